@@ -1,0 +1,35 @@
+"""What is true at one tick: the snapshot that sensors, the radio medium and metrics look at."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwerm.draws import Draws
+from zwerm.world.arena import Arena
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(slots=True)
+class Scene:
+    """The truth at tick `tick`. Arrays have one row per robot id, whether or not the robot is in the arena.
+
+    `present` marks the robots that are bodies in the arena; `moved` those whose pose differs from the previous scene's.
+    """
+
+    tick: int
+    time_s: float
+    position: Floats  # (n, 2) [m]
+    heading: Floats  # (n,) [rad], not wrapped
+    present: Bools  # (n,)
+    moved: Bools  # (n,)
+    radius_m: float
+    arena: Arena
+    draws: Draws
+
+    def present_ids(self) -> Ints:
+        """Return the ids of the robots in the arena, ascending."""
+        return np.flatnonzero(self.present)

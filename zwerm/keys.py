@@ -1,0 +1,44 @@
+"""The key expressions of a run, in one place: `zwerm/<run>/...`, with `*` for every node."""
+
+from typing import Final
+
+ROOT: Final = "zwerm"
+EVERY: Final = "*"
+
+Node = int | str
+
+
+def observation_key(run: str, node: Node) -> str:
+    """Where the world publishes a node's observations."""
+    return f"{ROOT}/{run}/node/{node}/obs"
+
+
+def command_key(run: str, node: Node) -> str:
+    """Where a node publishes its commands."""
+    return f"{ROOT}/{run}/node/{node}/cmd"
+
+
+def hello_key(run: str, node: Node) -> str:
+    """Where a node asks to join: a query, answered with a Welcome."""
+    return f"{ROOT}/{run}/hello/{node}"
+
+
+def alive_key(run: str, node: Node) -> str:
+    """The liveliness token of a node: it vanishes when the process dies."""
+    return f"{ROOT}/{run}/alive/{node}"
+
+
+def truth_key(run: str, topic: str) -> str:
+    """Where the world publishes what only viewers may see."""
+    return f"{ROOT}/{run}/truth/{topic}"
+
+
+def node_of(key: str) -> int:
+    """Return the node id in a key made by this module.
+
+    Raises ValueError where the key names no node.
+    """
+    parts = key.split("/")
+    if len(parts) >= 4 and parts[0] == ROOT and parts[2] in ("node", "hello", "alive"):
+        return int(parts[3])
+    raise ValueError(f"{key}: names no node")

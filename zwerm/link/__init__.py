@@ -1,0 +1,44 @@
+"""Links carry bytes between the world and its nodes: in memory within one process, or over Zenoh between processes.
+
+A link knows nothing of what the bytes mean and makes no promise on order between nodes; from one node, messages arrive in
+the order they were sent, each exactly once, until the node is lost.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+
+class Arrival(NamedTuple):
+    """A message from a node; `payload` None says that the node is lost: its process ended without a word."""
+
+    node: int
+    payload: bytes | None
+
+
+class WorldLink(Protocol):
+    """The world's end of the link to all nodes."""
+
+    def send(self, node: int, payload: bytes) -> None:
+        """Send one message to a node that has joined."""
+
+    def receive(self, timeout_s: float) -> Arrival | None:
+        """Return the next arrival, or None after `timeout_s` seconds without one."""
+
+    def close(self) -> None:
+        """Release all that the link holds; idempotent."""
+
+
+class NodeLink(Protocol):
+    """A node's end of the link to the world."""
+
+    def send(self, payload: bytes) -> None:
+        """Send one message to the world."""
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        """Return the next message from the world, or None after `timeout_s` seconds without one."""
+
+    def close(self) -> None:
+        """Release all that the link holds; idempotent."""
+
+
+Answer = Callable[[bytes], bytes]

@@ -1,0 +1,257 @@
+"""Everything that crosses the wire: one `Observation` in, one `Command` out, and the messages that open and end a node's life.
+
+Messages are MessagePack maps with field names, so that any language can join; small parts that come in numbers (a bearing, a
+contact) are MessagePack arrays. Every message carries its kind and the protocol version as `type`, for example "command/1". Decoding is strict: unknown fields, wrong
+types, other versions, non-finite numbers and trailing bytes are refused with a reason that can be counted.
+
+New fields go last, with defaults; a field at its default is left out of the encoded message. Angles are radians in
+(-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+import msgspec
+from msgspec import Struct
+
+from zwerm.errors import ProtocolError
+
+PROTOCOL_VERSION: Final = 1
+
+# The largest message a node may send; a larger one is refused before it is decoded.
+MESSAGE_BYTES_MAX: Final = 65_536
+
+
+class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A part of a message that may come in numbers: an array on the wire."""
+
+
+def _type_tag(class_name: str) -> str:
+    return f"{class_name.lower()}/{PROTOCOL_VERSION}"
+
+
+class _Message(Struct, forbid_unknown_fields=True, omit_defaults=True, tag_field="type", tag=_type_tag):
+    """A whole message: a map on the wire, led by its type and the protocol version."""
+
+
+# --- what a node senses ---------------------------------------------------------------------------------------------
+
+
+class Bearing(_Part, frozen=True):
+    """A robot seen, by its id, in the direction `bearing_rad` of the body frame. No range."""
+
+    node: int
+    bearing_rad: float
+
+
+class LandmarkBearing(_Part, frozen=True):
+    """A landmark seen, by its id, in the direction `bearing_rad` of the body frame. No range."""
+
+    landmark: int
+    bearing_rad: float
+
+
+class Contact(_Part, frozen=True):
+    """One closed touch switch: contact within +-half_width_rad of bearing_rad, in the body frame."""
+
+    bearing_rad: float
+    half_width_rad: float
+
+
+class Neighbour(_Part, frozen=True):
+    """A robot's position relative to this one, in the body frame."""
+
+    node: int
+    x_m: float
+    y_m: float
+
+
+class FieldSample(_Part, frozen=True):
+    """A scalar field's value where the robot stands, and its gradient [1/m] in the body frame."""
+
+    value: float
+    gradient_x: float
+    gradient_y: float
+
+
+class Pose(_Part, frozen=True):
+    """Position and heading in the frame of the arena."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+class Displacement(_Part, frozen=True):
+    """Motion since the node's previous observation, in the body frame it had then."""
+
+    forward_m: float
+    left_m: float
+    turn_rad: float
+
+
+class Packet(_Part, frozen=True):
+    """A radio packet delivered now. `sender` is None where the channel does not tell it."""
+
+    channel: str
+    payload: bytes
+    sender: int | None = None
+
+
+class Observation(_Message, frozen=True):
+    """All that a node learns at one tick. A sensor the scenario does not give the node is None, and not on the wire."""
+
+    tick: int
+    time_s: float
+    inbox: tuple[Packet, ...] = ()
+    line_of_sight: bool | None = None
+    bearings: tuple[Bearing, ...] | None = None
+    touch: tuple[Contact, ...] | None = None
+    landmarks: tuple[LandmarkBearing, ...] | None = None
+    neighbours: tuple[Neighbour, ...] | None = None
+    field: FieldSample | None = None
+    pose: Pose | None = None
+    boundary: tuple[tuple[float, float], ...] | None = None
+    odometry: Displacement | None = None
+    compass_rad: float | None = None
+    extra: dict[str, tuple[float, ...]] | None = None
+
+
+SENSOR_FIELDS: Final = Observation.__struct_fields__[3:]
+
+
+# --- what a node commands -------------------------------------------------------------------------------------------
+
+
+class BodyVelocity(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="kind", tag="velocity"):
+    """Velocity of a holonomic body in its own frame."""
+
+    forward_m_s: float = 0.0
+    left_m_s: float = 0.0
+    turn_rad_s: float = 0.0
+
+
+class WheelSpeeds(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="kind", tag="wheels"):
+    """Ground speed of the two wheels of a differential drive."""
+
+    left_m_s: float = 0.0
+    right_m_s: float = 0.0
+
+
+class Transmission(_Part, frozen=True):
+    """A radio packet to send: to every node that hears it, or to the one node `to`."""
+
+    channel: str
+    payload: bytes
+    to: int | None = None
+
+
+class Wake(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """When the node wants its next observation: at `at_s`, or at the first of the events it names, whichever is earlier.
+
+    With nothing set the node sleeps until the run ends.
+    """
+
+    at_s: float | None = None
+    on_packet: bool = False
+    on_contact: bool = False
+    on_visible: bool = False
+
+
+class Command(_Message):
+    """A node's answer to one observation.
+
+    `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation at
+    every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of the
+    task is complete. `tick` is set by whatever runs the controller: the tick of the observation answered.
+    """
+
+    tick: int = 0
+    drive: BodyVelocity | WheelSpeeds | None = None
+    outbox: tuple[Transmission, ...] = ()
+    wake: Wake | None = None
+    release: bool = False
+    done: bool = False
+
+
+class Failure(_Message, frozen=True):
+    """A controller raised: the last message of a node, in place of its command."""
+
+    tick: int
+    error: str
+    traceback: str
+
+
+# --- how a node joins and leaves ------------------------------------------------------------------------------------
+
+
+class Hello(_Message, frozen=True):
+    """A node asks to join under the incarnation it was started with."""
+
+    node: int
+    incarnation: int
+
+
+class Welcome(_Message, frozen=True):
+    """The world's answer to `Hello`: what the node is and what it may know of itself, or why it is refused."""
+
+    refused: str = ""
+    controller: str = ""
+    setup: msgspec.Raw = msgspec.Raw(b"\xc0")
+
+
+class Goodbye(_Message, frozen=True):
+    """The world tells a node that its life is over, and why; the node closes and exits."""
+
+    reason: str
+
+
+# --- encode and decode ----------------------------------------------------------------------------------------------
+
+_encoder = msgspec.msgpack.Encoder()
+encode: Final[Callable[[object], bytes]] = _encoder.encode
+
+# For the hot paths; what they raise is turned into a ProtocolError by `refusal`. In a union a message must carry its type.
+decode_observation: Final = msgspec.msgpack.Decoder(Observation).decode
+decode_answer: Final = msgspec.msgpack.Decoder(Command | Failure).decode
+decode_hello: Final = msgspec.msgpack.Decoder(Hello | Goodbye).decode
+decode_welcome: Final = msgspec.msgpack.Decoder(Welcome).decode
+decode_to_node: Final = msgspec.msgpack.Decoder(Observation | Goodbye).decode
+
+REFUSABLE: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+
+
+def refusal(error: Exception) -> ProtocolError:
+    """Return what a decoder raised as a ProtocolError.
+
+    Its reason is `schema` (unknown or missing field, wrong type), `version`, or `malformed` (not MessagePack, truncated,
+    trailing bytes).
+    """
+    if isinstance(error, msgspec.ValidationError):
+        text = str(error)
+        return ProtocolError("version" if "/" in text and text.endswith("`$.type`") else "schema", text)
+    return ProtocolError("malformed", str(error))
+
+
+def open_answer(payload: bytes) -> Command | Failure:
+    """Return the command or failure in `payload`.
+
+    Raises ProtocolError with the reasons of `refusal`, or `oversized`, or `not-finite` for a drive that is no number.
+    """
+    if len(payload) > MESSAGE_BYTES_MAX:
+        raise ProtocolError("oversized", f"{len(payload)} bytes, at most {MESSAGE_BYTES_MAX}")
+    try:
+        answer: Command | Failure = decode_answer(payload)
+    except REFUSABLE as error:
+        raise refusal(error) from None
+    if isinstance(answer, Command) and answer.drive is not None and not is_finite_drive(answer.drive):
+        raise ProtocolError("not-finite", repr(answer.drive))
+    return answer
+
+
+def is_finite_drive(drive: BodyVelocity | WheelSpeeds) -> bool:
+    """Tell whether every number of `drive` is finite."""
+    if isinstance(drive, WheelSpeeds):
+        return math.isfinite(drive.left_m_s + drive.right_m_s)
+    return math.isfinite(drive.forward_m_s + drive.left_m_s + drive.turn_rad_s)

@@ -1,0 +1,280 @@
+"""A scenario: everything that defines an experiment but its seed, as strict typed tables read from TOML.
+
+Every table refuses keys it does not know. All mistakes are reported at once, each as `file: path: rule, got value`.
+What a sensor or a controller takes as parameters is theirs to type; the tables here carry them as they are.
+"""
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
+
+from zwerm.errors import ScenarioError
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Point = tuple[Finite, Finite]
+
+
+class Table(BaseModel):
+    """A TOML table with a fixed set of keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class OpenTable(BaseModel):
+    """A TOML table that names a plug-in by `kind` and carries the plug-in's own parameters beside it."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    kind: str
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The keys besides `kind`, for the plug-in to type."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class TimeTable(Table):
+    """Virtual time, and how long the world waits for a node in wall-clock time."""
+
+    dt_s: Positive = 0.1
+    duration_s: Positive = 60.0
+    straggler_s: Positive = 30.0
+    deadman_s: Positive = 0.5
+
+
+class ArenaTable(Table):
+    """The space robots live in: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
+
+    `map` is a ROS map_server YAML, or a bitmap, which needs `resolution_m` or `size_m`. Paths are relative to the scenario.
+    """
+
+    size_m: tuple[Positive, Positive] | None = None
+    polygon: list[Point] | None = Field(default=None, min_length=3)
+    wkt: str | None = None
+    geojson: str | None = None
+    map: str | None = None
+    resolution_m: Positive | None = None
+    scale: Positive = 1.0
+    obstacles: list[Annotated[list[Point], Field(min_length=3)]] = []
+    walls: list[Annotated[list[Point], Field(min_length=2)]] = []
+
+
+class BodyTable(Table):
+    """A robot's body. A command takes effect `latency_ticks` ticks after the observation it answers."""
+
+    kind: Literal["differential", "holonomic"] = "differential"
+    radius_m: Positive = 0.037
+    mass_kg: Positive = 0.152
+    wheel_base_m: Positive = 0.051
+    max_speed_m_s: Positive = 0.128
+    max_turn_rad_s: Positive = 6.0
+    latency_ticks: Annotated[int, Field(ge=0, le=100)] = 0
+    substeps: Annotated[int, Field(ge=1, le=1000)] = 10
+    friction: NonNegative = 0.0
+    drive_noise_fraction: Fraction = 0.0
+    collide: bool = True
+
+
+class PlacementTable(Table):
+    """Where robots start: `uniform` in the arena, within a `disc`, in a random cell of the `cell` grid, or at given `poses`.
+
+    `disc` takes `radius_m` and optionally `center_m` (else a random one that fits); `cell` takes `grid` and `radius_m` about
+    the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad].
+    """
+
+    kind: Literal["uniform", "disc", "cell", "poses"] = "uniform"
+    radius_m: Positive | None = None
+    center_m: Point | None = None
+    grid: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = None
+    cell: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
+    poses: list[tuple[Finite, Finite, Finite]] | None = None
+
+
+class InflowTable(Table):
+    """Robots wait in a depot and enter one by one, at random places of a rectangle; they leave in another."""
+
+    every_s: Positive
+    entry_m: tuple[Finite, Finite, Finite, Finite]
+    exit_m: tuple[Finite, Finite, Finite, Finite] | None = None
+
+
+class RobotsTable(Table):
+    """The swarm: how many, what they are, what they sense, what runs on them."""
+
+    count: Annotated[int, Field(ge=1, le=100_000)]
+    controller: str
+    parameters: dict[str, Any] = {}
+    body: BodyTable = BodyTable()
+    placement: PlacementTable = PlacementTable()
+    inflow: InflowTable | None = None
+    sensors: list[OpenTable] = []
+    on_crash: Literal["fail", "continue"] = "fail"
+
+
+class RadioTable(Table):
+    """The radio: who hears whom."""
+
+    range_m: Positive | None = None
+    line_of_sight: bool = False
+    anonymous: bool = False
+
+
+class MetricsTable(Table):
+    """What is measured of the run; metrics whose settings are absent are not computed."""
+
+    cells: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = None
+    coverage_radius_m: Positive | None = None
+    every_s: Positive | None = None
+
+
+class Scenario(Table):
+    """One experiment."""
+
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
+    summary: str = ""
+    source: str = ""
+    time: TimeTable = TimeTable()
+    arena: ArenaTable
+    robots: RobotsTable
+    field: OpenTable | None = None
+    landmarks: list[Point] = []
+    radio: RadioTable | None = None
+    metrics: MetricsTable = MetricsTable()
+    folder: Path = Field(default=Path(), exclude=True)
+
+
+BUILT_IN = Path(__file__).parent / "scenarios"
+
+
+def built_in() -> dict[str, Path]:
+    """Return the scenarios that ship with Zwerm, by name."""
+    return {path.stem: path for path in sorted(BUILT_IN.glob("*.toml"))}
+
+
+def locate(name: str) -> Path:
+    """Return the file of a built-in scenario's name, or of a path.
+
+    Raises ScenarioError where neither exists.
+    """
+    if name in built_in():
+        return built_in()[name]
+    path = Path(name)
+    if path.is_file():
+        return path
+    hint = "" if path.suffix == ".toml" else "; built in are " + ", ".join(built_in())
+    raise ScenarioError([f"{name}: expected a scenario file or the name of a built-in one{hint}"])
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file, unchecked.
+
+    Raises ScenarioError where it is no TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError([f"{path}: not TOML: {error}"]) from None
+    except OSError as error:
+        raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
+
+
+def override(tables: dict[str, Any], assignment: str) -> None:
+    """Apply one `path=value` in place; value is TOML, or else a bare string. A number in the path indexes a list.
+
+    Raises ScenarioError where the path leads nowhere.
+    """
+    path, equals, text = assignment.partition("=")
+    if not equals or not path.strip():
+        raise ScenarioError([f"--set {assignment}: expected path=value"])
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text
+    *parents, last = path.strip().split(".")
+    place: Any = tables
+    for depth, part in enumerate(parents):
+        place = _enter(place, part, ".".join(parents[: depth + 1]), assignment)
+    if isinstance(place, list):
+        place[_index(place, last, path, assignment)] = value
+    elif isinstance(place, dict):
+        place[last] = value
+    else:
+        raise ScenarioError([f"--set {assignment}: {'.'.join(parents)} is no table"])
+
+
+def _enter(place: Any, part: str, path: str, assignment: str) -> Any:
+    if isinstance(place, list):
+        return place[_index(place, part, path, assignment)]
+    if isinstance(place, dict):
+        return place.setdefault(part, {})
+    raise ScenarioError([f"--set {assignment}: {path} is in no table"])
+
+
+def _index(place: list[Any], part: str, path: str, assignment: str) -> int:
+    if not part.isdigit() or int(part) >= len(place):
+        raise ScenarioError([f"--set {assignment}: {path}: expected an index below {len(place)}, got {part}"])
+    return int(part)
+
+
+def load(name: str, overrides: tuple[str, ...] = ()) -> Scenario:
+    """Return the scenario `name` (built in, or a path) with each `path=value` of `overrides` applied.
+
+    Raises ScenarioError with every mistake.
+    """
+    path = locate(name)
+    tables = read(path)
+    tables.setdefault("name", path.stem)
+    for assignment in overrides:
+        override(tables, assignment)
+    return validate(tables, str(path), path.parent)
+
+
+def validate(tables: dict[str, Any], place: str, folder: Path) -> Scenario:
+    """Return `tables` as a Scenario whose relative paths start at `folder`.
+
+    Raises ScenarioError with every mistake, each led by `place`.
+    """
+    try:
+        return Scenario.model_validate(tables | {"folder": folder})
+    except ValidationError as error:
+        raise ScenarioError(mistakes(error, place)) from None
+
+
+def mistakes(error: ValidationError, place: str, prefix: str = "") -> list[str]:
+    """Return one line for every mistake in `error`: `place: path: rule, got value`."""
+    return [_line(each, place, prefix) for each in error.errors(include_url=False)]
+
+
+_RULES = {
+    "greater_than": "expected > {gt:g}",
+    "greater_than_equal": "expected >= {ge:g}",
+    "less_than": "expected < {lt:g}",
+    "less_than_equal": "expected <= {le:g}",
+    "finite_number": "expected a finite number",
+    "literal_error": "expected {expected}",
+    "too_short": "expected at least {min_length} items",
+    "too_long": "expected at most {max_length} items",
+}
+
+
+def _line(each: ErrorDetails, place: str, prefix: str) -> str:
+    path = prefix + ".".join(str(part) for part in each["loc"])
+    kind, context = each["type"], each.get("ctx", {})
+    if kind == "missing":
+        return f"{place}: {path}: required, and missing"
+    if kind == "extra_forbidden":
+        return f"{place}: {path}: unknown key"
+    if kind in _RULES:
+        rule = _RULES[kind].format(**context)
+    else:
+        message = re.sub(r"^(Value error, |Input should be )", "", each["msg"])
+        rule = message if kind == "value_error" else f"expected {message}"
+    got = each["input"]
+    return f"{place}: {path}: {rule}" + ("" if isinstance(got, dict) else f", got {got!r}")
