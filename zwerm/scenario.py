@@ -52,7 +52,7 @@ class TimeTable(Table):
 class ArenaTable(Table):
     """The space robots live in: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
 
-    `map` is a ROS map_server YAML, or a bitmap, which needs `resolution_m` or `size_m`. Paths are relative to the scenario.
+    `map` is a ROS map_server YAML, or a bitmap, which needs `resolution_m` or `size_m`. Paths start at the scenario.
     """
 
     size_m: tuple[Positive, Positive] | None = None
@@ -83,10 +83,10 @@ class BodyTable(Table):
 
 
 class PlacementTable(Table):
-    """Where robots start: `uniform` in the arena, within a `disc`, in a random cell of the `cell` grid, or at given `poses`.
+    """Where robots start: `uniform` in the arena, within a `disc`, in a random `cell` of a grid, or at given `poses`.
 
-    `disc` takes `radius_m` and optionally `center_m` (else a random one that fits); `cell` takes `grid` and `radius_m` about
-    the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad].
+    `disc` takes `radius_m` and optionally `center_m` (else a random one that fits); `cell` takes `grid` and `radius_m`
+    about the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad].
     """
 
     kind: Literal["uniform", "disc", "cell", "poses"] = "uniform"
