@@ -15,7 +15,7 @@ import numpy as np
 
 from zwerm.draws import Draws
 from zwerm.errors import ProtocolError
-from zwerm.protocol import SENSOR_FIELDS, Command, Failure, Observation, Transmission, encode, open_answer
+from zwerm.protocol import SENSOR_FIELDS, BodyVelocity, Command, Failure, Observation, Transmission, WheelSpeeds, encode, open_answer
 from zwerm.scenario import Scenario
 from zwerm.trace import Trace
 from zwerm.world.arena import Arena
@@ -58,12 +58,14 @@ class World:
         last = max((SENSOR_FIELDS.index(field) for field in self._sensors), default=-1)
         self._columns = SENSOR_FIELDS[: last + 1]
         self._done: Bools = np.zeros(count, dtype=np.bool_)
+        self._any_done = False
+        self._drive_types = (self._drives.kind, type(None))
         self._present: Bools = np.zeros(count, dtype=np.bool_)
         self._nodes: list[int] = []
         self._awaited: dict[int, None] = {}
         self._observations: list[bytes] = []
         self._answers: dict[int, tuple[bytes, Command | Failure]] = {}
-        self._late: list[tuple[int, bytes, Command | Failure]] = []
+        self._late: list[tuple[int, Command | Failure]] = []
         self._last_answer: dict[int, int] = {}
         self._outboxes: list[tuple[int, tuple[Transmission, ...]]] = []
         self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
@@ -106,10 +108,10 @@ class World:
         """
         try:
             answer = open_answer(payload)
-            late = self._is_late(node, answer.tick)
-            if not late:
-                self._check_turn(node, answer.tick)
-            if type(answer) is Command and (answer.drive is not None or answer.outbox):
+            late = answer.tick != self.tick or node not in self._awaited or node in self._answers
+            if late:
+                self._check_late(node, answer.tick)
+            if type(answer) is Command and (answer.outbox or type(answer.drive) not in self._drive_types):
                 self._check_content(answer)
         except ProtocolError as error:
             self.refused[error.reason] += 1
@@ -118,7 +120,7 @@ class World:
             self.failures[node] = answer
             self.crash(node, answer.error)
         if late:
-            self._late.append((node, payload, answer))
+            self._late.append((node, answer))
             self.late_commands += 1
         else:
             self._answers[node] = payload, answer
@@ -131,13 +133,17 @@ class World:
 
     def advance(self) -> None:
         """Apply what was accepted, in id order, and go on to the next tick."""
-        payloads = []
-        for node, _, answer in self._late:
-            self._apply(node, answer)
+        payloads: list[bytes] = []
+        commands: list[tuple[int, Command | Failure]] = list(self._late)
+        answers = self._answers
         for node in self._nodes:
-            payload, current = self._answers.get(node, (NO_ANSWER, None))
-            payloads.append(payload)
-            self._apply(node, current)
+            if node in answers:
+                payload, answer = answers[node]
+                payloads.append(payload)
+                commands.append((node, answer))
+            else:
+                payloads.append(NO_ANSWER)
+        self._apply(commands)
         self.trace.extend(self.tick, self._nodes, self._observations, payloads)
         if self._outboxes:
             self.medium.send(self.scene, self._outboxes)
@@ -167,6 +173,8 @@ class World:
     @property
     def completed(self) -> bool:
         """Tell whether every robot that lives says that its part is done, or has left by the exit."""
+        if not (self._any_done or self.exited):
+            return False
         over = self._done.copy()
         over[self.exited] = True
         over[list(self.crashed)] = True
@@ -234,33 +242,37 @@ class World:
             if sensor is not None and len(watchers := self._wakes.watchers(field)):
                 self._wakes.note_readings(field, watchers, sensor.read(self.scene, watchers), self.tick)
 
-    def _apply(self, node: int, answer: Command | Failure | None) -> None:
-        if type(answer) is not Command:
+    def _apply(self, answers: list[tuple[int, Command | Failure]]) -> None:
+        drives: list[tuple[int, BodyVelocity | WheelSpeeds]] = []
+        done = self._done
+        for node, answer in answers:
+            if type(answer) is not Command:
+                continue
+            if answer.drive is not None:
+                drives.append((node, answer.drive))
+            if answer.outbox:
+                self._outboxes.append((node, answer.outbox))
+            if answer.wake is not None:
+                self._wakes.sleep(node, answer.wake, self.tick)
+            if answer.done or self._any_done:
+                done[node] = answer.done
+                self._any_done = True
+        if drives:
+            self._drives.command(drives)
+
+    def _check_late(self, node: int, tick: int) -> None:
+        """Raise ProtocolError, unless late answers are allowed and this one comes in order."""
+        if self.late_allowed and self._last_answer.get(node, -1) < tick < self.tick:
             return
-        if answer.drive is not None:
-            self._drives.command(node, answer.drive)
-        if answer.outbox:
-            self._outboxes.append((node, answer.outbox))
-        if answer.wake is not None:
-            self._wakes.sleep(node, answer.wake, self.tick)
-        self._done[node] = answer.done
-
-    def _is_late(self, node: int, tick: int) -> bool:
-        """Tell whether this answers an earlier observation, in order, where that is allowed."""
-        return self.late_allowed and self._last_answer.get(node, -1) < tick < self.tick
-
-    def _check_turn(self, node: int, tick: int) -> None:
-        """Raise ProtocolError unless the node was sent this tick's observation and has not answered it."""
         if tick != self.tick:
             raise ProtocolError("out-of-order", f"node {node} answers tick {tick} at tick {self.tick}")
         if node not in self._awaited:
             raise ProtocolError("unasked", f"node {node} was sent no observation at tick {tick}")
-        if node in self._answers:
-            raise ProtocolError("duplicate", f"node {node} answers tick {tick} again")
+        raise ProtocolError("duplicate", f"node {node} answers tick {tick} again")
 
     def _check_content(self, command: Command) -> None:
         """Raise ProtocolError for a command that this world cannot carry out."""
-        if command.drive is not None and not self._drives.fits(command.drive):
+        if command.drive is not None and type(command.drive) is not self._drives.kind:
             raise ProtocolError("wrong-drive", f"a {self.scenario.robots.body.kind} body takes no {command.drive!r}")
         for message in command.outbox:
             refused = self.medium.refuses(message)

@@ -249,7 +249,7 @@ def open_answer(payload: bytes) -> Command | Failure:
         answer: Command | Failure = decode_answer(payload)
     except REFUSABLE as error:
         raise refusal(error) from None
-    if isinstance(answer, Command) and answer.drive is not None and not is_finite_drive(answer.drive):
+    if type(answer) is Command and answer.drive is not None and not is_finite_drive(answer.drive):
         raise ProtocolError("not-finite", repr(answer.drive))
     return answer
 
