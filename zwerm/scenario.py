@@ -52,7 +52,9 @@ class TimeTable(Table):
 class ArenaTable(Table):
     """The space robots live in: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
 
-    `map` is a ROS map_server YAML, or a bitmap, which needs `resolution_m` or `size_m`. Paths start at the scenario.
+    `map` is a ROS map_server YAML, or a bitmap (dark is wall), which needs `resolution_m`, or `size_m` to stretch it to;
+    `start` is a place [m] in the part of the map to keep, else the largest is. Paths are relative to the scenario.
+    `scale` multiplies every length of this table.
     """
 
     size_m: tuple[Positive, Positive] | None = None
@@ -61,6 +63,7 @@ class ArenaTable(Table):
     geojson: str | None = None
     map: str | None = None
     resolution_m: Positive | None = None
+    start: Point | None = None
     scale: Positive = 1.0
     obstacles: list[Annotated[list[Point], Field(min_length=3)]] = []
     walls: list[Annotated[list[Point], Field(min_length=2)]] = []
