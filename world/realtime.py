@@ -23,6 +23,7 @@ class RealTime:
         self._last_tick = round(world.scenario.time.duration_s / world.scenario.time.dt_s)
         self._unanswered_since_s: dict[int, float] = {}
         self._outstanding: dict[int, int] = {}
+        self._stopped: dict[int, None] = {}
         self.deadman_stops = 0
         self.overruns = 0
         self.reason = ""
@@ -69,6 +70,7 @@ class RealTime:
                 continue
             self._outstanding[arrival.node] = max(0, self._outstanding.get(arrival.node, 0) - 1)
             self._unanswered_since_s.pop(arrival.node, None)
+            self._stopped.pop(arrival.node, None)
             try:
                 world.accept(arrival.node, arrival.payload)
             except ProtocolError:
@@ -79,6 +81,7 @@ class RealTime:
     def _stop_the_silent(self) -> None:
         limit_s = self._world.time_s - self._world.scenario.time.deadman_s
         for node, since_s in self._unanswered_since_s.items():
-            if since_s < limit_s and node not in self._world.crashed:
+            if since_s < limit_s and node not in self._stopped and node not in self._world.crashed:
                 self._world.halt(node)
+                self._stopped[node] = None
                 self.deadman_stops += 1

@@ -148,6 +148,7 @@ class Scenario(Table):
     radio: RadioTable | None = None
     metrics: MetricsTable = MetricsTable()
     folder: Path = Field(default=Path(), exclude=True)
+    place: str = Field(default="scenario", exclude=True)
 
 
 BUILT_IN = Path(__file__).parent / "scenarios"
@@ -242,7 +243,7 @@ def validate(tables: dict[str, Any], place: str, folder: Path) -> Scenario:
     Raises ScenarioError with every mistake, each led by `place`.
     """
     try:
-        return Scenario.model_validate(tables | {"folder": folder})
+        return Scenario.model_validate(tables | {"folder": folder, "place": place})
     except ValidationError as error:
         raise ScenarioError(mistakes(error, place)) from None
 
