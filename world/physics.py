@@ -58,6 +58,11 @@ class Physics:
         self.heading[robot] = heading
         self._arrange()
 
+    def fix(self, robot: int, position: Floats, heading: float) -> None:
+        """Put a robot into the arena that never moves and that nobody runs into: a base station."""
+        self.position[robot] = position
+        self.heading[robot] = heading
+
     def remove(self, robot: int) -> None:
         """Take a robot's body out of the arena; its last pose stays on record."""
         body = self._bodies.pop(robot)

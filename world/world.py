@@ -15,12 +15,22 @@ import numpy as np
 
 from zwerm.draws import Draws
 from zwerm.errors import ProtocolError
-from zwerm.protocol import SENSOR_FIELDS, BodyVelocity, Command, Failure, Observation, Transmission, WheelSpeeds, encode, open_answer
+from zwerm.protocol import (
+    SENSOR_FIELDS,
+    BodyVelocity,
+    Command,
+    Failure,
+    Observation,
+    Transmission,
+    WheelSpeeds,
+    encode,
+    open_answer,
+)
 from zwerm.scenario import Scenario
 from zwerm.trace import Trace
 from zwerm.world.arena import Arena
 from zwerm.world.drives import Drives
-from zwerm.world.inflow import Inflow
+from zwerm.world.inflow import Depot, Inflow
 from zwerm.world.medium import Medium
 from zwerm.world.physics import Physics
 from zwerm.world.placement import place
@@ -49,16 +59,19 @@ class World:
         self.late_commands = 0
         self.exited: list[int] = []
         self.trace = Trace()
-        self.medium = Medium(scenario.radio, count)
+        self.coordinator = count if scenario.coordinator is not None else None
+        self.medium = Medium(scenario.radio, count, self.coordinator is not None)
         self._physics = Physics(body, arena.segments, count, scenario.time.dt_s)
         self._drives = Drives(body, count, self.draws)
-        self._wakes = Wakes(count, scenario.time.dt_s)
+        nodes = count + (self.coordinator is not None)
+        self._wakes = Wakes(nodes, scenario.time.dt_s)
         self._sensors = {sensor.field: sensor for sensor in sensors}
         # One column of readings a field, up to the last field that any sensor fills.
         last = max((SENSOR_FIELDS.index(field) for field in self._sensors), default=-1)
         self._columns = SENSOR_FIELDS[: last + 1]
-        self._done: Bools = np.zeros(count, dtype=np.bool_)
+        self._done: Bools = np.zeros(nodes, dtype=np.bool_)
         self._any_done = False
+        self._fixed = ([self.coordinator] if self.coordinator is not None else []) + ([0] if scenario.base else [])
         self._drive_types = (self._drives.kind, type(None))
         self._present: Bools = np.zeros(count, dtype=np.bool_)
         self._nodes: list[int] = []
@@ -69,10 +82,18 @@ class World:
         self._last_answer: dict[int, int] = {}
         self._outboxes: list[tuple[int, tuple[Transmission, ...]]] = []
         self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
-        if self._inflow is None:
-            position, heading = place(scenario.robots.placement, arena, count, body.radius_m, self.draws)
+        self._depot = Depot(scenario.base, count) if scenario.base else None
+        if self.coordinator is not None:
+            self._wakes.admit(self.coordinator)
+        if self._depot is not None:
+            base, position, heading = self._depot.base
+            self._physics.fix(base, position, heading)
+            self._set_present(base, True)
+            self._wakes.admit(base)
+        elif self._inflow is None:
+            positions, headings = place(scenario.robots.placement, arena, count, body.radius_m, self.draws)
             for robot in range(count):
-                self._enter(robot, position[robot], float(heading[robot]))
+                self._enter(robot, positions[robot], float(headings[robot]))
         self.scene = self._look(np.ones(count, dtype=np.bool_))
         self._let_in_and_out()
 
@@ -87,14 +108,19 @@ class World:
             self._note_changes()
         awake = self._wakes.awake(tick)
         nodes: list[int] = awake.tolist()
-        readings = {field: sensor.read(scene, awake) for field, sensor in self._sensors.items()} if nodes else {}
+        # Ids ascend, and the coordinator's, which has no sensors, is the largest.
+        robots = awake[:-1] if nodes and nodes[-1] == self.coordinator else awake
+        readings = {field: sensor.read(scene, robots) for field, sensor in self._sensors.items()} if len(robots) else {}
         for field in SIGNATURES:
             if field in readings:
-                self._wakes.remember(field, nodes, readings[field])
+                self._wakes.remember(field, nodes[: len(robots)], readings[field])
         inboxes: Any = [self.medium.deliver(node) for node in nodes] if receivers else repeat(())
         columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]
-        ticks, times = repeat(tick, len(nodes)), repeat(scene.time_s)
+        ticks, times = repeat(tick, len(robots)), repeat(scene.time_s)
         self._observations = list(map(encode, map(Observation, ticks, times, inboxes, *columns)))
+        if len(robots) < len(nodes):
+            inbox = inboxes[-1] if receivers else ()
+            self._observations.append(encode(Observation(tick, scene.time_s, inbox)))
         self._nodes = nodes
         self._awaited = dict.fromkeys(nodes)
         self._answers.clear()
@@ -111,8 +137,10 @@ class World:
             late = answer.tick != self.tick or node not in self._awaited or node in self._answers
             if late:
                 self._check_late(node, answer.tick)
-            if type(answer) is Command and (answer.outbox or type(answer.drive) not in self._drive_types):
-                self._check_content(answer)
+            if type(answer) is Command and (
+                answer.outbox or type(answer.drive) not in self._drive_types or node in self._fixed
+            ):
+                self._check_content(node, answer)
         except ProtocolError as error:
             self.refused[error.reason] += 1
             raise
@@ -172,7 +200,12 @@ class World:
 
     @property
     def completed(self) -> bool:
-        """Tell whether every robot that lives says that its part is done, or has left by the exit."""
+        """Tell whether the task is done: the coordinator says so, or the base station does, or all robots that live do.
+
+        Where there is a coordinator, it decides; else the base station, if there is one. Robots that left count as done.
+        """
+        if self._fixed:
+            return bool(self._done[self._fixed[0]])
         if not (self._any_done or self.exited):
             return False
         over = self._done.copy()
@@ -203,15 +236,16 @@ class World:
 
     def _let_in_and_out(self) -> None:
         """Let robots enter and leave at the start of a tick, and look again if any did."""
-        if self._inflow is None:
+        door = self._inflow or self._depot
+        if door is None:
             return
-        leaving = self._inflow.leaving(self.scene).tolist()
+        leaving = door.leaving(self.scene).tolist()
         for robot in leaving:
             self._physics.remove(robot)
             self._set_present(robot, False)
             self.exited.append(robot)
             self._retire(robot, "receiver-left")
-        entering = self._inflow.entering(self.scene)
+        entering = door.entering(self.scene)
         if entering is not None:
             self._enter(*entering)
         if leaving or entering is not None:
@@ -230,7 +264,8 @@ class World:
 
     def _retire(self, node: int, cause: str) -> None:
         self._wakes.retire(node)
-        self._drives.stop(node)
+        if node < self.count:
+            self._drives.stop(node)
         self.medium.lose(node, cause)
 
     def _note_changes(self) -> None:
@@ -254,6 +289,8 @@ class World:
                 self._outboxes.append((node, answer.outbox))
             if answer.wake is not None:
                 self._wakes.sleep(node, answer.wake, self.tick)
+            if answer.release and node == 0 and self._depot is not None:
+                self._depot.release()
             if answer.done or self._any_done:
                 done[node] = answer.done
                 self._any_done = True
@@ -270,11 +307,13 @@ class World:
             raise ProtocolError("unasked", f"node {node} was sent no observation at tick {tick}")
         raise ProtocolError("duplicate", f"node {node} answers tick {tick} again")
 
-    def _check_content(self, command: Command) -> None:
+    def _check_content(self, node: int, command: Command) -> None:
         """Raise ProtocolError for a command that this world cannot carry out."""
         if command.drive is not None and type(command.drive) is not self._drives.kind:
             raise ProtocolError("wrong-drive", f"a {self.scenario.robots.body.kind} body takes no {command.drive!r}")
+        if command.drive is not None and node in self._fixed:
+            raise ProtocolError("wrong-drive", f"node {node} has no drive")
         for message in command.outbox:
-            refused = self.medium.refuses(message)
+            refused = self.medium.refuses(node, message)
             if refused:
                 raise ProtocolError("wrong-packet", refused)

@@ -121,8 +121,23 @@ class RobotsTable(Table):
     on_crash: Literal["fail", "continue"] = "fail"
 
 
+class BaseTable(Table):
+    """A base station: robot 0, which never moves. The others wait in its depot until it releases them, one at a time."""
+
+    controller: str
+    parameters: dict[str, Any] = {}
+    pose: tuple[Finite, Finite, Finite]
+
+
+class CoordinatorTable(Table):
+    """The optional central node. It has no body and no sensors; it hears robots over the `uplink` channel."""
+
+    controller: str
+    parameters: dict[str, Any] = {}
+
+
 class RadioTable(Table):
-    """The radio: who hears whom."""
+    """The radio between robots, channel `robots`: who hears whom. Without this table there is none."""
 
     range_m: Positive | None = None
     line_of_sight: bool = False
@@ -146,6 +161,8 @@ class Scenario(Table):
     time: TimeTable = TimeTable()
     arena: ArenaTable
     robots: RobotsTable
+    base: BaseTable | None = None
+    coordinator: CoordinatorTable | None = None
     field: OpenTable | None = None
     landmarks: list[Point] = []
     radio: RadioTable | None = None
