@@ -8,6 +8,7 @@ The world is deterministic: its state after a tick is a function of the scenario
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from itertools import repeat
 from typing import Any, Final
 
@@ -44,7 +45,7 @@ NO_ANSWER: Final = b""
 class World:
     """One run's world. Every robot carries the `sensors`; `seed` keys all randomness."""
 
-    def __init__(self, scenario: Scenario, seed: int, arena: Arena, sensors: list[Sensor]) -> None:
+    def __init__(self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor]) -> None:
         count, body = scenario.robots.count, scenario.robots.body
         self.scenario = scenario
         self.arena = arena
