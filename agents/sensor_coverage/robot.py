@@ -1,0 +1,294 @@
+"""The robot of sensor coverage: it stands and watches until the coordinator sends it somewhere, one drive at a time.
+
+Each drive is a story, told as a generator that yields one velocity a tick. A robot decides for itself what is local: where it
+is from the bearings it should see, whether it touches a wall, when a visual link breaks, when it has arrived. It knows
+bearings, touch, its own odometry and its radio; it never turns on purpose, and its frame is nobody else's business.
+"""
+
+import math
+from collections.abc import Generator, Sequence
+
+from msgspec import Struct
+
+from zwerm.agents.contract import Controller, Setup
+from zwerm.agents.sensor_coverage.homing import Offset, Vector, offset, slid, unit
+from zwerm.agents.sensor_coverage.senses import Senses
+from zwerm.deployment import (
+    Answer,
+    Arrived,
+    Cleared,
+    Correct,
+    Deploy,
+    Emerged,
+    Landmark,
+    Move,
+    Order,
+    Release,
+    Report,
+    Survey,
+    decode_order,
+    encode,
+)
+from zwerm.protocol import BodyVelocity, Command, Observation, Transmission, Wake
+
+STOP = BodyVelocity()
+Story = Generator[BodyVelocity, None, None]
+
+# A contact within this of the heading is ahead.
+AHEAD_RAD = math.pi / 3.0
+
+
+class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
+    """What a scenario may set. `link_m` is r_v; neighbours shall be `margin_m` less apart."""
+
+    link_m: float = 1.0
+    margin_m: float = 0.05
+    samples: int = 1
+    tolerance_m: float = 0.004
+    creep_m: float = 0.02
+    fine_m: float = 0.005
+    drive_ticks_max: int = 90
+
+
+class Robot(Controller):
+    """A robot of the swarm."""
+
+    sensors = ("bearings", "touch", "odometry")
+    Parameters = Parameters
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        p: Parameters = self.parameters
+        self.hop_m = p.link_m - p.margin_m
+        self.step_m = setup.body.max_speed_m_s * setup.dt_s if setup.body is not None else 0.0
+        self.senses = Senses()
+        self._outbox: list[Answer] = []
+        self._story: Story | None = self._emerge()
+
+    def step(self, observation: Observation) -> Command:
+        """Go on with the present drive, or start what an order asks for."""
+        self.senses.take(observation)
+        for packet in observation.inbox:
+            self._story = self._begin(decode_order(packet.payload))
+        drive, wake = STOP, None
+        if self._story is not None:
+            try:
+                drive = next(self._story)
+            except StopIteration:
+                self._story = None
+        if self._story is None:
+            wake = Wake(on_packet=True)
+        outbox = tuple(Transmission("uplink", encode(each)) for each in self._outbox)
+        self._outbox.clear()
+        return Command(drive=drive, outbox=outbox, wake=wake)
+
+    def _begin(self, order: Order) -> Story | None:
+        match order:
+            case Survey():
+                return self._survey(order)
+            case Deploy():
+                return self._deploy(order)
+            case Move():
+                return self._move(order)
+            case Correct():
+                return self._correct(order)
+            case Release():
+                return None
+
+    # --- standing still ---------------------------------------------------------------------------------------------
+
+    def _emerge(self) -> Story:
+        yield from self._sample()
+        self._outbox.append(Emerged(self.senses.sightings()))
+
+    def _sample(self) -> Story:
+        """Stand still until everyone in sight has been averaged."""
+        for _ in range(2 * self.parameters.samples):
+            self.senses.average()
+            if self.senses.averaged(self.parameters.samples):
+                return
+            yield STOP
+
+    def _survey(self, order: Survey) -> Story:
+        self.senses.forget(order.moved)
+        if self.setup.node in order.moved:
+            self.senses.forget()
+        fresh = not self.senses.averaged(self.parameters.samples)
+        if fresh:
+            yield from self._sample()
+        sightings = self.senses.sightings() if fresh else None
+        self._outbox.append(Report(order.cycle, sightings, self.senses.touched))
+
+    # --- into the unknown -------------------------------------------------------------------------------------------
+
+    def _deploy(self, order: Deploy) -> Story:
+        """Algorithm 1, line 8, with the test drive of section III-A, item iv."""
+        senses = self.senses
+        self.senses.forget()
+        start = senses.x_m, senses.y_m
+        ux, uy = unit(order.bearing_rad)
+        cleared, lost, stuck = False, 0, 0
+        touched: tuple[float, ...] = ()
+        done = 0.0
+        for _ in range(self.parameters.drive_ticks_max):
+            now = (senses.x_m - start[0]) * ux + (senses.y_m - start[1]) * uy
+            stuck = stuck + 1 if now < done + 0.2 * self.step_m else 0
+            done = max(done, now)
+            ahead = [b for b in senses.touched if _apart(b, order.bearing_rad) < AHEAD_RAD]
+            if ahead or stuck > 5:
+                touched = tuple(ahead)
+                if done < order.clear_m:
+                    yield from self._back(start)
+                    self._arrive(order.cycle, False, False, done, touched)
+                    return
+                break
+            if not cleared and done >= order.clear_m:
+                cleared = True
+                self._outbox.append(Cleared(order.cycle))
+            if done >= order.hop_m - 1e-3:
+                break
+            lost = 0 if any(node in senses.seen for node in order.beacons) else lost + 1
+            if lost > 3:
+                if not cleared:
+                    yield from self._back(start)
+                    self._arrive(order.cycle, False, False, done, touched)
+                    return
+                break
+            # Back onto the line if a wall pushed the robot off it.
+            aside = (senses.y_m - start[1]) * ux - (senses.x_m - start[0]) * uy
+            left = min(order.hop_m - done, self.step_m)
+            yield self._velocity(ux * left + uy * aside * 0.5, uy * left - ux * aside * 0.5)
+        if not cleared:
+            self._outbox.append(Cleared(order.cycle))
+        self._arrive(order.cycle, True, False, done, touched)
+
+    def _back(self, to: Vector) -> Story:
+        """Drive back along odometry."""
+        for _ in range(self.parameters.drive_ticks_max):
+            dx, dy = to[0] - self.senses.x_m, to[1] - self.senses.y_m
+            if math.hypot(dx, dy) < self.parameters.tolerance_m:
+                return
+            yield self._velocity(dx, dy)
+
+    # --- taking the place of the robot ahead ------------------------------------------------------------------------
+
+    def _move(self, order: Move) -> Story:
+        """Push: section III-B, by the visual homing of section II-D."""
+        p, senses = self.parameters, self.senses
+        senses.forget()
+        start = senses.x_m, senses.y_m
+        ux, uy = unit(order.bearing_rad)
+        goal = start[0] + ux * order.hop_m, start[1] + uy * order.hop_m
+        near = 0.06 if p.samples > 1 else p.tolerance_m
+        loose, lost, ticks = False, 0, 0
+        for ticks in range(p.drive_ticks_max):  # noqa: B007
+            dx, dy, loose = self._towards(order.landmarks, senses.seen, goal)
+            if math.hypot(dx, dy) < near:
+                break
+            lost = 0 if senses.seen else lost + 1
+            if lost > 20:
+                yield from self._back(start)
+                self._arrive(order.cycle, False, True, 0.0, senses.touched)
+                return
+            far = math.hypot(senses.x_m - start[0], senses.y_m - start[1])
+            gain = 1.0 if far < 0.5 * order.hop_m else 0.7
+            x, y = slid(gain * dx, gain * dy, senses.touched)
+            if math.hypot(x, y) < p.tolerance_m:
+                break  # a wall is in the way
+            yield self._velocity(x, y)
+        if p.samples > 1:
+            loose = yield from self._settle(order, goal, start)
+        self._arrive(order.cycle, True, loose, math.hypot(senses.x_m - start[0], senses.y_m - start[1]), senses.touched)
+
+    def _settle(self, order: Move, goal: Vector, start: Vector) -> Generator[BodyVelocity, None, bool]:
+        """Stand, average, step, and again: noise falls with the root of the samples."""
+        p, senses = self.parameters, self.senses
+        loose = False
+        for _ in range(3):
+            yield STOP
+            senses.forget()
+            for _ in range(p.samples):
+                senses.average()
+                yield STOP
+            mean = {each.node: each.bearing_rad for each in senses.sightings()}
+            dx, dy, loose = self._towards(order.landmarks, mean, goal)
+            dx, dy = slid(dx, dy, senses.touched)
+            if math.hypot(dx, dy) < p.tolerance_m:
+                break
+            yield from self._back((senses.x_m + dx, senses.y_m + dy))
+        return loose
+
+    def _towards(
+        self, landmarks: Sequence[Landmark], seen: dict[int, float], goal: Vector
+    ) -> tuple[float, float, bool]:
+        """Return the way to go [m], and whether odometry had to say part of it.
+
+        Landmarks that stand still are preferred, where they are enough.
+        """
+        rx, ry = goal[0] - self.senses.x_m, goal[1] - self.senses.y_m
+        found = Offset(0.0, 0.0, None, False)
+        for still in (True, False):
+            pairs = [
+                (unit(seen[each.node]), unit(each.bearing_rad))
+                for each in landmarks
+                if each.node in seen and (each.still or not still)
+            ]
+            found = offset(pairs)
+            if found.known and found.blind is None:
+                return found.x * self.hop_m, found.y * self.hop_m, False
+        if not found.known or found.blind is None:
+            return rx, ry, True
+        bx, by = found.blind
+        along = rx * bx + ry * by
+        return found.x * self.hop_m + along * bx, found.y * self.hop_m + along * by, True
+
+    # --- the ruler --------------------------------------------------------------------------------------------------
+
+    def _correct(self, order: Correct) -> Story:
+        """Scale correction, section III-C.2: the range of sight is the only measure there is."""
+        p, senses = self.parameters, self.senses
+        first: Vector | None = None
+        for anchor in order.anchors:
+            ax, ay = unit(senses.seen.get(anchor.node, anchor.bearing_rad))
+            if first is not None:  # on a circle about the first anchor
+                turn = ax * first[0] + ay * first[1]
+                ax, ay = ax - turn * first[0], ay - turn * first[1]
+                length = math.hypot(ax, ay)
+                if length < 0.3:
+                    break
+                ax, ay = ax / length, ay / length
+            away = math.atan2(-ay, -ax)
+            driven = 0.0
+            while anchor.node in senses.seen and driven < 0.3:
+                if any(_apart(each, away) < AHEAD_RAD for each in senses.touched):
+                    break
+                driven += p.creep_m
+                yield self._velocity(-ax * p.creep_m, -ay * p.creep_m)
+            broken = anchor.node not in senses.seen
+            driven = 0.0
+            while anchor.node not in senses.seen and driven < 0.5:
+                driven += p.fine_m
+                yield self._velocity(ax * p.fine_m, ay * p.fine_m)
+            if broken:
+                x, y = senses.x_m + ax * p.margin_m, senses.y_m + ay * p.margin_m
+                yield from self._back((x, y))
+            if first is None:
+                first = unit(senses.seen.get(anchor.node, anchor.bearing_rad))
+        self._arrive(order.cycle, True, False, 0.0, senses.touched)
+
+    # --- means ------------------------------------------------------------------------------------------------------
+
+    def _arrive(self, cycle: int, ok: bool, loose: bool, driven_m: float, touched: tuple[float, ...]) -> None:
+        self.senses.forget()
+        self._outbox.append(Arrived(cycle, ok, loose, driven_m, touched))
+
+    def _velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        """Return the drive that goes (x, y) in the robot's first frame within a tick, or as far of it as it can."""
+        length = math.hypot(x_m, y_m)
+        scale = min(1.0, self.step_m / length) / self.setup.dt_s if length > 0.0 else 0.0
+        cos, sin = math.cos(self.senses.turned_rad), math.sin(self.senses.turned_rad)
+        return BodyVelocity((cos * x_m + sin * y_m) * scale, (cos * y_m - sin * x_m) * scale)
+
+
+def _apart(a: float, b: float) -> float:
+    return abs(math.remainder(a - b, math.tau))

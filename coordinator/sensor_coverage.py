@@ -1,0 +1,431 @@
+"""The coordinator of sensor coverage: survey, fence, path, push, and again until nothing is left to expand.
+
+Algorithm 1 of Ramaithitima et al. 2015. It knows what robots told it over the uplink, and nothing else. The central pieces are
+functions beside it: the complex (`zwerm.simplicial`), the fence, the path, who can be spared; here is only the story.
+"""
+
+import math
+from collections.abc import Callable, Generator, Iterable, Sequence
+from typing import Any, Final, NamedTuple, Protocol
+
+import msgspec
+from msgspec import Struct
+
+from zwerm.coordinator.fence import SIXTY_RAD, Fence, Side, Views, fence, wedges
+from zwerm.coordinator.paths import Reach, reach
+from zwerm.coordinator.places import Places
+from zwerm.deployment import (
+    Answer,
+    Arrived,
+    Cleared,
+    Correct,
+    Deploy,
+    Emerged,
+    Landmark,
+    Move,
+    Order,
+    Release,
+    Report,
+    Sighting,
+    Survey,
+    decode_answer,
+    encode,
+)
+from zwerm.protocol import Command, Observation, Transmission, Wake
+from zwerm.simplicial import Edge, FlagComplex, edge, sparing
+
+BASE: Final = 0
+Story = Generator[Wake, None, None]
+
+
+class Setup(Protocol):
+    """What a coordinator needs of its setup."""
+
+    @property
+    def dt_s(self) -> float:
+        """The period of a tick."""
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What the scenario set."""
+
+
+class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
+    """What a scenario may set. `link_m`, `margin_m` and `samples` are the robots'."""
+
+    link_m: float = 1.0
+    margin_m: float = 0.05
+    samples: int = 1
+    clear_m: float = 0.8
+    clear_vertex_m: float = 0.9
+    obstacle_cost: float = 3.0
+    corner_margin_rad: float = 0.15
+    redundancy_every: int = 10
+    attempts_max: int = 2
+    drive_ticks_max: int = 160
+    cycles_max: int = 2000
+
+
+class Plan(NamedTuple):
+    """One deployment: the robot at `mover` goes along `direction`, and the robots on the path follow."""
+
+    key: tuple[int, ...]
+    mover: int
+    direction: float
+    hop_m: float
+    clear_m: float
+    anchors: tuple[int, ...]
+    path: tuple[int, ...] = ()
+
+
+class SensorCoverage:
+    """The coordinator."""
+
+    Parameters = Parameters
+
+    def __init__(self, setup: Setup) -> None:
+        self.parameters: Parameters = msgspec.convert(setup.parameters, Parameters)
+        self.dt_s = setup.dt_s
+        self.places = Places()
+        self.done = False
+        self.outcome = ""
+        self.cycle = 0
+        self.pushes = 0
+        self.released = 0
+        self.redundant: list[int] = []
+        self._now_s = 0.0
+        self._outbox: list[Transmission] = []
+        self._mail: list[tuple[int, Answer]] = []
+        self._closed: dict[tuple[int, ...], None] = {}
+        self._attempts: dict[tuple[int, ...], int] = {}
+        self._blocked: dict[int, list[float]] = {}
+        self._waiting: int | None = None
+        self._story = self._tell()
+
+    def step(self, observation: Observation) -> Command:
+        """Take the mail and go on."""
+        self._now_s = observation.time_s
+        self._mail += [
+            (packet.sender, decode_answer(packet.payload)) for packet in observation.inbox if packet.sender is not None
+        ]
+        wake = next(self._story, Wake())
+        outbox, self._outbox = tuple(self._outbox), []
+        return Command(outbox=outbox, wake=wake, done=self.done)
+
+    # --- the story --------------------------------------------------------------------------------------------------
+
+    def _tell(self) -> Story:
+        self.places.found(BASE, 0.0)
+        self.places.take(BASE, ())
+        quiet = 0
+        moved: Sequence[int] = ()
+        while self.cycle < self.parameters.cycles_max:
+            self.cycle += 1
+            yield from self._survey(moved)
+            moved = ()
+            if len(self.places.occupant) == 1:
+                moved = yield from self._first()
+                if self.outcome:
+                    break
+                continue
+            plan = self._plan()
+            if plan is None:
+                quiet += 1
+                if quiet >= 2:
+                    self.outcome = self.outcome or "covered"
+                    break
+                continue
+            quiet = 0
+            moved = yield from self._push(plan)
+            if self.outcome:
+                break
+        self.done = True
+        yield Wake()
+
+    def _say(self, node: int, order: Order) -> None:
+        self._outbox.append(Transmission("uplink", encode(order), node))
+
+    def _await(self, wanted: Callable[[int, Answer], bool], count: int, ticks: int) -> Generator[Wake, None, list[tuple[int, Answer]]]:
+        """Wait until `count` answers that are wanted have come, or so many ticks have passed, and return them."""
+        until_s = self._now_s + ticks * self.dt_s
+        found: list[tuple[int, Answer]] = []
+        while True:
+            found += [(node, answer) for node, answer in self._mail if wanted(node, answer)]
+            self._mail = [(node, answer) for node, answer in self._mail if not wanted(node, answer)]
+            if len(found) >= count or self._now_s >= until_s - 1e-9:
+                return found
+            yield Wake(at_s=until_s, on_packet=True)
+
+    def _survey(self, moved: Sequence[int]) -> Story:
+        """Ask everyone what they see; who does not answer is dead."""
+        places, cycle = self.places, self.cycle
+        self._mail.clear()
+        asked = sorted(places.occupant.values())
+        for robot in asked:
+            self._say(robot, Survey(cycle, tuple(sorted(moved))))
+        answers = yield from self._await(
+            lambda _, answer: isinstance(answer, Report) and answer.cycle == cycle,
+            len(asked),
+            2 * self.parameters.samples + 5,
+        )
+        place_of = places.place_of()
+        reports = {node: answer for node, answer in answers if isinstance(answer, Report)}
+        for robot in asked:
+            if robot not in reports:
+                places.drop(place_of[robot])
+        fresh = []
+        for robot, report in sorted(reports.items()):
+            if report.sightings is not None:
+                places.take(robot, report.sightings)
+                fresh.append(robot)
+        places.learn_headings(fresh)
+        for robot, report in sorted(reports.items()):
+            place = place_of[robot]
+            for bearing in report.touched:
+                self._remember(places.walls.setdefault(place, []), bearing + places.heading[robot])
+        self.views = places.views()
+        self.complex = FlagComplex(self.views)
+        places.learn_references(self.views)
+
+    @staticmethod
+    def _remember(known: list[float], direction: float) -> None:
+        if all(_apart(each, direction) > 0.2 for each in known):
+            known.append(direction)
+
+    # --- where to go ------------------------------------------------------------------------------------------------
+
+    def _plan(self) -> Plan | None:
+        found = fence(self.views, self.complex, self.parameters.corner_margin_rad)
+        obstacle = dict.fromkeys(found.corners)
+        plans: list[Plan] = []
+        for side in found.sides:
+            options = self._edge_plans(side)
+            if not options:
+                obstacle[side.edge] = None
+            plans += options
+        self.obstacle = tuple(sorted(obstacle))
+        self.frontier = tuple(sorted({edge(*each.key[:2]) for each in plans}))
+        self._spare(found)
+        sources = dict.fromkeys(self.redundant, -100.0) if self.redundant else {}
+        ways = reach(self.complex, {BASE: 0.0, **sources}, obstacle, self.parameters.obstacle_cost)
+        best = self._cheapest(plans, ways)
+        return best or self._cheapest(self._vertex_plans(), ways)
+
+    def _cheapest(self, plans: Iterable[Plan], ways: Reach) -> Plan | None:
+        open_plans = [(ways.cost[plan.mover], plan.mover, plan.key, plan) for plan in plans if plan.mover in ways.cost]
+        if not open_plans:
+            return None
+        plan = min(open_plans)[-1]
+        return plan._replace(path=ways.path(plan.mover))
+
+    def _edge_plans(self, side: Side) -> list[Plan]:
+        """Return the ways to expand one side of an edge; none if it is an obstacle edge. Section III-A, i to iv."""
+        key = (side.i, side.j, side.sign)
+        if key in self._closed:
+            return []
+        hop = self.parameters.link_m - self.parameters.margin_m
+        plans = []
+        for mover, other, sign, near, far in (
+            (side.i, side.j, side.sign, side.angle_i_rad, side.angle_j_rad),
+            (side.j, side.i, -side.sign, side.angle_j_rad, side.angle_i_rad),
+        ):
+            if mover == BASE:
+                continue
+            towards = self.places.direction(mover, other)
+            if towards is None:
+                towards = self.views[mover][other]
+            angle, length, anchors = near, hop, (mover, other)
+            if far < near - 1e-9:  # bisected at the other end: keep that end's angle and distance
+                angle, length, anchors = math.pi / 2.0 - far / 2.0, 2.0 * hop * math.sin(far / 2.0), (other,)
+            elif near < SIXTY_RAD - 1e-9:
+                anchors = (mover,)
+            direction = towards + sign * angle
+            if self._walled(mover, self.views[mover][other] + sign * near):
+                continue
+            clear = min(self.parameters.clear_m, 0.85 * length)
+            plans.append(Plan(key, mover, direction, length, clear, anchors))
+        return plans
+
+    def _vertex_plans(self) -> Iterable[Plan]:
+        """Yield the ways on for robots with a wide gap in what they see: single files, and doors."""
+        hop = self.parameters.link_m - self.parameters.margin_m
+        for i, a, _, gap in wedges(self.views, self.complex):
+            direction = self.views[i][a] + gap / 2.0
+            key = (i, a, 0)
+            if i == BASE or gap < math.radians(150.0) or key in self._closed or self._walled(i, direction):
+                continue
+            if any(_apart(each, direction) < SIXTY_RAD / 2.0 for each in self._blocked.get(i, ())):
+                continue
+            yield Plan(key, i, direction, hop, self.parameters.clear_vertex_m, (i,))
+
+    def _walled(self, place: int, direction: float) -> bool:
+        return any(_apart(each, direction) < SIXTY_RAD for each in self.places.walls.get(place, ()))
+
+    def _spare(self, found: Fence) -> None:
+        """Look for redundant robots now and then; section III-D."""
+        self.redundant = [place for place in self.redundant if place in self.places.occupant]
+        every = self.parameters.redundancy_every
+        if not every or self.pushes == 0 or self.pushes % every:
+            return
+        fenced: dict[Edge, None] = dict.fromkeys((*found.corners, *(side.edge for side in found.sides)))
+        for i, a, b, _ in wedges(self.views, self.complex):
+            fenced[edge(i, a)] = fenced[edge(i, b)] = None
+        missed_max = 1 + len(self.complex.vertices) // 50
+        self.redundant = list(sparing(self.complex, fenced, (BASE,), missed_max).redundant)
+
+    # --- pushing ----------------------------------------------------------------------------------------------------
+
+    def _first(self) -> Generator[Wake, None, Sequence[int]]:
+        """Deploy robot 1, open loop. Algorithm 1, line 1."""
+        p = self.parameters
+        robot = yield from self._release()
+        if robot is None:
+            self.outcome = "depot-dry"
+            return ()
+        for bearing in (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi):
+            self._say(robot, Deploy(self.cycle, bearing, p.link_m - p.margin_m, p.clear_m, (BASE,)))
+            arrived = yield from self._arrivals([robot])
+            if arrived.get(robot) is not None and arrived[robot].ok:
+                self.places.found(robot, 0.0)
+                yield from self._correct(robot, [(BASE, bearing + math.pi)])
+                return (robot,)
+        self.outcome = "source-blocked"
+        return ()
+
+    def _release(self) -> Generator[Wake, None, int | None]:
+        self._say(self.places.occupant[BASE], Release(self.cycle))
+        answers = yield from self._await(
+            lambda _, answer: isinstance(answer, Emerged), 1, 2 * self.parameters.samples + 8
+        )
+        for robot, answer in answers:
+            if isinstance(answer, Emerged):
+                self.released += 1
+                self.places.take(robot, answer.sightings)
+                return robot
+        return None
+
+    def _push(self, plan: Plan) -> Generator[Wake, None, Sequence[int]]:
+        """Push along the plan's path; section III-B. Return the robots that moved."""
+        places, cycle, path = self.places, self.cycle, plan.path
+        robots = [places.occupant[place] for place in path]
+        leader = robots[-1]
+        self._attempts[plan.key] = self._attempts.get(plan.key, 0) + 1
+        if self._attempts[plan.key] >= self.parameters.attempts_max:
+            self._closed[plan.key] = None
+        if path[0] == BASE and self._waiting is None and not any(each not in path for each in self.views[BASE]):
+            # Whom the base sees is about to move: the next robot must look around before that.
+            yield from self._let_out(path)
+        beacons = tuple(places.occupant[each] for each in self.complex.neighbours[plan.mover])
+        bearing = plan.direction - places.heading[leader]
+        self._say(leader, Deploy(cycle, _wrapped(bearing), plan.hop_m, plan.clear_m, beacons))
+        news = yield from self._await(
+            lambda node, answer: node == leader and isinstance(answer, Cleared | Arrived),
+            1,
+            self.parameters.drive_ticks_max,
+        )
+        first = news[0][1] if news else None
+        if first is None or (isinstance(first, Arrived) and not first.ok):
+            self._closed[plan.key] = None
+            self._blocked.setdefault(plan.mover, []).append(plan.direction)
+            return (leader,)
+        followers = robots[:-1]
+        if path[0] == BASE:
+            yield from self._let_out(path)
+            born, self._waiting = self._waiting, None
+            if born is None:
+                self.outcome = "depot-dry"
+                self._move([leader], [plan.mover], [plan.mover], {})
+                yield from self._arrivals([leader])
+                return (leader,)
+            followers[0] = born
+        going = list(path[1:])
+        self._move(followers, path[:-1], going, dict(zip(going, followers, strict=True)))
+        arrived = yield from self._arrivals([*followers, leader])
+        self.pushes += 1
+        if path[0] != BASE:
+            places.drop(path[0])
+        for place, robot in zip(going, followers, strict=True):
+            places.occupant[place] = robot
+        if leader in arrived:
+            place = places.found(leader, 0.0)
+            yield from self._straighten(followers, path, arrived)
+            anchors = [
+                (places.occupant[each], plan.direction + math.pi - places.heading[leader] + bend)
+                for each, bend in zip(plan.anchors, (0.0, 0.0), strict=False)
+            ]
+            if not arrived[leader].ok:
+                places.drop(place)
+            else:
+                yield from self._correct(leader, anchors)
+        return (*followers, leader)
+
+    def _let_out(self, path: Sequence[int]) -> Story:
+        """Have a robot wait at the base, its heading known, unless one does."""
+        if self._waiting is not None:
+            return
+        born = yield from self._release()
+        if born is not None:
+            self.places.heading[born] = self._heading_at_base(born, path)
+            self._waiting = born
+
+    def _heading_at_base(self, born: int, path: Sequence[int]) -> float:
+        """Return the heading of a robot that stands on the base and sees what the base sees."""
+        base = self.views[BASE]
+        place_of = self.places.place_of()
+        x = y = 0.0
+        for node, bearing in self.places.view[born].items():
+            place = place_of.get(node)
+            if place in base and (place not in path or len(base) == 1):
+                x += math.cos(base[place] - bearing)
+                y += math.sin(base[place] - bearing)
+        return math.atan2(y, x)
+
+    def _move(self, robots: Sequence[int], origins: Sequence[int], goals: Sequence[int], future: dict[int, int]) -> None:
+        """Tell robots to take the places ahead of them; `future` is who will be where among the places that change."""
+        places = self.places
+        hop = self.parameters.link_m - self.parameters.margin_m
+        vacated = [place for place in origins if place not in future and place != BASE]
+        for robot, origin, goal in zip(robots, origins, goals, strict=True):
+            heading = places.heading[robot]
+            direction = places.direction(origin, goal)
+            length = hop
+            if direction is None:
+                direction, length = 0.0, 0.0
+            landmarks = []
+            for place, there in places.known_from(goal):
+                node = future.get(place, places.occupant[place])
+                if node == robot or (place in vacated and place not in future and future):
+                    continue
+                still = place not in future
+                landmarks.append(Landmark(node, _wrapped(there - heading), still))
+            if origin == BASE and sum(each.still for each in landmarks) > 2:
+                landmarks = [each for each in landmarks if each.node != places.occupant[BASE]]
+            self._say(robot, Move(self.cycle, _wrapped(direction - heading), length, tuple(landmarks)))
+
+    def _straighten(self, followers: Sequence[int], path: Sequence[int], arrived: dict[int, Arrived]) -> Story:
+        """In single file, rear to front: bearings did not tell how far to go, the range of sight does."""
+        rear = self.places.occupant.get(path[0])
+        for robot in followers:
+            if robot in arrived and arrived[robot].loose and rear is not None:
+                yield from self._correct(robot, [(rear, 0.0)])
+            rear = robot
+
+    def _correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Story:
+        self._say(robot, Correct(self.cycle, tuple(Sighting(node, _wrapped(there)) for node, there in anchors)))
+        yield from self._arrivals([robot])
+
+    def _arrivals(self, robots: Sequence[int]) -> Generator[Wake, None, dict[int, Arrived]]:
+        answers = yield from self._await(
+            lambda node, answer: node in robots and isinstance(answer, Arrived),
+            len(robots),
+            self.parameters.drive_ticks_max,
+        )
+        return {node: answer for node, answer in answers if isinstance(answer, Arrived)}
+
+
+def _apart(a: float, b: float) -> float:
+    return abs(math.remainder(a - b, math.tau))
+
+
+def _wrapped(angle: float) -> float:
+    return math.remainder(angle, math.tau)
