@@ -23,6 +23,7 @@ class Offset(NamedTuple):
     y: float
     blind: Vector | None
     known: bool
+    spread: float = 0.0  # trace of M^-1: the variance per that of a bearing
 
 
 def offset(pairs: Iterable[tuple[Vector, Vector]]) -> Offset:
@@ -40,12 +41,12 @@ def offset(pairs: Iterable[tuple[Vector, Vector]]) -> Offset:
         return Offset(0.0, 0.0, None, False)
     if small >= EIGENVALUE_MIN:
         det = mxx * myy - mxy * mxy
-        return Offset((myy * ex - mxy * ey) / det, (mxx * ey - mxy * ex) / det, None, True)
+        return Offset((myy * ex - mxy * ey) / det, (mxx * ey - mxy * ex) / det, None, True, (mxx + myy) / det)
     # The direction of the large eigenvalue; with several landmarks in line it is across that line.
     angle = 0.5 * math.atan2(2.0 * mxy, mxx - myy)
     ux, uy = math.cos(angle), math.sin(angle)
     along = (ux * ex + uy * ey) / large
-    return Offset(along * ux, along * uy, (-uy, ux), True)
+    return Offset(along * ux, along * uy, (-uy, ux), True, 1.0 / large)
 
 
 def unit(angle_rad: float) -> Vector:

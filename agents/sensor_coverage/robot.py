@@ -7,6 +7,8 @@ bearings, touch, its own odometry and its radio; it never turns on purpose, and 
 
 import math
 from collections.abc import Generator, Sequence
+from itertools import count
+from typing import NamedTuple
 
 from msgspec import Struct
 
@@ -44,10 +46,22 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     link_m: float = 1.0
     margin_m: float = 0.05
     samples: int = 1
-    tolerance_m: float = 0.004
+    bearing_sd_rad: float = 0.0
+    tolerance_m: float = 0.005
     creep_m: float = 0.02
     fine_m: float = 0.005
+    stop_samples: int = 12
+    still_samples_max: int = 120
     drive_ticks_max: int = 90
+
+
+class Way(NamedTuple):
+    """The way to a place [m]; `loose`: odometry had to say part of it; `spread` is the variance per that of a bearing."""
+
+    x: float
+    y: float
+    loose: bool
+    spread: float
 
 
 class Robot(Controller):
@@ -162,11 +176,12 @@ class Robot(Controller):
             self._outbox.append(Cleared(order.cycle))
         self._arrive(order.cycle, True, False, done, touched)
 
-    def _back(self, to: Vector) -> Story:
-        """Drive back along odometry."""
+    def _back(self, to: Vector, near_m: float | None = None) -> Story:
+        """Drive to where odometry says that `to` is."""
+        near_m = self.parameters.tolerance_m if near_m is None else near_m
         for _ in range(self.parameters.drive_ticks_max):
             dx, dy = to[0] - self.senses.x_m, to[1] - self.senses.y_m
-            if math.hypot(dx, dy) < self.parameters.tolerance_m:
+            if math.hypot(dx, dy) < near_m:
                 return
             yield self._velocity(dx, dy)
 
@@ -179,10 +194,11 @@ class Robot(Controller):
         start = senses.x_m, senses.y_m
         ux, uy = unit(order.bearing_rad)
         goal = start[0] + ux * order.hop_m, start[1] + uy * order.hop_m
-        near = 0.06 if p.samples > 1 else p.tolerance_m
+        noisy = p.bearing_sd_rad > 0.0
+        near = 0.06 if noisy else p.tolerance_m
         loose, lost, ticks = False, 0, 0
         for ticks in range(p.drive_ticks_max):  # noqa: B007
-            dx, dy, loose = self._towards(order.landmarks, senses.seen, goal)
+            dx, dy, loose, _ = self._towards(order.landmarks, senses.seen, goal)
             if math.hypot(dx, dy) < near:
                 break
             lost = 0 if senses.seen else lost + 1
@@ -196,32 +212,39 @@ class Robot(Controller):
             if math.hypot(x, y) < p.tolerance_m:
                 break  # a wall is in the way
             yield self._velocity(x, y)
-        if p.samples > 1:
+        if noisy:
             loose = yield from self._settle(order, goal, start)
         self._arrive(order.cycle, True, loose, math.hypot(senses.x_m - start[0], senses.y_m - start[1]), senses.touched)
 
     def _settle(self, order: Move, goal: Vector, start: Vector) -> Generator[BodyVelocity, None, bool]:
-        """Stand, average, step, and again: noise falls with the root of the samples."""
+        """Stand, average, step, and again: noise falls with the root of all samples, since odometry tells each step."""
         p, senses = self.parameters, self.senses
-        loose = False
-        for _ in range(3):
-            yield STOP
+        ex = ey = 0.0
+        way = Way(0.0, 0.0, False, 0.0)
+        for stop in count(1):
             senses.forget()
-            for _ in range(p.samples):
-                senses.average()
+            for _ in range(p.stop_samples):
                 yield STOP
+                senses.average()
             mean = {each.node: each.bearing_rad for each in senses.sightings()}
-            dx, dy, loose = self._towards(order.landmarks, mean, goal)
-            dx, dy = slid(dx, dy, senses.touched)
-            if math.hypot(dx, dy) < p.tolerance_m:
+            way = self._towards(order.landmarks, mean, goal)
+            ex, ey = ex + (way.x - ex) / stop, ey + (way.y - ey) / stop
+            sx, sy = slid(ex, ey, senses.touched)
+            wanted = (p.bearing_sd_rad * self.hop_m / p.tolerance_m) ** 2 * way.spread
+            enough = stop * p.stop_samples >= min(wanted, p.still_samples_max)
+            if enough and stop > 1 and math.hypot(sx, sy) < p.tolerance_m:
                 break
-            yield from self._back((senses.x_m + dx, senses.y_m + dy))
-        return loose
+            x, y = senses.x_m, senses.y_m
+            yield from self._back((x + sx, y + sy), 0.3 * p.tolerance_m)
+            ex, ey = ex - (senses.x_m - x), ey - (senses.y_m - y)
+            if enough and stop > 1:
+                break
+        return way.loose
 
     def _towards(
         self, landmarks: Sequence[Landmark], seen: dict[int, float], goal: Vector
-    ) -> tuple[float, float, bool]:
-        """Return the way to go [m], and whether odometry had to say part of it.
+    ) -> Way:
+        """Return the way to go.
 
         Landmarks that stand still are preferred, where they are enough.
         """
@@ -235,12 +258,12 @@ class Robot(Controller):
             ]
             found = offset(pairs)
             if found.known and found.blind is None:
-                return found.x * self.hop_m, found.y * self.hop_m, False
+                return Way(found.x * self.hop_m, found.y * self.hop_m, False, found.spread)
         if not found.known or found.blind is None:
-            return rx, ry, True
+            return Way(rx, ry, True, 0.0)
         bx, by = found.blind
         along = rx * bx + ry * by
-        return found.x * self.hop_m + along * bx, found.y * self.hop_m + along * by, True
+        return Way(found.x * self.hop_m + along * bx, found.y * self.hop_m + along * by, True, found.spread)
 
     # --- the ruler --------------------------------------------------------------------------------------------------
 
