@@ -58,6 +58,7 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     samples: int = 1
     clear_m: float = 0.8
     clear_vertex_m: float = 0.9
+    near_wall_m: float = 0.3
     obstacle_cost: float = 3.0
     corner_margin_rad: float = 0.15
     redundancy_every: int = 10
@@ -97,6 +98,7 @@ class SensorCoverage:
         self._outbox: list[Transmission] = []
         self._mail: list[tuple[int, Answer]] = []
         self._closed: dict[tuple[int, ...], None] = {}
+        self._failed: dict[tuple[tuple[int, ...], int], None] = {}
         self._attempts: dict[tuple[int, ...], int] = {}
         self._blocked: dict[int, list[float]] = {}
         self._waiting: int | None = None
@@ -240,7 +242,7 @@ class SensorCoverage:
             elif near < SIXTY_RAD - 1e-9:
                 anchors = (mover,)
             direction = towards + sign * angle
-            if self._walled(mover, self.views[mover][other] + sign * near):
+            if (key, mover) in self._failed or self._walled(mover, self.views[mover][other] + sign * near):
                 continue
             clear = min(self.parameters.clear_m, 0.85 * length)
             plans.append(Plan(key, mover, direction, length, clear, anchors))
@@ -257,6 +259,9 @@ class SensorCoverage:
             if any(_apart(each, direction) < SIXTY_RAD / 2.0 for each in self._blocked.get(i, ())):
                 continue
             yield Plan(key, i, direction, hop, self.parameters.clear_vertex_m, (i,))
+
+    def _failed_elsewhere(self, plan: Plan) -> bool:
+        return any((plan.key, end) in self._failed for end in plan.key[:2] if end != plan.mover)
 
     def _walled(self, place: int, direction: float) -> bool:
         return any(_apart(each, direction) < SIXTY_RAD for each in self.places.walls.get(place, ()))
@@ -283,7 +288,7 @@ class SensorCoverage:
             self.outcome = "depot-dry"
             return ()
         for bearing in (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi):
-            self._say(robot, Deploy(self.cycle, bearing, p.link_m - p.margin_m, p.clear_m, (BASE,)))
+            self._say(robot, Deploy(self.cycle, bearing, p.link_m - p.margin_m, p.clear_m))
             arrived = yield from self._arrivals([robot])
             if arrived.get(robot) is not None and arrived[robot].ok:
                 self.places.found(robot, 0.0)
@@ -315,9 +320,8 @@ class SensorCoverage:
         if path[0] == BASE and self._waiting is None and not any(each not in path for each in self.views[BASE]):
             # Whom the base sees is about to move: the next robot must look around before that.
             yield from self._let_out(path)
-        beacons = tuple(places.occupant[each] for each in self.complex.neighbours[plan.mover])
         bearing = plan.direction - places.heading[leader]
-        self._say(leader, Deploy(cycle, _wrapped(bearing), plan.hop_m, plan.clear_m, beacons))
+        self._say(leader, Deploy(cycle, _wrapped(bearing), plan.hop_m, plan.clear_m))
         news = yield from self._await(
             lambda node, answer: node == leader and isinstance(answer, Cleared | Arrived),
             1,
@@ -325,7 +329,9 @@ class SensorCoverage:
         )
         first = news[0][1] if news else None
         if first is None or (isinstance(first, Arrived) and not first.ok):
-            self._closed[plan.key] = None
+            if first is None or first.driven_m > self.parameters.near_wall_m or plan.key[2] == 0 or self._failed_elsewhere(plan):
+                self._closed[plan.key] = None
+            self._failed[plan.key, plan.mover] = None
             self._blocked.setdefault(plan.mover, []).append(plan.direction)
             return (leader,)
         followers = robots[:-1]

@@ -57,15 +57,13 @@ class Release(_Message, frozen=True):
 class Deploy(_Message, frozen=True):
     """Drive into the unknown along a bearing.
 
-    If a wall stops it before `clear_m`, the robot drives back; else it goes on to `hop_m`. `beacons` are the robots that
-    stay in its sight on the way.
+    If a wall stops it before `clear_m`, the robot drives back; else it goes on to `hop_m`.
     """
 
     cycle: int
     bearing_rad: float
     hop_m: float
     clear_m: float
-    beacons: tuple[int, ...]
 
 
 class Move(_Message, frozen=True):

@@ -136,12 +136,15 @@ class Robot(Controller):
     # --- into the unknown -------------------------------------------------------------------------------------------
 
     def _deploy(self, order: Deploy) -> Story:
-        """Algorithm 1, line 8, with the test drive of section III-A, item iv."""
+        """Algorithm 1, line 8, with the test drive of section III-A, item iv.
+
+        The robot may lose sight of everyone on its way: its follower comes to where it was, and the link is re-established then.
+        """
         senses = self.senses
         self.senses.forget()
         start = senses.x_m, senses.y_m
         ux, uy = unit(order.bearing_rad)
-        cleared, lost, stuck = False, 0, 0
+        cleared, stuck = False, 0
         touched: tuple[float, ...] = ()
         done = 0.0
         for _ in range(self.parameters.drive_ticks_max):
@@ -160,13 +163,6 @@ class Robot(Controller):
                 cleared = True
                 self._outbox.append(Cleared(order.cycle))
             if done >= order.hop_m - 1e-3:
-                break
-            lost = 0 if any(node in senses.seen for node in order.beacons) else lost + 1
-            if lost > 3:
-                if not cleared:
-                    yield from self._back(start)
-                    self._arrive(order.cycle, False, False, done, touched)
-                    return
                 break
             # Back onto the line if a wall pushed the robot off it.
             aside = (senses.y_m - start[1]) * ux - (senses.x_m - start[0]) * uy
