@@ -152,8 +152,10 @@ class SensorCoverage:
         until_s = self._now_s + ticks * self.dt_s
         found: list[tuple[int, Answer]] = []
         while True:
-            found += [(node, answer) for node, answer in self._mail if wanted(node, answer)]
-            self._mail = [(node, answer) for node, answer in self._mail if not wanted(node, answer)]
+            rest: list[tuple[int, Answer]] = []
+            for each in self._mail:
+                (found if len(found) < count and wanted(*each) else rest).append(each)
+            self._mail = rest
             if len(found) >= count or self._now_s >= until_s - 1e-9:
                 return found
             yield Wake(at_s=until_s, on_packet=True)
@@ -352,17 +354,11 @@ class SensorCoverage:
             places.drop(path[0])
         for place, robot in zip(going, followers, strict=True):
             places.occupant[place] = robot
+        places.found(leader, 0.0)
+        yield from self._straighten(followers, path, arrived)
         if leader in arrived:
-            place = places.found(leader, 0.0)
-            yield from self._straighten(followers, path, arrived)
-            anchors = [
-                (places.occupant[each], plan.direction + math.pi - places.heading[leader] + bend)
-                for each, bend in zip(plan.anchors, (0.0, 0.0), strict=False)
-            ]
-            if not arrived[leader].ok:
-                places.drop(place)
-            else:
-                yield from self._correct(leader, anchors)
+            back = plan.direction + math.pi - places.heading[leader]
+            yield from self._correct(leader, [(places.occupant[each], back) for each in plan.anchors])
         return (*followers, leader)
 
     def _let_out(self, path: Sequence[int]) -> Story:
