@@ -1,11 +1,12 @@
 """Identities: who may join a run, and what the network lets each node do.
 
-Every run has new random credentials. The router admits a user name only with its password, and only from the session with
-the Zenoh id issued along with it; then access control, which denies by default, leaves a node exactly its own keys: put its
-commands, receive its observations, say hello, keep its own liveliness token. So locality does not rest on good manners.
+Every run has new random credentials. The router admits a user name only with its password, and only from the session
+with the Zenoh id issued along with it. Access control denies by default and leaves a node exactly its own keys: put
+its commands, receive its observations, say hello, keep its own liveliness token. So locality does not rest on good
+manners.
 
-Credentials travel by pipe to robot processes of this machine and by file (0600) to others; never on a command line or in
-the environment.
+Credentials travel by pipe to processes of this machine, and by file (0600) to others; never on a command line or in the
+environment.
 """
 
 import os
@@ -74,7 +75,7 @@ def router_settings(credentials: Credentials, endpoints: list[str], dictionary: 
 
 def access_control(credentials: Credentials) -> dict[str, Any]:
     """Return the access control that leaves every node its own keys and nothing else."""
-    # A node's session publishes only once it knows that somebody listens; it may know that the world listens to every node.
+    # A session publishes only what it knows somebody listens to, so it may know that the world listens to every node.
     listens = _allow("world-listens", command_key(credentials.run, EVERY), "declare_subscriber", "egress")
     rules = [listens]
     policies = []
@@ -99,14 +100,22 @@ def _allow(name: str, key: str, message: str, flow: str) -> dict[str, Any]:
     return {"id": name, "permission": "allow", "messages": [message], "flows": [flow], "key_exprs": [key]}
 
 
-def slice_of(credentials: Credentials, nodes: Iterable[int]) -> Credentials:
-    """Return the credentials of `nodes` only. Raises LinkError where there are none for one of them."""
+def slice_of(credentials: Credentials, nodes: str) -> Credentials:
+    """Return the credentials of the nodes that `nodes` names, such as `0-24,30`.
+
+    Raises LinkError where it names none, or one that `credentials` does not hold.
+    """
     known = {credential.node: credential for credential in credentials.nodes}
-    chosen = list(nodes)
-    missing = [node for node in chosen if node not in known]
-    if missing:
-        raise LinkError(f"the credentials hold nothing for node {missing[0]}")
-    return Credentials(credentials.run, tuple(known[node] for node in chosen), credentials.authority_pem)
+    try:
+        bounds = [part.partition("-") for part in nodes.split(",")]
+        chosen = [node for first, _, last in bounds for node in range(int(first), int(last or first) + 1)]
+    except ValueError:
+        raise LinkError(f"ids: expected numbers and ranges such as 0-24,30, got {nodes!r}") from None
+    if not chosen:
+        raise LinkError(f"ids: expected at least one, got {nodes!r}")
+    if unknown := [node for node in chosen if node not in known]:
+        raise LinkError(f"ids: the credentials hold no node {unknown[0]}")
+    return Credentials(credentials.run, tuple(known[node] for node in dict.fromkeys(chosen)), credentials.authority_pem)
 
 
 def save(credentials: Credentials, path: Path) -> None:
@@ -133,5 +142,5 @@ def write_private(path: Path, content: bytes) -> None:
     """Write a file that only its owner can read, from its first byte on; one that was there before is replaced."""
     path.unlink(missing_ok=True)
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, PRIVATE_FILE_MODE)
-    with open(descriptor, "wb") as file:
+    with os.fdopen(descriptor, "wb") as file:
         file.write(content)
