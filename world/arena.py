@@ -3,7 +3,7 @@
 Free space is a polygon (its holes are obstacles) plus walls without thickness. Questions are asked for many points or
 lines at once; the answers are exact to rounding, and no line of sight slips through a corner at which two walls meet.
 Small arenas are answered by comparing everything with everything, large ones through a spatial index. An arena never
-changes. It knows nothing of robots: bodies do not block here. How an arena is read from files stands in `maps`.
+changes. It knows nothing of robots: bodies do not block here. How an arena is read from files stands in `shapes`.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from zwerm.scenario import ArenaTable
-from zwerm.world.maps import read_arena
+from zwerm.world.shapes import read_shape
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -67,7 +67,7 @@ class Arena:
 
         Raises ScenarioError with every mistake, each `arena.key: rule, got value`.
         """
-        return cls(*read_arena(table, folder))
+        return cls(*read_shape(table, folder))
 
     def blocked(self, start: Floats, end: Floats) -> Bools:
         """Return for each line from start (k, 2) to end (k, 2) whether a wall crosses or touches it, its ends aside."""

@@ -4,8 +4,11 @@ A commanded drive persists until the next one. It takes effect a fixed number of
 (the body's actuation latency), is disturbed by noise, drawn anew every tick, and is then clamped to what the motors can do.
 """
 
+from collections.abc import Sequence
+from itertools import chain
 from typing import Final
 
+import msgspec
 import numpy as np
 
 from zwerm.draws import Draws
@@ -16,16 +19,17 @@ from zwerm.world.scene import Floats
 # Ticks of noise drawn at once: draws are keyed by tick, so a block costs less and changes nothing.
 _BLOCK_TICKS: Final = 64
 
-_AXES: Final = {"differential": 2, "holonomic": 3}
+_KINDS: Final = {"differential": WheelSpeeds, "holonomic": BodyVelocity}
 
 
 class Drives:
-    """The drives of a swarm of `count` robots."""
+    """The drives of a swarm of `count` robots; `kind` is what such a body takes."""
 
     def __init__(self, body: BodyTable, count: int, draws: Draws) -> None:
         self._body = body
         self._draws = draws
-        self._axes = _AXES[body.kind]
+        self.kind: type[BodyVelocity] | type[WheelSpeeds] = _KINDS[body.kind]
+        self._axes = len(self.kind.__struct_fields__)
         self._commanded: Floats = np.zeros((count, self._axes))
         self._pending = [self._commanded.copy() for _ in range(body.latency_ticks)]
         self._noise_block = -1
@@ -35,16 +39,11 @@ class Drives:
         else:
             self._limit = np.array([body.max_speed_m_s, body.max_speed_m_s, body.max_turn_rad_s])
 
-    def fits(self, drive: BodyVelocity | WheelSpeeds) -> bool:
-        """Tell whether this body can take a drive of that kind."""
-        return (type(drive) is WheelSpeeds) == (self._axes == 2)
-
-    def command(self, robot: int, drive: BodyVelocity | WheelSpeeds) -> None:
-        """Take a robot's new drive."""
-        if type(drive) is WheelSpeeds:
-            self._commanded[robot] = drive.left_m_s, drive.right_m_s
-        elif type(drive) is BodyVelocity:
-            self._commanded[robot] = drive.forward_m_s, drive.left_m_s, drive.turn_rad_s
+    def command(self, drives: Sequence[tuple[int, BodyVelocity | WheelSpeeds]]) -> None:
+        """Take the new drives of some robots, all of this body's `kind`."""
+        axes, robots = self._axes, [robot for robot, _ in drives]
+        numbers = chain.from_iterable([msgspec.structs.astuple(drive) for _, drive in drives])
+        self._commanded[robots] = np.fromiter(numbers, np.float64, axes * len(robots)).reshape(-1, axes)
 
     def stop(self, robot: int) -> None:
         """Cut a robot's motors at once, whatever is still on its way to them."""

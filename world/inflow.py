@@ -1,12 +1,13 @@
-"""A depot that lets robots into the arena one by one, and an exit that takes them out.
+"""Depots, which let robots into the arena one by one, and an exit that takes them out.
 
-Robots enter in id order, every `every_s` seconds, at a random free place of the entry rectangle. While there is none, the
-next robot waits at the door; the interval counts from the last entry.
+From a timed inflow robots enter in id order, every `every_s` seconds, at a random free place of the entry rectangle. While
+there is none, the next robot waits at the door; the interval counts from the last entry. From a base station's depot they
+enter when it releases them, where it stands.
 """
 
 import numpy as np
 
-from zwerm.scenario import InflowTable
+from zwerm.scenario import BaseTable, InflowTable
 from zwerm.world.placement import free_spot
 from zwerm.world.scene import Floats, Ints, Scene
 
@@ -43,3 +44,34 @@ class Inflow:
         x, y, r = scene.position[:, 0], scene.position[:, 1], scene.radius_m
         inside = (x - r >= x0) & (x + r <= x1) & (y - r >= y0) & (y + r <= y1)
         return np.flatnonzero(inside & scene.present)
+
+
+class Depot:
+    """The robots, ids from 1 to `count` - 1, that wait at a base station, which is robot 0."""
+
+    def __init__(self, table: BaseTable, count: int) -> None:
+        x, y, heading = table.pose
+        self.base: tuple[int, Floats, float] = (0, np.array([x, y]), heading)
+        self._count = count
+        self._next_robot = 1
+        self._ordered = 0
+        self.refused_releases = 0
+
+    def release(self) -> None:
+        """Let the next robot out; a release from an empty depot is refused and counted."""
+        if self._next_robot + self._ordered < self._count:
+            self._ordered += 1
+        else:
+            self.refused_releases += 1
+
+    def entering(self, scene: Scene) -> tuple[int, Floats, float] | None:
+        """Return (robot, position (2,) [m], heading [rad]) of a robot that enters now, at the base, or None."""
+        if not self._ordered:
+            return None
+        self._ordered -= 1
+        robot, self._next_robot = self._next_robot, self._next_robot + 1
+        return robot, self.base[1].copy(), self.base[2]
+
+    def leaving(self, scene: Scene) -> Ints:
+        """Return nobody: what a base station released stays out."""
+        return np.zeros(0, dtype=np.int64)

@@ -15,8 +15,9 @@ from zwerm.protocol import Packet, Transmission
 from zwerm.scenario import RadioTable
 from zwerm.world.scene import Bools, Ints, Scene
 
+# From robot to robot, and between any robot and the coordinator.
 ROBOTS: Final = "robots"
-CHANNELS: Final = (ROBOTS,)
+UPLINK: Final = "uplink"
 
 
 class LinkModel(Protocol):
@@ -53,13 +54,14 @@ class LineOfSight:
 
 
 class Absent:
-    """Drops what is sent to or from a robot that is not in the arena."""
+    """Drops what is sent to a robot that is not in the arena; nodes without a body are always there."""
 
     cause = "absent"
 
     def drops(self, scene: Scene, sender: Ints, receiver: Ints) -> Bools:
-        """Look both ends up."""
-        return ~(scene.present[sender] & scene.present[receiver])
+        """Look the receivers up."""
+        robots = len(scene.present)
+        return (receiver < robots) & ~scene.present[np.minimum(receiver, robots - 1)]
 
 
 class Accounts:
@@ -80,20 +82,44 @@ class Accounts:
         return self.sent - self.delivered - self.dropped.total()
 
 
-class Medium:
-    """The medium of one run of `count` robots."""
+class Channel:
+    """A named channel: its members, and the models that judge its packets, in order."""
 
-    def __init__(self, table: RadioTable | None, count: int) -> None:
+    def __init__(self, members: range, center: int | None, models: list[LinkModel], anonymous: bool = False) -> None:
+        self.models = models
+        self.anonymous = anonymous
+        self._members = members
+        self._center = center
+
+    def hearers(self, sender: int) -> Sequence[int]:
+        """Return the nodes that a broadcast of `sender` is for: everyone, or through the center where there is one."""
+        if self._center is not None and sender != self._center:
+            return (self._center,)
+        return [node for node in self._members if node != sender]
+
+    def carries(self, sender: int, to: int) -> bool:
+        """Tell whether `sender` may address `to` at all."""
+        if to == sender or to not in self._members:
+            return False
+        return self._center is None or self._center in (sender, to)
+
+
+class Medium:
+    """The medium of one run: `robots` robots, with ids from 0, and a coordinator, if any, whose id is `robots`."""
+
+    def __init__(self, table: RadioTable | None, robots: int, coordinator: bool) -> None:
         self.accounts = Accounts()
-        self.open = table is not None
-        self._count = count
-        self._anonymous = table is not None and table.anonymous
-        self._models: list[LinkModel] = [Absent()]
-        if table is not None and table.range_m is not None:
-            self._models.append(DiscRange(table.range_m))
-        if table is not None and table.line_of_sight:
-            self._models.append(LineOfSight())
+        self.channels: dict[str, Channel] = {}
         self._inboxes: dict[int, list[tuple[int, Packet]]] = {}
+        if table is not None:
+            models: list[LinkModel] = [Absent()]
+            if table.range_m is not None:
+                models.append(DiscRange(table.range_m))
+            if table.line_of_sight:
+                models.append(LineOfSight())
+            self.channels[ROBOTS] = Channel(range(robots), None, models, table.anonymous)
+        if coordinator:
+            self.channels[UPLINK] = Channel(range(robots + 1), robots, [Absent()])
 
     def waiting(self) -> Sequence[int]:
         """Return the robots that have packets to receive, in id order."""
@@ -115,47 +141,55 @@ class Medium:
             self._drop(sender, robot, cause)
 
     def send(self, scene: Scene, outboxes: Sequence[tuple[int, Sequence[Transmission]]]) -> None:
-        """Take what the robots sent at this tick, (robot, its outbox) in id order, and judge every packet."""
-        sender, receiver, messages = self._expand(outboxes)
-        if not len(sender):
-            return
-        cause = np.full(len(sender), -1)
-        for number, model in enumerate(self._models):
-            left = np.flatnonzero(cause < 0)
-            cause[left[model.drops(scene, sender[left], receiver[left])]] = number
-        self.accounts.sent += len(sender)
-        for a, b, message, verdict in zip(sender.tolist(), receiver.tolist(), messages, cause.tolist(), strict=True):
-            self.accounts.links_sent[a, b] += 1
-            if verdict >= 0:
-                self._drop(a, b, self._models[verdict].cause)
+        """Take what the nodes sent at this tick, (node, its outbox) in id order, and judge every packet."""
+        for name, channel in self.channels.items():
+            sender, receiver, messages = self._expand(name, channel, outboxes)
+            if messages:
+                self._judge(channel, scene, sender, receiver, messages)
+
+    def _judge(
+        self, channel: Channel, scene: Scene, sender: Ints, receiver: Ints, messages: list[Transmission]
+    ) -> None:
+        verdict = np.full(len(messages), -1)
+        for number, model in enumerate(channel.models):
+            left = np.flatnonzero(verdict < 0)
+            verdict[left[model.drops(scene, sender[left], receiver[left])]] = number
+        accounts = self.accounts
+        accounts.sent += len(messages)
+        for a, b, message, number in zip(sender.tolist(), receiver.tolist(), messages, verdict.tolist(), strict=True):
+            accounts.links_sent[a, b] += 1
+            accounts.bytes += len(message.payload)
+            if number >= 0:
+                self._drop(a, b, channel.models[number].cause)
                 continue
-            packet = Packet(message.channel, message.payload, None if self._anonymous else a)
+            packet = Packet(message.channel, message.payload, None if channel.anonymous else a)
             self._inboxes.setdefault(b, []).append((a, packet))
 
     def _drop(self, sender: int, receiver: int, cause: str) -> None:
         self.accounts.dropped[cause] += 1
         self.accounts.links_dropped[sender, receiver][cause] += 1
 
-    def _expand(self, outboxes: Sequence[tuple[int, Sequence[Transmission]]]) -> tuple[Ints, Ints, list[Transmission]]:
-        """Return one (sender, receiver, transmission) for every potential receiver."""
+    def _expand(
+        self, name: str, channel: Channel, outboxes: Sequence[tuple[int, Sequence[Transmission]]]
+    ) -> tuple[Ints, Ints, list[Transmission]]:
+        """Return one (sender, receiver, transmission) for every receiver that a packet is meant for."""
         senders: list[int] = []
         receivers: list[int] = []
         messages: list[Transmission] = []
-        for robot, outbox in outboxes:
+        for node, outbox in outboxes:
             for message in outbox:
-                self.accounts.bytes += len(message.payload)
-                to = [each for each in range(self._count) if each != robot] if message.to is None else [message.to]
-                senders += [robot] * len(to)
-                receivers += to
-                messages += [message] * len(to)
+                if message.channel == name:
+                    to = channel.hearers(node) if message.to is None else (message.to,)
+                    senders += [node] * len(to)
+                    receivers += to
+                    messages += [message] * len(to)
         return np.array(senders, dtype=np.int64), np.array(receivers, dtype=np.int64), messages
 
-    def refuses(self, message: Transmission) -> str:
+    def refuses(self, sender: int, message: Transmission) -> str:
         """Return why this transmission cannot be sent at all, or an empty string."""
-        if not self.open:
-            return "this scenario has no radio"
-        if message.channel not in CHANNELS:
-            return f"no channel {message.channel!r}"
-        if message.to is not None and not 0 <= message.to < self._count:
-            return f"no node {message.to}"
+        channel = self.channels.get(message.channel)
+        if channel is None:
+            return f"no channel {message.channel!r} here"
+        if message.to is not None and not channel.carries(sender, message.to):
+            return f"channel {message.channel!r} does not lead from node {sender} to {message.to}"
         return ""

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from zwerm.world.arena import Arena
 
 from zwerm.draws import Draws
+from zwerm.world.arena import Arena
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -8,6 +8,7 @@ The world is deterministic: its state after a tick is a function of the scenario
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from itertools import repeat
 from typing import Any, Final
 
@@ -15,12 +16,22 @@ import numpy as np
 
 from zwerm.draws import Draws
 from zwerm.errors import ProtocolError
-from zwerm.protocol import SENSOR_FIELDS, Command, Failure, Observation, Transmission, encode, open_answer
+from zwerm.protocol import (
+    SENSOR_FIELDS,
+    BodyVelocity,
+    Command,
+    Failure,
+    Observation,
+    Transmission,
+    WheelSpeeds,
+    encode,
+    open_answer,
+)
 from zwerm.scenario import Scenario
 from zwerm.trace import Trace
 from zwerm.world.arena import Arena
 from zwerm.world.drives import Drives
-from zwerm.world.inflow import Inflow
+from zwerm.world.inflow import Depot, Inflow
 from zwerm.world.medium import Medium
 from zwerm.world.physics import Physics
 from zwerm.world.placement import place
@@ -34,7 +45,7 @@ NO_ANSWER: Final = b""
 class World:
     """One run's world. Every robot carries the `sensors`; `seed` keys all randomness."""
 
-    def __init__(self, scenario: Scenario, seed: int, arena: Arena, sensors: list[Sensor]) -> None:
+    def __init__(self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor]) -> None:
         count, body = scenario.robots.count, scenario.robots.body
         self.scenario = scenario
         self.arena = arena
@@ -49,28 +60,41 @@ class World:
         self.late_commands = 0
         self.exited: list[int] = []
         self.trace = Trace()
-        self.medium = Medium(scenario.radio, count)
+        self.coordinator = count if scenario.coordinator is not None else None
+        self.medium = Medium(scenario.radio, count, self.coordinator is not None)
         self._physics = Physics(body, arena.segments, count, scenario.time.dt_s)
         self._drives = Drives(body, count, self.draws)
-        self._wakes = Wakes(count, scenario.time.dt_s)
+        nodes = count + (self.coordinator is not None)
+        self._wakes = Wakes(nodes, scenario.time.dt_s)
         self._sensors = {sensor.field: sensor for sensor in sensors}
         # One column of readings a field, up to the last field that any sensor fills.
         last = max((SENSOR_FIELDS.index(field) for field in self._sensors), default=-1)
         self._columns = SENSOR_FIELDS[: last + 1]
-        self._done: Bools = np.zeros(count, dtype=np.bool_)
+        self._done: Bools = np.zeros(nodes, dtype=np.bool_)
+        self._any_done = False
+        self._fixed = ([self.coordinator] if self.coordinator is not None else []) + ([0] if scenario.base else [])
+        self._drive_types = (self._drives.kind, type(None))
         self._present: Bools = np.zeros(count, dtype=np.bool_)
         self._nodes: list[int] = []
         self._awaited: dict[int, None] = {}
         self._observations: list[bytes] = []
         self._answers: dict[int, tuple[bytes, Command | Failure]] = {}
-        self._late: list[tuple[int, bytes, Command | Failure]] = []
+        self._late: list[tuple[int, Command | Failure]] = []
         self._last_answer: dict[int, int] = {}
         self._outboxes: list[tuple[int, tuple[Transmission, ...]]] = []
         self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
-        if self._inflow is None:
-            position, heading = place(scenario.robots.placement, arena, count, body.radius_m, self.draws)
+        self._depot = Depot(scenario.base, count) if scenario.base else None
+        if self.coordinator is not None:
+            self._wakes.admit(self.coordinator)
+        if self._depot is not None:
+            base, position, heading = self._depot.base
+            self._physics.fix(base, position, heading)
+            self._set_present(base, True)
+            self._wakes.admit(base)
+        elif self._inflow is None:
+            positions, headings = place(scenario.robots.placement, arena, count, body.radius_m, self.draws)
             for robot in range(count):
-                self._enter(robot, position[robot], float(heading[robot]))
+                self._enter(robot, positions[robot], float(headings[robot]))
         self.scene = self._look(np.ones(count, dtype=np.bool_))
         self._let_in_and_out()
 
@@ -85,14 +109,19 @@ class World:
             self._note_changes()
         awake = self._wakes.awake(tick)
         nodes: list[int] = awake.tolist()
-        readings = {field: sensor.read(scene, awake) for field, sensor in self._sensors.items()} if nodes else {}
+        # Ids ascend, and the coordinator's, which has no sensors, is the largest.
+        robots = awake[:-1] if nodes and nodes[-1] == self.coordinator else awake
+        readings = {field: sensor.read(scene, robots) for field, sensor in self._sensors.items()} if len(robots) else {}
         for field in SIGNATURES:
             if field in readings:
-                self._wakes.remember(field, nodes, readings[field])
+                self._wakes.remember(field, nodes[: len(robots)], readings[field])
         inboxes: Any = [self.medium.deliver(node) for node in nodes] if receivers else repeat(())
         columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]
-        ticks, times = repeat(tick, len(nodes)), repeat(scene.time_s)
+        ticks, times = repeat(tick, len(robots)), repeat(scene.time_s)
         self._observations = list(map(encode, map(Observation, ticks, times, inboxes, *columns)))
+        if len(robots) < len(nodes):
+            inbox = inboxes[-1] if receivers else ()
+            self._observations.append(encode(Observation(tick, scene.time_s, inbox)))
         self._nodes = nodes
         self._awaited = dict.fromkeys(nodes)
         self._answers.clear()
@@ -106,11 +135,13 @@ class World:
         """
         try:
             answer = open_answer(payload)
-            late = self._is_late(node, answer.tick)
-            if not late:
-                self._check_turn(node, answer.tick)
-            if type(answer) is Command and (answer.drive is not None or answer.outbox):
-                self._check_content(answer)
+            late = answer.tick != self.tick or node not in self._awaited or node in self._answers
+            if late:
+                self._check_late(node, answer.tick)
+            if type(answer) is Command and (
+                answer.outbox or type(answer.drive) not in self._drive_types or node in self._fixed
+            ):
+                self._check_content(node, answer)
         except ProtocolError as error:
             self.refused[error.reason] += 1
             raise
@@ -118,7 +149,7 @@ class World:
             self.failures[node] = answer
             self.crash(node, answer.error)
         if late:
-            self._late.append((node, payload, answer))
+            self._late.append((node, answer))
             self.late_commands += 1
         else:
             self._answers[node] = payload, answer
@@ -131,13 +162,17 @@ class World:
 
     def advance(self) -> None:
         """Apply what was accepted, in id order, and go on to the next tick."""
-        payloads = []
-        for node, _, answer in self._late:
-            self._apply(node, answer)
+        payloads: list[bytes] = []
+        commands: list[tuple[int, Command | Failure]] = list(self._late)
+        answers = self._answers
         for node in self._nodes:
-            payload, current = self._answers.get(node, (NO_ANSWER, None))
-            payloads.append(payload)
-            self._apply(node, current)
+            if node in answers:
+                payload, answer = answers[node]
+                payloads.append(payload)
+                commands.append((node, answer))
+            else:
+                payloads.append(NO_ANSWER)
+        self._apply(commands)
         self.trace.extend(self.tick, self._nodes, self._observations, payloads)
         if self._outboxes:
             self.medium.send(self.scene, self._outboxes)
@@ -166,7 +201,14 @@ class World:
 
     @property
     def completed(self) -> bool:
-        """Tell whether every robot that lives says that its part is done, or has left by the exit."""
+        """Tell whether the task is done: the coordinator says so, or the base station does, or all robots that live do.
+
+        Where there is a coordinator, it decides; else the base station, if there is one. Robots that left count as done.
+        """
+        if self._fixed:
+            return bool(self._done[self._fixed[0]])
+        if not (self._any_done or self.exited):
+            return False
         over = self._done.copy()
         over[self.exited] = True
         over[list(self.crashed)] = True
@@ -195,15 +237,16 @@ class World:
 
     def _let_in_and_out(self) -> None:
         """Let robots enter and leave at the start of a tick, and look again if any did."""
-        if self._inflow is None:
+        door = self._inflow or self._depot
+        if door is None:
             return
-        leaving = self._inflow.leaving(self.scene).tolist()
+        leaving = door.leaving(self.scene).tolist()
         for robot in leaving:
             self._physics.remove(robot)
             self._set_present(robot, False)
             self.exited.append(robot)
             self._retire(robot, "receiver-left")
-        entering = self._inflow.entering(self.scene)
+        entering = door.entering(self.scene)
         if entering is not None:
             self._enter(*entering)
         if leaving or entering is not None:
@@ -222,7 +265,8 @@ class World:
 
     def _retire(self, node: int, cause: str) -> None:
         self._wakes.retire(node)
-        self._drives.stop(node)
+        if node < self.count:
+            self._drives.stop(node)
         self.medium.lose(node, cause)
 
     def _note_changes(self) -> None:
@@ -234,35 +278,43 @@ class World:
             if sensor is not None and len(watchers := self._wakes.watchers(field)):
                 self._wakes.note_readings(field, watchers, sensor.read(self.scene, watchers), self.tick)
 
-    def _apply(self, node: int, answer: Command | Failure | None) -> None:
-        if type(answer) is not Command:
+    def _apply(self, answers: list[tuple[int, Command | Failure]]) -> None:
+        drives: list[tuple[int, BodyVelocity | WheelSpeeds]] = []
+        done = self._done
+        for node, answer in answers:
+            if type(answer) is not Command:
+                continue
+            if answer.drive is not None:
+                drives.append((node, answer.drive))
+            if answer.outbox:
+                self._outboxes.append((node, answer.outbox))
+            if answer.wake is not None:
+                self._wakes.sleep(node, answer.wake, self.tick)
+            if answer.release and node == 0 and self._depot is not None:
+                self._depot.release()
+            if answer.done or self._any_done:
+                done[node] = answer.done
+                self._any_done = True
+        if drives:
+            self._drives.command(drives)
+
+    def _check_late(self, node: int, tick: int) -> None:
+        """Raise ProtocolError, unless late answers are allowed and this one comes in order."""
+        if self.late_allowed and self._last_answer.get(node, -1) < tick < self.tick:
             return
-        if answer.drive is not None:
-            self._drives.command(node, answer.drive)
-        if answer.outbox:
-            self._outboxes.append((node, answer.outbox))
-        if answer.wake is not None:
-            self._wakes.sleep(node, answer.wake, self.tick)
-        self._done[node] = answer.done
-
-    def _is_late(self, node: int, tick: int) -> bool:
-        """Tell whether this answers an earlier observation, in order, where that is allowed."""
-        return self.late_allowed and self._last_answer.get(node, -1) < tick < self.tick
-
-    def _check_turn(self, node: int, tick: int) -> None:
-        """Raise ProtocolError unless the node was sent this tick's observation and has not answered it."""
         if tick != self.tick:
             raise ProtocolError("out-of-order", f"node {node} answers tick {tick} at tick {self.tick}")
         if node not in self._awaited:
             raise ProtocolError("unasked", f"node {node} was sent no observation at tick {tick}")
-        if node in self._answers:
-            raise ProtocolError("duplicate", f"node {node} answers tick {tick} again")
+        raise ProtocolError("duplicate", f"node {node} answers tick {tick} again")
 
-    def _check_content(self, command: Command) -> None:
+    def _check_content(self, node: int, command: Command) -> None:
         """Raise ProtocolError for a command that this world cannot carry out."""
-        if command.drive is not None and not self._drives.fits(command.drive):
+        if command.drive is not None and type(command.drive) is not self._drives.kind:
             raise ProtocolError("wrong-drive", f"a {self.scenario.robots.body.kind} body takes no {command.drive!r}")
+        if command.drive is not None and node in self._fixed:
+            raise ProtocolError("wrong-drive", f"node {node} has no drive")
         for message in command.outbox:
-            refused = self.medium.refuses(message)
+            refused = self.medium.refuses(node, message)
             if refused:
                 raise ProtocolError("wrong-packet", refused)

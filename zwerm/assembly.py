@@ -1,9 +1,10 @@
 """From a scenario to a world ready to run, with every mistake that the typed tables could not see."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import msgspec
+import numpy as np
 
 from zwerm.agents.registry import find, parameters_of
 from zwerm.errors import ControllerError, ScenarioError
@@ -29,25 +30,27 @@ def assemble(scenario: Scenario, seed: int) -> World:
         try:
             return make()
         except ScenarioError as error:
-            mistakes.extend(error.mistakes)
+            named = scenario.place + ": "
+            mistakes.extend(line if line.startswith(named) else named + line for line in error.mistakes)
             return None
 
     arena = attempt(lambda: Arena.from_table(scenario.arena, scenario.folder))
-    sensors: list[Sensor] | None = None
-    if arena is not None:
-        sensors = attempt(lambda: _sensors(scenario, arena))
     attempt(lambda: check_controller(scenario))
+    sensors = None if arena is None else attempt(lambda: _sensors(scenario, arena))
     if arena is not None and sensors is not None and not mistakes:
         world = attempt(lambda: World(scenario, seed, arena, sensors))
         if world is not None:
             return world
-    raise ScenarioError([f"{scenario.place}: {line}" for line in mistakes])
+    raise ScenarioError(mistakes)
 
 
-def _sensors(scenario: Scenario, arena: Arena) -> list[Sensor]:
-    field = None if scenario.field is None else make_field(scenario.field, arena, scenario.folder)
-    surroundings = Surroundings(arena=arena, landmarks=scenario.landmarks, field=field)
-    return make_sensors(scenario.robots.sensors, surroundings)
+def _sensors(scenario: Scenario, arena: Arena) -> Sequence[Sensor]:
+    field = None
+    if scenario.field is not None:
+        field = make_field(scenario.field, arena.bounds, scenario.folder, scenario.place)
+    landmarks = np.array(scenario.landmarks, dtype=np.float64).reshape(-1, 2)
+    surroundings = Surroundings(arena, scenario.robots.count, landmarks=landmarks, field=field)
+    return make_sensors(scenario.robots.sensors, surroundings, "robots.sensors", scenario.place)
 
 
 def check_controller(scenario: Scenario) -> None:
@@ -60,11 +63,12 @@ def check_controller(scenario: Scenario) -> None:
         found = find(robots.controller)
     except ControllerError as error:
         raise ScenarioError([f"robots.controller: {error}"]) from None
-    mistakes = []
     given = {table.kind for table in robots.sensors}
-    for sensor in getattr(found, "sensors", ()):
-        if sensor not in given:
-            mistakes.append(f"robots.sensors: the controller {robots.controller} needs the sensor {sensor!r}")
+    mistakes = [
+        f"robots.sensors: the controller {robots.controller} needs the sensor {sensor!r}"
+        for sensor in getattr(found, "sensors", ())
+        if sensor not in given
+    ]
     try:
         msgspec.convert(robots.parameters, parameters_of(found))
     except msgspec.ValidationError as error:

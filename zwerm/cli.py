@@ -175,7 +175,12 @@ def robot(
     from zwerm.deploy.remote import run_robots
 
     with _mistakes_in_one_line():
-        raise typer.Exit(run_robots(connect, credentials, ids))
+        with RunProgress(err, "swarm") as progress:
+            codes = run_robots(connect, credentials, ids, progress.joined)
+        failed = {node: code for node, code in codes.items() if code}
+        for node, code in sorted(failed.items()):
+            err.print(f"zwerm: node {node} ended with exit code {code}", style="red", markup=False, highlight=False)
+        raise typer.Exit(EXIT_FAILED if failed else 0)
 
 
 def _report(result: RunResult, picture: Path | None, animate: Path | None, as_json: bool) -> NoReturn:

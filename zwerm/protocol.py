@@ -257,7 +257,7 @@ def open_answer(payload: bytes) -> Command | Failure:
         answer: Command | Failure = decode_answer(payload)
     except REFUSABLE as error:
         raise refusal(error) from None
-    if isinstance(answer, Command):
+    if type(answer) is Command:
         if answer.drive is not None and not is_finite_drive(answer.drive):
             raise ProtocolError("not-finite", repr(answer.drive))
         if answer.wake is not None and answer.wake.at_s is not None and not math.isfinite(answer.wake.at_s):

@@ -1,5 +1,6 @@
 """What a run leaves behind: its outcome, its numbers, and enough of its history to draw it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,21 @@ class RunResult:
             self.metrics,
             coverage_radius_m=self.scenario.metrics.coverage_radius_m,
             cells=self.scenario.metrics.cells,
+        )
+
+    def animate(self, path: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
+        """Draw the run as an animation at `path`, .gif or .mp4, and return the path."""
+        from zwerm.world.pictures import animate_run
+
+        return animate_run(
+            Path(path),
+            self.arena,
+            self.history,
+            self.scenario.robots.body.radius_m,
+            self.title,
+            coverage_radius_m=self.scenario.metrics.coverage_radius_m,
+            cells=self.scenario.metrics.cells,
+            progress=progress,
         )
 
     @property

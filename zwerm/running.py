@@ -1,15 +1,15 @@
 """Running a scenario: inline in this process, or with every robot a process of its own."""
 
+import secrets
 import time
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Literal, Protocol
 
 from zwerm.agents.node import Node
 from zwerm.assembly import assemble
 from zwerm.deploy.cast import cast
-from zwerm.deploy.supervisor import LocalSwarm
+from zwerm.deploy.swarm import LocalSwarm, RemoteSwarm
 from zwerm.errors import ScenarioError, StragglerError
 from zwerm.link import WorldLink
 from zwerm.link.memory import MemoryLink
@@ -67,17 +67,46 @@ def run(
     if not isinstance(scenario, Scenario):
         scenario = load(str(scenario), tuple(overrides))
     world = assemble(scenario, seed)
-    players = cast(scenario, seed)
+    members = cast(scenario, seed)
     watcher = watcher or Nobody()
-    with ExitStack() as stack:
-        if runner == "inline":
-            nodes = {node: Node(controller, setup) for node, (controller, setup) in players.items()}
-            link: WorldLink = MemoryLink({node: each.answer for node, each in nodes.items()})
-            watcher.joined(len(nodes), len(nodes))
-        else:
-            swarm = stack.enter_context(LocalSwarm(players, on_joined=watcher.joined))
-            link = swarm.link
+    if runner == "inline":
+        nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
+        watcher.joined(len(nodes), len(nodes))
+        link = MemoryLink({node: each.answer for node, each in nodes.items()})
         return drive(world, link, seed, runner, realtime, watcher)
+    with LocalSwarm(new_run_id(), members, progress=watcher.joined) as swarm:
+        return drive(world, swarm.link, seed, runner, realtime, watcher)
+
+
+def serve(
+    scenario: Scenario,
+    seed: int,
+    listen: Sequence[str],
+    credentials_file: Path,
+    realtime: float | None = None,
+    watcher: Watcher | None = None,
+    deadline_s: float = 600.0,
+) -> RunResult:
+    """Run a world whose robots are started elsewhere, with the credentials that are written to `credentials_file`.
+
+    Waits `deadline_s` for them to connect to one of the Zenoh endpoints `listen`. Raises ScenarioError and LinkError.
+    """
+    world = assemble(scenario, seed)
+    watcher = watcher or Nobody()
+    with RemoteSwarm(
+        new_run_id(),
+        cast(scenario, seed),
+        listen=listen,
+        credentials_file=credentials_file,
+        progress=watcher.joined,
+        deadline_s=deadline_s,
+    ) as swarm:
+        return drive(world, swarm.link, seed, "remote", realtime, watcher)
+
+
+def new_run_id() -> str:
+    """Return a name for a run that no other run on the same router has; it influences nothing."""
+    return secrets.token_hex(8)
 
 
 def drive(

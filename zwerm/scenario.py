@@ -77,7 +77,9 @@ class TimeTable(Table):
 class ArenaTable(Table):
     """The space robots live in: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
 
-    `map` is a ROS map_server YAML, or a bitmap, which needs `resolution_m` or `size_m`. Paths start at the scenario.
+    `map` is a ROS map_server YAML, or a bitmap (dark is wall), which needs `resolution_m`, or `size_m` to stretch it to;
+    `start` is a place [m] in the part of the map to keep, else the largest is. Paths are relative to the scenario.
+    `scale` multiplies every length of this table.
     """
 
     size_m: Size | None = None
@@ -86,6 +88,7 @@ class ArenaTable(Table):
     geojson: str | None = None
     map: str | None = None
     resolution_m: Positive | None = None
+    start: Point | None = None
     scale: Positive = 1.0
     obstacles: list[Annotated[list[Point], Field(min_length=3)]] = []
     walls: list[Annotated[list[Point], Field(min_length=2)]] = []
@@ -143,8 +146,23 @@ class RobotsTable(Table):
     on_crash: Literal["fail", "continue"] = "fail"
 
 
+class BaseTable(Table):
+    """A base station: robot 0, which never moves. The others wait in its depot until it releases them, one at a time."""
+
+    controller: str
+    parameters: dict[str, Any] = {}
+    pose: tuple[Finite, Finite, Finite]
+
+
+class CoordinatorTable(Table):
+    """The optional central node. It has no body and no sensors; it hears robots over the `uplink` channel."""
+
+    controller: str
+    parameters: dict[str, Any] = {}
+
+
 class RadioTable(Table):
-    """The radio: who hears whom."""
+    """The radio between robots, channel `robots`: who hears whom. Without this table there is none."""
 
     range_m: Positive | None = None
     line_of_sight: bool = False
@@ -168,6 +186,8 @@ class Scenario(Table):
     time: TimeTable = TimeTable()
     arena: ArenaTable
     robots: RobotsTable
+    base: BaseTable | None = None
+    coordinator: CoordinatorTable | None = None
     field: OpenTable | None = None
     landmarks: list[Point] = []
     radio: RadioTable | None = None

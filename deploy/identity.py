@@ -1,0 +1,137 @@
+"""Identities: who may join a run, and what the network lets each node do.
+
+Every run has new random credentials. The router admits a user name only with its password, and only from the session with
+the Zenoh id issued along with it; then access control, which denies by default, leaves a node exactly its own keys: put its
+commands, receive its observations, say hello, keep its own liveliness token. So locality does not rest on good manners.
+
+Credentials travel by pipe to robot processes of this machine and by file (0600) to others; never on a command line or in
+the environment.
+"""
+
+import os
+import secrets
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from zwerm.errors import LinkError
+from zwerm.keys import EVERY, alive_key, command_key, hello_key, observation_key
+from zwerm.link.session import Credential, Credentials, lease_settings
+
+PRIVATE_FILE_MODE: Final = 0o600
+SECRET_BYTES: Final = 24
+
+# What a node may do on each of its keys: (key, message, flow seen from the router).
+_PERMISSIONS: Final = (
+    (command_key, "put", "ingress"),
+    (observation_key, "declare_subscriber", "ingress"),
+    (observation_key, "put", "egress"),
+    (hello_key, "query", "ingress"),
+    (hello_key, "reply", "egress"),
+    (alive_key, "liveliness_token", "ingress"),
+)
+
+
+def issue(run: str, nodes: Iterable[int], authority_pem: str = "") -> Credentials:
+    """Return new random credentials for `nodes`, who are to trust certificates signed by `authority_pem`."""
+    return Credentials(run, tuple(_issue(node) for node in nodes), authority_pem)
+
+
+def renew(credential: Credential) -> Credential:
+    """Return the credential for the next life of a node: it connects as before, and joins under a new incarnation."""
+    return msgspec.structs.replace(credential, incarnation=credential.incarnation + 1)
+
+
+def _issue(node: int) -> Credential:
+    return Credential(
+        node=node,
+        incarnation=1,
+        user=f"node-{node}",
+        password=secrets.token_urlsafe(SECRET_BYTES),
+        zid="f" + secrets.token_hex(15),
+    )
+
+
+def router_settings(credentials: Credentials, endpoints: list[str], dictionary: Path) -> dict[str, Any]:
+    """Return Zenoh settings of a router that listens on `endpoints` and admits those, and only those, credentials.
+
+    Writes the passwords to `dictionary`, which the router reads when its session opens; the caller removes it then.
+    """
+    write_private(dictionary, "".join(f"{node.user}:{node.password}\n" for node in credentials.nodes).encode())
+    capacity = len(credentials.nodes)
+    return {
+        "listen/endpoints": endpoints,
+        "listen/exit_on_failure": True,
+        "transport/unicast/accept_pending": 2 * capacity + 100,
+        "transport/unicast/max_sessions": 2 * capacity + 100,
+        "transport/auth/usrpwd/dictionary_file": str(dictionary),
+        "access_control": access_control(credentials),
+        **lease_settings(endpoints),
+    }
+
+
+def access_control(credentials: Credentials) -> dict[str, Any]:
+    """Return the access control that leaves every node its own keys and nothing else."""
+    # A node's session publishes only once it knows that somebody listens; it may know that the world listens to every node.
+    listens = _allow("world-listens", command_key(credentials.run, EVERY), "declare_subscriber", "egress")
+    rules = [listens]
+    policies = []
+    for credential in credentials.nodes:
+        own = [
+            _allow(f"{credential.node}.{number}", key(credentials.run, credential.node), message, flow)
+            for number, (key, message, flow) in enumerate(_PERMISSIONS)
+        ]
+        rules += own
+        policies.append({"rules": [rule["id"] for rule in [listens, *own]], "subjects": [credential.user]})
+    subjects = [{"id": node.user, "usernames": [node.user], "zids": [node.zid]} for node in credentials.nodes]
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": subjects,
+        "policies": policies,
+    }
+
+
+def _allow(name: str, key: str, message: str, flow: str) -> dict[str, Any]:
+    return {"id": name, "permission": "allow", "messages": [message], "flows": [flow], "key_exprs": [key]}
+
+
+def slice_of(credentials: Credentials, nodes: Iterable[int]) -> Credentials:
+    """Return the credentials of `nodes` only. Raises LinkError where there are none for one of them."""
+    known = {credential.node: credential for credential in credentials.nodes}
+    chosen = list(nodes)
+    missing = [node for node in chosen if node not in known]
+    if missing:
+        raise LinkError(f"the credentials hold nothing for node {missing[0]}")
+    return Credentials(credentials.run, tuple(known[node] for node in chosen), credentials.authority_pem)
+
+
+def save(credentials: Credentials, path: Path) -> None:
+    """Write credentials to a file that only its owner can read. Raises LinkError where that is impossible."""
+    try:
+        write_private(path, msgspec.json.format(msgspec.json.encode(credentials), indent=1))
+    except OSError as error:
+        raise LinkError(f"{path}: cannot write credentials: {error.strerror}") from None
+
+
+def load(path: Path) -> Credentials:
+    """Return the credentials in a file. Raises LinkError where it is missing, readable by others, or malformed."""
+    try:
+        if path.stat().st_mode & 0o077:
+            raise LinkError(f"{path}: credentials must be readable by their owner only (chmod 600)")
+        return msgspec.json.decode(path.read_bytes(), type=Credentials)
+    except OSError as error:
+        raise LinkError(f"{path}: cannot read credentials: {error.strerror}") from None
+    except msgspec.DecodeError as error:
+        raise LinkError(f"{path}: no credentials: {error}") from None
+
+
+def write_private(path: Path, content: bytes) -> None:
+    """Write a file that only its owner can read, from its first byte on; one that was there before is replaced."""
+    path.unlink(missing_ok=True)
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, PRIVATE_FILE_MODE)
+    with open(descriptor, "wb") as file:
+        file.write(content)

@@ -1,0 +1,190 @@
+"""A whole swarm behind one link: its credentials, its router, and its processes, on this machine or on others.
+
+    with LocalSwarm(run, members) as swarm:
+        swarm.link.send(...); swarm.link.receive(...)
+
+Promises: entering returns when every node has joined; leaving, in whatever way, leaves no process, socket or directory.
+"""
+
+import contextlib
+import shutil
+import tempfile
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final, NamedTuple, Self
+
+from zwerm.agents.contract import Setup
+from zwerm.deploy.identity import issue, router_settings, save
+from zwerm.deploy.supervisor import (
+    JOIN_DEADLINE_S,
+    LEAVE_DEADLINE_S,
+    LocalSupervisor,
+    Progress,
+    interrupts_held,
+    prepare,
+)
+from zwerm.errors import LinkError
+from zwerm.link.session import UNIX_PROTOCOL, Credentials
+from zwerm.link.zenoh_world import Member, ZenohWorldLink
+from zwerm.protocol import encode
+
+Members = Mapping[int, tuple[str, Setup]]
+
+# The path of a Unix socket has at most 107 bytes, on macOS 103.
+_SOCKET_PATH_BYTES_MAX: Final = 100
+
+
+class Certificate(NamedTuple):
+    """The world's certificate for TLS and QUIC endpoints, its private key, and the authority that signed it: PEM files."""
+
+    certificate: Path
+    private_key: Path
+    authority: Path
+
+
+class _Swarm(ABC):
+    """The nodes of `members` (controller name and setup, by id), and the link to them, from enter to exit."""
+
+    link: ZenohWorldLink
+    credentials: Credentials
+
+    def __init__(self, run: str, members: Members, progress: Progress | None, deadline_s: float) -> None:
+        self._run = run
+        self._members = members
+        self._progress = progress or (lambda joined, total: None)
+        self._deadline_s = deadline_s
+        self._stack = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        """Start everything, and return when every node has joined. Raises LinkError where one does not."""
+        with contextlib.ExitStack() as stack:
+            with interrupts_held():
+                directory = Path(tempfile.mkdtemp(prefix="zwerm-", dir=_short_temporary_directory()))
+                stack.callback(shutil.rmtree, directory, ignore_errors=True)
+                self._open(stack, directory)
+            self._gather()
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End every node and release everything; idempotent."""
+        with interrupts_held():
+            self._stack.close()
+
+    def _listen(
+        self, stack: contextlib.ExitStack, directory: Path, endpoints: list[str], tls: Certificate | None
+    ) -> None:
+        """Issue credentials, and open the world's end of the link on `endpoints`."""
+        self.credentials = issue(self._run, self._members, tls.authority.read_text() if tls else "")
+        members = {
+            credential.node: Member(
+                credential.incarnation, self._members[credential.node][0], encode(self._members[credential.node][1])
+            )
+            for credential in self.credentials.nodes
+        }
+        passwords = directory / "passwords"
+        settings = router_settings(self.credentials, endpoints, passwords)
+        if tls:
+            settings["transport/link/tls/listen_certificate"] = str(tls.certificate)
+            settings["transport/link/tls/listen_private_key"] = str(tls.private_key)
+        try:
+            self.link = ZenohWorldLink(self._run, members, settings)
+        finally:
+            passwords.unlink()
+        stack.callback(self.link.close)
+
+    @abstractmethod
+    def _open(self, stack: contextlib.ExitStack, directory: Path) -> None:
+        """Open the link, and leave on the stack what ends the nodes."""
+
+    @abstractmethod
+    def _gather(self) -> None:
+        """Return when every node has joined."""
+
+
+class LocalSwarm(_Swarm):
+    """A swarm of processes of this machine, reached by a Unix socket in a private directory."""
+
+    supervisor: LocalSupervisor
+
+    def __init__(
+        self,
+        run: str,
+        members: Members,
+        *,
+        progress: Progress | None = None,
+        order: Sequence[int] | None = None,
+        deadline_s: float = JOIN_DEADLINE_S,
+    ) -> None:
+        """`order` is the order of starting; `deadline_s` is given to each wave of processes to join."""
+        super().__init__(run, members, progress, deadline_s)
+        self._order = order
+
+    def _open(self, stack: contextlib.ExitStack, directory: Path) -> None:
+        prepare(len(self._members))
+        endpoint = f"{UNIX_PROTOCOL}/{directory}/router"
+        self._listen(stack, directory, [endpoint], None)
+        self.supervisor = LocalSupervisor(endpoint, self.credentials, order=self._order)
+        stack.callback(self._end)
+
+    def _gather(self) -> None:
+        self.supervisor.start(self._progress, self._deadline_s)
+
+    def _end(self) -> None:
+        self.link.dismiss("the run is over")
+        self.supervisor.stop(LEAVE_DEADLINE_S)
+
+
+class RemoteSwarm(_Swarm):
+    """A swarm whose processes are started by others, with the credentials that are written to `credentials_file`."""
+
+    def __init__(
+        self,
+        run: str,
+        members: Members,
+        *,
+        listen: Sequence[str],
+        credentials_file: Path,
+        tls: Certificate | None = None,
+        progress: Progress | None = None,
+        deadline_s: float = JOIN_DEADLINE_S,
+    ) -> None:
+        """`listen` are Zenoh endpoints, such as `tcp/0.0.0.0:7447`; `deadline_s` is given to all nodes to join."""
+        super().__init__(run, members, progress, deadline_s)
+        self._endpoints = list(listen)
+        self._credentials_file = credentials_file
+        self._tls = tls
+
+    def _open(self, stack: contextlib.ExitStack, directory: Path) -> None:
+        self._listen(stack, directory, self._endpoints, self._tls)
+        save(self.credentials, self._credentials_file)
+        stack.callback(self._credentials_file.unlink, missing_ok=True)
+        stack.callback(self._end)
+
+    def _gather(self) -> None:
+        total = len(self._members)
+        joined = 0
+        end_s = time.monotonic() + self._deadline_s
+        while joined < total:
+            if not self.link.wait_joined(lambda count, before=joined: count != before, end_s - time.monotonic()):
+                missing = sorted(set(self._members) - self.link.joined)
+                raise LinkError(
+                    f"{len(missing)} nodes, first node {missing[0]}, did not join within {self._deadline_s:g} s"
+                )
+            joined = len(self.link.joined)
+            self._progress(joined, total)
+
+    def _end(self) -> None:
+        self.link.dismiss("the run is over")
+        self.link.wait_joined(lambda count: count == 0, LEAVE_DEADLINE_S)
+
+
+def _short_temporary_directory() -> str:
+    """Return the directory for temporary files, or /tmp where a socket below it would have too long a path."""
+    chosen = tempfile.gettempdir()
+    return chosen if len(chosen) < _SOCKET_PATH_BYTES_MAX - len("/zwerm-12345678/router") else "/tmp"

@@ -1,0 +1,122 @@
+"""A node's end of a Zenoh link: a client session that can reach the world's router and nothing else.
+
+Promises: `join` subscribes before it says hello, so that nothing sent to a welcomed node is lost; messages arrive in the
+order sent. The link is lost as soon as its transport is, and does not come back: to the world the node is lost as well.
+"""
+
+import contextlib
+import queue
+import time
+from collections.abc import Callable
+from typing import Final
+
+import zenoh
+
+from zwerm.errors import LinkError
+from zwerm.keys import alive_key, command_key, hello_key, observation_key
+from zwerm.link.session import Credential, lease_settings, open_session, tls_settings
+from zwerm.protocol import REFUSABLE, Hello, Welcome, decode_welcome, encode, refusal
+
+RETRY_S: Final = 0.05
+
+
+class ZenohNodeLink:
+    """The end of the node that `credential` names, of the run `run`, connected to `endpoint`."""
+
+    def __init__(
+        self,
+        run: str,
+        credential: Credential,
+        endpoint: str,
+        *,
+        authority_pem: str = "",
+        deadline_s: float = 30.0,
+        on_message: Callable[[bytes], object] | None = None,
+        on_lost: Callable[[], object] | None = None,
+    ) -> None:
+        """Connect. Raises LinkError where that does not succeed within `deadline_s` seconds.
+
+        `on_message` and `on_lost` are called in Zenoh's thread and must return at once; without `on_message`, messages wait
+        for `receive`.
+        """
+        self._run = run
+        self._credential = credential
+        self._place = f"node {credential.node} at {endpoint}"
+        self._deadline_s = time.monotonic() + deadline_s
+        self._inbox: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._on_message = on_message or self._inbox.put
+        self._on_lost = on_lost
+        self._session = open_session(
+            {
+                "mode": "client",
+                "id": credential.zid,
+                "connect/endpoints": [endpoint],
+                "connect/timeout_ms": round(1000 * deadline_s),
+                "connect/exit_on_failure": True,
+                "transport/auth/usrpwd": {"user": credential.user, "password": credential.password},
+                **lease_settings([endpoint]),
+                **tls_settings(authority_pem),
+            },
+            f"{self._place}: no world answers there, or it does not take these credentials",
+        )
+        try:
+            self._session.info.declare_transport_events_listener(
+                zenoh.handlers.Callback(self._on_transport, indirect=False)
+            )
+            publisher = self._session.declare_publisher(
+                command_key(run, credential.node),
+                express=True,
+                congestion_control=zenoh.CongestionControl.BLOCK,
+                allowed_destination=zenoh.Locality.REMOTE,
+            )
+            self.send: Callable[[bytes], None] = publisher.put
+        except BaseException:
+            self._session.close()
+            raise
+
+    def join(self) -> Welcome:
+        """Say hello until the world answers. Raises LinkError where it refuses, or does not answer in time."""
+        node = self._credential.node
+        self._session.declare_subscriber(
+            observation_key(self._run, node),
+            zenoh.handlers.Callback(self._on_sample, indirect=False),
+            allowed_origin=zenoh.Locality.REMOTE,
+        )
+        self._token = self._session.liveliness().declare_token(alive_key(self._run, node))
+        hello = encode(Hello(node, self._credential.incarnation))
+        while (left_s := self._deadline_s - time.monotonic()) > 0:
+            replies = self._session.get(
+                hello_key(self._run, node), zenoh.handlers.FifoChannel(1), payload=hello, timeout=left_s, express=True
+            )
+            for reply in replies:
+                if reply.ok is not None:
+                    return self._opened(reply.ok.payload.to_bytes())
+            time.sleep(RETRY_S)  # the world listens already but does not answer yet
+        raise LinkError(f"{self._place}: the world did not answer hello in time")
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        """Return the next message from the world, or None after `timeout_s` seconds without one."""
+        with contextlib.suppress(queue.Empty):
+            return self._inbox.get(timeout=max(timeout_s, 0.0))
+        return None
+
+    def close(self) -> None:
+        """Release all that the link holds, after what was sent has left; idempotent."""
+        self._on_lost = None
+        self._session.close()
+
+    def _opened(self, payload: bytes) -> Welcome:
+        try:
+            welcome: Welcome = decode_welcome(payload)
+        except REFUSABLE as error:
+            raise LinkError(f"{self._place}: the world's welcome is {refusal(error)}") from None
+        if welcome.refused:
+            raise LinkError(f"{self._place}: the world refuses it: {welcome.refused}")
+        return welcome
+
+    def _on_sample(self, sample: zenoh.Sample) -> None:
+        self._on_message(sample.payload.to_bytes())
+
+    def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        if event.kind == zenoh.SampleKind.DELETE and self._on_lost is not None:
+            self._on_lost()
