@@ -24,9 +24,13 @@ def main() -> None:
     with LocalSwarm(new_run_id(), cast(scenario, 1)) as swarm:
         result = drive(assemble(scenario, 1), swarm.link, 1, "processes")
         turned_away = swarm.link.refused.total()
-    print(f"outcome {result.outcome} after {result.wall_s:,.0f} s, {result.robot_ticks / result.wall_s:,.0f} robot-ticks/s")
+    print(
+        f"outcome {result.outcome} after {result.wall_s:,.0f} s, {result.robot_ticks / result.wall_s:,.0f} robot-ticks/s"
+    )
     print(f"{2 * result.robot_ticks:,} messages: {result.robot_ticks:,} observations and as many commands")
-    print(f"lost {result.middleware_lost}, duplicated or out of order {sum(result.refused.values())}, refused {turned_away}")
+    print(
+        f"lost {result.middleware_lost}, duplicated or out of order {sum(result.refused.values())}, refused {turned_away}"
+    )
     if result.middleware_lost or result.refused or turned_away or not result.ok:
         raise SystemExit("the middleware lost messages")
 

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from support import ROOT, ZWERM
+
 from zwerm.scenario import built_in
 
 
@@ -36,7 +36,7 @@ def test_check_reports_every_mistake_of_every_stage_with_its_place_rule_and_valu
         'arena = { size_m = [3.0, -1.0] }\nrobots = { count = 0, controller = "computation-free", colour = "red" }\n'
     )
     (tmp_path / "parts.toml").write_text(
-        'arena = { size_m = [3.0, 3.0], polygon = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] }\n'
+        "arena = { size_m = [3.0, 3.0], polygon = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] }\n"
         '[robots]\ncount = 2\ncontroller = "computation-free"\nparameters = { left_0 = 3.0 }\n'
     )
     ran = zwerm("check", "tables.toml", "parts.toml", cwd=tmp_path)
@@ -57,11 +57,17 @@ def test_check_reports_every_mistake_of_every_stage_with_its_place_rule_and_valu
         (["run", "no-such"], "zwerm: no-such: expected a scenario file or the name of a built-in one; built in are "),
         (["run", "computation-free", "--set", "robots.count=none"], "robots.count: "),
         (["run", "computation-free", "--set", "robots"], "zwerm: --set robots: expected path=value"),
-        (["run", "computation-free", "--set", "robots.controller=nobody"], "robots.controller: expected a built-in controller"),
+        (
+            ["run", "computation-free", "--set", "robots.controller=nobody"],
+            "robots.controller: expected a built-in controller",
+        ),
         (["run", "computation-free", "--set", "robots.controller=no_such_file:Robot"], "cannot import 'no_such_file'"),
         (["run", "computation-free", "--set", "robots.count=2000"], "robots.placement: no room for robot"),
         (["run", "computation-free", "--inline", "--realtime", "0"], "zwerm: realtime: expected a factor > 0, got 0.0"),
-        (["robot", "--connect", "tcp/127.0.0.1:1", "--credentials", "none.key"], "zwerm: none.key: cannot read credentials"),
+        (
+            ["robot", "--connect", "tcp/127.0.0.1:1", "--credentials", "none.key"],
+            "zwerm: none.key: cannot read credentials",
+        ),
     ],
 )
 def test_a_mistake_is_one_line_and_status_2(arguments: list[str], line: str) -> None:
@@ -73,7 +79,9 @@ def test_a_mistake_is_one_line_and_status_2(arguments: list[str], line: str) -> 
 
 
 def test_json_is_one_object_with_exactly_the_documented_keys_and_nothing_else(tmp_path: Path) -> None:
-    ran = zwerm("run", "computation-free", "--inline", "--json", "--seed", "2", "--set", "time.duration_s=1", cwd=tmp_path)
+    ran = zwerm(
+        "run", "computation-free", "--inline", "--json", "--seed", "2", "--set", "time.duration_s=1", cwd=tmp_path
+    )
     assert ran.returncode == 0, ran.stderr
     assert ran.stderr == ""
     found = json.loads(ran.stdout)
@@ -90,9 +98,18 @@ def test_json_is_one_object_with_exactly_the_documented_keys_and_nothing_else(tm
 
 
 def test_a_run_for_people_says_how_it_went_and_where_the_picture_is(tmp_path: Path) -> None:
-    ran = zwerm("run", "computation-free", "--inline", "--set", "time.duration_s=2", "--animate", "run.gif", cwd=tmp_path)
+    ran = zwerm(
+        "run", "computation-free", "--inline", "--set", "time.duration_s=2", "--animate", "run.gif", cwd=tmp_path
+    )
     assert ran.returncode == 0, ran.stderr
-    for word in ("time-limit", "cell_coverage_fraction", "robot-ticks/s", "trace", "runs/computation-free-seed1.png", "run.gif"):
+    for word in (
+        "time-limit",
+        "cell_coverage_fraction",
+        "robot-ticks/s",
+        "trace",
+        "runs/computation-free-seed1.png",
+        "run.gif",
+    ):
         assert word in ran.stdout
     assert (tmp_path / "runs/computation-free-seed1.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")

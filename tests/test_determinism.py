@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
-
 from support import ROBOTS, ROOT, ZWERM, scenario
+
 from zwerm.assembly import assemble
 from zwerm.deploy.cast import cast
 from zwerm.deploy.swarm import LocalSwarm
@@ -86,18 +86,27 @@ def test_the_hash_seed_of_python_changes_nothing(hash_seed: str) -> None:
     assert found["trace"] == inline.trace
 
 
-def test_one_flipped_bit_of_one_command_changes_the_trace() -> None:
-    chosen = chattering()
-    nudged = chattering(arena={"size_m": [2.0, 2.0 + 1e-12]})
-    assert run(chosen, 1, "inline").trace != run(nudged, 1, "inline").trace
+def test_a_start_shifted_by_a_picometre_changes_the_trace() -> None:
+    def starting_at(x_m: float) -> Scenario:
+        poses = {"kind": "poses", "poses": [[x_m, 0.5, 0.0]]}
+        return scenario(
+            robots={"count": 1, "controller": "random-walk", "sensors": [{"kind": "pose"}], "placement": poses}
+        )
+
+    assert run(starting_at(0.5), 1, "inline").trace == run(starting_at(0.5), 1, "inline").trace
+    assert run(starting_at(0.5), 1, "inline").trace != run(starting_at(0.5 + 1e-12), 1, "inline").trace
 
 
 def test_adding_a_robot_out_of_everyones_way_changes_nobody_elses_draws() -> None:
     poses = [[0.5, 0.5, 0.0], [1.0, 0.5, 1.0], [1.5, 1.5, 2.0]]
     body = {"drive_noise_fraction": 0.05}
     walk = {"controller": "random-walk", "body": body, "sensors": []}
-    three = scenario(arena={"size_m": [9.0, 9.0]}, robots=walk | {"count": 3, "placement": {"kind": "poses", "poses": poses}})
+    three = scenario(
+        arena={"size_m": [9.0, 9.0]}, robots=walk | {"count": 3, "placement": {"kind": "poses", "poses": poses}}
+    )
     far = [*poses, [8.0, 8.0, 0.0]]
-    four = scenario(arena={"size_m": [9.0, 9.0]}, robots=walk | {"count": 4, "placement": {"kind": "poses", "poses": far}})
+    four = scenario(
+        arena={"size_m": [9.0, 9.0]}, robots=walk | {"count": 4, "placement": {"kind": "poses", "poses": far}}
+    )
     a, b = run(three, 1, "inline"), run(four, 1, "inline")
     assert (a.history.arrays().position[-1] == b.history.arrays().position[-1][:3]).all()

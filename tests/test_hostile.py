@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-
 from support import scenario, until
+
 from zwerm.agents.node import Node
 from zwerm.assembly import assemble
 from zwerm.deploy.cast import cast
@@ -55,7 +55,9 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize(("payload", "reason"), HOSTILE.items(), ids=lambda value: value if isinstance(value, str) else "")
+@pytest.mark.parametrize(
+    ("payload", "reason"), HOSTILE.items(), ids=lambda value: value if isinstance(value, str) else ""
+)
 def test_a_hostile_message_is_refused_for_its_reason(payload: bytes, reason: str) -> None:
     world = assemble(scenario(), 1)
     world.observe()
@@ -136,12 +138,11 @@ def run_with_a_stranger(tmp_path: Path, say: Callable[[Node, bytes], list[bytes]
     """Run the small scenario over Zenoh; node 0 says what `say` makes of each observation, the others behave."""
     keys, endpoint = tmp_path / "keys", f"unixsock-stream/{tmp_path}/router"
     strangers = [
-        Stranger(keys, endpoint, number, say if number == 0 else lambda node, seen: [node.answer(seen)]) for number in range(4)
+        Stranger(keys, endpoint, number, say if number == 0 else lambda node, seen: [node.answer(seen)])
+        for number in range(4)
     ]
     chosen = scenario(**tables)
-    swarm = RemoteSwarm(
-        new_run_id(), cast(chosen, 1), listen=[endpoint], credentials_file=keys, deadline_s=20.0
-    )
+    swarm = RemoteSwarm(new_run_id(), cast(chosen, 1), listen=[endpoint], credentials_file=keys, deadline_s=20.0)
     starter = threading.Thread(target=_start_when_there, args=(keys, strangers), daemon=True)
     starter.start()
     with swarm:

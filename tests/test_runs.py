@@ -10,8 +10,8 @@ import tempfile
 from pathlib import Path
 
 import pytest
-
 from support import ROBOTS, ROOT, ZWERM, children_of, scenario, until
+
 from zwerm.running import run
 
 
@@ -142,11 +142,14 @@ def test_robots_started_elsewhere_join_over_tcp_and_give_the_same_trace(tmp_path
     keys = tmp_path / "robots.key"
     sets = ["--set", "time.duration_s=3", "--set", "robots.count=6", "--seed", "4"]
     port = free_port()
-    world = start("world", "computation-free", *sets, "--listen", f"tcp/127.0.0.1:{port}", "--credentials", str(keys), "--json")
+    world = start(
+        "world", "computation-free", *sets, "--listen", f"tcp/127.0.0.1:{port}", "--credentials", str(keys), "--json"
+    )
     until(keys.exists, "credentials written")
     assert keys.stat().st_mode & 0o777 == 0o600
     robots = [
-        start("robot", "--connect", f"tcp/127.0.0.1:{port}", "--credentials", str(keys), "--ids", ids) for ids in ("0-2", "3-5")
+        start("robot", "--connect", f"tcp/127.0.0.1:{port}", "--credentials", str(keys), "--ids", ids)
+        for ids in ("0-2", "3-5")
     ]
     out, err = world.communicate(timeout=60)
     assert world.returncode == 0, err

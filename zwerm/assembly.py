@@ -11,8 +11,8 @@ from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario import Scenario
 from zwerm.world.arena import Arena
 from zwerm.world.fields import make_field
-from zwerm.world.sensors import Sensor
-from zwerm.world.sensors.registry import Surroundings, make_sensors
+from zwerm.world.sensors import Sensor, Surroundings
+from zwerm.world.sensors.registry import make_sensors
 from zwerm.world.world import World
 
 T = TypeVar("T")

@@ -55,7 +55,11 @@ class Chatter(Controller):
         for packet in observation.inbox:
             self.heard = (self.heard + float(packet.payload.decode())) % 1.0
         number = self.random.random()
-        wake = Wake(at_s=observation.time_s + 0.5, on_packet=self.setup.node % 2 == 0) if observation.tick % 10 == 9 else None
+        wake = (
+            Wake(at_s=observation.time_s + 0.5, on_packet=self.setup.node % 2 == 0)
+            if observation.tick % 10 == 9
+            else None
+        )
         return Command(
             drive=WheelSpeeds(0.1 * self.heard, 0.1 * number),
             outbox=(Transmission("robots", repr(number).encode()),) if observation.tick % 3 == 0 else (),

@@ -35,7 +35,9 @@ LEASE_REMOTE_MS: Final = 10_000
 # one thread to the next, so there are as few as can be: one that receives, answers and sends. Only where a slow answer
 # must not silence the lease, and in the world, does another one send.
 ONE_THREAD: Final = "(app:(worker_threads:1),acc:(handover:app),tx:(handover:app),rx:(handover:app),net:(handover:app))"
-TWO_THREADS: Final = "(app:(worker_threads:1),acc:(handover:app),tx:(handover:app),rx:(worker_threads:1),net:(handover:app))"
+TWO_THREADS: Final = (
+    "(app:(worker_threads:1),acc:(handover:app),tx:(handover:app),rx:(worker_threads:1),net:(handover:app))"
+)
 _THREADS_VARIABLE: Final = "ZENOH_RUNTIME"
 
 
