@@ -1,8 +1,8 @@
 """The contract between a controller and whatever runs it: observation in, command out.
 
-A controller is a plain object. It does no I/O, reads no clock and imports no global randomness; what it may know of itself
-arrives in its `Setup`, what it may know of its surroundings arrives in each `Observation`. `Controller` is a convenience:
-any class with the same constructor and `step` will do.
+A controller is a plain object. It does no I/O, reads no clock and imports no global randomness; what it may know of
+itself arrives in its `Setup`, what it may know of its surroundings arrives in each `Observation`. `Controller` is a
+convenience: any class with the same constructor and `step` will do.
 """
 
 from typing import Any, ClassVar, Protocol

@@ -1,8 +1,9 @@
-"""Keyed randomness: every draw is a function of (seed, purpose, ids, sequence number), never of how many were drawn before.
+"""Keyed randomness: a draw is a function of (seed, purpose, ids, sequence number), never of how many were drawn before.
 
-Adding a robot, a sensor or a fault therefore changes nobody else's draws, and neither does the order in which they are made.
-The counter-based generator is SplitMix64's finaliser (Steele, Lea, Flood 2014) chained over the parts of the key, vectorised
-over arrays of ids; controllers get a numpy Generator over Philox instead, keyed the same way. Not for cryptography.
+Adding a robot, a sensor or a fault therefore changes nobody else's draws, and neither does the order in which they are
+made. The counter-based generator is SplitMix64's finaliser (Steele, Lea, Flood 2014) chained over the parts of the key,
+vectorised over arrays of ids; controllers get a numpy Generator over Philox instead, keyed the same way. Not for
+cryptography.
 """
 
 from hashlib import blake2b
@@ -51,14 +52,14 @@ class Draws:
 
     def uniform(self, purpose: str, *ids: ArrayLike) -> NDArray[np.float64]:
         """Return draws in [0, 1), one per broadcast element of `ids`."""
-        return (self.bits(purpose, *ids) >> _S11) * _TO_UNIT
+        return (self.bits(purpose, *ids) >> _S11).astype(np.float64) * _TO_UNIT
 
     def normal(self, purpose: str, *ids: ArrayLike) -> NDArray[np.float64]:
         """Return standard normal draws, one per broadcast element of `ids` (Box and Muller 1958)."""
         word = np.atleast_1d(self.bits(purpose, *ids))
         u = ((word >> _S11) + _ONE) * _TO_UNIT  # (0, 1], so that the logarithm is finite
         v = (splitmix64(word) >> _S11) * _TO_UNIT
-        draw = np.sqrt(-2.0 * np.log(u)) * np.cos(2.0 * np.pi * v)
+        draw: NDArray[np.float64] = np.sqrt(-2.0 * np.log(u)) * np.cos(2.0 * np.pi * v)
         return draw.reshape(np.broadcast_shapes(*(np.shape(part) for part in ids)))
 
     def stream_key(self, purpose: str, *ids: int) -> bytes:

@@ -1,14 +1,16 @@
-"""Everything that crosses the wire: one `Observation` in, one `Command` out, and the messages that open and end a node's life.
+"""All that crosses the wire: one `Observation` in, one `Command` out, and the messages that open and end a node's life.
 
-Messages are MessagePack maps with field names, so that any language can join; small parts that come in numbers (a bearing, a
-contact) are MessagePack arrays. Every message carries its kind and the protocol version as `type`, for example "command/1". Decoding is strict: unknown fields, wrong
-types, other versions, non-finite numbers and trailing bytes are refused with a reason that can be counted.
+Messages are MessagePack maps with field names, so that any language can join; small parts that come in numbers (a
+bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as `type`, for
+example "command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and trailing
+bytes are refused with a reason that can be counted.
 
-New fields go last, with defaults; a field at its default is left out of the encoded message. Angles are radians in
-(-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
+New fields go last, with defaults; a field at its default is left out of a message (those of a drive are not). Angles
+are radians in (-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
 """
 
 import math
+import re
 from collections.abc import Callable
 from typing import Final
 
@@ -31,7 +33,7 @@ def _type_tag(class_name: str) -> str:
     return f"{class_name.lower()}/{PROTOCOL_VERSION}"
 
 
-class _Message(Struct, forbid_unknown_fields=True, omit_defaults=True, tag_field="type", tag=_type_tag):
+class _Message(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="type", tag=_type_tag):
     """A whole message: a map on the wire, led by its type and the protocol version."""
 
 
@@ -124,7 +126,11 @@ SENSOR_FIELDS: Final = Observation.__struct_fields__[3:]
 # --- what a node commands -------------------------------------------------------------------------------------------
 
 
-class BodyVelocity(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="kind", tag="velocity"):
+# Drives are sent whole: msgspec leaves out a number only where it is the default's own object, so that equal drives
+# could differ in their bytes, and runs in their traces.
+
+
+class BodyVelocity(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="velocity"):
     """Velocity of a holonomic body in its own frame."""
 
     forward_m_s: float = 0.0
@@ -132,7 +138,7 @@ class BodyVelocity(Struct, frozen=True, forbid_unknown_fields=True, omit_default
     turn_rad_s: float = 0.0
 
 
-class WheelSpeeds(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="kind", tag="wheels"):
+class WheelSpeeds(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="wheels"):
     """Ground speed of the two wheels of a differential drive."""
 
     left_m_s: float = 0.0
@@ -148,7 +154,7 @@ class Transmission(_Part, frozen=True):
 
 
 class Wake(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """When the node wants its next observation: at `at_s`, or at the first of the events it names, whichever is earlier.
+    """When the node wants its next observation: at `at_s`, or at the first event it names, if that is earlier.
 
     With nothing set the node sleeps until the run ends.
     """
@@ -159,12 +165,12 @@ class Wake(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     on_visible: bool = False
 
 
-class Command(_Message):
+class Command(Struct, forbid_unknown_fields=True, omit_defaults=True, tag_field="type", tag=_type_tag):
     """A node's answer to one observation.
 
-    `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation at
-    every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of the
-    task is complete. `tick` is set by whatever runs the controller: the tick of the observation answered.
+    `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation
+    at every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of
+    the task is complete. `tick` is set by whatever runs the controller: the tick of the observation answered.
     """
 
     tick: int = 0
@@ -212,12 +218,16 @@ class Goodbye(_Message, frozen=True):
 _encoder = msgspec.msgpack.Encoder()
 encode: Final[Callable[[object], bytes]] = _encoder.encode
 
-# For the hot paths; what they raise is turned into a ProtocolError by `refusal`. In a union a message must carry its type.
+# For the hot paths; what they raise is turned into a ProtocolError by `refusal`. In a union a message must carry its
+# type.
 decode_observation: Final = msgspec.msgpack.Decoder(Observation).decode
 decode_answer: Final = msgspec.msgpack.Decoder(Command | Failure).decode
 decode_hello: Final = msgspec.msgpack.Decoder(Hello | Goodbye).decode
 decode_welcome: Final = msgspec.msgpack.Decoder(Welcome).decode
 decode_to_node: Final = msgspec.msgpack.Decoder(Observation | Goodbye).decode
+
+# What msgspec says of a message of another type, such as "command/2".
+_OTHER_TYPE = re.compile(r"Invalid value '\w+/([0-9]{1,9})' - at `\$\.type`")
 
 REFUSABLE: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
@@ -225,19 +235,21 @@ REFUSABLE: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 def refusal(error: Exception) -> ProtocolError:
     """Return what a decoder raised as a ProtocolError.
 
-    Its reason is `schema` (unknown or missing field, wrong type), `version`, or `malformed` (not MessagePack, truncated,
-    trailing bytes).
+    Its reason is `schema` (unknown or missing field, wrong type, another message), `version`, or `malformed` (not
+    MessagePack, truncated, trailing bytes).
     """
     if isinstance(error, msgspec.ValidationError):
         text = str(error)
-        return ProtocolError("version" if "/" in text and text.endswith("`$.type`") else "schema", text)
+        tag = _OTHER_TYPE.fullmatch(text)
+        return ProtocolError("version" if tag and int(tag[1]) != PROTOCOL_VERSION else "schema", text)
     return ProtocolError("malformed", str(error))
 
 
 def open_answer(payload: bytes) -> Command | Failure:
     """Return the command or failure in `payload`.
 
-    Raises ProtocolError with the reasons of `refusal`, or `oversized`, or `not-finite` for a drive that is no number.
+    Raises ProtocolError with the reasons of `refusal`, or `oversized`, or `not-finite` for a number that is none in the
+    drive or the wake.
     """
     if len(payload) > MESSAGE_BYTES_MAX:
         raise ProtocolError("oversized", f"{len(payload)} bytes, at most {MESSAGE_BYTES_MAX}")
@@ -245,8 +257,11 @@ def open_answer(payload: bytes) -> Command | Failure:
         answer: Command | Failure = decode_answer(payload)
     except REFUSABLE as error:
         raise refusal(error) from None
-    if isinstance(answer, Command) and answer.drive is not None and not is_finite_drive(answer.drive):
-        raise ProtocolError("not-finite", repr(answer.drive))
+    if type(answer) is Command:
+        if answer.drive is not None and not is_finite_drive(answer.drive):
+            raise ProtocolError("not-finite", repr(answer.drive))
+        if answer.wake is not None and answer.wake.at_s is not None and not math.isfinite(answer.wake.at_s):
+            raise ProtocolError("not-finite", repr(answer.wake))
     return answer
 
 

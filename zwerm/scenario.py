@@ -1,15 +1,17 @@
 """A scenario: everything that defines an experiment but its seed, as strict typed tables read from TOML.
 
-Every table refuses keys it does not know. All mistakes are reported at once, each as `file: path: rule, got value`.
-What a sensor or a controller takes as parameters is theirs to type; the tables here carry them as they are.
+Every table refuses keys it does not know and values of another type: "25" is no number, and true is no 1. All mistakes
+are reported at once, each as `file: path: rule, got value`. What a sensor or a controller takes as parameters is theirs
+to type; the tables here carry them as they are.
 """
 
+import json
 import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
 from pydantic_core import ErrorDetails
 
 from zwerm.errors import ScenarioError
@@ -18,19 +20,42 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Point = tuple[Finite, Finite]
+Count = Annotated[int, Field(ge=1)]
+
+# TOML knows arrays only: a tuple that takes one says so with this, and its items stay strict.
+ARRAY = Field(strict=False)
+Point = Annotated[tuple[Finite, Finite], ARRAY]
+Size = Annotated[tuple[Positive, Positive], ARRAY]
+Pose = Annotated[tuple[Finite, Finite, Finite], ARRAY]
+Grid = Annotated[tuple[Count, Count], ARRAY]
+
+
+def _rectangle(corners: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    xmin, ymin, xmax, ymax = corners
+    if not (xmin < xmax and ymin < ymax):
+        raise ValueError("expected [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax")
+    return corners
+
+
+def _name(text: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", text):
+        raise ValueError("expected letters, digits, '.', '_' and '-', and no sign first")
+    return text
+
+
+Rectangle = Annotated[tuple[Finite, Finite, Finite, Finite], ARRAY, AfterValidator(_rectangle)]
 
 
 class Table(BaseModel):
     """A TOML table with a fixed set of keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class OpenTable(BaseModel):
     """A TOML table that names a plug-in by `kind` and carries the plug-in's own parameters beside it."""
 
-    model_config = ConfigDict(extra="allow", frozen=True)
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
 
     kind: str
 
@@ -52,15 +77,18 @@ class TimeTable(Table):
 class ArenaTable(Table):
     """The space robots live in: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
 
-    `map` is a ROS map_server YAML, or a bitmap, which needs `resolution_m` or `size_m`. Paths are relative to the scenario.
+    `map` is a ROS map_server YAML, or a bitmap (dark is wall), which needs `resolution_m`, or `size_m` to stretch it to;
+    `start` is a place [m] in the part of the map to keep, else the largest is. Paths are relative to the scenario.
+    `scale` multiplies every length of this table.
     """
 
-    size_m: tuple[Positive, Positive] | None = None
+    size_m: Size | None = None
     polygon: list[Point] | None = Field(default=None, min_length=3)
     wkt: str | None = None
     geojson: str | None = None
     map: str | None = None
     resolution_m: Positive | None = None
+    start: Point | None = None
     scale: Positive = 1.0
     obstacles: list[Annotated[list[Point], Field(min_length=3)]] = []
     walls: list[Annotated[list[Point], Field(min_length=2)]] = []
@@ -83,26 +111,26 @@ class BodyTable(Table):
 
 
 class PlacementTable(Table):
-    """Where robots start: `uniform` in the arena, within a `disc`, in a random cell of the `cell` grid, or at given `poses`.
+    """Where robots start: `uniform` in the arena, within a `disc`, in a random `cell` of a grid, or at given `poses`.
 
-    `disc` takes `radius_m` and optionally `center_m` (else a random one that fits); `cell` takes `grid` and `radius_m` about
-    the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad].
+    `disc` takes `radius_m` and optionally `center_m` (else a random one that fits); `cell` takes `grid` and `radius_m`
+    about the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad].
     """
 
     kind: Literal["uniform", "disc", "cell", "poses"] = "uniform"
     radius_m: Positive | None = None
     center_m: Point | None = None
-    grid: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = None
-    cell: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
-    poses: list[tuple[Finite, Finite, Finite]] | None = None
+    grid: Grid | None = None
+    cell: Annotated[tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]], ARRAY] | None = None
+    poses: list[Pose] | None = None
 
 
 class InflowTable(Table):
     """Robots wait in a depot and enter one by one, at random places of a rectangle; they leave in another."""
 
     every_s: Positive
-    entry_m: tuple[Finite, Finite, Finite, Finite]
-    exit_m: tuple[Finite, Finite, Finite, Finite] | None = None
+    entry_m: Rectangle
+    exit_m: Rectangle | None = None
 
 
 class RobotsTable(Table):
@@ -118,8 +146,23 @@ class RobotsTable(Table):
     on_crash: Literal["fail", "continue"] = "fail"
 
 
+class BaseTable(Table):
+    """A base station: robot 0, which never moves. The others wait in its depot until it releases them, one at a time."""
+
+    controller: str
+    parameters: dict[str, Any] = {}
+    pose: tuple[Finite, Finite, Finite]
+
+
+class CoordinatorTable(Table):
+    """The optional central node. It has no body and no sensors; it hears robots over the `uplink` channel."""
+
+    controller: str
+    parameters: dict[str, Any] = {}
+
+
 class RadioTable(Table):
-    """The radio: who hears whom."""
+    """The radio between robots, channel `robots`: who hears whom. Without this table there is none."""
 
     range_m: Positive | None = None
     line_of_sight: bool = False
@@ -129,7 +172,7 @@ class RadioTable(Table):
 class MetricsTable(Table):
     """What is measured of the run; metrics whose settings are absent are not computed."""
 
-    cells: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = None
+    cells: Grid | None = None
     coverage_radius_m: Positive | None = None
     every_s: Positive | None = None
 
@@ -137,17 +180,30 @@ class MetricsTable(Table):
 class Scenario(Table):
     """One experiment."""
 
-    name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
+    name: Annotated[str, AfterValidator(_name)]
     summary: str = ""
     source: str = ""
     time: TimeTable = TimeTable()
     arena: ArenaTable
     robots: RobotsTable
+    base: BaseTable | None = None
+    coordinator: CoordinatorTable | None = None
     field: OpenTable | None = None
     landmarks: list[Point] = []
     radio: RadioTable | None = None
     metrics: MetricsTable = MetricsTable()
-    folder: Path = Field(default=Path(), exclude=True)
+    _folder: Path = PrivateAttr(default=Path())
+    _place: str = PrivateAttr(default="scenario")
+
+    @property
+    def folder(self) -> Path:
+        """Where the relative paths in it start."""
+        return self._folder
+
+    @property
+    def place(self) -> str:
+        """What messages call it: its file."""
+        return self._place
 
 
 BUILT_IN = Path(__file__).parent / "scenarios"
@@ -194,7 +250,7 @@ def override(tables: dict[str, Any], assignment: str) -> None:
     if not equals or not path.strip():
         raise ScenarioError([f"--set {assignment}: expected path=value"])
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
+        value = tomllib.loads(f"value = {text}")["value"] if "\n" not in text else text
     except tomllib.TOMLDecodeError:
         value = text
     *parents, last = path.strip().split(".")
@@ -242,39 +298,65 @@ def validate(tables: dict[str, Any], place: str, folder: Path) -> Scenario:
     Raises ScenarioError with every mistake, each led by `place`.
     """
     try:
-        return Scenario.model_validate(tables | {"folder": folder})
+        scenario = Scenario.model_validate(tables)
     except ValidationError as error:
         raise ScenarioError(mistakes(error, place)) from None
+    scenario._folder, scenario._place = folder, place
+    return scenario
 
 
 def mistakes(error: ValidationError, place: str, prefix: str = "") -> list[str]:
     """Return one line for every mistake in `error`: `place: path: rule, got value`."""
-    return [_line(each, place, prefix) for each in error.errors(include_url=False)]
+    lines = {}
+    for each in error.errors(include_url=False):
+        where, rule, got = _mistake(each)
+        path = prefix + ".".join(map(str, where))
+        lines[f"{place}: {path}" if path else place] = rule if got is None else f"{rule}, got {got}"
+    return [f"{where}: {what}" for where, what in lines.items()]
 
 
 _RULES = {
+    "bool_type": "expected true or false",
+    "dict_type": "expected a table",
+    "finite_number": "expected a finite number",
+    "float_type": "expected a number",
     "greater_than": "expected > {gt:g}",
     "greater_than_equal": "expected >= {ge:g}",
+    "int_type": "expected an integer",
     "less_than": "expected < {lt:g}",
     "less_than_equal": "expected <= {le:g}",
-    "finite_number": "expected a finite number",
+    "list_type": "expected an array",
     "literal_error": "expected {expected}",
-    "too_short": "expected at least {min_length} items",
-    "too_long": "expected at most {max_length} items",
+    "model_type": "expected a table",
+    "string_pattern_mismatch": "expected a match of {pattern}",
+    "string_type": "expected a string",
+    "too_long": "expected {max_length} items at most",
+    "too_short": "expected {min_length} items at least",
+    "tuple_type": "expected an array",
 }
+_GOT_LENGTH_MAX = 60
 
 
-def _line(each: ErrorDetails, place: str, prefix: str) -> str:
-    path = prefix + ".".join(str(part) for part in each["loc"])
-    kind, context = each["type"], each.get("ctx", {})
-    if kind == "missing":
-        return f"{place}: {path}: required, and missing"
+def _mistake(each: ErrorDetails) -> tuple[tuple[int | str, ...], str, str | None]:
+    """Return where the mistake is, the rule, and the value as the file has it, or None where that says nothing."""
+    where, kind, context, got = each["loc"], each["type"], each.get("ctx", {}), each["input"]
     if kind == "extra_forbidden":
-        return f"{place}: {path}: unknown key"
-    if kind in _RULES:
+        return where, "unknown key", None
+    if kind == "missing" and isinstance(where[-1], int):
+        return where[:-1], f"expected {where[-1] + 1} items", _shown(got)
+    if kind == "missing":
+        return where, "required, and missing", None
+    if kind == "too_long" and context["field_type"] == "Tuple":
+        rule = f"expected {context['max_length']} items"
+    elif kind in _RULES:
         rule = _RULES[kind].format(**context)
     else:
-        message = re.sub(r"^(Value error, |Input should be )", "", each["msg"])
-        rule = message if kind == "value_error" else f"expected {message}"
-    got = each["input"]
-    return f"{place}: {path}: {rule}" + ("" if isinstance(got, dict) else f", got {got!r}")
+        rule = re.sub(r"^(Value error, |Input should be |Input )", "", each["msg"])
+        rule = rule if rule.startswith("expected") else f"expected {rule}"
+    return where, rule, None if isinstance(got, dict) else _shown(got)
+
+
+def _shown(value: Any) -> str:
+    """Return the value as TOML would have it, cut where it is long."""
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= _GOT_LENGTH_MAX else text[:_GOT_LENGTH_MAX] + "..."

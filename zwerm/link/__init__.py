@@ -1,7 +1,7 @@
 """Links carry bytes between the world and its nodes: in memory within one process, or over Zenoh between processes.
 
-A link knows nothing of what the bytes mean and makes no promise on order between nodes; from one node, messages arrive in
-the order they were sent, each exactly once, until the node is lost.
+A link knows nothing of what the bytes mean and makes no promise on order between nodes; from one node, messages arrive
+in the order they were sent, each exactly once, until the node is lost.
 """
 
 from collections.abc import Callable

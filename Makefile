@@ -1,0 +1,68 @@
+# Everything runs in .venv, which is made from the hashed locks. `make` alone lists the targets.
+
+PYTHON ?= python3
+SCENARIO ?= computation-free
+VENV := .venv
+BIN := $(VENV)/bin
+UV ?= uv
+
+RUN_READY := $(VENV)/.run-ready
+DEV_READY := $(VENV)/.dev-ready
+
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+	--no-emit-index-url --no-annotate --no-header --no-config pyproject.toml --extra study --group build
+
+.DEFAULT_GOAL := help
+.PHONY: help setup dev run test lint format docs bench lock clean
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(RUN_READY)  ## make .venv with the zwerm command in it
+
+dev: $(DEV_READY)  ## add what tests, linters and documentation need
+
+run: setup  ## run a scenario (SCENARIO=name; default computation-free)
+	$(BIN)/zwerm run $(SCENARIO)
+
+test: dev  ## run the tests
+	$(BIN)/python -m pytest
+
+lint: dev  ## check style, types and import boundaries
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
+
+format: dev  ## rewrite the code in the project's format
+	$(BIN)/ruff check --fix-only .
+	$(BIN)/ruff format .
+
+docs: dev  ## build the documentation into site/
+	$(BIN)/mkdocs build --strict --quiet
+
+bench: dev  ## run the benchmarks
+	@for each in benchmarks/bench_*.py; do \
+	  test -e "$$each" || continue; echo "== $$each"; $(BIN)/python "$$each" || exit 1; done
+
+lock:  ## resolve the dependencies anew (needs uv)
+	$(COMPILE) --upgrade --output-file requirements.txt
+	$(COMPILE) --group dev --constraint requirements.txt --upgrade --output-file requirements-dev.txt
+
+clean:  ## remove .venv and everything that was built
+	rm -rf $(VENV) build dist site *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+$(RUN_READY): requirements.txt pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || \
+	  { echo "make: Zwerm needs Python 3.11 or newer; name one with: make setup PYTHON=python3.12" >&2; exit 1; }
+	@test -x $(BIN)/pip || { rm -rf $(VENV) && $(PYTHON) -m venv $(VENV); }
+	@echo "Installing what requirements.txt locks into $(VENV) (the first time takes about a minute)"
+	@$(PIP) install --quiet --require-hashes -r requirements.txt
+	@$(PIP) install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(DEV_READY): $(RUN_READY) requirements-dev.txt
+	@echo "Installing what requirements-dev.txt locks into $(VENV)"
+	@$(PIP) install --quiet --require-hashes -r requirements-dev.txt
+	@touch $@

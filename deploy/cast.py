@@ -1,0 +1,54 @@
+"""The cast of a run: for every node, the controller that plays it and what it may know before its first observation."""
+
+from typing import Any, Final
+
+from zwerm.agents.contract import Body, Setup
+from zwerm.draws import Draws
+from zwerm.scenario import Scenario
+
+ROBOT: Final = "robot"
+BASE: Final = "base"
+COORDINATOR: Final = "coordinator"
+
+
+def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
+    """Return (controller, setup) by node id.
+
+    A node gets the key of its own random stream and no other: from it the run's other draws cannot be told.
+    """
+    draws, robots = Draws(seed), scenario.robots
+    body = Body(
+        kind=robots.body.kind,
+        radius_m=robots.body.radius_m,
+        max_speed_m_s=robots.body.max_speed_m_s,
+        max_turn_rad_s=robots.body.max_turn_rad_s,
+        wheel_base_m=robots.body.wheel_base_m if robots.body.kind == "differential" else 0.0,
+    )
+    sensors = tuple(table.kind for table in robots.sensors)
+    channels = (("robots",) if scenario.radio is not None else ()) + (("uplink",) if scenario.coordinator else ())
+    players: dict[int, tuple[str, Setup]] = {}
+
+    def add(node: int, role: str, controller: str, parameters: dict[str, Any]) -> None:
+        placed = role != COORDINATOR
+        key = draws.stream_key("controller", node)
+        players[node] = (
+            controller,
+            Setup(
+                node=node,
+                role=role,
+                dt_s=scenario.time.dt_s,
+                sensors=sensors if placed else (),
+                stream_key=key,
+                body=body if placed else None,
+                channels=channels if placed else ("uplink",),
+                parameters=parameters,
+            ),
+        )
+
+    for node in range(robots.count):
+        add(node, ROBOT, robots.controller, robots.parameters)
+    if scenario.base is not None:
+        add(0, BASE, scenario.base.controller, scenario.base.parameters)
+    if scenario.coordinator is not None:
+        add(robots.count, COORDINATOR, scenario.coordinator.controller, scenario.coordinator.parameters)
+    return players

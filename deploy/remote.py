@@ -1,0 +1,45 @@
+"""A slice of a swarm on this machine, for a world elsewhere."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from zwerm.deploy.identity import load, slice_of
+from zwerm.deploy.supervisor import JOIN_DEADLINE_S, LocalSupervisor, prepare
+from zwerm.errors import LinkError
+
+# How long a robot may take to end by itself once the others of its slice have.
+_FOREVER_S = 365 * 86_400.0
+
+
+def parse_ids(text: str) -> list[int]:
+    """Return the ids in `3`, `0-24` or `0-4,10-14`, ascending. Raises LinkError for anything else."""
+    ids: set[int] = set()
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdigit() or (dash and not last.isdigit()) or (dash and int(last) < int(first)):
+            raise LinkError(f"--ids: expected ids such as 3, 0-24 or 0-4,10-14, got {text!r}")
+        ids.update(range(int(first), int(last or first) + 1))
+    return sorted(ids)
+
+
+def run_robots(
+    endpoint: str,
+    credentials_file: Path,
+    ids: str = "",
+    progress: Callable[[int, int], object] | None = None,
+    deadline_s: float = JOIN_DEADLINE_S,
+) -> dict[int, int]:
+    """Start the robots `ids` (all in the file, if empty), wait until they end, and return their exit codes by id.
+
+    Raises LinkError where the file cannot be used, or a robot cannot join within `deadline_s`.
+    """
+    credentials = load(credentials_file)
+    if ids:
+        credentials = slice_of(credentials, parse_ids(ids))
+    prepare(len(credentials.nodes))
+    start_s = time.monotonic()
+    with LocalSupervisor(endpoint, credentials) as supervisor:
+        supervisor.start(progress, deadline_s - (time.monotonic() - start_s))
+        supervisor.wait(_FOREVER_S)
+        return supervisor.exit_codes

@@ -1,0 +1,49 @@
+"""What is measured of a run, by name; units are last in the names."""
+
+import numpy as np
+import shapely
+
+from zwerm.scenario import MetricsTable
+from zwerm.world.arena import Arena
+from zwerm.world.scene import Floats, Ints
+from zwerm.world.world import World
+
+# Sides of the polygon that stands for a disc, a quarter: the area is off by 2e-5 of the disc's.
+_QUARTER_SIDES = 64
+
+
+def cell_counts(position: Floats, bounds: tuple[float, float, float, float], grid: tuple[int, int]) -> Ints:
+    """Return (rows, columns) numbers of robots in the cells of `grid` = (columns, rows) over `bounds` [m]."""
+    x0, y0, x1, y1 = bounds
+    columns, rows = grid
+    column = np.clip(((position[:, 0] - x0) / (x1 - x0) * columns).astype(np.int64), 0, columns - 1)
+    row = np.clip(((position[:, 1] - y0) / (y1 - y0) * rows).astype(np.int64), 0, rows - 1)
+    return np.bincount(row * columns + column, minlength=rows * columns).reshape(rows, columns)
+
+
+def cell_coverage_fraction(counts: Ints) -> float:
+    """Return the fraction of cells that hold a robot. Ozdemir 2019, eq. 2."""
+    return float(np.count_nonzero(counts) / counts.size)
+
+
+def area_coverage_fraction(position: Floats, radius_m: float, arena: Arena) -> float:
+    """Return the fraction of the arena within `radius_m` of a robot. Ozdemir 2019, eq. 3."""
+    if not len(position):
+        return 0.0
+    discs = shapely.buffer(shapely.points(position), radius_m, quad_segs=_QUARTER_SIDES)
+    covered = shapely.intersection(shapely.union_all(discs), arena.free)
+    return float(covered.area / arena.area_m2)
+
+
+def measure(world: World, table: MetricsTable) -> dict[str, float]:
+    """Return the metrics of the world as it is now."""
+    position = world.scene.position[world.scene.present]
+    found = {"robots_in_arena": float(len(position))}
+    if world.scenario.robots.inflow is not None:
+        found["robots_exited"] = float(len(world.exited))
+    if table.cells is not None:
+        counts = cell_counts(position, world.arena.bounds, table.cells)
+        found["cell_coverage_fraction"] = cell_coverage_fraction(counts)
+    if table.coverage_radius_m is not None:
+        found["area_coverage_fraction"] = area_coverage_fraction(position, table.coverage_radius_m, world.arena)
+    return found

@@ -1,0 +1,87 @@
+"""Real time: ticks are paced by the wall clock, and nobody is waited for.
+
+A command that misses its tick is counted and applied when it arrives. A robot that stays silent longer than the deadman
+time is stopped until it speaks again. Runs in real time are not repeatable, and promise no trace.
+"""
+
+import time
+
+from zwerm.errors import ProtocolError
+from zwerm.link import WorldLink
+from zwerm.world.lockstep import COMPLETED, FAILED, TIME_LIMIT, OnTick
+from zwerm.world.world import World
+
+
+class RealTime:
+    """Drives a world over a link at `factor` times the speed of the wall clock."""
+
+    def __init__(self, world: World, link: WorldLink, factor: float, on_tick: OnTick | None = None) -> None:
+        self._world = world
+        self._link = link
+        self._dt_s = world.scenario.time.dt_s / factor
+        self._on_tick = on_tick
+        self._last_tick = round(world.scenario.time.duration_s / world.scenario.time.dt_s)
+        self._unanswered_since_s: dict[int, float] = {}
+        self._outstanding: dict[int, int] = {}
+        self._stopped: dict[int, None] = {}
+        self.deadman_stops = 0
+        self.overruns = 0
+        self.reason = ""
+        world.late_allowed = True
+
+    @property
+    def lost(self) -> int:
+        """Return how many observations living nodes have not answered yet, besides each one's newest."""
+        crashed = self._world.crashed
+        return sum(max(0, owed - 1) for node, owed in self._outstanding.items() if node not in crashed)
+
+    def run(self) -> str:
+        """Go on until the run is over, and return its outcome."""
+        world = self._world
+        start = time.monotonic()
+        while world.tick < self._last_tick:
+            deadline = start + (world.tick + 1) * self._dt_s
+            nodes, observations = world.observe()
+            for node, observation in zip(nodes, observations, strict=True):
+                self._link.send(node, observation)
+                self._outstanding[node] = self._outstanding.get(node, 0) + 1
+                self._unanswered_since_s.setdefault(node, world.time_s)
+            self._listen(deadline)
+            self._stop_the_silent()
+            world.advance()
+            if self._on_tick is not None:
+                self._on_tick(world)
+            if world.crashed and world.scenario.robots.on_crash == "fail":
+                node, why = next(iter(world.crashed.items()))
+                self.reason = f"node {node} crashed at tick {world.tick}: {why}"
+                return FAILED
+            if world.completed:
+                return COMPLETED
+        return TIME_LIMIT
+
+    def _listen(self, deadline: float) -> None:
+        """Take what arrives until `deadline` on the monotonic clock; once, without waiting, where that has passed."""
+        world = self._world
+        if time.monotonic() > deadline:
+            self.overruns += 1
+        while (arrival := self._link.receive(max(0.0, deadline - time.monotonic()))) is not None:
+            if arrival.payload is None:
+                world.crash(arrival.node, "process ended")
+                continue
+            self._outstanding[arrival.node] = max(0, self._outstanding.get(arrival.node, 0) - 1)
+            self._unanswered_since_s.pop(arrival.node, None)
+            self._stopped.pop(arrival.node, None)
+            try:
+                world.accept(arrival.node, arrival.payload)
+            except ProtocolError:
+                continue  # counted by the world
+        # A link in memory answers at once and cannot wait: sleep the rest of the tick away.
+        time.sleep(max(0.0, deadline - time.monotonic()))
+
+    def _stop_the_silent(self) -> None:
+        limit_s = self._world.time_s - self._world.scenario.time.deadman_s
+        for node, since_s in self._unanswered_since_s.items():
+            if since_s < limit_s and node not in self._stopped and node not in self._world.crashed:
+                self._world.halt(node)
+                self._stopped[node] = None
+                self.deadman_stops += 1

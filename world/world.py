@@ -1,0 +1,320 @@
+"""The world: physics, sensing, the radio and virtual time, without any I/O.
+
+One tick goes: `observe` (sense at t_k, for the nodes that are awake), then one `accept` for every answer that came, then
+`advance` (apply the commands in id order, send their packets, move the bodies to t_k+1). Whoever drives the world decides
+when to advance: the lock-step driver when all have answered, the real-time driver when the clock says so.
+
+The world is deterministic: its state after a tick is a function of the scenario, the seed and the accepted answers.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import repeat
+from typing import Any, Final
+
+import numpy as np
+
+from zwerm.draws import Draws
+from zwerm.errors import ProtocolError
+from zwerm.protocol import (
+    SENSOR_FIELDS,
+    BodyVelocity,
+    Command,
+    Failure,
+    Observation,
+    Transmission,
+    WheelSpeeds,
+    encode,
+    open_answer,
+)
+from zwerm.scenario import Scenario
+from zwerm.trace import Trace
+from zwerm.world.arena import Arena
+from zwerm.world.drives import Drives
+from zwerm.world.inflow import Depot, Inflow
+from zwerm.world.medium import Medium
+from zwerm.world.physics import Physics
+from zwerm.world.placement import place
+from zwerm.world.scene import Bools, Floats, Scene
+from zwerm.world.sensors import Sensor
+from zwerm.world.wakes import SIGNATURES, Wakes
+
+NO_ANSWER: Final = b""
+
+
+class World:
+    """One run's world. Every robot carries the `sensors`; `seed` keys all randomness."""
+
+    def __init__(self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor]) -> None:
+        count, body = scenario.robots.count, scenario.robots.body
+        self.scenario = scenario
+        self.arena = arena
+        self.draws = Draws(seed)
+        self.tick = 0
+        self.count = count
+        self.robot_ticks = 0
+        self.refused: Counter[str] = Counter()
+        self.crashed: dict[int, str] = {}
+        self.failures: dict[int, Failure] = {}
+        self.late_allowed = False
+        self.late_commands = 0
+        self.exited: list[int] = []
+        self.trace = Trace()
+        self.coordinator = count if scenario.coordinator is not None else None
+        self.medium = Medium(scenario.radio, count, self.coordinator is not None)
+        self._physics = Physics(body, arena.segments, count, scenario.time.dt_s)
+        self._drives = Drives(body, count, self.draws)
+        nodes = count + (self.coordinator is not None)
+        self._wakes = Wakes(nodes, scenario.time.dt_s)
+        self._sensors = {sensor.field: sensor for sensor in sensors}
+        # One column of readings a field, up to the last field that any sensor fills.
+        last = max((SENSOR_FIELDS.index(field) for field in self._sensors), default=-1)
+        self._columns = SENSOR_FIELDS[: last + 1]
+        self._done: Bools = np.zeros(nodes, dtype=np.bool_)
+        self._any_done = False
+        self._fixed = ([self.coordinator] if self.coordinator is not None else []) + ([0] if scenario.base else [])
+        self._drive_types = (self._drives.kind, type(None))
+        self._present: Bools = np.zeros(count, dtype=np.bool_)
+        self._nodes: list[int] = []
+        self._awaited: dict[int, None] = {}
+        self._observations: list[bytes] = []
+        self._answers: dict[int, tuple[bytes, Command | Failure]] = {}
+        self._late: list[tuple[int, Command | Failure]] = []
+        self._last_answer: dict[int, int] = {}
+        self._outboxes: list[tuple[int, tuple[Transmission, ...]]] = []
+        self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
+        self._depot = Depot(scenario.base, count) if scenario.base else None
+        if self.coordinator is not None:
+            self._wakes.admit(self.coordinator)
+        if self._depot is not None:
+            base, position, heading = self._depot.base
+            self._physics.fix(base, position, heading)
+            self._set_present(base, True)
+            self._wakes.admit(base)
+        elif self._inflow is None:
+            positions, headings = place(scenario.robots.placement, arena, count, body.radius_m, self.draws)
+            for robot in range(count):
+                self._enter(robot, positions[robot], float(headings[robot]))
+        self.scene = self._look(np.ones(count, dtype=np.bool_))
+        self._let_in_and_out()
+
+    # --- one tick, in order -----------------------------------------------------------------------------------------
+
+    def observe(self) -> tuple[list[int], list[bytes]]:
+        """Sense, and return the ids of the nodes that are awake, ascending, with each one's encoded observation."""
+        scene, tick = self.scene, self.tick
+        receivers = self.medium.waiting()
+        if self._wakes.sleeping:
+            self._wakes.note_packets(receivers, tick)
+            self._note_changes()
+        awake = self._wakes.awake(tick)
+        nodes: list[int] = awake.tolist()
+        # Ids ascend, and the coordinator's, which has no sensors, is the largest.
+        robots = awake[:-1] if nodes and nodes[-1] == self.coordinator else awake
+        readings = {field: sensor.read(scene, robots) for field, sensor in self._sensors.items()} if len(robots) else {}
+        for field in SIGNATURES:
+            if field in readings:
+                self._wakes.remember(field, nodes[: len(robots)], readings[field])
+        inboxes: Any = [self.medium.deliver(node) for node in nodes] if receivers else repeat(())
+        columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]
+        ticks, times = repeat(tick, len(robots)), repeat(scene.time_s)
+        self._observations = list(map(encode, map(Observation, ticks, times, inboxes, *columns)))
+        if len(robots) < len(nodes):
+            inbox = inboxes[-1] if receivers else ()
+            self._observations.append(encode(Observation(tick, scene.time_s, inbox)))
+        self._nodes = nodes
+        self._awaited = dict.fromkeys(nodes)
+        self._answers.clear()
+        self.robot_ticks += len(nodes)
+        return nodes, self._observations
+
+    def accept(self, node: int, payload: bytes) -> None:
+        """Take a node's answer to its observation of this tick, or in real time to an earlier one.
+
+        Raises ProtocolError, and counts its reason, for what is malformed or unasked for; the node is still awaited then.
+        """
+        try:
+            answer = open_answer(payload)
+            late = answer.tick != self.tick or node not in self._awaited or node in self._answers
+            if late:
+                self._check_late(node, answer.tick)
+            if type(answer) is Command and (
+                answer.outbox or type(answer.drive) not in self._drive_types or node in self._fixed
+            ):
+                self._check_content(node, answer)
+        except ProtocolError as error:
+            self.refused[error.reason] += 1
+            raise
+        if type(answer) is Failure:
+            self.failures[node] = answer
+            self.crash(node, answer.error)
+        if late:
+            self._late.append((node, answer))
+            self.late_commands += 1
+        else:
+            self._answers[node] = payload, answer
+        if self.late_allowed:
+            self._last_answer[node] = answer.tick
+
+    def awaited(self) -> list[int]:
+        """Return the nodes whose answer to this tick's observation has not come, ascending."""
+        return [node for node in self._nodes if node not in self._answers and node not in self.crashed]
+
+    def advance(self) -> None:
+        """Apply what was accepted, in id order, and go on to the next tick."""
+        payloads: list[bytes] = []
+        commands: list[tuple[int, Command | Failure]] = list(self._late)
+        answers = self._answers
+        for node in self._nodes:
+            if node in answers:
+                payload, answer = answers[node]
+                payloads.append(payload)
+                commands.append((node, answer))
+            else:
+                payloads.append(NO_ANSWER)
+        self._apply(commands)
+        self.trace.extend(self.tick, self._nodes, self._observations, payloads)
+        if self._outboxes:
+            self.medium.send(self.scene, self._outboxes)
+            self._outboxes = []
+        self._late = []
+        before = self.scene
+        moving = self._physics.advance(*self._drives.velocities(self.tick))
+        self.tick += 1
+        moved: Bools = np.zeros(self.count, dtype=np.bool_)
+        if moving:
+            moved = (self._physics.position != before.position).any(axis=1) | (self._physics.heading != before.heading)
+        self.scene = self._look(moved)
+        self._let_in_and_out()
+
+    # --- what happens to robots -------------------------------------------------------------------------------------
+
+    def crash(self, node: int, reason: str) -> None:
+        """Take note that a node is dead: its motors stop, it is never awaited again, its body stays where it is."""
+        if node not in self.crashed:
+            self.crashed[node] = reason
+            self._retire(node, "receiver-crashed")
+
+    def halt(self, node: int) -> None:
+        """Stop a robot's motors until its next command."""
+        self._drives.stop(node)
+
+    @property
+    def completed(self) -> bool:
+        """Tell whether the task is done: the coordinator says so, or the base station does, or all robots that live do.
+
+        Where there is a coordinator, it decides; else the base station, if there is one. Robots that left count as done.
+        """
+        if self._fixed:
+            return bool(self._done[self._fixed[0]])
+        if not (self._any_done or self.exited):
+            return False
+        over = self._done.copy()
+        over[self.exited] = True
+        over[list(self.crashed)] = True
+        return bool(over.all()) and len(self.crashed) < self.count
+
+    @property
+    def time_s(self) -> float:
+        """Virtual time [s]."""
+        return self.tick * self.scenario.time.dt_s
+
+    # --- inside -----------------------------------------------------------------------------------------------------
+
+    def _look(self, moved: Bools) -> Scene:
+        physics = self._physics
+        return Scene(
+            self.tick,
+            self.time_s,
+            physics.position.copy(),
+            physics.heading.copy(),
+            self._present,
+            moved,
+            self.scenario.robots.body.radius_m,
+            self.arena,
+            self.draws,
+        )
+
+    def _let_in_and_out(self) -> None:
+        """Let robots enter and leave at the start of a tick, and look again if any did."""
+        door = self._inflow or self._depot
+        if door is None:
+            return
+        leaving = door.leaving(self.scene).tolist()
+        for robot in leaving:
+            self._physics.remove(robot)
+            self._set_present(robot, False)
+            self.exited.append(robot)
+            self._retire(robot, "receiver-left")
+        entering = door.entering(self.scene)
+        if entering is not None:
+            self._enter(*entering)
+        if leaving or entering is not None:
+            changed = self.scene.moved.copy()
+            changed[leaving if entering is None else [*leaving, entering[0]]] = True
+            self.scene = self._look(changed)
+
+    def _enter(self, robot: int, position: Floats, heading: float) -> None:
+        self._physics.add(robot, position, heading)
+        self._set_present(robot, True)
+        self._wakes.admit(robot)
+
+    def _set_present(self, robot: int, present: bool) -> None:
+        self._present = self._present.copy()  # scenes of earlier ticks keep theirs
+        self._present[robot] = present
+
+    def _retire(self, node: int, cause: str) -> None:
+        self._wakes.retire(node)
+        if node < self.count:
+            self._drives.stop(node)
+        self.medium.lose(node, cause)
+
+    def _note_changes(self) -> None:
+        """Wake the sleepers whose contacts or visible ids have changed."""
+        if not self.scene.moved.any():
+            return
+        for field in SIGNATURES:
+            sensor = self._sensors.get(field)
+            if sensor is not None and len(watchers := self._wakes.watchers(field)):
+                self._wakes.note_readings(field, watchers, sensor.read(self.scene, watchers), self.tick)
+
+    def _apply(self, answers: list[tuple[int, Command | Failure]]) -> None:
+        drives: list[tuple[int, BodyVelocity | WheelSpeeds]] = []
+        done = self._done
+        for node, answer in answers:
+            if type(answer) is not Command:
+                continue
+            if answer.drive is not None:
+                drives.append((node, answer.drive))
+            if answer.outbox:
+                self._outboxes.append((node, answer.outbox))
+            if answer.wake is not None:
+                self._wakes.sleep(node, answer.wake, self.tick)
+            if answer.release and node == 0 and self._depot is not None:
+                self._depot.release()
+            if answer.done or self._any_done:
+                done[node] = answer.done
+                self._any_done = True
+        if drives:
+            self._drives.command(drives)
+
+    def _check_late(self, node: int, tick: int) -> None:
+        """Raise ProtocolError, unless late answers are allowed and this one comes in order."""
+        if self.late_allowed and self._last_answer.get(node, -1) < tick < self.tick:
+            return
+        if tick != self.tick:
+            raise ProtocolError("out-of-order", f"node {node} answers tick {tick} at tick {self.tick}")
+        if node not in self._awaited:
+            raise ProtocolError("unasked", f"node {node} was sent no observation at tick {tick}")
+        raise ProtocolError("duplicate", f"node {node} answers tick {tick} again")
+
+    def _check_content(self, node: int, command: Command) -> None:
+        """Raise ProtocolError for a command that this world cannot carry out."""
+        if command.drive is not None and type(command.drive) is not self._drives.kind:
+            raise ProtocolError("wrong-drive", f"a {self.scenario.robots.body.kind} body takes no {command.drive!r}")
+        if command.drive is not None and node in self._fixed:
+            raise ProtocolError("wrong-drive", f"node {node} has no drive")
+        for message in command.outbox:
+            refused = self.medium.refuses(node, message)
+            if refused:
+                raise ProtocolError("wrong-packet", refused)

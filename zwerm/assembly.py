@@ -1,0 +1,77 @@
+"""From a scenario to a world ready to run, with every mistake that the typed tables could not see."""
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import msgspec
+import numpy as np
+
+from zwerm.agents.registry import find, parameters_of
+from zwerm.errors import ControllerError, ScenarioError
+from zwerm.scenario import Scenario
+from zwerm.world.arena import Arena
+from zwerm.world.fields import make_field
+from zwerm.world.sensors import Sensor, Surroundings
+from zwerm.world.sensors.registry import make_sensors
+from zwerm.world.world import World
+
+T = TypeVar("T")
+
+
+def assemble(scenario: Scenario, seed: int) -> World:
+    """Return the world of `scenario`, its robots placed for `seed`.
+
+    Raises ScenarioError with every mistake in the arena, the field, the sensors and the controller; or, where those are
+    right, in the placement.
+    """
+    mistakes: list[str] = []
+
+    def attempt(make: Callable[[], T]) -> T | None:
+        try:
+            return make()
+        except ScenarioError as error:
+            named = scenario.place + ": "
+            mistakes.extend(line if line.startswith(named) else named + line for line in error.mistakes)
+            return None
+
+    arena = attempt(lambda: Arena.from_table(scenario.arena, scenario.folder))
+    attempt(lambda: check_controller(scenario))
+    sensors = None if arena is None else attempt(lambda: _sensors(scenario, arena))
+    if arena is not None and sensors is not None and not mistakes:
+        world = attempt(lambda: World(scenario, seed, arena, sensors))
+        if world is not None:
+            return world
+    raise ScenarioError(mistakes)
+
+
+def _sensors(scenario: Scenario, arena: Arena) -> Sequence[Sensor]:
+    field = None
+    if scenario.field is not None:
+        field = make_field(scenario.field, arena.bounds, scenario.folder, scenario.place)
+    landmarks = np.array(scenario.landmarks, dtype=np.float64).reshape(-1, 2)
+    surroundings = Surroundings(arena, scenario.robots.count, landmarks=landmarks, field=field)
+    return make_sensors(scenario.robots.sensors, surroundings, "robots.sensors", scenario.place)
+
+
+def check_controller(scenario: Scenario) -> None:
+    """Find the robots' controller, and check what it is given against what it needs.
+
+    Raises ScenarioError with every mistake.
+    """
+    robots = scenario.robots
+    try:
+        found = find(robots.controller)
+    except ControllerError as error:
+        raise ScenarioError([f"robots.controller: {error}"]) from None
+    given = {table.kind for table in robots.sensors}
+    mistakes = [
+        f"robots.sensors: the controller {robots.controller} needs the sensor {sensor!r}"
+        for sensor in getattr(found, "sensors", ())
+        if sensor not in given
+    ]
+    try:
+        msgspec.convert(robots.parameters, parameters_of(found))
+    except msgspec.ValidationError as error:
+        mistakes.append(f"robots.parameters: {str(error).replace('`', '')}, got {robots.parameters!r}")
+    if mistakes:
+        raise ScenarioError(mistakes)

@@ -1,0 +1,225 @@
+"""The command line: `zwerm list`, `check`, `run`, `world`, `robot` and `study`.
+
+What a command prints for people goes to standard error, but for tables that are its result; with --json standard output is
+one JSON object and nothing else. Exit status: 0 as it should be, 1 the run failed, 2 a mistake of the user's, 130 Ctrl-C.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, NoReturn, Optional
+
+import msgspec
+import typer
+from rich.console import Console
+
+from zwerm import __version__
+from zwerm.console import RunProgress, print_result, print_scenarios
+from zwerm.errors import ScenarioError, ZwermError
+from zwerm.result import RunResult
+from zwerm.scenario import built_in, load, locate
+
+EXIT_FAILED, EXIT_MISTAKE, EXIT_INTERRUPTED = 1, 2, 130
+
+app = typer.Typer(
+    name="zwerm",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    help="Emulate robot swarms as what they are: many processes that pass messages, with bit-identical runs.",
+)
+err = Console(stderr=True)
+out = Console()
+
+ScenarioName = Annotated[str, typer.Argument(help="A built-in scenario (see `zwerm list`) or a TOML file.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Keys all randomness of the run.")]
+Sets = Annotated[
+    Optional[list[str]],  # noqa: UP045 - typer reads it
+    typer.Option("--set", metavar="PATH=VALUE", help="Override a setting of the scenario; may be given often."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Picture = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--picture", metavar="FILE.png", help="Where to draw the run; runs/SCENARIO-seedN.png by default."),
+]
+Animation = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--animate", metavar="FILE", help="Also draw an animation: .gif, or .mp4 where ffmpeg is installed."),
+]
+RealTime = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--realtime", metavar="FACTOR", help="Pace the run at FACTOR times the wall clock."),
+]
+
+
+@contextmanager
+def _mistakes_in_one_line() -> Iterator[None]:
+    """Print a user's mistakes as they are, one line each, and exit with status 2."""
+    try:
+        yield
+    except ZwermError as error:
+        for line in str(error).splitlines():
+            err.print(f"zwerm: {line}", style="red", markup=False, highlight=False, soft_wrap=True)
+        raise typer.Exit(EXIT_MISTAKE) from None
+
+
+@app.callback(invoke_without_command=True)
+def _root(version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False) -> None:
+    if version:
+        typer.echo(f"zwerm {__version__}")
+        raise typer.Exit
+
+
+@app.command("list", help="List the built-in scenarios.\n\nExample: [bold]zwerm list[/bold]")
+def list_scenarios() -> None:
+    """Print a table of the built-in scenarios."""
+    with _mistakes_in_one_line():
+        print_scenarios(out, [load(name) for name in built_in()])
+
+
+@app.command(
+    help="Check scenarios, and report every mistake with its place, the rule and the value.\n\n"
+    "Examples: [bold]zwerm check my.toml[/bold], [bold]zwerm check computation-free --set robots.count=30[/bold]"
+)
+def check(
+    scenarios: Annotated[list[str], typer.Argument(help="Built-in names or TOML files.")], sets: Sets = None
+) -> None:
+    """Load and assemble each scenario without running it."""
+    from zwerm.assembly import assemble
+
+    mistakes: list[str] = []
+    for name in scenarios:
+        try:
+            assemble(load(name, tuple(sets or ())), seed=1)
+            out.print(f"{locate(name)}: no mistakes", markup=False, highlight=False, soft_wrap=True)
+        except ScenarioError as error:
+            mistakes += error.mistakes
+    if mistakes:
+        with _mistakes_in_one_line():
+            raise ScenarioError(mistakes)
+
+
+@app.command(
+    help="Run a scenario: the world in this process, and every robot in a process of its own.\n\n"
+    "Examples:\n\n"
+    "[bold]zwerm run computation-free[/bold]\n\n"
+    "[bold]zwerm run computation-free --seed 7 --set robots.count=40 --animate swarm.gif[/bold]\n\n"
+    "[bold]zwerm run computation-free --inline --json[/bold]\n\n"
+    "[bold]zwerm run computation-free --set robots.controller=my_file:MyController[/bold]"
+)
+def run(
+    scenario: ScenarioName,
+    seed: Seed = 1,
+    sets: Sets = None,
+    inline: Annotated[
+        bool, typer.Option("--inline/--processes", help="Run the robots in this process: faster, same trace.")
+    ] = False,
+    realtime: RealTime = None,
+    picture: Picture = None,
+    animate: Animation = None,
+    as_json: Json = False,
+) -> None:
+    """Run a scenario and report on it."""
+    from zwerm.running import run as run_scenario
+
+    with _mistakes_in_one_line():
+        loaded = load(scenario, tuple(sets or ()))
+        with RunProgress(err, loaded.name, quiet=as_json) as progress:
+            result = run_scenario(
+                loaded, seed, "inline" if inline else "processes", realtime=realtime, watcher=progress
+            )
+        _report(result, picture, animate, as_json)
+
+
+@app.command(
+    help="Run the world of a scenario and wait for robots on other machines to connect.\n\n"
+    "Writes the robots' credentials to a file that only you can read; carry it to where the robots run.\n\n"
+    "Example: [bold]zwerm world computation-free --listen tcp/0.0.0.0:7447 --credentials robots.key[/bold]"
+)
+def world(
+    scenario: ScenarioName,
+    listen: Annotated[list[str], typer.Option("--listen", help="A Zenoh endpoint, such as tcp/0.0.0.0:7447.")],
+    credentials: Annotated[Path, typer.Option("--credentials", help="The file to write the robots' credentials to.")],
+    seed: Seed = 1,
+    sets: Sets = None,
+    realtime: RealTime = None,
+    picture: Picture = None,
+    animate: Animation = None,
+    as_json: Json = False,
+) -> None:
+    """Run a world whose robots are started elsewhere."""
+    from zwerm.running import serve
+
+    with _mistakes_in_one_line():
+        loaded = load(scenario, tuple(sets or ()))
+        with RunProgress(err, loaded.name, quiet=as_json) as progress:
+            result = serve(loaded, seed, listen, credentials, realtime=realtime, watcher=progress)
+        _report(result, picture, animate, as_json)
+
+
+@app.command(
+    help="Run robots that connect to a world elsewhere.\n\n"
+    "Example: [bold]zwerm robot --connect tcp/192.0.2.1:7447 --credentials robots.key --ids 0-24[/bold]"
+)
+def robot(
+    connect: Annotated[str, typer.Option("--connect", help="The world's Zenoh endpoint.")],
+    credentials: Annotated[Path, typer.Option("--credentials", help="The file that `zwerm world` wrote.")],
+    ids: Annotated[str, typer.Option("--ids", help="The robots to run here: 3, 0-24 or 0-4,10-14.")] = "",
+) -> None:
+    """Start a slice of a swarm's robots on this machine, each in a process of its own."""
+    from zwerm.deploy.remote import run_robots
+
+    with _mistakes_in_one_line():
+        with RunProgress(err, "swarm") as progress:
+            codes = run_robots(connect, credentials, ids, progress.joined)
+        failed = {node: code for node, code in codes.items() if code}
+        for node, code in sorted(failed.items()):
+            err.print(f"zwerm: node {node} ended with exit code {code}", style="red", markup=False, highlight=False)
+        raise typer.Exit(EXIT_FAILED if failed else 0)
+
+
+def _report(result: RunResult, picture: Path | None, animate: Path | None, as_json: bool) -> NoReturn:
+    """Draw, print, and exit with the status that belongs to the outcome."""
+    drawn: list[Path] = []
+    if not as_json and picture is None:
+        picture = Path("runs") / f"{result.scenario.name}-seed{result.seed}.png"
+    if picture is not None:
+        drawn.append(result.picture(picture))
+    if animate is not None:
+        with RunProgress(err, "animation", quiet=as_json) as progress:
+            drawn.append(result.animate(animate, progress.ticked))
+    for node, traceback in sorted(result.tracebacks.items()):
+        err.print(f"node {node} raised:\n{traceback}", markup=False, highlight=False, soft_wrap=True)
+    if as_json:
+        sys.stdout.write(msgspec.json.encode(result.as_json()).decode() + "\n")
+        sys.stdout.flush()
+    else:
+        print_result(out, result, drawn)
+    if result.reason:
+        err.print(f"zwerm: {result.reason}", style="red", markup=False, highlight=False, soft_wrap=True)
+    if result.outcome == "interrupted":
+        raise typer.Exit(EXIT_INTERRUPTED)
+    raise typer.Exit(0 if result.ok else EXIT_FAILED)
+
+
+def _interrupt(signum: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def main() -> None:
+    """Run the command line, with the current directory importable, so that it can name a controller of the user's."""
+    sys.path.insert(0, str(Path.cwd()))
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        app()
+    except KeyboardInterrupt:
+        err.print("zwerm: interrupted", style="red")
+        sys.exit(EXIT_INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)

@@ -1,0 +1,93 @@
+"""What a person sees of a run on the terminal: progress bars, and tables at the end."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from zwerm.result import RunResult
+from zwerm.scenario import Scenario
+
+
+class RunProgress:
+    """A run's progress on `console`: robots that have joined, then ticks. A quiet one shows nothing."""
+
+    def __init__(self, console: Console, name: str, quiet: bool = False) -> None:
+        self._name = name
+        self._progress = Progress(
+            TextColumn("[bold]{task.description}"),
+            BarColumn(bar_width=None),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[unit]}"),
+            TimeRemainingColumn(),
+            console=console,
+            disable=quiet,
+        )
+        self._tasks: dict[str, TaskID] = {}
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._progress.stop()
+
+    def joined(self, count: int, total: int) -> None:
+        """Show that `count` of `total` robots have joined."""
+        self._show(f"{self._name}: robots", "joined", count, total)
+
+    def ticked(self, tick: int, ticks: int) -> None:
+        """Show that `tick` of `ticks` are done."""
+        self._show(self._name, "ticks", tick, ticks)
+
+    def _show(self, title: str, unit: str, done: int, total: int) -> None:
+        task = self._tasks.get(title)
+        if task is None:
+            task = self._tasks[title] = self._progress.add_task(title, total=total, unit=unit)
+        self._progress.update(task, completed=done)
+
+
+def print_scenarios(console: Console, scenarios: Sequence[Scenario]) -> None:
+    """Print the built-in scenarios as a table."""
+    table = Table(box=None, padding=(0, 2, 0, 0), title_justify="left")
+    table.add_column("scenario", style="bold", no_wrap=True)
+    table.add_column("robots", justify="right")
+    table.add_column("duration", justify="right")
+    table.add_column("what it is")
+    for each in scenarios:
+        table.add_row(each.name, str(each.robots.count), f"{each.time.duration_s:g} s", each.summary)
+    console.print(table)
+
+
+def print_result(console: Console, result: RunResult, drawn: Sequence[Path]) -> None:
+    """Print what became of a run, its metrics, its packets, and where its pictures are."""
+    table = Table(title=result.title, title_justify="left", show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    rate = result.robot_ticks / result.wall_s if result.wall_s else 0.0
+    table.add_row("outcome", result.outcome)
+    for name, value in result.metrics.items():
+        table.add_row(name, f"{value:.4g}")
+    if result.radio["sent"]:
+        radio = result.radio
+        lost = ", ".join(f"{count} {cause}" for cause, count in radio["dropped"].items()) or "none"
+        table.add_row(
+            "radio packets",
+            f"{radio['sent']} sent = {radio['delivered']} delivered + {radio['in_flight']} in flight + dropped: {lost}",
+        )
+    table.add_row("lost by the middleware", str(result.middleware_lost))
+    if result.refused:
+        table.add_row("refused", ", ".join(f"{count} {reason}" for reason, count in sorted(result.refused.items())))
+    if result.crashed:
+        table.add_row("crashed", ", ".join(map(str, result.crashed)))
+    table.add_row("wall time", f"{result.wall_s:.1f} s, {rate:,.0f} robot-ticks/s, {result.runner}")
+    table.add_row("trace", result.trace)
+    for path in drawn:
+        table.add_row("picture" if path.suffix == ".png" else "animation", str(path))
+    console.print(table)

@@ -1,0 +1,191 @@
+"""Running a scenario: inline in this process, or with every robot a process of its own."""
+
+import secrets
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal, Protocol
+
+from zwerm.agents.node import Node
+from zwerm.assembly import assemble
+from zwerm.deploy.cast import cast
+from zwerm.deploy.swarm import LocalSwarm, RemoteSwarm
+from zwerm.errors import ScenarioError, StragglerError
+from zwerm.link import WorldLink
+from zwerm.link.memory import MemoryLink
+from zwerm.result import RunResult
+from zwerm.scenario import Scenario, load
+from zwerm.world.history import History
+from zwerm.world.lockstep import FAILED, INTERRUPTED, LockStep
+from zwerm.world.metrics import cell_counts, measure
+from zwerm.world.realtime import RealTime
+from zwerm.world.world import World
+
+Runner = Literal["processes", "inline"]
+
+# How many samples of a run its history starts with, for pictures and animations.
+HISTORY_SAMPLES = 1_000
+
+
+class Watcher(Protocol):
+    """Somebody to tell how a run is getting on."""
+
+    def joined(self, count: int, total: int) -> None:
+        """`count` of `total` robots have joined."""
+
+    def ticked(self, tick: int, ticks: int) -> None:
+        """`tick` of `ticks` are done."""
+
+
+class Nobody:
+    """A watcher that does not look."""
+
+    def joined(self, count: int, total: int) -> None:
+        """Ignore it."""
+
+    def ticked(self, tick: int, ticks: int) -> None:
+        """Ignore it."""
+
+
+def run(
+    scenario: str | Path | Scenario,
+    seed: int = 1,
+    runner: Runner = "processes",
+    overrides: Sequence[str] = (),
+    realtime: float | None = None,
+    watcher: Watcher | None = None,
+) -> RunResult:
+    """Run `scenario` (a built-in name, a path, or one already loaded) and return its result.
+
+    `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock. Raises ScenarioError
+    for a mistake in the scenario. A failed or interrupted run is a result like any other: look at its `outcome`.
+    """
+    if seed < 0:
+        raise ScenarioError([f"seed: expected >= 0, got {seed}"])
+    if realtime is not None and not realtime > 0:
+        raise ScenarioError([f"realtime: expected a factor > 0, got {realtime}"])
+    if not isinstance(scenario, Scenario):
+        scenario = load(str(scenario), tuple(overrides))
+    world = assemble(scenario, seed)
+    members = cast(scenario, seed)
+    watcher = watcher or Nobody()
+    if runner == "inline":
+        nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
+        watcher.joined(len(nodes), len(nodes))
+        link = MemoryLink({node: each.answer for node, each in nodes.items()})
+        return drive(world, link, seed, runner, realtime, watcher)
+    with LocalSwarm(new_run_id(), members, progress=watcher.joined) as swarm:
+        return drive(world, swarm.link, seed, runner, realtime, watcher)
+
+
+def serve(
+    scenario: Scenario,
+    seed: int,
+    listen: Sequence[str],
+    credentials_file: Path,
+    realtime: float | None = None,
+    watcher: Watcher | None = None,
+    deadline_s: float = 600.0,
+) -> RunResult:
+    """Run a world whose robots are started elsewhere, with the credentials that are written to `credentials_file`.
+
+    Waits `deadline_s` for them to connect to one of the Zenoh endpoints `listen`. Raises ScenarioError and LinkError.
+    """
+    world = assemble(scenario, seed)
+    watcher = watcher or Nobody()
+    with RemoteSwarm(
+        new_run_id(),
+        cast(scenario, seed),
+        listen=listen,
+        credentials_file=credentials_file,
+        progress=watcher.joined,
+        deadline_s=deadline_s,
+    ) as swarm:
+        return drive(world, swarm.link, seed, "remote", realtime, watcher)
+
+
+def new_run_id() -> str:
+    """Return a name for a run that no other run on the same router has; it influences nothing."""
+    return secrets.token_hex(8)
+
+
+def drive(
+    world: World, link: WorldLink, seed: int, runner: str, realtime: float | None = None, watcher: Watcher | None = None
+) -> RunResult:
+    """Run `world` over a link on which all nodes have joined, and return the result."""
+    watcher = watcher or Nobody()
+    table = world.scenario.time
+    ticks = round(table.duration_s / table.dt_s)
+    stride = max(1, ticks // HISTORY_SAMPLES)
+    history = History()
+    history.append(world.scene)
+
+    def on_tick(world: World) -> None:
+        if world.tick % stride == 0:
+            history.append(world.scene)
+            watcher.ticked(world.tick, ticks)
+
+    driver = LockStep(world, link, on_tick) if realtime is None else RealTime(world, link, realtime, on_tick)
+    start = time.monotonic()
+    try:
+        outcome, reason = driver.run(), driver.reason
+    except StragglerError as error:
+        outcome, reason = FAILED, str(error)
+    except KeyboardInterrupt:
+        outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
+    wall_s = time.monotonic() - start
+    if world.tick % stride:
+        history.append(world.scene)
+    return _result(world, seed, runner, outcome, reason, wall_s, driver, history)
+
+
+def _result(
+    world: World,
+    seed: int,
+    runner: str,
+    outcome: str,
+    reason: str,
+    wall_s: float,
+    driver: LockStep | RealTime,
+    history: History,
+) -> RunResult:
+    scenario, accounts = world.scenario, world.medium.accounts
+    metrics = measure(world, scenario.metrics)
+    metrics["refused_messages"] = float(world.refused.total())
+    if isinstance(driver, RealTime):
+        metrics["late_commands"] = float(world.late_commands)
+        metrics["deadman_stops"] = float(driver.deadman_stops)
+        metrics["tick_overruns"] = float(driver.overruns)
+    counts = None
+    if scenario.metrics.cells is not None:
+        position = world.scene.position[world.scene.present]
+        counts = cell_counts(position, world.arena.bounds, scenario.metrics.cells)
+    return RunResult(
+        scenario=scenario,
+        seed=seed,
+        runner=runner,
+        outcome=outcome,
+        reason=reason,
+        trace=world.trace.hex(),
+        ticks=world.tick,
+        sim_s=round(world.time_s, 9),
+        wall_s=round(wall_s, 6),
+        robots=world.count,
+        robot_ticks=world.robot_ticks,
+        metrics=metrics,
+        radio={
+            "sent": accounts.sent,
+            "delivered": accounts.delivered,
+            "dropped": dict(sorted(accounts.dropped.items())),
+            "in_flight": accounts.in_flight,
+            "bytes": accounts.bytes,
+        },
+        middleware_lost=driver.lost,
+        crashed=sorted(world.crashed),
+        restarted=[],
+        arena=world.arena,
+        history=history,
+        cell_counts=counts,
+        refused=dict(world.refused),
+        tracebacks={node: failure.traceback for node, failure in world.failures.items()},
+    )
