@@ -100,22 +100,13 @@ def _allow(name: str, key: str, message: str, flow: str) -> dict[str, Any]:
     return {"id": name, "permission": "allow", "messages": [message], "flows": [flow], "key_exprs": [key]}
 
 
-def slice_of(credentials: Credentials, nodes: str) -> Credentials:
-    """Return the credentials of the nodes that `nodes` names, such as `0-24,30`.
-
-    Raises LinkError where it names none, or one that `credentials` does not hold.
-    """
+def slice_of(credentials: Credentials, nodes: Iterable[int]) -> Credentials:
+    """Return the credentials of `nodes` only. Raises LinkError where there are none for one of them."""
     known = {credential.node: credential for credential in credentials.nodes}
-    try:
-        bounds = [part.partition("-") for part in nodes.split(",")]
-        chosen = [node for first, _, last in bounds for node in range(int(first), int(last or first) + 1)]
-    except ValueError:
-        raise LinkError(f"ids: expected numbers and ranges such as 0-24,30, got {nodes!r}") from None
-    if not chosen:
-        raise LinkError(f"ids: expected at least one, got {nodes!r}")
+    chosen = list(nodes)
     if unknown := [node for node in chosen if node not in known]:
-        raise LinkError(f"ids: the credentials hold no node {unknown[0]}")
-    return Credentials(credentials.run, tuple(known[node] for node in dict.fromkeys(chosen)), credentials.authority_pem)
+        raise LinkError(f"the credentials hold no node {unknown[0]}")
+    return Credentials(credentials.run, tuple(known[node] for node in chosen), credentials.authority_pem)
 
 
 def save(credentials: Credentials, path: Path) -> None:
