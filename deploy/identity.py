@@ -18,7 +18,7 @@ import msgspec
 
 from zwerm.errors import LinkError
 from zwerm.keys import EVERY, alive_key, command_key, hello_key, observation_key
-from zwerm.link.session import Credential, Credentials, lease_settings
+from zwerm.link.session import Credential, Credentials, transport_settings
 
 PRIVATE_FILE_MODE: Final = 0o600
 SECRET_BYTES: Final = 24
@@ -68,7 +68,7 @@ def router_settings(credentials: Credentials, endpoints: list[str], dictionary: 
         "transport/unicast/max_sessions": 2 * capacity + 100,
         "transport/auth/usrpwd/dictionary_file": str(dictionary),
         "access_control": access_control(credentials),
-        **lease_settings(endpoints),
+        **transport_settings(endpoints),
     }
 
 

@@ -1,8 +1,8 @@
 """Depots, which let robots into the arena one by one, and an exit that takes them out.
 
-From a timed inflow robots enter in id order, every `every_s` seconds, at a random free place of the entry rectangle. While there is none, the
-next robot waits at the door; the interval counts from the last entry. From a base station's depot they enter when it
-releases them, where it stands.
+From a timed inflow robots enter in id order, every `every_s` seconds, at a random free place of the entry rectangle. While
+there is none, the next robot waits at the door; the interval counts from the last entry. From a base station's depot they
+enter when it releases them, where it stands.
 """
 
 import numpy as np

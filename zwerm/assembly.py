@@ -11,8 +11,8 @@ from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario import Scenario
 from zwerm.world.arena import Arena
 from zwerm.world.fields import make_field
-from zwerm.world.sensors import Sensor
-from zwerm.world.sensors.registry import Surroundings, make_sensors
+from zwerm.world.sensors import Sensor, Surroundings
+from zwerm.world.sensors.registry import make_sensors
 from zwerm.world.world import World
 
 T = TypeVar("T")
@@ -59,7 +59,8 @@ def _sensors(scenario: Scenario, arena: Arena) -> Sequence[Sensor]:
     field = None
     if scenario.field is not None:
         field = make_field(scenario.field, arena.bounds, scenario.folder, scenario.place)
-    surroundings = Surroundings(arena=arena, landmarks=np.array(scenario.landmarks).reshape(-1, 2), field=field)
+    landmarks = np.array(scenario.landmarks, dtype=np.float64).reshape(-1, 2)
+    surroundings = Surroundings(arena, scenario.robots.count, landmarks=landmarks, field=field)
     return make_sensors(scenario.robots.sensors, surroundings, "robots.sensors", scenario.place)
 
 
@@ -73,11 +74,12 @@ def check_controller(scenario: Scenario) -> None:
         found = find(robots.controller)
     except ControllerError as error:
         raise ScenarioError([f"robots.controller: {error}"]) from None
-    mistakes = []
     given = {table.kind for table in robots.sensors}
-    for sensor in getattr(found, "sensors", ()):
-        if sensor not in given:
-            mistakes.append(f"robots.sensors: the controller {robots.controller} needs the sensor {sensor!r}")
+    mistakes = [
+        f"robots.sensors: the controller {robots.controller} needs the sensor {sensor!r}"
+        for sensor in getattr(found, "sensors", ())
+        if sensor not in given
+    ]
     try:
         msgspec.convert(robots.parameters, parameters_of(found))
     except msgspec.ValidationError as error:

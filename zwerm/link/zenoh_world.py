@@ -21,7 +21,7 @@ from msgspec import Struct
 from zwerm.errors import LinkError
 from zwerm.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
 from zwerm.link import Arrival
-from zwerm.link.session import open_session
+from zwerm.link.session import TWO_THREADS, open_session, set_threads
 from zwerm.protocol import REFUSABLE, Goodbye, Hello, Welcome, decode_hello, encode, refusal
 
 # More than can wait at once when every node answers each message with one; past it Zenoh holds the senders back.
@@ -51,6 +51,7 @@ class ZenohWorldLink:
         self._source_of: dict[str, int] = {}
         self._changed = threading.Condition()
         self._dismissed = False
+        set_threads(TWO_THREADS)
         self._session = open_session({"mode": "router", **settings}, "the world cannot listen")
         try:
             self._put = {node: self._publisher(observation_key(run, node)).put for node in self._members}
@@ -63,7 +64,7 @@ class ZenohWorldLink:
             self._session.liveliness().declare_subscriber(alive_key(run, EVERY), self._on_life)
             self._session.declare_queryable(hello_key(run, EVERY), self._on_hello)
         except BaseException:
-            self._session.close()
+            self._session.close()  # type: ignore[no-untyped-call]
             raise
 
     @property
@@ -126,7 +127,7 @@ class ZenohWorldLink:
         """Release all that the link holds; idempotent."""
         self._dismissed = True
         self._alarm.close()
-        self._session.close()
+        self._session.close()  # type: ignore[no-untyped-call]
 
     def _publisher(self, key: str, destination: zenoh.Locality = zenoh.Locality.REMOTE) -> zenoh.Publisher:
         return self._session.declare_publisher(
