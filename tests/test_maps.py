@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 from scipy import ndimage
@@ -176,6 +176,7 @@ def bitmaps(draw: Any) -> np.ndarray[Any, Any]:
     return free
 
 
+@settings(deadline=None)
 @given(free=bitmaps())
 def test_an_outline_is_valid_keeps_every_hole_and_moves_by_less_than_a_pixel(free: Any) -> None:
     kept = component(free)
@@ -183,11 +184,12 @@ def test_an_outline_is_valid_keeps_every_hole_and_moves_by_less_than_a_pixel(fre
     exact = shapely.union_all(shapely.box(columns, rows, columns + 1, rows + 1))
     drawn = outline(kept)
     assert drawn.is_valid
-    assert shapely.hausdorff_distance(drawn.boundary, exact.boundary, densify=0.1) < 1.0
+    assert shapely.hausdorff_distance(drawn.boundary, exact.boundary, densify=0.25) < 1.0
     _, regions = ndimage.label(np.pad(~kept, 1, constant_values=True), structure=np.ones((3, 3)))
     assert len(drawn.interiors) == regions - 1  # walls that touch at a corner hang together
 
 
+@settings(deadline=None)
 @given(rows=st.lists(st.integers(2, 37), min_size=2, max_size=6), upside=st.booleans())
 def test_a_wall_one_pixel_thin_lets_no_sight_through_however_it_winds(rows: list[int], upside: bool) -> None:
     size = 40
