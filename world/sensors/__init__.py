@@ -1,20 +1,67 @@
-"""Sensors: what a robot may know of the scene. One file a sensor, each with its noise model; `registry` names them."""
+"""Sensors: what a robot may know of the scene. One file a sensor, each with its noise model; `registry` names them.
 
+Every sensor reads the truth, adds its noise from keyed draws, and returns what crosses the wire. Robots that are not
+present are neither sensed nor read. Which robots are read changes no reading, but for `odometry`, which speaks of the
+time since.
+"""
+
+import dataclasses
 from collections.abc import Sequence
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, TypeVar
+
+import numpy as np
+from pydantic import ConfigDict
 
 from zwerm.scenario import Table
-from zwerm.world.scene import Ints, Scene
+from zwerm.world.arena import Arena
+from zwerm.world.fields import Field
+from zwerm.world.scene import Floats, Ints, Scene
+from zwerm.world.visibility import Visibility
+
+Item = TypeVar("Item")
+
+
+class SensorTable(Table):
+    """A sensor's parameters: numbers must be numbers, not strings of them."""
+
+    model_config = ConfigDict(strict=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Surroundings:
+    """What stays the same all through a run and a sensor may need: given to its constructor.
+
+    `count` robots have ids below it; `visibility` is shared, so that no line of sight is looked along twice.
+    """
+
+    arena: Arena
+    count: int
+    visibility: Visibility = dataclasses.field(default_factory=Visibility)
+    landmarks: Floats = dataclasses.field(default_factory=lambda: np.empty((0, 2)))  # (l, 2) [m]
+    field: Field | None = None
 
 
 class Sensor(Protocol):
     """A sensor that every robot of the swarm carries.
 
-    `field` is the field of `Observation` that it fills. The constructor takes an instance of `Parameters`.
+    `field` is the field of `Observation` that it fills; any other name is a key of the field `extra`.
     """
 
     field: ClassVar[str]
     Parameters: ClassVar[type[Table]]
 
+    def __init__(self, parameters: Any, surroundings: Surroundings) -> None:
+        """Take an instance of `Parameters`. Raises ValueError, one line, if the surroundings lack what it needs."""
+
     def read(self, scene: Scene, robots: Ints) -> Sequence[Any]:
         """Return one reading for each of `robots` (ascending ids of present robots), vectorised over all of them."""
+
+
+def portions(items: list[Item], ends: Ints) -> list[tuple[Item, ...]]:
+    """Return `items` cut before each of `ends`, which ascend to the end of items: one tuple for each robot."""
+    readings = []
+    start = 0
+    for end in ends.tolist():
+        readings.append(tuple(items[start:end]))
+        start = end
+    return readings

@@ -1,0 +1,47 @@
+"""The outline of the arena: the corners of its outer boundary, counter-clockwise, in the body frame.
+
+For algorithms that presume to know their environment's boundary, such as Voronoi coverage (Schwager et al. 2006). Every
+robot is told all of it, through walls and at any distance; obstacles are no part of it. The noise is Gaussian and
+independent for each tick, robot, corner and axis.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from zwerm.scenario import NonNegative, Table
+from zwerm.world.scene import Ints, Scene
+from zwerm.world.sensors import SensorTable, Surroundings
+
+
+class BoundaryTable(SensorTable):
+    """How well the corners are known."""
+
+    sd_m: NonNegative = 0.0
+
+
+class Boundary:
+    """The corners (x, y) [m], the same for every robot but for the frame."""
+
+    field: ClassVar[str] = "boundary"
+    Parameters: ClassVar[type[Table]] = BoundaryTable
+
+    def __init__(self, parameters: BoundaryTable, surroundings: Surroundings) -> None:
+        free = surroundings.arena.free
+        if not isinstance(free, Polygon):
+            raise ValueError("the boundary sensor needs an arena of one piece")
+        self._sd_m = parameters.sd_m
+        corners = np.asarray(free.exterior.coords)[:-1, :2]
+        self._corners = corners if free.exterior.is_ccw else corners[::-1]
+
+    def read(self, scene: Scene, robots: Ints) -> list[tuple[tuple[float, float], ...]]:
+        """Return the corners in the frame of each of `robots`."""
+        dx, dy = self._corners.T[:, None, :] - scene.position[robots].T[:, :, None]
+        cos, sin = np.cos(scene.heading[robots])[:, None], np.sin(scene.heading[robots])[:, None]
+        x, y = cos * dx + sin * dy, cos * dy - sin * dx
+        if self._sd_m > 0.0:
+            corner = np.arange(len(self._corners))
+            x += self._sd_m * scene.draws.normal("sensor.boundary.x", scene.tick, robots[:, None], corner)
+            y += self._sd_m * scene.draws.normal("sensor.boundary.y", scene.tick, robots[:, None], corner)
+        return [tuple(zip(*corners, strict=True)) for corners in zip(x.tolist(), y.tolist(), strict=True)]

@@ -1,0 +1,27 @@
+"""The readings of other people's sensors: the observation's field `extra`, a tuple of floats under each sensor's name.
+
+A sensor whose `field` is no field of `Observation` returns one tuple of floats for each robot; this gathers them.
+"""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from zwerm.scenario import Table
+from zwerm.world.scene import Ints, Scene
+from zwerm.world.sensors import Sensor
+
+
+class Extra:
+    """One dictionary for each robot, from sensors' fields to readings. Made by the registry, not by a table."""
+
+    field: ClassVar[str] = "extra"
+    Parameters: ClassVar[type[Table]] = Table
+
+    def __init__(self, parameters: Sequence[Sensor], surroundings: object = None) -> None:
+        self._sensors = tuple(parameters)
+
+    def read(self, scene: Scene, robots: Ints) -> list[dict[str, tuple[float, ...]]]:
+        """Return every sensor's reading for each of `robots`."""
+        names = [sensor.field for sensor in self._sensors]
+        columns = [sensor.read(scene, robots) for sensor in self._sensors]
+        return [dict(zip(names, readings, strict=True)) for readings in zip(*columns, strict=True)]

@@ -1,0 +1,86 @@
+"""Bearings to landmarks: points with an id that anybody can tell apart, and nobody knows the place of.
+
+As in Ramaithitima and Bhattacharya 2018: a robot sees every landmark within `range_m` to which no wall blocks the line;
+a landmark on a wall is seen from the side it faces. The noise is Gaussian and independent for each tick, robot and
+landmark. Robots do not hide landmarks. A robot that stands still asks the arena nothing.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from zwerm.angles import wrap
+from zwerm.protocol import LandmarkBearing
+from zwerm.scenario import NonNegative, Positive, Table
+from zwerm.world.scene import Bools, Ints, Scene
+from zwerm.world.sensors import SensorTable, Surroundings, portions
+from zwerm.world.visibility import WallVerdicts
+
+# A line of sight ends this fraction of its length short, so that a wall does not hide the landmark that hangs on it.
+_SHORT = 1e-9
+
+
+class LandmarksTable(SensorTable):
+    """Which landmarks are seen, and how well."""
+
+    range_m: Positive | None = None
+    through_walls: bool = False
+    sd_rad: NonNegative = 0.0
+
+
+class Landmarks:
+    """Bearings to landmarks, ascending by id."""
+
+    field: ClassVar[str] = "landmarks"
+    Parameters: ClassVar[type[Table]] = LandmarksTable
+
+    def __init__(self, parameters: LandmarksTable, surroundings: Surroundings) -> None:
+        if len(surroundings.landmarks) == 0:
+            raise ValueError("the landmark sensor needs landmarks, and the scenario has none")
+        self._range_m, self._sd_rad = parameters.range_m, parameters.sd_rad
+        self._through_walls = parameters.through_walls or surroundings.arena.is_convex
+        self._landmarks = surroundings.landmarks
+        self._tree = cKDTree(surroundings.landmarks)
+        self._verdicts = WallVerdicts()
+        self._read_at = np.full((surroundings.count, 2), np.nan)
+
+    def read(self, scene: Scene, robots: Ints) -> list[tuple[LandmarkBearing, ...]]:
+        """Return the bearings that each of `robots` has to the landmarks it sees."""
+        row, landmark = self._within_range(scene, robots)
+        if not self._through_walls:
+            clear = self._clear(scene, robots, robots[row], landmark)
+            row, landmark = row[clear], landmark[clear]
+        robot = robots[row]
+        dx, dy = (self._landmarks[landmark] - scene.position[robot]).T
+        bearing = np.arctan2(dy, dx) - scene.heading[robot]
+        if self._sd_rad > 0.0:
+            bearing += self._sd_rad * scene.draws.normal("sensor.landmarks", scene.tick, robot, landmark)
+        ends = np.searchsorted(row, np.arange(len(robots)), side="right")
+        return portions(list(map(LandmarkBearing, landmark.tolist(), wrap(bearing).tolist())), ends)
+
+    def _within_range(self, scene: Scene, robots: Ints) -> tuple[Ints, Ints]:
+        """Return (k,) rows of `robots` and (k,) landmarks that are within range of each other, ascending."""
+        position, landmarks = scene.position[robots], self._landmarks
+        if self._range_m is None:
+            row, landmark = np.divmod(np.arange(len(robots) * len(landmarks)), len(landmarks))
+            return row, landmark
+        # A little too far, so that one rule, the one below, decides at the very edge.
+        reach_m = self._range_m * (1.0 + 1e-9)
+        found = cKDTree(position).sparse_distance_matrix(self._tree, reach_m, output_type="ndarray")
+        order = np.argsort(found["i"] * len(landmarks) + found["j"])
+        row, landmark = found["i"][order], found["j"][order]
+        apart = landmarks[landmark] - position[row]
+        near = apart[:, 0] ** 2 + apart[:, 1] ** 2 <= self._range_m**2
+        return row[near], landmark[near]
+
+    def _clear(self, scene: Scene, robots: Ints, robot: Ints, landmark: Ints) -> Bools:
+        """Return (k,) whether no wall blocks the line from each of `robot` to its `landmark`."""
+        moved = np.zeros(len(self._read_at), dtype=np.bool_)
+        moved[robots] = (scene.position[robots] != self._read_at[robots]).any(axis=1)
+        if moved.any():
+            self._verdicts.keep(~moved[self._verdicts.keys // len(self._landmarks)])
+            self._read_at[robots] = scene.position[robots]
+        start = scene.position[robot]
+        end = start + (self._landmarks[landmark] - start) * (1.0 - _SHORT)
+        return ~self._verdicts.blocked(scene.arena, robot * len(self._landmarks) + landmark, start, end)

@@ -1,0 +1,117 @@
+"""The one-bit sensor of Ozdemir et al. 2019: is there a robot straight ahead?
+
+A ray of no width leaves the robot's centre along its heading; the reading is True iff the ray meets the disc of another
+robot before it meets a wall, however far away unless there is a range. The noise is that of their section IV-B: with
+some probability the reading is replaced by a random bit. It is not the distance, nor which robot.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+from pydantic import ValidationInfo, field_validator
+
+from zwerm.scenario import Fraction, Positive, Table
+from zwerm.world.scene import Bools, Ints, Scene
+from zwerm.world.sensors import SensorTable, Surroundings
+
+# So many (observer, other) pairs are worked on at a time: few enough for a core's cache (measured).
+_PAIRS_AT_ONCE = 1 << 15
+
+
+class LineOfSightTable(SensorTable):
+    """With these probabilities a reading becomes a random bit: one that is True, one that is False, or any."""
+
+    range_m: Positive | None = None
+    false_negative: Fraction = 0.0
+    false_positive: Fraction = 0.0
+    combined: Fraction = 0.0
+
+    @field_validator("combined")
+    @classmethod
+    def _alone(cls, combined: float, table: ValidationInfo) -> float:
+        if combined > 0.0 and (table.data.get("false_negative") or table.data.get("false_positive")):
+            raise ValueError("expected it alone, or false_negative and false_positive without it")
+        return combined
+
+
+class LineOfSight:
+    """One bit for each robot."""
+
+    field: ClassVar[str] = "line_of_sight"
+    Parameters: ClassVar[type[Table]] = LineOfSightTable
+
+    def __init__(self, parameters: LineOfSightTable, surroundings: Surroundings) -> None:
+        self._range_m = np.inf if parameters.range_m is None else parameters.range_m
+        # A bit that is replaced by a random one changes half of the time.
+        self._missed = max(parameters.false_negative, parameters.combined) / 2.0
+        self._imagined = max(parameters.false_positive, parameters.combined) / 2.0
+        self._any_entry_will_do = surroundings.arena.is_convex and parameters.range_m is None
+        self._total = 0
+
+    def read(self, scene: Scene, robots: Ints) -> list[bool]:
+        """Return whether each of `robots` has a robot straight ahead."""
+        if len(robots) == 0:
+            return []
+        sees = self._truth(scene, robots)
+        if self._missed > 0.0 or self._imagined > 0.0:
+            draw = scene.draws.uniform("sensor.line_of_sight", scene.tick, robots)
+            sees ^= draw < np.where(sees, self._missed, self._imagined)
+        answer: list[bool] = sees.tolist()
+        return answer
+
+    def _truth(self, scene: Scene, robots: Ints) -> Bools:
+        x, y = scene.position.T.copy()
+        ox, oy, heading, others = x, y, scene.heading, robots
+        if len(robots) < len(scene.present):
+            others = scene.present_ids()
+            x, y, ox, oy, heading = x[others], y[others], x[robots], y[robots], heading[robots]
+        cos, sin = np.cos(heading), np.sin(heading)
+        offset = oy * cos - ox * sin
+        cos_column, sin_column, offset_column = cos[:, None], sin[:, None], offset[:, None]
+        radius2 = scene.radius_m**2
+        sees = np.zeros(len(robots), dtype=np.bool_)
+        entry_m = None if self._any_entry_will_do else np.full(len(robots), np.inf)
+        total = len(others)
+        if total != self._total:
+            self._prepare(total)
+        for first in range(0, len(robots), self._rows):
+            last = min(first + self._rows, len(robots))
+            size = (last - first) * total
+            across, on_line = self._across[:size], self._on_line[:size]
+            grid, product = self._across_grid[: last - first], self._product_grid[: last - first]
+            # How far to the left of the ray each centre lies, squared: elementwise, so that every machine rounds alike.
+            np.multiply(cos_column[first:last], y, out=grid)
+            np.multiply(sin_column[first:last], x, out=product)
+            np.subtract(grid, product, out=grid)
+            np.subtract(grid, offset_column[first:last], out=grid)
+            np.multiply(across, across, out=across)
+            if others is robots:
+                across[first :: total + 1] = np.inf  # nobody sees itself
+            else:
+                grid[np.arange(last - first), np.searchsorted(others, robots[first:last])] = np.inf
+            np.less_equal(across, radius2, out=on_line)
+            near = on_line.nonzero()[0]
+            row, seen = self._row[near] + first, self._column[near]
+            ahead = (x[seen] - ox[row]) * cos[row] + (y[seen] - oy[row]) * sin[row]
+            half_chord2 = radius2 - across[near]
+            # The disc's far side is ahead: in front, or about the ray's own start (where bodies may overlap).
+            met = ahead * np.abs(ahead) >= -half_chord2
+            if entry_m is None:
+                sees[row[met]] = True
+            else:
+                np.minimum.at(entry_m, row[met], np.maximum(ahead[met] - np.sqrt(half_chord2[met]), 0.0))
+        if entry_m is not None:
+            hit = np.flatnonzero((entry_m <= self._range_m) & (entry_m < np.inf))
+            start = np.column_stack([ox[hit], oy[hit]])
+            ray = np.column_stack([cos[hit], sin[hit]]) * entry_m[hit, None]
+            sees[hit[~scene.arena.blocked(start, start + ray)]] = True
+        return sees
+
+    def _prepare(self, total: int) -> None:
+        """Make the buffers for so many rows at a time of `total` robots, and tables of each entry's row and column."""
+        self._total = total
+        self._rows = min(max(1, _PAIRS_AT_ONCE // total), total)
+        size = self._rows * total
+        self._across, self._product, self._on_line = np.empty(size), np.empty(size), np.empty(size, dtype=np.bool_)
+        self._across_grid, self._product_grid = self._across.reshape(-1, total), self._product.reshape(-1, total)
+        self._row, self._column = np.divmod(np.arange(size), total)

@@ -1,0 +1,68 @@
+"""How far the robot came since its previous observation, in the body frame it had then.
+
+The displacement is the straight line between the two poses, not the path between them, and the turn is told in (-pi,
+pi]. A robot's first reading, and the first after it was out of the arena, is no motion at all. The noise is Gaussian,
+on the length of the displacement and on the turn, independent for each robot and tick, and nothing for a robot that
+stands still: its variance is (fraction x motion)^2, as of a badly calibrated wheel, plus motion x (sd per root)^2, as
+of many small slips.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from zwerm.angles import wrap
+from zwerm.protocol import Displacement
+from zwerm.scenario import NonNegative, Table
+from zwerm.world.scene import Floats, Ints, Scene
+from zwerm.world.sensors import SensorTable, Surroundings
+
+
+class OdometryTable(SensorTable):
+    """The noise: of the distance in 1 and m per root m, of the turn in 1 and rad per root rad."""
+
+    distance_sd_fraction: NonNegative = 0.0
+    distance_sd_per_root_m: NonNegative = 0.0
+    turn_sd_fraction: NonNegative = 0.0
+    turn_sd_per_root_rad: NonNegative = 0.0
+
+
+class Odometry:
+    """One displacement for each robot."""
+
+    field: ClassVar[str] = "odometry"
+    Parameters: ClassVar[type[Table]] = OdometryTable
+
+    def __init__(self, parameters: OdometryTable, surroundings: Surroundings) -> None:
+        self._distance_noise = (parameters.distance_sd_fraction, parameters.distance_sd_per_root_m)
+        self._turn_noise = (parameters.turn_sd_fraction, parameters.turn_sd_per_root_rad)
+        self._known = np.zeros(surroundings.count, dtype=np.bool_)
+        self._position = np.zeros((surroundings.count, 2))
+        self._heading = np.zeros(surroundings.count)
+
+    def read(self, scene: Scene, robots: Ints) -> list[Displacement]:
+        """Return the motion of each of `robots` since it was last read."""
+        self._known &= scene.present
+        new = robots[~self._known[robots]]
+        self._position[new], self._heading[new], self._known[new] = scene.position[new], scene.heading[new], True
+        before = self._heading[robots]
+        dx, dy = (scene.position[robots] - self._position[robots]).T
+        turn = scene.heading[robots] - before
+        self._position[robots], self._heading[robots] = scene.position[robots], scene.heading[robots]
+        cos, sin = np.cos(before), np.sin(before)
+        forward, left = cos * dx + sin * dy, cos * dy - sin * dx
+        if any(self._distance_noise):
+            distance = np.hypot(dx, dy)
+            draw = scene.draws.normal("sensor.odometry.distance", scene.tick, robots)
+            # 1 + error / distance, finite also where there was no motion.
+            scale = 1.0 + draw * _sd(distance, *self._distance_noise) / np.maximum(distance, np.finfo(np.float64).tiny)
+            forward, left = forward * scale, left * scale
+        if any(self._turn_noise):
+            draw = scene.draws.normal("sensor.odometry.turn", scene.tick, robots)
+            turn = turn + draw * _sd(np.abs(turn), *self._turn_noise)
+        return list(map(Displacement, forward.tolist(), left.tolist(), wrap(turn).tolist()))
+
+
+def _sd(motion: Floats, fraction: float, per_root: float) -> Floats:
+    sd: Floats = np.sqrt((fraction * motion) ** 2 + per_root**2 * motion)
+    return sd

@@ -1,0 +1,41 @@
+"""Where the robot is and how it is turned, in the frame of the arena: what a positioning system would tell it.
+
+The noise is Gaussian and independent for each tick and robot: `sd_m` in x and in y, `sd_rad` in the heading. A robot
+that has this sensor is not lost; algorithms without metric information must do without it.
+"""
+
+from typing import ClassVar
+
+from zwerm.angles import wrap
+from zwerm.protocol import Pose
+from zwerm.scenario import NonNegative, Table
+from zwerm.world.scene import Ints, Scene
+from zwerm.world.sensors import SensorTable, Surroundings
+
+
+class PoseTable(SensorTable):
+    """How well the pose is known."""
+
+    sd_m: NonNegative = 0.0
+    sd_rad: NonNegative = 0.0
+
+
+class PoseSensor:
+    """One pose for each robot."""
+
+    field: ClassVar[str] = "pose"
+    Parameters: ClassVar[type[Table]] = PoseTable
+
+    def __init__(self, parameters: PoseTable, surroundings: Surroundings) -> None:
+        self._sd_m, self._sd_rad = parameters.sd_m, parameters.sd_rad
+
+    def read(self, scene: Scene, robots: Ints) -> list[Pose]:
+        """Return the pose of each of `robots`."""
+        x, y = scene.position[robots].T
+        heading = scene.heading[robots]
+        if self._sd_m > 0.0:
+            x = x + self._sd_m * scene.draws.normal("sensor.pose.x", scene.tick, robots)
+            y = y + self._sd_m * scene.draws.normal("sensor.pose.y", scene.tick, robots)
+        if self._sd_rad > 0.0:
+            heading = heading + self._sd_rad * scene.draws.normal("sensor.pose.heading", scene.tick, robots)
+        return list(map(Pose, x.tolist(), y.tolist(), wrap(heading).tolist()))

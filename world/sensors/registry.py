@@ -1,0 +1,118 @@
+"""Sensors by name: the built-in table, and `module:Class` for anyone else's.
+
+A scenario's `[[robots.sensors]]` tables go in, sensors that fill different fields of the observation come out, or every
+mistake in the tables at once.
+"""
+
+import importlib
+import inspect
+from collections.abc import Sequence
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from zwerm.errors import ScenarioError
+from zwerm.protocol import SENSOR_FIELDS, Observation
+from zwerm.scenario import OpenTable, Table, mistakes
+from zwerm.world.sensors import Sensor, Surroundings
+from zwerm.world.sensors.bearings import Bearings
+from zwerm.world.sensors.boundary import Boundary
+from zwerm.world.sensors.compass import Compass
+from zwerm.world.sensors.extra import Extra
+from zwerm.world.sensors.field import FieldSensor
+from zwerm.world.sensors.landmarks import Landmarks
+from zwerm.world.sensors.line_of_sight import LineOfSight
+from zwerm.world.sensors.neighbours import Neighbours
+from zwerm.world.sensors.odometry import Odometry
+from zwerm.world.sensors.pose import PoseSensor
+from zwerm.world.sensors.touch import Touch
+
+BUILT_IN: Final[dict[str, type[Sensor]]] = {
+    "bearings": Bearings,
+    "boundary": Boundary,
+    "compass": Compass,
+    "field": FieldSensor,
+    "landmarks": Landmarks,
+    "line_of_sight": LineOfSight,
+    "neighbours": Neighbours,
+    "odometry": Odometry,
+    "pose": PoseSensor,
+    "touch": Touch,
+}
+
+_STANDARD = frozenset(SENSOR_FIELDS) - {"extra"}
+_TAKEN = frozenset(Observation.__struct_fields__) - _STANDARD
+
+
+def find(kind: str) -> type[Sensor]:
+    """Return the sensor class that `kind` names.
+
+    Raises ValueError, in one line, where there is none or it is no sensor.
+    """
+    if kind in BUILT_IN:
+        return BUILT_IN[kind]
+    module_name, _, class_name = kind.partition(":")
+    if not module_name or not class_name:
+        raise ValueError(f"expected a built-in sensor ({', '.join(BUILT_IN)}) or module:Class, got {kind!r}")
+    try:
+        module = importlib.import_module(module_name)
+    except ImportError as error:
+        raise ValueError(f"cannot import {module_name!r}: {error}") from None
+    found: Any = getattr(module, class_name, None)
+    if not isinstance(found, type):
+        raise ValueError(f"module {module_name!r} has no class {class_name!r}")
+    if not callable(getattr(found, "read", None)):
+        raise ValueError(f"{kind} is no sensor: it has no method read(scene, robots)")
+    name = getattr(found, "field", None)
+    if not isinstance(name, str) or name in _TAKEN:
+        raise ValueError(f"{kind} is no sensor: its `field` must name what it fills, got {name!r}")
+    parameters = getattr(found, "Parameters", None)
+    if not isinstance(parameters, type) or not issubclass(parameters, Table):
+        raise ValueError(f"{kind} is no sensor: its `Parameters` must be a subclass of zwerm.scenario.Table")
+    try:
+        inspect.signature(found).bind(None, None)
+    except (TypeError, ValueError):
+        raise ValueError(f"{kind} is no sensor: its constructor must take (parameters, surroundings)") from None
+    return found
+
+
+def make_sensor(table: OpenTable, surroundings: Surroundings, path: str, place: str) -> Sensor:
+    """Return the sensor that `table` describes; `path` is where the table stands in the scenario `place`.
+
+    Raises ScenarioError with every mistake, each `place: path.key: rule, got value`.
+    """
+    try:
+        kind = find(table.kind)
+        return kind(kind.Parameters.model_validate(table.parameters), surroundings)
+    except ValidationError as error:
+        raise ScenarioError(mistakes(error, place, f"{path}.")) from None
+    except ValueError as error:
+        raise ScenarioError([f"{place}: {path}.kind: {error}"]) from None
+
+
+def make_sensors(tables: Sequence[OpenTable], surroundings: Surroundings, path: str, place: str) -> tuple[Sensor, ...]:
+    """Return the sensors that `tables` describe, one for each field of the observation that they fill.
+
+    Those whose field is not one of the observation's own are gathered in the one that fills `extra`. Raises
+    ScenarioError with every mistake in every table, and where two sensors fill the same field.
+    """
+    found: list[str] = []
+    filled: dict[str, str] = {}
+    standard: list[Sensor] = []
+    extra: list[Sensor] = []
+    for index, table in enumerate(tables):
+        here = f"{path}.{index}"
+        try:
+            sensor = make_sensor(table, surroundings, here, place)
+        except ScenarioError as error:
+            found += error.mistakes
+            continue
+        if sensor.field in filled:
+            found.append(
+                f"{place}: {here}.kind: fills {sensor.field}, as {filled[sensor.field]} does, got {table.kind!r}"
+            )
+        filled.setdefault(sensor.field, here)
+        (standard if sensor.field in _STANDARD else extra).append(sensor)
+    if found:
+        raise ScenarioError(found)
+    return (*standard, Extra(extra)) if extra else tuple(standard)

@@ -1,0 +1,65 @@
+"""A ring of touch switches: which of them are closed, and so roughly in which directions the robot is touched.
+
+As in Ramaithitima et al. 2015: `switches` of them, evenly spaced from straight ahead, each good for half its sector to
+either side. A wall or a robot within `reach_m` of the body's surface closes the switch that faces its nearest point; so
+a wall closes one switch for each straight piece of it, not every switch whose sector it grazes. Each tick a closed
+switch reads open with probability `false_negative`, an open one closed with `false_positive`. What touches, and how
+hard, is not sensed.
+"""
+
+import math
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from zwerm.angles import wrap
+from zwerm.protocol import Contact
+from zwerm.scenario import Fraction, Positive, Table
+from zwerm.world.scene import Ints, Scene
+from zwerm.world.sensors import SensorTable, Surroundings, portions
+
+
+class TouchTable(SensorTable):
+    """The ring, and how it errs."""
+
+    switches: Annotated[int, Field(ge=1, le=360)] = 8
+    reach_m: Positive = 0.005
+    false_negative: Fraction = 0.0
+    false_positive: Fraction = 0.0
+
+
+class Touch:
+    """The closed switches, counter-clockwise from straight ahead."""
+
+    field: ClassVar[str] = "touch"
+    Parameters: ClassVar[type[Table]] = TouchTable
+
+    def __init__(self, parameters: TouchTable, surroundings: Surroundings) -> None:
+        self._reach_m = parameters.reach_m
+        self._false_negative, self._false_positive = parameters.false_negative, parameters.false_positive
+        self._sector_rad = 2.0 * math.pi / parameters.switches
+        self._switch = np.arange(parameters.switches)
+        bearings = wrap(self._switch * self._sector_rad).tolist()
+        self._contacts = [Contact(bearing, self._sector_rad / 2.0) for bearing in bearings]
+        self._visibility = surroundings.visibility
+
+    def read(self, scene: Scene, robots: Ints) -> list[tuple[Contact, ...]]:
+        """Return the closed switches of each of `robots`."""
+        here = scene.position[robots]
+        walls = scene.arena.walls_within(here, scene.radius_m + self._reach_m)
+        # A wall thin enough to stand between two bodies in reach is in reach of both: it need not be looked for.
+        others = self._visibility.sightings(scene, robots, 2.0 * scene.radius_m + self._reach_m, through_walls=True)
+        row = np.concatenate([walls.point, np.searchsorted(robots, others.observer)])
+        place = np.concatenate([walls.nearest, scene.position[others.seen]])
+        closed = np.zeros((len(robots), len(self._switch)), dtype=np.bool_)
+        if len(row):
+            dx, dy = (place - here[row]).T
+            bearing = np.arctan2(dy, dx) - scene.heading[robots[row]]
+            closed[row, np.rint(bearing / self._sector_rad).astype(np.int64) % len(self._switch)] = True
+        if self._false_negative > 0.0 or self._false_positive > 0.0:
+            draw = scene.draws.uniform("sensor.touch", scene.tick, robots[:, None], self._switch)
+            closed ^= draw < np.where(closed, self._false_negative, self._false_positive)
+        row, switch = closed.nonzero()
+        ends = np.searchsorted(row, np.arange(len(robots)), side="right")
+        return portions([self._contacts[each] for each in switch.tolist()], ends)
