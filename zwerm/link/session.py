@@ -26,14 +26,14 @@ SETTINGS: Final[Mapping[str, Any]] = {
 
 UNIX_PROTOCOL: Final = "unixsock-stream"
 
-# Between processes of one machine the kernel reports a death at once, so the lease only decides how long a stopped process
-# (SIGSTOP, a debugger) still counts as there. Over a network it decides how soon a cut cable is noticed.
+# Between processes of one machine the kernel reports a death at once, so the lease only decides how long a stopped
+# process (SIGSTOP, a debugger) still counts as there. Over a network it decides how soon a cut cable is noticed.
 LEASE_LOCAL_MS: Final = 600_000
 LEASE_REMOTE_MS: Final = 10_000
 
-# Zenoh's threads, which it reads from the environment once per process. What a message costs is mostly the switches from
-# one thread to the next, so there are as few as can be: one that receives, answers and sends. Only where a slow answer
-# must not silence the lease, and in the world, does another one send.
+# Zenoh's threads, which it reads from the environment once per process. What a message costs is mostly the switches
+# from one thread to the next, so there are as few as can be: one that receives, answers and sends. Only where a slow
+# answer must not silence the lease, and in the world, does another one send.
 ONE_THREAD: Final = "(app:(worker_threads:1),acc:(handover:app),tx:(handover:app),rx:(handover:app),net:(handover:app))"
 TWO_THREADS: Final = (
     "(app:(worker_threads:1),acc:(handover:app),tx:(handover:app),rx:(worker_threads:1),net:(handover:app))"
@@ -52,7 +52,8 @@ class Credential(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Credentials(Struct, frozen=True, forbid_unknown_fields=True):
-    """The credentials of some nodes of a run; `authority_pem` is who signed the world's certificate, for TLS and QUIC."""
+    """The credentials of some nodes of a run; `authority_pem` is who signed the world's certificate, for TLS and
+    QUIC."""
 
     run: str
     nodes: tuple[Credential, ...]

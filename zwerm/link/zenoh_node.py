@@ -1,7 +1,8 @@
 """A node's end of a Zenoh link: a client session that can reach the world's router and nothing else.
 
-Promises: `join` subscribes before it says hello, so nothing that is sent to a welcomed node is lost; messages arrive in the
-order sent. The link is lost when its transport is, and does not come back: to the world the node is lost as well.
+Promises: `join` subscribes before it says hello, so nothing that is sent to a welcomed node is lost; messages arrive
+in the order sent. The link is lost when its transport is, and does not come back: to the world the node is lost as
+well.
 """
 
 import contextlib
@@ -25,7 +26,8 @@ RETRY_S: Final = 0.05
 class ZenohNodeLink:
     """The end of the node that `credential` names, of the run `run`, connected to `endpoint`.
 
-    `on_lost` is called, in Zenoh's thread, when the world is gone. Until `listen` is called messages wait for `receive`.
+    `on_lost` is called, in Zenoh's thread, when the world is gone. Until `listen` is called messages wait for
+    `receive`.
     """
 
     send: Callable[[bytes], None]
@@ -82,7 +84,8 @@ class ZenohNodeLink:
             Callback(self._on_sample, indirect=False),
             allowed_origin=zenoh.Locality.REMOTE,
         )
-        # Held, because Zenoh withdraws a token that nobody holds. Declared before hello, so that the world knows it by then.
+        # Held, because Zenoh withdraws a token that nobody holds. Declared before hello, so that the world knows it by
+        # then.
         self._token = self._session.liveliness().declare_token(alive_key(self._run, node))
         hello = encode(Hello(node, self._credential.incarnation))
         while (left_s := self._deadline_s - time.monotonic()) > 0:
