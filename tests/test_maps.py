@@ -125,7 +125,7 @@ def test_in_scale_mode_a_transparent_pixel_is_unknown(folder: Path) -> None:
 def test_a_turned_map_is_turned_about_its_origin(folder: Path) -> None:
     straight = read(folder, map="room.yaml").free
     write_yaml(folder / "room.yaml", origin=[-1.0, -2.0, 0.5])
-    turned = read(folder, map="room.yaml", start=(-0.95, -1.6)).free
+    turned = read(folder, map="room.yaml", start=(-0.45, -1.13)).free  # 0.9 m and 0.5 m along the turned sides
     expected = shapely.affinity.rotate(straight, 0.5, origin=(-1.0, -2.0), use_radians=True)
     assert turned.symmetric_difference(expected).area < 1e-12
 
