@@ -176,7 +176,7 @@ def bitmaps(draw: Any) -> np.ndarray[Any, Any]:
     return free
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=50)
 @given(free=bitmaps())
 def test_an_outline_is_valid_keeps_every_hole_and_moves_by_less_than_a_pixel(free: Any) -> None:
     kept = component(free)
@@ -189,7 +189,7 @@ def test_an_outline_is_valid_keeps_every_hole_and_moves_by_less_than_a_pixel(fre
     assert len(drawn.interiors) == regions - 1  # walls that touch at a corner hang together
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=50)
 @given(rows=st.lists(st.integers(2, 37), min_size=2, max_size=6), upside=st.booleans())
 def test_a_wall_one_pixel_thin_lets_no_sight_through_however_it_winds(rows: list[int], upside: bool) -> None:
     size = 40
