@@ -1,11 +1,12 @@
 """Identities: who may join a run, and what the network lets each node do.
 
-Every run has new random credentials. The router admits a user name only with its password, and only from the session with
-the Zenoh id issued along with it; then access control, which denies by default, leaves a node exactly its own keys: put its
-commands, receive its observations, say hello, keep its own liveliness token. So locality does not rest on good manners.
+Every run has new random credentials. The router admits a user name only with its password, and only from the session
+with the Zenoh id issued along with it. Access control denies by default and leaves a node exactly its own keys: put
+its commands, receive its observations, say hello, keep its own liveliness token. So locality does not rest on good
+manners.
 
-Credentials travel by pipe to robot processes of this machine and by file (0600) to others; never on a command line or in
-the environment.
+Credentials travel by pipe to processes of this machine, and by file (0600) to others; never on a command line or in the
+environment.
 """
 
 import os
@@ -18,7 +19,7 @@ import msgspec
 
 from zwerm.errors import LinkError
 from zwerm.keys import EVERY, alive_key, command_key, hello_key, observation_key
-from zwerm.link.session import Credential, Credentials, lease_settings
+from zwerm.link.session import Credential, Credentials, transport_settings
 
 PRIVATE_FILE_MODE: Final = 0o600
 SECRET_BYTES: Final = 24
@@ -68,13 +69,13 @@ def router_settings(credentials: Credentials, endpoints: list[str], dictionary: 
         "transport/unicast/max_sessions": 2 * capacity + 100,
         "transport/auth/usrpwd/dictionary_file": str(dictionary),
         "access_control": access_control(credentials),
-        **lease_settings(endpoints),
+        **transport_settings(endpoints),
     }
 
 
 def access_control(credentials: Credentials) -> dict[str, Any]:
     """Return the access control that leaves every node its own keys and nothing else."""
-    # A node's session publishes only once it knows that somebody listens; it may know that the world listens to every node.
+    # A session publishes only what it knows somebody listens to, so it may know that the world listens to every node.
     listens = _allow("world-listens", command_key(credentials.run, EVERY), "declare_subscriber", "egress")
     rules = [listens]
     policies = []
@@ -103,9 +104,8 @@ def slice_of(credentials: Credentials, nodes: Iterable[int]) -> Credentials:
     """Return the credentials of `nodes` only. Raises LinkError where there are none for one of them."""
     known = {credential.node: credential for credential in credentials.nodes}
     chosen = list(nodes)
-    missing = [node for node in chosen if node not in known]
-    if missing:
-        raise LinkError(f"the credentials hold nothing for node {missing[0]}")
+    if unknown := [node for node in chosen if node not in known]:
+        raise LinkError(f"the credentials hold no node {unknown[0]}")
     return Credentials(credentials.run, tuple(known[node] for node in chosen), credentials.authority_pem)
 
 
@@ -133,5 +133,5 @@ def write_private(path: Path, content: bytes) -> None:
     """Write a file that only its owner can read, from its first byte on; one that was there before is replaced."""
     path.unlink(missing_ok=True)
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, PRIVATE_FILE_MODE)
-    with open(descriptor, "wb") as file:
+    with os.fdopen(descriptor, "wb") as file:
         file.write(content)

@@ -1,7 +1,8 @@
 """What the server that robots are forked from loads first: importing this module prepares the calling process for it.
 
-Robots share the server's memory as long as nobody writes to it. So whatever a robot imports is imported here, once, and the
-garbage collector, which writes to all it looks at, is told to leave that alone. For the server only, never for the world.
+Robots share the server's memory as long as nobody writes to it. So whatever a robot imports is imported here, once,
+and the garbage collector, which writes to all it looks at, is told to leave that alone. For the server only, never for
+the world.
 """
 
 import gc

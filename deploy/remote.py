@@ -8,9 +8,6 @@ from zwerm.deploy.identity import load, slice_of
 from zwerm.deploy.supervisor import JOIN_DEADLINE_S, LocalSupervisor, prepare
 from zwerm.errors import LinkError
 
-# How long a robot may take to end by itself once the others of its slice have.
-_FOREVER_S = 365 * 86_400.0
-
 
 def parse_ids(text: str) -> list[int]:
     """Return the ids in `3`, `0-24` or `0-4,10-14`, ascending. Raises LinkError for anything else."""
@@ -41,5 +38,5 @@ def run_robots(
     start_s = time.monotonic()
     with LocalSupervisor(endpoint, credentials) as supervisor:
         supervisor.start(progress, deadline_s - (time.monotonic() - start_s))
-        supervisor.wait(_FOREVER_S)
+        supervisor.wait()
         return supervisor.exit_codes

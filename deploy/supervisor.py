@@ -1,7 +1,7 @@
 """Robot processes of this machine: started in waves, watched, and ended, whatever happens.
 
-Promises: `stop` leaves no process, and needs no cooperation of theirs; if this process is killed the kernel ends them (on
-Linux; elsewhere they end themselves). Knows nothing of the run they take part in.
+Promises: `stop` leaves no process, and needs no cooperation of theirs; if this process is killed the kernel ends them
+(on Linux; elsewhere they end themselves). Knows nothing of the run they take part in.
 """
 
 import contextlib
@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from zwerm.agents.robot import main
 from zwerm.errors import LinkError
@@ -37,8 +37,9 @@ Progress = Callable[[int, int], object]
 def prepare(robots: int) -> None:
     """Start the server that robots are forked from, and raise the limit of open files for `robots` of them.
 
-    Call it from the main thread, before any Zenoh session is opened: a fork copies only the thread that forks, and on Linux
-    the server ends with the thread that started it. Raises LinkError where the limit cannot be raised far enough.
+    Call it from the main thread, and before the first Zenoh session is opened: on Linux the server ends with the thread
+    that started it, and no fork may come after a session. The server lives as long as this process, and serves every
+    later swarm too. Raises LinkError where the limit cannot be raised far enough.
     """
     _raise_file_limit(robots * _FILES_PER_ROBOT + 200)
     multiprocessing.set_forkserver_preload(["zwerm.deploy.nursery"])
@@ -63,7 +64,7 @@ def _raise_file_limit(needed: int) -> None:
 
 
 class LocalSupervisor:
-    """One process for each of `credentials`, connected to `endpoint`; `order` is the order in which they are started."""
+    """One process for each of `credentials`, connected to `endpoint`; `order` is the order of starting."""
 
     def __init__(
         self, endpoint: str, credentials: Credentials, *, order: Sequence[int] | None = None, wave: int = WAVE
@@ -97,8 +98,8 @@ class LocalSupervisor:
     def start(self, progress: Progress | None = None, deadline_s: float = JOIN_DEADLINE_S) -> None:
         """Start all robots, a wave at a time, each wave once the one before has joined.
 
-        `progress` is called with how many have joined, and of how many. Raises LinkError where a robot ends before it has
-        joined, or a wave has not joined within `deadline_s`.
+        `progress` is called with how many have joined, and of how many. Raises LinkError where a robot ends before it
+        has joined, or a wave has not joined within `deadline_s`.
         """
         total = len(self._order)
         for first in range(0, total, self._wave):
@@ -118,17 +119,20 @@ class LocalSupervisor:
         process.kill()
         process.join()
 
-    def signal(self, node: int, number: signal.Signals) -> None:
+    def send_signal(self, node: int, number: signal.Signals) -> None:
         """Send a signal to one robot, such as SIGSTOP and SIGCONT."""
         os.kill(self.pids[node], number)
 
-    def wait(self, deadline_s: float) -> bool:
-        """Wait until all robots have ended; tell whether they have."""
-        end_s = time.monotonic() + deadline_s
-        while alive := self._alive():
-            left_s = end_s - time.monotonic()
-            if left_s <= 0 or not wait([process.sentinel for process in alive], left_s):
-                return not self._alive()
+    def wait(self, deadline_s: float | None = None) -> bool:
+        """Wait until all robots have ended, at most `deadline_s` seconds; tell whether they have."""
+        end_s = None if deadline_s is None else time.monotonic() + deadline_s
+        alive: dict[Any, ForkServerProcess] = {process.sentinel: process for process in self._alive()}
+        while alive:
+            ended = wait(list(alive), None if end_s is None else max(0.0, end_s - time.monotonic()))
+            if not ended:
+                return False
+            for sentinel in ended:
+                alive.pop(sentinel).join()
         return True
 
     def stop(self, leave_deadline_s: float = 0.0) -> None:
@@ -155,27 +159,26 @@ class LocalSupervisor:
             with writer, interrupts_held(), _main_module_hidden():
                 for credential in credentials:
                     self._processes[credential.node] = self._started(credential, deadline_s, writer)
-            missing = {credential.node for credential in credentials}
+            missing = {credential.node: self._processes[credential.node] for credential in credentials}
             while missing:
-                sentinels: list[Any] = [self._processes[node].sentinel for node in sorted(missing)]
+                sentinels = {process.sentinel: node for node, process in missing.items()}
                 ready = wait([reader, *sentinels], max(0.0, end_s - time.monotonic()))
                 if reader in ready and (node := _received(reader)) is not None:
-                    missing.remove(node)
+                    del missing[node]
                     yield node
                     continue
-                for node in sorted(missing):
-                    self._processes[node].join(0 if reader not in ready else 1)
-                    code = self._processes[node].exitcode
-                    if code is not None:
-                        raise LinkError(f"node {node} ended with exit code {code} before it joined")
-                if not ready:
-                    raise LinkError(f"node {min(missing)} did not join within {deadline_s:g} s")
+                # What a robot wrote before it ended has been read, or there is nobody left to write.
+                for sentinel in wait(list(sentinels), 1.0) if ready else []:
+                    process = missing[sentinels[cast(int, sentinel)]]
+                    process.join()
+                    raise LinkError(f"{process.name} ended with exit code {process.exitcode} before it joined")
+                raise LinkError(f"{next(iter(missing.values())).name} did not join within {deadline_s:g} s")
 
     def _started(self, credential: Credential, deadline_s: float, joined: Connection) -> ForkServerProcess:
         process = self._context.Process(
             target=main,
             args=(self._run, credential, self._endpoint, self._authority_pem, deadline_s, joined),
-            name=f"zwerm robot {credential.node}",
+            name=f"node {credential.node}",
             daemon=True,
         )
         process.start()
@@ -210,9 +213,10 @@ def interrupts_held() -> Iterator[None]:
 def _main_module_hidden() -> Iterator[None]:
     """Keep robot processes from importing the program that starts them, and all that it imports."""
     module = sys.modules["__main__"]
-    hidden = {name: vars(module)[name] for name in ("__spec__", "__file__") if name in vars(module)}
-    vars(module).update(dict.fromkeys(hidden))
+    names: dict[str, Any] = vars(module)
+    hidden: dict[str, Any] = {name: names[name] for name in ("__spec__", "__file__") if name in names}
+    names.update(dict.fromkeys(hidden))
     try:
         yield
     finally:
-        vars(module).update(hidden)
+        names.update(hidden)

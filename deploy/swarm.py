@@ -7,16 +7,16 @@ Promises: entering returns when every node has joined; leaving, in whatever way,
 """
 
 import contextlib
-import shutil
 import tempfile
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple, Self
 
 from zwerm.agents.contract import Setup
-from zwerm.deploy.identity import issue, router_settings, save
+from zwerm.deploy.identity import issue, renew, router_settings, save
 from zwerm.deploy.supervisor import (
     JOIN_DEADLINE_S,
     LEAVE_DEADLINE_S,
@@ -26,7 +26,7 @@ from zwerm.deploy.supervisor import (
     prepare,
 )
 from zwerm.errors import LinkError
-from zwerm.link.session import UNIX_PROTOCOL, Credentials
+from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials
 from zwerm.link.zenoh_world import Member, ZenohWorldLink
 from zwerm.protocol import encode
 
@@ -37,7 +37,7 @@ _SOCKET_PATH_BYTES_MAX: Final = 100
 
 
 class Certificate(NamedTuple):
-    """The world's certificate for TLS and QUIC endpoints, its private key, and the authority that signed it: PEM files."""
+    """The world's certificate for TLS and QUIC endpoints, its key, and the authority that signed it: PEM files."""
 
     certificate: Path
     private_key: Path
@@ -50,8 +50,9 @@ class _Swarm(ABC):
     link: ZenohWorldLink
     credentials: Credentials
 
-    def __init__(self, run: str, members: Members, progress: Progress | None, deadline_s: float) -> None:
+    def __init__(self, run: str, members: Members, progress: Progress | None, deadline_s: float, paced: bool) -> None:
         self._run = run
+        self._paced = paced
         self._members = members
         self._progress = progress or (lambda joined, total: None)
         self._deadline_s = deadline_s
@@ -59,13 +60,16 @@ class _Swarm(ABC):
 
     def __enter__(self) -> Self:
         """Start everything, and return when every node has joined. Raises LinkError where one does not."""
-        with contextlib.ExitStack() as stack:
+        try:
             with interrupts_held():
-                directory = Path(tempfile.mkdtemp(prefix="zwerm-", dir=_short_temporary_directory()))
-                stack.callback(shutil.rmtree, directory, ignore_errors=True)
-                self._open(stack, directory)
+                temporary = tempfile.TemporaryDirectory(
+                    prefix="zwerm-", dir=_short_directory(), ignore_cleanup_errors=True
+                )
+                self._open(Path(self._stack.enter_context(temporary)))
             self._gather()
-            self._stack = stack.pop_all()
+        except BaseException:
+            self.close()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -76,17 +80,10 @@ class _Swarm(ABC):
         with interrupts_held():
             self._stack.close()
 
-    def _listen(
-        self, stack: contextlib.ExitStack, directory: Path, endpoints: list[str], tls: Certificate | None
-    ) -> None:
+    def _listen(self, directory: Path, endpoints: list[str], tls: Certificate | None = None) -> None:
         """Issue credentials, and open the world's end of the link on `endpoints`."""
         self.credentials = issue(self._run, self._members, tls.authority.read_text() if tls else "")
-        members = {
-            credential.node: Member(
-                credential.incarnation, self._members[credential.node][0], encode(self._members[credential.node][1])
-            )
-            for credential in self.credentials.nodes
-        }
+        members = {credential.node: self._member(credential) for credential in self.credentials.nodes}
         passwords = directory / "passwords"
         settings = router_settings(self.credentials, endpoints, passwords)
         if tls:
@@ -96,10 +93,14 @@ class _Swarm(ABC):
             self.link = ZenohWorldLink(self._run, members, settings)
         finally:
             passwords.unlink()
-        stack.callback(self.link.close)
+        self._stack.callback(self.link.close)
+
+    def _member(self, credential: Credential) -> Member:
+        controller, setup = self._members[credential.node]
+        return Member(credential.incarnation, controller, encode(setup), self._paced)
 
     @abstractmethod
-    def _open(self, stack: contextlib.ExitStack, directory: Path) -> None:
+    def _open(self, directory: Path) -> None:
         """Open the link, and leave on the stack what ends the nodes."""
 
     @abstractmethod
@@ -120,20 +121,34 @@ class LocalSwarm(_Swarm):
         progress: Progress | None = None,
         order: Sequence[int] | None = None,
         deadline_s: float = JOIN_DEADLINE_S,
+        paced: bool = False,
     ) -> None:
-        """`order` is the order of starting; `deadline_s` is given to each wave of processes to join."""
-        super().__init__(run, members, progress, deadline_s)
+        """`order` is the order of starting; `deadline_s` is given to each wave of processes to join; `paced` is real time."""
+        super().__init__(run, members, progress, deadline_s, paced)
         self._order = order
 
-    def _open(self, stack: contextlib.ExitStack, directory: Path) -> None:
+    def _open(self, directory: Path) -> None:
         prepare(len(self._members))
         endpoint = f"{UNIX_PROTOCOL}/{directory}/router"
-        self._listen(stack, directory, [endpoint], None)
+        self._listen(directory, [endpoint])
+        self._current = {credential.node: credential for credential in self.credentials.nodes}
         self.supervisor = LocalSupervisor(endpoint, self.credentials, order=self._order)
-        stack.callback(self._end)
+        self._stack.callback(self._end)
 
     def _gather(self) -> None:
         self.supervisor.start(self._progress, self._deadline_s)
+
+    def restart(self, node: int) -> None:
+        """Kill a node, and start it with a new incarnation and no memory; return when it has joined.
+
+        Its end is reported by the link all the same. Raises LinkError where it does not join.
+        """
+        self.supervisor.kill(node)
+        self.link.wait_joined(lambda joined: node not in joined, LEAVE_DEADLINE_S)
+        credential = renew(self._current[node])
+        self.link.expect(node, self._member(credential))
+        self._current[node] = credential
+        self.supervisor.restart(credential, self._deadline_s)
 
     def _end(self) -> None:
         self.link.dismiss("the run is over")
@@ -153,38 +168,43 @@ class RemoteSwarm(_Swarm):
         tls: Certificate | None = None,
         progress: Progress | None = None,
         deadline_s: float = JOIN_DEADLINE_S,
+        paced: bool = False,
     ) -> None:
         """`listen` are Zenoh endpoints, such as `tcp/0.0.0.0:7447`; `deadline_s` is given to all nodes to join."""
-        super().__init__(run, members, progress, deadline_s)
+        super().__init__(run, members, progress, deadline_s, paced)
         self._endpoints = list(listen)
         self._credentials_file = credentials_file
         self._tls = tls
 
-    def _open(self, stack: contextlib.ExitStack, directory: Path) -> None:
-        self._listen(stack, directory, self._endpoints, self._tls)
+    def _open(self, directory: Path) -> None:
+        self._listen(directory, self._endpoints, self._tls)
         save(self.credentials, self._credentials_file)
-        stack.callback(self._credentials_file.unlink, missing_ok=True)
-        stack.callback(self._end)
+        self._stack.callback(self._credentials_file.unlink, missing_ok=True)
+        self._stack.callback(self._end)
 
     def _gather(self) -> None:
         total = len(self._members)
-        joined = 0
+        count = 0
         end_s = time.monotonic() + self._deadline_s
-        while joined < total:
-            if not self.link.wait_joined(lambda count, before=joined: count != before, end_s - time.monotonic()):
+        while count < total:
+            if not self.link.wait_joined(partial(_changed, count), end_s - time.monotonic()):
                 missing = sorted(set(self._members) - self.link.joined)
                 raise LinkError(
-                    f"{len(missing)} nodes, first node {missing[0]}, did not join within {self._deadline_s:g} s"
+                    f"{len(missing)} nodes did not join within {self._deadline_s:g} s, first node {missing[0]}"
                 )
-            joined = len(self.link.joined)
-            self._progress(joined, total)
+            count = len(self.link.joined)
+            self._progress(count, total)
 
     def _end(self) -> None:
         self.link.dismiss("the run is over")
-        self.link.wait_joined(lambda count: count == 0, LEAVE_DEADLINE_S)
+        self.link.wait_joined(lambda joined: not joined, LEAVE_DEADLINE_S)
 
 
-def _short_temporary_directory() -> str:
+def _changed(count: int, joined: Collection[int]) -> bool:
+    return len(joined) != count
+
+
+def _short_directory() -> str:
     """Return the directory for temporary files, or /tmp where a socket below it would have too long a path."""
     chosen = tempfile.gettempdir()
     return chosen if len(chosen) < _SOCKET_PATH_BYTES_MAX - len("/zwerm-12345678/router") else "/tmp"

@@ -17,13 +17,16 @@ from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from zwerm.scenario import ArenaTable
 from zwerm.world.shapes import read_shape
+from zwerm.world.wall_index import WallIndex
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# Up to this many pairs, comparing all with all is quicker than asking the index (measured).
-_DENSE_PAIRS = 20_000
+# Up to this many pairs, comparing all with all is quicker than asking an index (measured).
+_DENSE_LINES = 5_000
+_DENSE_POINTS = 20_000
+_ON_WALL_M = 1e-9  # a ray that begins this near a wall, on either side, begins on it
 
 
 class WallContacts(NamedTuple):
@@ -59,6 +62,7 @@ class Arena:
         self._px, self._py, self._qx, self._qy = (np.ascontiguousarray(column) for column in self.segments.T)
         self._ex, self._ey = self._qx - self._px, self._qy - self._py
         self._length2 = self._ex**2 + self._ey**2
+        self._index = WallIndex(self.segments)
         self._tree = shapely.STRtree(shapely.linestrings(self.segments.reshape(-1, 2, 2)))
 
     @classmethod
@@ -74,13 +78,13 @@ class Arena:
         count = len(start)
         if self.is_convex or count == 0:
             return np.zeros(count, dtype=np.bool_)
-        if count * len(self.segments) <= _DENSE_PAIRS:
+        if count * len(self.segments) <= _DENSE_LINES:
             a, b = start.T[:, :, None], end.T[:, :, None]
             hit = _crosses(a[0], a[1], b[0], b[1], self._px, self._py, self._qx, self._qy)
             dense: Bools = np.logical_or.reduce(hit, axis=1)
             return dense
         blocked = np.zeros(count, dtype=np.bool_)
-        line, wall = self._tree.query(shapely.linestrings(np.stack([start, end], axis=1)))
+        line, wall = self._index.candidates(start, end)
         a, b = start[line].T, end[line].T
         crossing = _crosses(a[0], a[1], b[0], b[1], self._px[wall], self._py[wall], self._qx[wall], self._qy[wall])
         blocked[line[crossing]] = True
@@ -89,17 +93,15 @@ class Arena:
     def ray_length(self, origin: Floats, direction: Floats, limit_m: float) -> Floats:
         """Return (k,) the distance [m] from origin (k, 2) to a wall along unit vectors direction (k, 2), or limit_m."""
         count = len(origin)
-        if count * len(self.segments) <= _DENSE_PAIRS:
+        if count * len(self.segments) <= _DENSE_LINES:
             o, d = origin.T[:, :, None], direction.T[:, :, None]
             dense: Floats = _meets(o[0], o[1], d[0], d[1], self._px, self._py, self._qx, self._qy).min(axis=1)
             return np.minimum(dense, limit_m)
         length = np.full(count, limit_m, dtype=np.float64)
         box = np.array(self.bounds)
         farthest = _norm(np.maximum(np.abs(origin - box[:2]), np.abs(origin - box[2:])))
-        reach = np.minimum(limit_m, farthest * 1.01)[
-            :, None
-        ]  # no wall is farther, and the index takes no infinite line
-        ray, wall = self._tree.query(shapely.linestrings(np.stack([origin, origin + reach * direction], axis=1)))
+        reach = np.minimum(limit_m, 1.01 * farthest)  # no wall is farther, and the index takes no infinite lines
+        ray, wall = self._index.candidates(origin, origin + reach[:, None] * direction)
         o, d = origin[ray].T, direction[ray].T
         met = _meets(o[0], o[1], d[0], d[1], self._px[wall], self._py[wall], self._qx[wall], self._qy[wall])
         np.minimum.at(length, ray, met)
@@ -112,29 +114,24 @@ class Arena:
     def nearest_wall_points(self, points: Floats) -> Floats:
         """Return (k, 2) the place on a wall nearest to each of points (k, 2) [m]; of equals, the first segment's."""
         count = len(points)
-        if count * len(self.segments) <= _DENSE_PAIRS:
+        if count * len(self.segments) <= _DENSE_POINTS:
             x, y = points.T[:, :, None]
             nx, ny = self._nearest(x, y, np.s_[:])
             best = np.argmin((nx - x) ** 2 + (ny - y) ** 2, axis=1)
             rows = np.arange(count)
             return np.column_stack([nx[rows, best], ny[rows, best]])
-        point, wall = self._tree.query_nearest(shapely.points(points))
-        order = np.lexsort((wall, point))
-        first = order[np.unique(point[order], return_index=True)[1]]
-        x, y = points.T
-        return np.column_stack(self._nearest(x, y, wall[first]))
+        # The tree's own distances only tell how far to look: what is nearest is then found by the same sums as above.
+        _, distance = self._tree.query_nearest(shapely.points(points), all_matches=False, return_distance=True)
+        point, wall = self._near(points, distance + _ON_WALL_M)
+        x, y = points[point].T
+        nx, ny = self._nearest(x, y, wall)
+        order = np.lexsort((wall, (nx - x) ** 2 + (ny - y) ** 2, point))
+        best = order[np.searchsorted(point, np.arange(count))]
+        return np.column_stack([nx[best], ny[best]])
 
     def walls_within(self, points: Floats, distance_m: float) -> WallContacts:
         """Return every pair of a point of points (k, 2) and a wall segment at most distance_m from it."""
-        if len(points) * len(self.segments) <= _DENSE_PAIRS:
-            point = np.repeat(np.arange(len(points)), len(self.segments))
-            wall = np.tile(np.arange(len(self.segments)), len(points))
-        else:
-            x, y = points.T
-            boxes = shapely.box(x - distance_m, y - distance_m, x + distance_m, y + distance_m)
-            point, wall = self._tree.query(boxes)
-            order = np.lexsort((wall, point))
-            point, wall = point[order], wall[order]
+        point, wall = self._near(points, distance_m)
         nearest = np.column_stack(self._nearest(points[point, 0], points[point, 1], wall))
         distance = _norm(nearest - points[point])
         near = distance <= distance_m
@@ -144,8 +141,17 @@ class Arena:
         """Return (k,) whether each of points (k, 2) is in free space and at least margin_m from every wall."""
         inside: Bools = shapely.contains_xy(self.free, points[:, 0], points[:, 1])
         if margin_m > 0.0:
-            inside &= self.clearance(points) >= margin_m
+            close = self.walls_within(points, margin_m)
+            inside[close.point[close.distance_m < margin_m]] = False
         return inside
+
+    def _near(self, points: Floats, distance_m: float | Floats) -> tuple[Ints, Ints]:
+        """Return pairs (point, wall), sorted, among which are all walls within distance_m of points (k, 2)."""
+        x, y = points.T
+        boxes = shapely.box(x - distance_m, y - distance_m, x + distance_m, y + distance_m)
+        point, wall = self._tree.query(boxes)
+        order = np.lexsort((wall, point))
+        return point[order], wall[order]
 
     def _nearest(self, x: Floats, y: Floats, wall: Ints | slice) -> tuple[Floats, Floats]:
         px, py, ex, ey = self._px[wall], self._py[wall], self._ex[wall], self._ey[wall]
@@ -229,4 +235,4 @@ def _meets(
     ):  # edge-on: nothing is met beside the ray; in it, the nearer end, or the origin where it lies in the wall
         edge_on = np.where(at_p * at_q <= 0.0, 0.0, np.minimum(at_p, at_q))
         at = np.where(along, np.where(side_p == 0.0, edge_on, np.inf), at)
-    return np.where((side_p * side_q <= 0.0) & (at >= 0.0), at, np.inf)
+    return np.where((side_p * side_q <= 0.0) & (at >= -_ON_WALL_M), np.maximum(at, 0.0), np.inf)

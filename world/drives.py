@@ -19,7 +19,10 @@ from zwerm.world.scene import Floats
 # Ticks of noise drawn at once: draws are keyed by tick, so a block costs less and changes nothing.
 _BLOCK_TICKS: Final = 64
 
-_KINDS: Final = {"differential": WheelSpeeds, "holonomic": BodyVelocity}
+_KINDS: Final[dict[str, type[BodyVelocity] | type[WheelSpeeds]]] = {
+    "differential": WheelSpeeds,
+    "holonomic": BodyVelocity,
+}
 
 
 class Drives:

@@ -55,7 +55,7 @@ class Wakes:
 
     def sleep(self, node: int, wake: Wake, tick: int) -> None:
         """Put a node to sleep until `wake`; a time that has passed means the next tick."""
-        due = NEVER if wake.at_s is None else math.ceil(wake.at_s / self._dt_s - 1e-9)
+        due = NEVER if wake.at_s is None else float(np.ceil(wake.at_s / self._dt_s - 1e-9))
         self._due[node] = max(due, tick + 1)
         self._on_packet[node] = wake.on_packet
         self._watching["touch"][node] = wake.on_contact

@@ -1,11 +1,14 @@
 """The key expressions of a run, in one place: `zwerm/<run>/...`, with `*` for every node."""
 
+import re
 from typing import Final
 
 ROOT: Final = "zwerm"
 EVERY: Final = "*"
 
 Node = int | str
+
+_OF_A_NODE = re.compile(rf"{ROOT}/[^/]+/(?:node/([0-9]+)/(?:obs|cmd)|(?:hello|alive)/([0-9]+))")
 
 
 def observation_key(run: str, node: Node) -> str:
@@ -38,7 +41,7 @@ def node_of(key: str) -> int:
 
     Raises ValueError where the key names no node.
     """
-    parts = key.split("/")
-    if len(parts) >= 4 and parts[0] == ROOT and parts[2] in ("node", "hello", "alive"):
-        return int(parts[3])
-    raise ValueError(f"{key}: names no node")
+    found = _OF_A_NODE.fullmatch(key)
+    if found is None:
+        raise ValueError(f"{key}: names no node")
+    return int(found[1] or found[2])

@@ -5,11 +5,12 @@ bearing, a contact) are MessagePack arrays. Every message carries its kind and t
 example "command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and trailing
 bytes are refused with a reason that can be counted.
 
-New fields go last, with defaults; a field at its default is left out of the encoded message. Angles are radians in
-(-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
+New fields go last, with defaults; a field at its default is left out of a message (those of a drive are not). Angles
+are radians in (-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
 """
 
 import math
+import re
 from collections.abc import Callable
 from typing import Final
 
@@ -125,9 +126,11 @@ SENSOR_FIELDS: Final = Observation.__struct_fields__[3:]
 # --- what a node commands -------------------------------------------------------------------------------------------
 
 
-class BodyVelocity(
-    Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="kind", tag="velocity"
-):
+# Drives are sent whole: msgspec leaves out a number only where it is the default's own object, so that equal drives
+# could differ in their bytes, and runs in their traces.
+
+
+class BodyVelocity(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="velocity"):
     """Velocity of a holonomic body in its own frame."""
 
     forward_m_s: float = 0.0
@@ -135,7 +138,7 @@ class BodyVelocity(
     turn_rad_s: float = 0.0
 
 
-class WheelSpeeds(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="kind", tag="wheels"):
+class WheelSpeeds(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="wheels"):
     """Ground speed of the two wheels of a differential drive."""
 
     left_m_s: float = 0.0
@@ -197,11 +200,15 @@ class Hello(_Message, frozen=True):
 
 
 class Welcome(_Message, frozen=True):
-    """The world's answer to `Hello`: what the node is and what it may know of itself, or why it is refused."""
+    """The world's answer to `Hello`: what the node is and what it may know of itself, or why it is refused.
+
+    In a `paced` run, one in real time, observations come whether or not the node has answered the one before.
+    """
 
     refused: str = ""
     controller: str = ""
     setup: msgspec.Raw = msgspec.Raw(b"\xc0")
+    paced: bool = False
 
 
 class Goodbye(_Message, frozen=True):
@@ -223,25 +230,30 @@ decode_hello: Final = msgspec.msgpack.Decoder(Hello | Goodbye).decode
 decode_welcome: Final = msgspec.msgpack.Decoder(Welcome).decode
 decode_to_node: Final = msgspec.msgpack.Decoder(Observation | Goodbye).decode
 
+# What msgspec says of a message of another type, such as "command/2".
+_OTHER_TYPE = re.compile(r"Invalid value '\w+/([0-9]{1,9})' - at `\$\.type`")
+
 REFUSABLE: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
 def refusal(error: Exception) -> ProtocolError:
     """Return what a decoder raised as a ProtocolError.
 
-    Its reason is `schema` (unknown or missing field, wrong type), `version`, or `malformed` (not MessagePack,
-    truncated, trailing bytes).
+    Its reason is `schema` (unknown or missing field, wrong type, another message), `version`, or `malformed` (not
+    MessagePack, truncated, trailing bytes).
     """
     if isinstance(error, msgspec.ValidationError):
         text = str(error)
-        return ProtocolError("version" if "/" in text and text.endswith("`$.type`") else "schema", text)
+        tag = _OTHER_TYPE.fullmatch(text)
+        return ProtocolError("version" if tag and int(tag[1]) != PROTOCOL_VERSION else "schema", text)
     return ProtocolError("malformed", str(error))
 
 
 def open_answer(payload: bytes) -> Command | Failure:
     """Return the command or failure in `payload`.
 
-    Raises ProtocolError with the reasons of `refusal`, or `oversized`, or `not-finite` for a drive that is no number.
+    Raises ProtocolError with the reasons of `refusal`, or `oversized`, or `not-finite` for a number that is none in the
+    drive or the wake.
     """
     if len(payload) > MESSAGE_BYTES_MAX:
         raise ProtocolError("oversized", f"{len(payload)} bytes, at most {MESSAGE_BYTES_MAX}")
@@ -249,8 +261,11 @@ def open_answer(payload: bytes) -> Command | Failure:
         answer: Command | Failure = decode_answer(payload)
     except REFUSABLE as error:
         raise refusal(error) from None
-    if type(answer) is Command and answer.drive is not None and not is_finite_drive(answer.drive):
-        raise ProtocolError("not-finite", repr(answer.drive))
+    if type(answer) is Command:
+        if answer.drive is not None and not is_finite_drive(answer.drive):
+            raise ProtocolError("not-finite", repr(answer.drive))
+        if answer.wake is not None and answer.wake.at_s is not None and not math.isfinite(answer.wake.at_s):
+            raise ProtocolError("not-finite", repr(answer.wake))
     return answer
 
 

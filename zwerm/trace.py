@@ -1,7 +1,8 @@
 """The trace: a hash chain over every observation and command in (tick, node) order.
 
 Two runs with the same trace exchanged the same bytes with the same nodes at the same ticks. Each link of the chain is
-BLAKE2b over the previous link and the tick's messages; messages are self-delimiting, node ids and the tick frame them.
+BLAKE2b over the previous link, a frame and the tick's messages; the frame holds the tick, the node ids and the length
+of every message, so that no two ticks share their bytes.
 """
 
 from collections.abc import Sequence
@@ -20,9 +21,9 @@ class Trace:
 
     def extend(self, tick: int, nodes: Sequence[int], observations: Sequence[bytes], commands: Sequence[bytes]) -> None:
         """Chain one tick; the three sequences are parallel and ordered by node id. A node that gave none has b""."""
-        parts = [self._link, pack(f"<QQ{len(nodes)}Q", tick, len(nodes), *nodes)]
-        parts += observations
-        parts += commands
+        parts = [self._link, b"", *observations, *commands]
+        lengths = [len(part) for part in parts[2:]]
+        parts[1] = pack(f"<QQ{len(nodes)}Q{len(lengths)}I", tick, len(nodes), *nodes, *lengths)
         self._link = blake2b(b"".join(parts), digest_size=DIGEST_BYTES).digest()
 
     def hex(self) -> str:

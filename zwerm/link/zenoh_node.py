@@ -1,27 +1,36 @@
 """A node's end of a Zenoh link: a client session that can reach the world's router and nothing else.
 
-Promises: `join` subscribes before it says hello, so that nothing sent to a welcomed node is lost; messages arrive in the
-order sent. The link is lost as soon as its transport is, and does not come back: to the world the node is lost as well.
+Promises: `join` subscribes before it says hello, so nothing that is sent to a welcomed node is lost; messages arrive
+in the order sent. The link is lost when its transport is, and does not come back: to the world the node is lost as
+well.
 """
 
 import contextlib
 import queue
+import threading
 import time
 from collections.abc import Callable
 from typing import Final
 
 import zenoh
+from zenoh.handlers import Callback, FifoChannel
 
 from zwerm.errors import LinkError
 from zwerm.keys import alive_key, command_key, hello_key, observation_key
-from zwerm.link.session import Credential, lease_settings, open_session, tls_settings
+from zwerm.link.session import Credential, open_session, transport_settings, trust_settings
 from zwerm.protocol import REFUSABLE, Hello, Welcome, decode_welcome, encode, refusal
 
 RETRY_S: Final = 0.05
 
 
 class ZenohNodeLink:
-    """The end of the node that `credential` names, of the run `run`, connected to `endpoint`."""
+    """The end of the node that `credential` names, of the run `run`, connected to `endpoint`.
+
+    `on_lost` is called, in Zenoh's thread, when the world is gone. Until `listen` is called messages wait for
+    `receive`.
+    """
+
+    send: Callable[[bytes], None]
 
     def __init__(
         self,
@@ -31,20 +40,16 @@ class ZenohNodeLink:
         *,
         authority_pem: str = "",
         deadline_s: float = 30.0,
-        on_message: Callable[[bytes], object] | None = None,
         on_lost: Callable[[], object] | None = None,
     ) -> None:
-        """Connect. Raises LinkError where that does not succeed within `deadline_s` seconds.
-
-        `on_message` and `on_lost` are called in Zenoh's thread and must return at once; without `on_message`, messages wait
-        for `receive`.
-        """
+        """Connect. Raises LinkError where that does not succeed within `deadline_s` seconds."""
         self._run = run
         self._credential = credential
         self._place = f"node {credential.node} at {endpoint}"
         self._deadline_s = time.monotonic() + deadline_s
         self._inbox: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        self._on_message = on_message or self._inbox.put
+        self._deliver: Callable[[bytes], object] = self._inbox.put
+        self._delivering = threading.Lock()
         self._on_lost = on_lost
         self._session = open_session(
             {
@@ -54,24 +59,21 @@ class ZenohNodeLink:
                 "connect/timeout_ms": round(1000 * deadline_s),
                 "connect/exit_on_failure": True,
                 "transport/auth/usrpwd": {"user": credential.user, "password": credential.password},
-                **lease_settings([endpoint]),
-                **tls_settings(authority_pem),
+                **transport_settings([endpoint]),
+                **trust_settings(authority_pem),
             },
             f"{self._place}: no world answers there, or it does not take these credentials",
         )
         try:
-            self._session.info.declare_transport_events_listener(
-                zenoh.handlers.Callback(self._on_transport, indirect=False)
-            )
-            publisher = self._session.declare_publisher(
+            self._session.info.declare_transport_events_listener(Callback(self._on_transport, indirect=False))
+            self.send = self._session.declare_publisher(
                 command_key(run, credential.node),
                 express=True,
                 congestion_control=zenoh.CongestionControl.BLOCK,
                 allowed_destination=zenoh.Locality.REMOTE,
-            )
-            self.send: Callable[[bytes], None] = publisher.put
+            ).put
         except BaseException:
-            self._session.close()
+            self.close()
             raise
 
     def join(self) -> Welcome:
@@ -79,20 +81,29 @@ class ZenohNodeLink:
         node = self._credential.node
         self._session.declare_subscriber(
             observation_key(self._run, node),
-            zenoh.handlers.Callback(self._on_sample, indirect=False),
+            Callback(self._on_sample, indirect=False),
             allowed_origin=zenoh.Locality.REMOTE,
         )
+        # Held, because Zenoh withdraws a token that nobody holds. Declared before hello, so that the world knows it by
+        # then.
         self._token = self._session.liveliness().declare_token(alive_key(self._run, node))
         hello = encode(Hello(node, self._credential.incarnation))
         while (left_s := self._deadline_s - time.monotonic()) > 0:
             replies = self._session.get(
-                hello_key(self._run, node), zenoh.handlers.FifoChannel(1), payload=hello, timeout=left_s, express=True
+                hello_key(self._run, node), FifoChannel(1), payload=hello, timeout=left_s, express=True
             )
             for reply in replies:
                 if reply.ok is not None:
                     return self._opened(reply.ok.payload.to_bytes())
-            time.sleep(RETRY_S)  # the world listens already but does not answer yet
+            time.sleep(RETRY_S)  # the world listens already, but does not answer yet
         raise LinkError(f"{self._place}: the world did not answer hello in time")
+
+    def listen(self, deliver: Callable[[bytes], object]) -> None:
+        """From now on hand every message, those that wait first, to `deliver`; it runs in Zenoh's thread."""
+        with self._delivering:
+            while (payload := self.receive(0)) is not None:
+                deliver(payload)
+            self._deliver = deliver
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the next message from the world, or None after `timeout_s` seconds without one."""
@@ -103,7 +114,7 @@ class ZenohNodeLink:
     def close(self) -> None:
         """Release all that the link holds, after what was sent has left; idempotent."""
         self._on_lost = None
-        self._session.close()
+        self._session.close()  # type: ignore[no-untyped-call]
 
     def _opened(self, payload: bytes) -> Welcome:
         try:
@@ -115,7 +126,8 @@ class ZenohNodeLink:
         return welcome
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
-        self._on_message(sample.payload.to_bytes())
+        with self._delivering:
+            self._deliver(sample.payload.to_bytes())
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         if event.kind == zenoh.SampleKind.DELETE and self._on_lost is not None:

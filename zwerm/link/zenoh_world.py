@@ -1,17 +1,19 @@
 """The world's end of a Zenoh link: a session that is itself the router, so that no message takes a detour.
 
-Promises: only nodes that are expected and have been welcomed are heard, under one incarnation at a time; a node's messages
-arrive in the order sent, and the end of its process after the last of them. What was turned away is counted in `refused`.
-Who may connect, and speak on which key, is not decided here but by the access control in the router's settings.
+Promises: only nodes that are expected and have been welcomed are heard, under one incarnation at a time; a node's
+messages arrive in the order sent, and the end of its process after the last of them. What was turned away is counted
+in `refused`. Who may connect, and speak on which key, is not decided here but by the access control in the router's
+settings.
 
-Messages wait in a channel on Zenoh's side and are taken out in the caller's own thread: a callback in Python for each would
-compete with the world for the interpreter lock. As that channel has no wait with a timeout, an alarm rings through it.
+Messages wait in a channel on Zenoh's side and are taken out in the caller's own thread: a callback in Python for each
+would compete with the world for the interpreter lock. As that channel has no wait with a timeout, an alarm rings
+through it.
 """
 
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, Final
 
 import msgspec
@@ -21,7 +23,7 @@ from msgspec import Struct
 from zwerm.errors import LinkError
 from zwerm.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
 from zwerm.link import Arrival
-from zwerm.link.session import open_session
+from zwerm.link.session import TWO_THREADS, open_session, set_threads
 from zwerm.protocol import REFUSABLE, Goodbye, Hello, Welcome, decode_hello, encode, refusal
 
 # More than can wait at once when every node answers each message with one; past it Zenoh holds the senders back.
@@ -37,6 +39,7 @@ class Member(Struct, frozen=True):
     incarnation: int
     controller: str
     setup: bytes
+    paced: bool = False
 
 
 class ZenohWorldLink:
@@ -51,6 +54,7 @@ class ZenohWorldLink:
         self._source_of: dict[str, int] = {}
         self._changed = threading.Condition()
         self._dismissed = False
+        set_threads(TWO_THREADS)
         self._session = open_session({"mode": "router", **settings}, "the world cannot listen")
         try:
             self._put = {node: self._publisher(observation_key(run, node)).put for node in self._members}
@@ -63,7 +67,7 @@ class ZenohWorldLink:
             self._session.liveliness().declare_subscriber(alive_key(run, EVERY), self._on_life)
             self._session.declare_queryable(hello_key(run, EVERY), self._on_hello)
         except BaseException:
-            self._session.close()
+            self._session.close()  # type: ignore[no-untyped-call]
             raise
 
     @property
@@ -71,10 +75,10 @@ class ZenohWorldLink:
         """The nodes that have been welcomed and are not lost."""
         return frozenset(self._joined)
 
-    def wait_joined(self, enough: Callable[[int], bool], timeout_s: float) -> bool:
-        """Wait until `enough` of how many nodes are joined; tell whether it came true within `timeout_s` seconds."""
+    def wait_joined(self, enough: Callable[[Collection[int]], bool], timeout_s: float) -> bool:
+        """Wait until `enough` of the nodes joined is true; tell whether it was within `timeout_s` seconds."""
         with self._changed:
-            return self._changed.wait_for(lambda: enough(len(self._joined)), timeout_s)
+            return self._changed.wait_for(lambda: enough(self._joined.keys()), timeout_s)
 
     def expect(self, node: int, member: Member) -> None:
         """Let a node that is lost, or never joined, join as `member`. Raises LinkError for one that is joined."""
@@ -126,7 +130,7 @@ class ZenohWorldLink:
         """Release all that the link holds; idempotent."""
         self._dismissed = True
         self._alarm.close()
-        self._session.close()
+        self._session.close()  # type: ignore[no-untyped-call]
 
     def _publisher(self, key: str, destination: zenoh.Locality = zenoh.Locality.REMOTE) -> zenoh.Publisher:
         return self._session.declare_publisher(
@@ -165,7 +169,9 @@ class ZenohWorldLink:
                 query.reply(key, encode(Welcome(refused=reason)))
                 return
             member = self._members[node]
-            query.reply(key, encode(Welcome(controller=member.controller, setup=msgspec.Raw(member.setup))))
+            query.reply(
+                key, encode(Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced))
+            )
 
     def _refusal(self, node: int, payload: bytes) -> str:
         """Let the node join, or return the reason why not."""
@@ -202,7 +208,7 @@ class _Alarm:
         self._thread.start()
 
     def set(self, due_s: float) -> None:
-        """Ring at `due_s` of the monotonic clock. A time later than the last wakes nobody up, and so costs next to nothing."""
+        """Ring at `due_s` of the monotonic clock. A time later than the last one wakes nobody up: it costs little."""
         with self._changed:
             self._due_s = due_s
             if due_s < self._wakes_s:

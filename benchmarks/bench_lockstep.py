@@ -1,0 +1,64 @@
+"""Lock-step throughput with robots in processes, beside a bare Zenoh echo with as many processes and as many bytes.
+
+Both are measured in turn in the same run, several times; the ratio of the medians is what the emulator keeps of what the
+middleware can do. The emulator does everything: physics, sensing, encoding, decoding, controllers, trace.
+"""
+
+import argparse
+import statistics
+
+from echo import echo_rate
+
+from zwerm.assembly import assemble
+from zwerm.deploy.cast import cast
+from zwerm.deploy.swarm import LocalSwarm
+from zwerm.running import drive, new_run_id
+from zwerm.scenario import Scenario, load
+
+TARGET = 0.7
+
+SENSORS = (
+    "robots.sensors=[{kind='line_of_sight'}, {kind='bearings', range_m=0.6}, {kind='touch'}, {kind='odometry'},"
+    " {kind='compass'}]"
+)
+
+
+def lockstep_rate(scenario: Scenario, seed: int) -> float:
+    """Return robot-ticks per second of one run in processes, the start of the processes not counted."""
+    with LocalSwarm(new_run_id(), cast(scenario, seed)) as swarm:
+        result = drive(assemble(scenario, seed), swarm.link, seed, "processes")
+    if result.middleware_lost or not result.ok:
+        raise SystemExit(f"the run failed: {result.outcome}, {result.reason}, {result.middleware_lost} messages lost")
+    return result.robot_ticks / result.wall_s
+
+
+def mean_payload_bytes(scenario: Scenario, seed: int) -> int:
+    """Return how long an observation of the first tick is on average."""
+    world = assemble(scenario, seed)
+    _, observations = world.observe()
+    return round(statistics.fmean(map(len, observations)))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--robots", type=int, default=100)
+    parser.add_argument("--seconds", type=float, default=20.0, help="virtual time of each run")
+    parser.add_argument("--repeats", type=int, default=3)
+    options = parser.parse_args()
+    base = (f"robots.count={options.robots}", f"time.duration_s={options.seconds}")
+    cases = {"line of sight": base, "five sensors": (*base, SENSORS)}
+    print(f"{'observation':<14} {'bytes':>6} {'emulator/s':>11} {'echo/s':>9} {'ratio':>6} {'target':>7}")
+    for name, overrides in cases.items():
+        scenario = load("computation-free-scaling", overrides)
+        payload_bytes = mean_payload_bytes(scenario, 1)
+        ticks = round(options.seconds / scenario.time.dt_s)
+        ours, echo = [], []
+        for seed in range(1, options.repeats + 1):
+            echo.append(echo_rate(options.robots, ticks, payload_bytes))
+            ours.append(lockstep_rate(scenario, seed))
+        rate, bare = statistics.median(ours), statistics.median(echo)
+        print(f"{name:<14} {payload_bytes:>6} {rate:>11,.0f} {bare:>9,.0f} {rate / bare:>6.2f} {TARGET:>7}")
+
+
+if __name__ == "__main__":
+    main()

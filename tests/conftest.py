@@ -1,0 +1,35 @@
+"""Fixtures for every test."""
+
+import multiprocessing.util
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from support import ROBOTS, robots_of_this_process
+
+
+@pytest.fixture(autouse=True)
+def _robots_importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROBOTS))
+
+
+@pytest.fixture
+def private_tmp(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A directory for temporary files of this test's alone, with a path short enough for a socket."""
+    multiprocessing.util.get_temp_dir()  # the start server's socket stays there for later tests
+    directory = Path(tempfile.mkdtemp(prefix="zt-"))
+    monkeypatch.setattr(tempfile, "tempdir", str(directory))
+    monkeypatch.setenv("TMPDIR", str(directory))
+    yield directory
+    shutil.rmtree(directory)
+
+
+@pytest.fixture
+def nothing_left(private_tmp: Path) -> Iterator[None]:
+    """Fail the test if it leaves a robot process, a socket or a private directory behind."""
+    yield
+    assert robots_of_this_process() == set(), "robot processes left"
+    left = [path for path in private_tmp.iterdir() if path.name.startswith("zwerm-")]
+    assert left == [], "private directories left"

@@ -1,0 +1,56 @@
+"""What several tests share: small scenarios, and a look at the processes of this machine."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from zwerm.scenario import Scenario, validate
+
+ROOT = Path(__file__).parent.parent
+ROBOTS = Path(__file__).parent / "robots"
+
+# The command line, without relying on what is on PATH.
+ZWERM = ["-c", "from zwerm.cli import main; main()"]
+
+
+def scenario(**tables: Any) -> Scenario:
+    """Return a small scenario: four e-pucks in a square, changed by whole tables."""
+    base: dict[str, Any] = {
+        "name": "small",
+        "time": {"dt_s": 0.1, "duration_s": 2.0, "straggler_s": 20.0},
+        "arena": {"size_m": [2.0, 2.0]},
+        "robots": {"count": 4, "controller": "computation-free", "sensors": [{"kind": "line_of_sight"}]},
+    }
+    for name, table in tables.items():
+        base[name] = base.get(name, {}) | table if isinstance(table, dict) else table
+    return validate(base, "small.toml", Path())
+
+
+def children_of(parent: int) -> set[int]:
+    """Return the ids of the living processes whose parent is `parent`."""
+    found = set()
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit():
+            continue
+        try:
+            state, ppid = (entry / "stat").read_text().rsplit(")", 1)[1].split()[:2]
+        except OSError:
+            continue
+        if int(ppid) == parent and state != "Z":
+            found.add(int(entry.name))
+    return found
+
+
+def robots_of_this_process() -> set[int]:
+    """Return the ids of the robot processes that this process has started; the server they are forked from is none."""
+    return {robot for child in children_of(os.getpid()) for robot in children_of(child)}
+
+
+def until(holds: Callable[[], object], what: str, deadline_s: float = 30.0) -> None:
+    """Return as soon as `holds()` is true, and fail the test if it is not within `deadline_s` seconds."""
+    end_s = time.monotonic() + deadline_s
+    while not holds():
+        assert time.monotonic() < end_s, f"{what} within {deadline_s:g} s"
+        os.sched_yield()
