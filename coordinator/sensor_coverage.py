@@ -35,6 +35,15 @@ from zwerm.protocol import Command, Observation, Transmission, Wake
 from zwerm.simplicial import Edge, FlagComplex, edge, sparing
 
 BASE: Final = 0
+
+# How a deployment ends.
+COVERED: Final = "covered"
+GIVEN_UP: Final = {
+    "depot-dry": "the depot is empty",
+    "source-blocked": "no robot gets away from the base",
+    "cut-off": "no path leads to the frontier",
+    "no-end": "too many cycles",
+}
 Story = Generator[Wake, None, None]
 
 
@@ -88,14 +97,18 @@ class SensorCoverage:
         self.parameters: Parameters = msgspec.convert(setup.parameters, Parameters)
         self.dt_s = setup.dt_s
         self.places = Places()
-        self.done = False
         self.outcome = ""
+        self.cut_off = False
+        self.fence = Fence((), ())
+        self.frontier: tuple[Edge, ...] = ()
+        self.obstacle: tuple[Edge, ...] = ()
         self.cycle = 0
         self.pushes = 0
         self.released = 0
         self.redundant: list[int] = []
         self._now_s = 0.0
         self._outbox: list[Transmission] = []
+        self._told: dict[str, Any] = {}
         self._mail: list[tuple[int, Answer]] = []
         self._closed: dict[tuple[int, ...], None] = {}
         self._failed: dict[tuple[tuple[int, ...], int], None] = {}
@@ -112,7 +125,13 @@ class SensorCoverage:
         ]
         wake = next(self._story, Wake())
         outbox, self._outbox = tuple(self._outbox), []
-        return Command(outbox=outbox, wake=wake, done=self.done)
+        told, self._told = self._told, {}
+        return Command(outbox=outbox, wake=wake, done=self.outcome == COVERED, gave_up=self._gave_up(), told=told)
+
+    def _gave_up(self) -> str:
+        """Return why the task cannot be completed, if so."""
+        reason = GIVEN_UP.get(self.outcome, "")
+        return f"{self.outcome}: {reason}, {len(self.frontier)} frontier edges left" if reason else ""
 
     # --- the story --------------------------------------------------------------------------------------------------
 
@@ -134,15 +153,25 @@ class SensorCoverage:
             if plan is None:
                 quiet += 1
                 if quiet >= 2:
-                    self.outcome = self.outcome or "covered"
+                    self.outcome = COVERED if not self.cut_off else "cut-off"
                     break
                 continue
             quiet = 0
             moved = yield from self._push(plan)
             if self.outcome:
                 break
-        self.done = True
+        self.outcome = self.outcome or "no-end"
+        self._spare(self.fence)
+        self._tell_numbers()
         yield Wake()
+
+    def _tell_numbers(self) -> None:
+        self._told |= {
+            "deployment_cycles": self.cycle,
+            "pushes": self.pushes,
+            "robots_released": self.released,
+            "redundant_robots": len(self.redundant),
+        }
 
     def _say(self, node: int, order: Order) -> None:
         self._outbox.append(Transmission("uplink", encode(order), node))
@@ -170,7 +199,7 @@ class SensorCoverage:
         answers = yield from self._await(
             lambda _, answer: isinstance(answer, Report) and answer.cycle == cycle,
             len(asked),
-            2 * self.parameters.samples + 5,
+            2 * self.parameters.samples + 15,
         )
         place_of = places.place_of()
         reports = {node: answer for node, answer in answers if isinstance(answer, Report)}
@@ -199,7 +228,7 @@ class SensorCoverage:
     # --- where to go ------------------------------------------------------------------------------------------------
 
     def _plan(self) -> Plan | None:
-        found = fence(self.views, self.complex, self.parameters.corner_margin_rad)
+        found = self.fence = fence(self.views, self.complex, self.parameters.corner_margin_rad)
         obstacle = dict.fromkeys(found.corners)
         plans: list[Plan] = []
         for side in found.sides:
@@ -209,11 +238,25 @@ class SensorCoverage:
             plans += options
         self.obstacle = tuple(sorted(obstacle))
         self.frontier = tuple(sorted({edge(*each.key[:2]) for each in plans}))
-        self._spare(found)
+        if self.pushes and self.parameters.redundancy_every and self.pushes % self.parameters.redundancy_every == 0:
+            self._spare(found)
+        self.redundant = [place for place in self.redundant if place in self.places.occupant]
         sources = dict.fromkeys(self.redundant, -100.0) if self.redundant else {}
         ways = reach(self.complex, {BASE: 0.0, **sources}, obstacle, self.parameters.obstacle_cost)
-        best = self._cheapest(plans, ways)
-        return best or self._cheapest(self._vertex_plans(), ways)
+        best = self._cheapest(plans, ways) or self._cheapest(self._vertex_plans(), ways)
+        self.cut_off = best is None and bool(plans)
+        self._told = {
+            "cycle": self.cycle,
+            "edges": self._by_robot(self.complex.edges),
+            "frontier": self._by_robot(self.frontier),
+            "obstacle": self._by_robot(self.obstacle),
+            "path": [] if best is None else [self.places.occupant[each] for each in best.path],
+        }
+        return best
+
+    def _by_robot(self, edges: Iterable[Edge]) -> list[list[int]]:
+        occupant = self.places.occupant
+        return [[occupant[i], occupant[j]] for i, j in edges]
 
     def _cheapest(self, plans: Iterable[Plan], ways: Reach) -> Plan | None:
         open_plans = [(ways.cost[plan.mover], plan.mover, plan.key, plan) for plan in plans if plan.mover in ways.cost]
@@ -269,11 +312,7 @@ class SensorCoverage:
         return any(_apart(each, direction) < SIXTY_RAD for each in self.places.walls.get(place, ()))
 
     def _spare(self, found: Fence) -> None:
-        """Look for redundant robots now and then; section III-D."""
-        self.redundant = [place for place in self.redundant if place in self.places.occupant]
-        every = self.parameters.redundancy_every
-        if not every or self.pushes == 0 or self.pushes % every:
-            return
+        """Look for redundant robots; section III-D."""
         fenced: dict[Edge, None] = dict.fromkeys((*found.corners, *(side.edge for side in found.sides)))
         for i, a, b, _ in wedges(self.views, self.complex):
             fenced[edge(i, a)] = fenced[edge(i, b)] = None
@@ -356,6 +395,7 @@ class SensorCoverage:
             places.occupant[place] = robot
         places.found(leader, 0.0)
         yield from self._straighten(followers, path, arrived)
+        yield from self._settle(followers, going, arrived)
         if leader in arrived:
             back = plan.direction + math.pi - places.heading[leader]
             yield from self._correct(leader, [(places.occupant[each], back) for each in plan.anchors])
@@ -404,6 +444,19 @@ class SensorCoverage:
                 landmarks = [each for each in landmarks if each.node != places.occupant[BASE]]
             self._say(robot, Move(self.cycle, _wrapped(direction - heading), length, tuple(landmarks)))
 
+    def _settle(self, robots: Sequence[int], goals: Sequence[int], arrived: dict[int, Arrived]) -> Story:
+        """Who leaned on moving robots finds its place again now that they stand: one by one, rear to front."""
+        leaning = {place: robot for place, robot in zip(goals, robots, strict=True) if _leaned(arrived, robot)}
+        for _ in range(2):
+            again: dict[int, int] = {}
+            for place, robot in list(leaning.items()):
+                del leaning[place]
+                self._move([robot], [place], [place], leaning)
+                arrived = yield from self._arrivals([robot])
+                if _leaned(arrived, robot):
+                    again[place] = robot
+            leaning = again
+
     def _straighten(self, followers: Sequence[int], path: Sequence[int], arrived: dict[int, Arrived]) -> Story:
         """In single file, rear to front: bearings did not tell how far to go, the range of sight does."""
         rear = self.places.occupant.get(path[0])
@@ -423,6 +476,10 @@ class SensorCoverage:
             self.parameters.drive_ticks_max,
         )
         return {node: answer for node, answer in answers if isinstance(answer, Arrived)}
+
+
+def _leaned(arrived: dict[int, Arrived], robot: int) -> bool:
+    return robot in arrived and arrived[robot].leaned
 
 
 def _apart(a: float, b: float) -> float:

@@ -55,6 +55,9 @@ class RealTime:
                 node, why = next(iter(world.crashed.items()))
                 self.reason = f"node {node} crashed at tick {world.tick}: {why}"
                 return FAILED
+            if world.gave_up:
+                self.reason = world.gave_up
+                return FAILED
             if world.completed:
                 return COMPLETED
         return TIME_LIMIT

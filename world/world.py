@@ -59,6 +59,8 @@ class World:
         self.late_allowed = False
         self.late_commands = 0
         self.exited: list[int] = []
+        self.told: list[tuple[int, int, dict[str, Any]]] = []  # (tick, node, what it told those who watch)
+        self.gave_up = ""
         self.trace = Trace()
         self.coordinator = count if scenario.coordinator is not None else None
         self.medium = Medium(scenario.radio, count, self.coordinator is not None)
@@ -290,6 +292,10 @@ class World:
                 self._outboxes.append((node, answer.outbox))
             if answer.wake is not None:
                 self._wakes.sleep(node, answer.wake, self.tick)
+            if answer.told:
+                self.told.append((self.tick, node, answer.told))
+            if answer.gave_up and node in self._fixed:
+                self.gave_up = f"node {node} gave up: {answer.gave_up}"
             if answer.release and node == 0 and self._depot is not None:
                 self._depot.release()
             if answer.done or self._any_done:

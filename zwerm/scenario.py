@@ -174,6 +174,7 @@ class MetricsTable(Table):
 
     cells: Grid | None = None
     coverage_radius_m: Positive | None = None
+    sight_range_m: Positive | None = None
     every_s: Positive | None = None
 
 

@@ -56,11 +56,16 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Way(NamedTuple):
-    """The way to a place [m]; `loose`: odometry had to say part of it; `spread` is the variance per that of a bearing."""
+    """The way to a place [m], and how it is known.
+
+    `loose`: odometry had to say part of it; `leaned`: landmarks that move had to; `spread` is the variance per that of a
+    bearing.
+    """
 
     x: float
     y: float
     loose: bool
+    leaned: bool
     spread: float
 
 
@@ -77,6 +82,7 @@ class Robot(Controller):
         self.step_m = setup.body.max_speed_m_s * setup.dt_s if setup.body is not None else 0.0
         self.senses = Senses()
         self._outbox: list[Answer] = []
+        self._rest: Vector | None = None
         self._story: Story | None = self._emerge()
 
     def step(self, observation: Observation) -> Command:
@@ -124,6 +130,8 @@ class Robot(Controller):
             yield STOP
 
     def _survey(self, order: Survey) -> Story:
+        if self._rest is not None:  # who was pushed aside goes back
+            yield from self._back(self._rest)
         self.senses.forget(order.moved)
         if self.setup.node in order.moved:
             self.senses.forget()
@@ -156,7 +164,7 @@ class Robot(Controller):
                 touched = tuple(ahead)
                 if done < order.clear_m:
                     yield from self._back(start)
-                    self._arrive(order.cycle, False, False, done, touched)
+                    self._arrive(order.cycle, False, driven_m=done, touched=touched)
                     return
                 break
             if not cleared and done >= order.clear_m:
@@ -170,7 +178,7 @@ class Robot(Controller):
             yield self._velocity(ux * left + uy * aside * 0.5, uy * left - ux * aside * 0.5)
         if not cleared:
             self._outbox.append(Cleared(order.cycle))
-        self._arrive(order.cycle, True, False, done, touched)
+        self._arrive(order.cycle, True, driven_m=done, touched=touched)
 
     def _back(self, to: Vector, near_m: float | None = None) -> Story:
         """Drive to where odometry says that `to` is."""
@@ -192,15 +200,17 @@ class Robot(Controller):
         goal = start[0] + ux * order.hop_m, start[1] + uy * order.hop_m
         noisy = p.bearing_sd_rad > 0.0
         near = 0.06 if noisy else p.tolerance_m
-        loose, lost, ticks = False, 0, 0
-        for ticks in range(p.drive_ticks_max):  # noqa: B007
-            dx, dy, loose, _ = self._towards(order.landmarks, senses.seen, goal)
+        lost = 0
+        way = Way(0.0, 0.0, False, False, 0.0)
+        for _ in range(p.drive_ticks_max):
+            way = self._towards(order.landmarks, senses.seen, goal)
+            dx, dy = way.x, way.y
             if math.hypot(dx, dy) < near:
                 break
             lost = 0 if senses.seen else lost + 1
             if lost > 20:
                 yield from self._back(start)
-                self._arrive(order.cycle, False, True, 0.0, senses.touched)
+                self._arrive(order.cycle, False, loose=True)
                 return
             far = math.hypot(senses.x_m - start[0], senses.y_m - start[1])
             gain = 1.0 if far < 0.5 * order.hop_m else 0.7
@@ -208,15 +218,15 @@ class Robot(Controller):
             if math.hypot(x, y) < p.tolerance_m:
                 break  # a wall is in the way
             yield self._velocity(x, y)
-        if noisy:
-            loose = yield from self._settle(order, goal, start)
-        self._arrive(order.cycle, True, loose, math.hypot(senses.x_m - start[0], senses.y_m - start[1]), senses.touched)
+        if noisy and not way.leaned:
+            way = yield from self._settle(order, goal)
+        self._arrive(order.cycle, True, way.loose, way.leaned)
 
-    def _settle(self, order: Move, goal: Vector, start: Vector) -> Generator[BodyVelocity, None, bool]:
+    def _settle(self, order: Move, goal: Vector) -> Generator[BodyVelocity, None, Way]:
         """Stand, average, step, and again: noise falls with the root of all samples, since odometry tells each step."""
         p, senses = self.parameters, self.senses
         ex = ey = 0.0
-        way = Way(0.0, 0.0, False, 0.0)
+        way = Way(0.0, 0.0, False, False, 0.0)
         for stop in count(1):
             senses.forget()
             for _ in range(p.stop_samples):
@@ -235,7 +245,7 @@ class Robot(Controller):
             ex, ey = ex - (senses.x_m - x), ey - (senses.y_m - y)
             if enough and stop > 1:
                 break
-        return way.loose
+        return way
 
     def _towards(
         self, landmarks: Sequence[Landmark], seen: dict[int, float], goal: Vector
@@ -254,12 +264,12 @@ class Robot(Controller):
             ]
             found = offset(pairs)
             if found.known and found.blind is None:
-                return Way(found.x * self.hop_m, found.y * self.hop_m, False, found.spread)
+                return Way(found.x * self.hop_m, found.y * self.hop_m, False, not still, found.spread)
         if not found.known or found.blind is None:
-            return Way(rx, ry, True, 0.0)
+            return Way(rx, ry, True, False, 0.0)
         bx, by = found.blind
         along = rx * bx + ry * by
-        return Way(found.x * self.hop_m + along * bx, found.y * self.hop_m + along * by, True, found.spread)
+        return Way(found.x * self.hop_m + along * bx, found.y * self.hop_m + along * by, True, not all(each.still for each in landmarks if each.node in seen), found.spread)
 
     # --- the ruler --------------------------------------------------------------------------------------------------
 
@@ -293,13 +303,22 @@ class Robot(Controller):
                 yield from self._back((x, y))
             if first is None:
                 first = unit(senses.seen.get(anchor.node, anchor.bearing_rad))
-        self._arrive(order.cycle, True, False, 0.0, senses.touched)
+        self._arrive(order.cycle, True)
 
     # --- means ------------------------------------------------------------------------------------------------------
 
-    def _arrive(self, cycle: int, ok: bool, loose: bool, driven_m: float, touched: tuple[float, ...]) -> None:
+    def _arrive(
+        self,
+        cycle: int,
+        ok: bool,
+        loose: bool = False,
+        leaned: bool = False,
+        driven_m: float = 0.0,
+        touched: tuple[float, ...] = (),
+    ) -> None:
         self.senses.forget()
-        self._outbox.append(Arrived(cycle, ok, loose, driven_m, touched))
+        self._rest = self.senses.x_m, self.senses.y_m
+        self._outbox.append(Arrived(cycle, ok, loose, leaned, driven_m, touched))
 
     def _velocity(self, x_m: float, y_m: float) -> BodyVelocity:
         """Return the drive that goes (x, y) in the robot's first frame within a tick, or as far of it as it can."""
