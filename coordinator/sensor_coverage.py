@@ -60,11 +60,10 @@ class Setup(Protocol):
 
 
 class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
-    """What a scenario may set. `link_m`, `margin_m` and `samples` are the robots'."""
+    """What a scenario may set. `link_m` and `margin_m` are the robots'."""
 
     link_m: float = 1.0
     margin_m: float = 0.05
-    samples: int = 1
     clear_m: float = 0.8
     clear_vertex_m: float = 0.9
     near_wall_m: float = 0.3
@@ -72,7 +71,8 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     corner_margin_rad: float = 0.15
     redundancy_every: int = 10
     attempts_max: int = 2
-    drive_ticks_max: int = 160
+    survey_ticks_max: int = 60
+    drive_ticks_max: int = 300
     cycles_max: int = 2000
 
 
@@ -199,7 +199,7 @@ class SensorCoverage:
         answers = yield from self._await(
             lambda _, answer: isinstance(answer, Report) and answer.cycle == cycle,
             len(asked),
-            2 * self.parameters.samples + 15,
+            self.parameters.survey_ticks_max,
         )
         place_of = places.place_of()
         reports = {node: answer for node, answer in answers if isinstance(answer, Report)}
@@ -341,7 +341,7 @@ class SensorCoverage:
     def _release(self) -> Generator[Wake, None, int | None]:
         self._say(self.places.occupant[BASE], Release(self.cycle))
         answers = yield from self._await(
-            lambda _, answer: isinstance(answer, Emerged), 1, 2 * self.parameters.samples + 8
+            lambda _, answer: isinstance(answer, Emerged), 1, self.parameters.survey_ticks_max
         )
         for robot, answer in answers:
             if isinstance(answer, Emerged):

@@ -37,9 +37,10 @@ def sight_coverage_fraction(position: Floats, range_m: float, arena: Arena) -> f
 def seen_from(place: Floats, range_m: float, arena: Arena) -> shapely.Geometry:
     """Return what is seen from a place (2,) within `range_m`: the disc, less the shadows of the walls."""
     disc = shapely.buffer(shapely.Point(place), range_m, quad_segs=_QUARTER_SIDES)
+    walls = arena.segments[arena.walls_within(place[None, :], range_m).segment]
     shadows = [
         piece
-        for x0, y0, x1, y1 in arena.segments.tolist()
+        for x0, y0, x1, y1 in walls.tolist()
         for piece in _shadow(place, (x0, y0), (x1, y1), range_m)
     ]
     near = shapely.intersection(disc, arena.free)

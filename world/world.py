@@ -85,7 +85,7 @@ class World:
         self._last_answer: dict[int, int] = {}
         self._outboxes: list[tuple[int, tuple[Transmission, ...]]] = []
         self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
-        self._depot = Depot(scenario.base, count) if scenario.base else None
+        self._depot = Depot(scenario.base, count, arena, body.radius_m, self.draws) if scenario.base else None
         if self.coordinator is not None:
             self._wakes.admit(self.coordinator)
         if self._depot is not None:

@@ -36,6 +36,9 @@ from zwerm.protocol import BodyVelocity, Command, Observation, Transmission, Wak
 STOP = BodyVelocity()
 Story = Generator[BodyVelocity, None, None]
 
+# Bearings that err less than this do not err.
+NOISE_MIN_RAD = 1e-5
+
 # A contact within this of the heading is ahead.
 AHEAD_RAD = math.pi / 3.0
 
@@ -45,8 +48,8 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
 
     link_m: float = 1.0
     margin_m: float = 0.05
-    samples: int = 1
-    bearing_sd_rad: float = 0.0
+    samples: int = 16
+    first_samples: int = 10
     tolerance_m: float = 0.005
     creep_m: float = 0.02
     fine_m: float = 0.005
@@ -83,6 +86,7 @@ class Robot(Controller):
         self.senses = Senses()
         self._outbox: list[Answer] = []
         self._rest: Vector | None = None
+        self._noise_rad: float | None = None  # how much a bearing errs: the robot finds out for itself
         self._story: Story | None = self._emerge()
 
     def step(self, observation: Observation) -> Command:
@@ -123,11 +127,21 @@ class Robot(Controller):
 
     def _sample(self) -> Story:
         """Stand still until everyone in sight has been averaged."""
-        for _ in range(2 * self.parameters.samples):
+        wanted = self._samples
+        for _ in range(2 * wanted):
             self.senses.average()
-            if self.senses.averaged(self.parameters.samples):
-                return
+            if self.senses.averaged(wanted):
+                break
             yield STOP
+        if self._noise_rad is None:
+            self._noise_rad = self.senses.spread()
+
+    @property
+    def _samples(self) -> int:
+        """How many readings make an average: one will do if bearings do not err."""
+        if self._noise_rad is None:
+            return int(self.parameters.first_samples)
+        return int(self.parameters.samples) if self._noise_rad > NOISE_MIN_RAD else 1
 
     def _survey(self, order: Survey) -> Story:
         if self._rest is not None:  # who was pushed aside goes back
@@ -135,7 +149,7 @@ class Robot(Controller):
         self.senses.forget(order.moved)
         if self.setup.node in order.moved:
             self.senses.forget()
-        fresh = not self.senses.averaged(self.parameters.samples)
+        fresh = not self.senses.averaged(1 if self._noise_rad is None else self._samples)
         if fresh:
             yield from self._sample()
         sightings = self.senses.sightings() if fresh else None
@@ -198,7 +212,7 @@ class Robot(Controller):
         start = senses.x_m, senses.y_m
         ux, uy = unit(order.bearing_rad)
         goal = start[0] + ux * order.hop_m, start[1] + uy * order.hop_m
-        noisy = p.bearing_sd_rad > 0.0
+        noisy = self._samples > 1
         near = 0.06 if noisy else p.tolerance_m
         lost = 0
         way = Way(0.0, 0.0, False, False, 0.0)
@@ -236,7 +250,7 @@ class Robot(Controller):
             way = self._towards(order.landmarks, mean, goal)
             ex, ey = ex + (way.x - ex) / stop, ey + (way.y - ey) / stop
             sx, sy = slid(ex, ey, senses.touched)
-            wanted = (p.bearing_sd_rad * self.hop_m / p.tolerance_m) ** 2 * way.spread
+            wanted = ((self._noise_rad or 0.0) * self.hop_m / p.tolerance_m) ** 2 * way.spread
             enough = stop * p.stop_samples >= min(wanted, p.still_samples_max)
             if enough and stop > 1 and math.hypot(sx, sy) < p.tolerance_m:
                 break

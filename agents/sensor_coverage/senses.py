@@ -64,6 +64,14 @@ class Senses:
         """Tell whether everyone in sight was averaged over `samples`, and nobody else is on record."""
         return self._sums.keys() == self.seen.keys() and all(n >= samples for _, n in self._sums.values())
 
+    def spread(self) -> float | None:
+        """Return how much one bearing errs [rad], by the averages with at least 4 readings, or None if there are none.
+
+        It is the median over the robots in sight, the lower of two: some of them may have moved.
+        """
+        found = sorted(2.0 * max(0.0, 1.0 - abs(total) / n) * n / (n - 1) for total, n in self._sums.values() if n >= 4)
+        return math.sqrt(found[(len(found) - 1) // 2]) if found else None
+
     def sightings(self) -> tuple[Sighting, ...]:
         """Return the averages, ascending by id."""
         return tuple(Sighting(node, cmath.phase(total)) for node, (total, _) in sorted(self._sums.items()))
