@@ -36,6 +36,10 @@ from zwerm.simplicial import Edge, FlagComplex, edge, sparing
 
 BASE: Final = 0
 
+# Which ways a robot with a wide gap in what it sees may go, off the middle of the gap, and how far beside its neighbours.
+VERTEX_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 60, -60, 100, -100))
+VERTEX_BESIDE_RAD: Final = math.radians(75.0)
+
 # How a deployment ends.
 COVERED: Final = "covered"
 GIVEN_UP: Final = {
@@ -297,13 +301,17 @@ class SensorCoverage:
         """Yield the ways on for robots with a wide gap in what they see: single files, and doors."""
         hop = self.parameters.link_m - self.parameters.margin_m
         for i, a, _, gap in wedges(self.views, self.complex):
-            direction = self.views[i][a] + gap / 2.0
-            key = (i, a, 0)
-            if i == BASE or gap < math.radians(150.0) or key in self._closed or self._walled(i, direction):
+            if i == BASE:
                 continue
-            if any(_apart(each, direction) < SIXTY_RAD / 2.0 for each in self._blocked.get(i, ())):
-                continue
-            yield Plan(key, i, direction, hop, self.parameters.clear_vertex_m, (i,))
+            for turn in VERTEX_TURNS_RAD:
+                # The bisector first; aside only as far as the gap is wide.
+                direction = self.views[i][a] + gap / 2.0 + turn
+                key = (i, a, 0, round(math.degrees(turn)))
+                if gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD or key in self._closed or self._walled(i, direction):
+                    continue
+                if any(_apart(each, direction) < SIXTY_RAD / 2.0 for each in self._blocked.get(i, ())):
+                    continue
+                yield Plan(key, i, direction, hop, self.parameters.clear_vertex_m, (i,))
 
     def _failed_elsewhere(self, plan: Plan) -> bool:
         return any((plan.key, end) in self._failed for end in plan.key[:2] if end != plan.mover)
