@@ -302,7 +302,7 @@ class Robot(Controller):
                 ax, ay = ax / length, ay / length
             away = math.atan2(-ay, -ax)
             driven = 0.0
-            while anchor.node in senses.seen and driven < 0.3:
+            while anchor.node in senses.seen and driven < 0.4:
                 if any(_apart(each, away) < AHEAD_RAD for each in senses.touched):
                     break
                 driven += p.creep_m
