@@ -75,8 +75,7 @@ def is_exception(views: Views, complex_: FlagComplex, i: int, j: int) -> bool:
         reached = [each for each in between if edge(i, each) in complex_ and _beyond(views, complex_, i, j, each, side)]
         for each in between:
             if each not in reached and any(
-                edge(other, each) in complex_
-                and abs(relative(views[k], i, other)) < abs(relative(views[k], i, each))
+                edge(other, each) in complex_ and abs(relative(views[k], i, other)) < abs(relative(views[k], i, each))
                 for other in reached
             ):
                 reached.append(each)

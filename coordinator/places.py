@@ -107,5 +107,7 @@ class Places:
     def known_from(self, place: int) -> list[tuple[int, float]]:
         """Return (place, direction) of every place that was ever seen from this one and still is one."""
         return [
-            (b, cmath.phase(mean)) for (a, b), (mean, _) in sorted(self._reference.items()) if a == place and b in self.occupant
+            (b, cmath.phase(mean))
+            for (a, b), (mean, _) in sorted(self._reference.items())
+            if a == place and b in self.occupant
         ]

@@ -6,14 +6,12 @@ functions beside it: the complex (`zwerm.simplicial`), the fence, the path, who 
 
 import math
 from collections.abc import Callable, Generator, Iterable, Sequence
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, Protocol
 
 import msgspec
-from msgspec import Struct
 
-from zwerm.coordinator.fence import SIXTY_RAD, Fence, Side, Views, fence, wedges
-from zwerm.coordinator.paths import Reach, reach
 from zwerm.coordinator.places import Places
+from zwerm.coordinator.planner import BASE, Parameters, Plan, Planner
 from zwerm.deployment import (
     Answer,
     Arrived,
@@ -32,13 +30,7 @@ from zwerm.deployment import (
     encode,
 )
 from zwerm.protocol import Command, Observation, Transmission, Wake
-from zwerm.simplicial import Edge, FlagComplex, edge, sparing
-
-BASE: Final = 0
-
-# Which ways a robot with a wide gap in what it sees may go, off the middle of the gap, and how far beside its neighbours.
-VERTEX_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 60, -60, 100, -100))
-VERTEX_BESIDE_RAD: Final = math.radians(75.0)
+from zwerm.simplicial import Edge, FlagComplex
 
 # How a deployment ends.
 COVERED: Final = "covered"
@@ -63,35 +55,6 @@ class Setup(Protocol):
         """What the scenario set."""
 
 
-class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
-    """What a scenario may set. `link_m` and `margin_m` are the robots'."""
-
-    link_m: float = 1.0
-    margin_m: float = 0.05
-    clear_m: float = 0.8
-    clear_vertex_m: float = 0.9
-    near_wall_m: float = 0.3
-    obstacle_cost: float = 3.0
-    corner_margin_rad: float = 0.15
-    redundancy_every: int = 10
-    attempts_max: int = 2
-    survey_ticks_max: int = 60
-    drive_ticks_max: int = 300
-    cycles_max: int = 2000
-
-
-class Plan(NamedTuple):
-    """One deployment: the robot at `mover` goes along `direction`, and the robots on the path follow."""
-
-    key: tuple[int, ...]
-    mover: int
-    direction: float
-    hop_m: float
-    clear_m: float
-    anchors: tuple[int, ...]
-    path: tuple[int, ...] = ()
-
-
 class SensorCoverage:
     """The coordinator."""
 
@@ -101,23 +64,15 @@ class SensorCoverage:
         self.parameters: Parameters = msgspec.convert(setup.parameters, Parameters)
         self.dt_s = setup.dt_s
         self.places = Places()
+        self.planner = Planner(self.parameters, self.places)
         self.outcome = ""
-        self.cut_off = False
-        self.fence = Fence((), ())
-        self.frontier: tuple[Edge, ...] = ()
-        self.obstacle: tuple[Edge, ...] = ()
         self.cycle = 0
         self.pushes = 0
         self.released = 0
-        self.redundant: list[int] = []
         self._now_s = 0.0
         self._outbox: list[Transmission] = []
         self._told: dict[str, Any] = {}
         self._mail: list[tuple[int, Answer]] = []
-        self._closed: dict[tuple[int, ...], None] = {}
-        self._failed: dict[tuple[tuple[int, ...], int], None] = {}
-        self._attempts: dict[tuple[int, ...], int] = {}
-        self._blocked: dict[int, list[float]] = {}
         self._waiting: int | None = None
         self._story = self._tell()
 
@@ -135,7 +90,7 @@ class SensorCoverage:
     def _gave_up(self) -> str:
         """Return why the task cannot be completed, if so."""
         reason = GIVEN_UP.get(self.outcome, "")
-        return f"{self.outcome}: {reason}, {len(self.frontier)} frontier edges left" if reason else ""
+        return f"{self.outcome}: {reason}, {len(self.planner.frontier)} frontier edges left" if reason else ""
 
     # --- the story --------------------------------------------------------------------------------------------------
 
@@ -153,11 +108,12 @@ class SensorCoverage:
                 if self.outcome:
                     break
                 continue
-            plan = self._plan()
+            plan = self.planner.plan(self.pushes)
+            self._tell_complex(plan)
             if plan is None:
                 quiet += 1
                 if quiet >= 2:
-                    self.outcome = COVERED if not self.cut_off else "cut-off"
+                    self.outcome = COVERED if not self.planner.cut_off else "cut-off"
                     break
                 continue
             quiet = 0
@@ -165,22 +121,38 @@ class SensorCoverage:
             if self.outcome:
                 break
         self.outcome = self.outcome or "no-end"
-        self._spare(self.fence)
+        self.planner.spare()
         self._tell_numbers()
         yield Wake()
+
+    def _tell_complex(self, best: Plan | None) -> None:
+        """Tell who watches what the swarm looks like, by robots."""
+        self._told = {
+            "cycle": self.cycle,
+            "edges": self._by_robot(self.complex.edges),
+            "frontier": self._by_robot(self.planner.frontier),
+            "obstacle": self._by_robot(self.planner.obstacle),
+            "path": [] if best is None else [self.places.occupant[each] for each in best.path],
+        }
+
+    def _by_robot(self, edges: Iterable[Edge]) -> list[list[int]]:
+        occupant = self.places.occupant
+        return [[occupant[i], occupant[j]] for i, j in edges]
 
     def _tell_numbers(self) -> None:
         self._told |= {
             "deployment_cycles": self.cycle,
             "pushes": self.pushes,
             "robots_released": self.released,
-            "redundant_robots": len(self.redundant),
+            "redundant_robots": len(self.planner.redundant),
         }
 
     def _say(self, node: int, order: Order) -> None:
         self._outbox.append(Transmission("uplink", encode(order), node))
 
-    def _await(self, wanted: Callable[[int, Answer], bool], count: int, ticks: int) -> Generator[Wake, None, list[tuple[int, Answer]]]:
+    def _await(
+        self, wanted: Callable[[int, Answer], bool], count: int, ticks: int
+    ) -> Generator[Wake, None, list[tuple[int, Answer]]]:
         """Wait until `count` answers that are wanted have come, or so many ticks have passed, and return them."""
         until_s = self._now_s + ticks * self.dt_s
         found: list[tuple[int, Answer]] = []
@@ -223,109 +195,12 @@ class SensorCoverage:
         self.views = places.views()
         self.complex = FlagComplex(self.views)
         places.learn_references(self.views)
+        self.planner.look(self.views, self.complex)
 
     @staticmethod
     def _remember(known: list[float], direction: float) -> None:
         if all(_apart(each, direction) > 0.2 for each in known):
             known.append(direction)
-
-    # --- where to go ------------------------------------------------------------------------------------------------
-
-    def _plan(self) -> Plan | None:
-        found = self.fence = fence(self.views, self.complex, self.parameters.corner_margin_rad)
-        obstacle = dict.fromkeys(found.corners)
-        plans: list[Plan] = []
-        for side in found.sides:
-            options = self._edge_plans(side)
-            if not options:
-                obstacle[side.edge] = None
-            plans += options
-        self.obstacle = tuple(sorted(obstacle))
-        self.frontier = tuple(sorted({edge(*each.key[:2]) for each in plans}))
-        if self.pushes and self.parameters.redundancy_every and self.pushes % self.parameters.redundancy_every == 0:
-            self._spare(found)
-        self.redundant = [place for place in self.redundant if place in self.places.occupant]
-        sources = dict.fromkeys(self.redundant, -100.0) if self.redundant else {}
-        ways = reach(self.complex, {BASE: 0.0, **sources}, obstacle, self.parameters.obstacle_cost)
-        best = self._cheapest(plans, ways) or self._cheapest(self._vertex_plans(), ways)
-        self.cut_off = best is None and bool(plans)
-        self._told = {
-            "cycle": self.cycle,
-            "edges": self._by_robot(self.complex.edges),
-            "frontier": self._by_robot(self.frontier),
-            "obstacle": self._by_robot(self.obstacle),
-            "path": [] if best is None else [self.places.occupant[each] for each in best.path],
-        }
-        return best
-
-    def _by_robot(self, edges: Iterable[Edge]) -> list[list[int]]:
-        occupant = self.places.occupant
-        return [[occupant[i], occupant[j]] for i, j in edges]
-
-    def _cheapest(self, plans: Iterable[Plan], ways: Reach) -> Plan | None:
-        open_plans = [(ways.cost[plan.mover], plan.mover, plan.key, plan) for plan in plans if plan.mover in ways.cost]
-        if not open_plans:
-            return None
-        plan = min(open_plans)[-1]
-        return plan._replace(path=ways.path(plan.mover))
-
-    def _edge_plans(self, side: Side) -> list[Plan]:
-        """Return the ways to expand one side of an edge; none if it is an obstacle edge. Section III-A, i to iv."""
-        key = (side.i, side.j, side.sign)
-        if key in self._closed:
-            return []
-        hop = self.parameters.link_m - self.parameters.margin_m
-        plans = []
-        for mover, other, sign, near, far in (
-            (side.i, side.j, side.sign, side.angle_i_rad, side.angle_j_rad),
-            (side.j, side.i, -side.sign, side.angle_j_rad, side.angle_i_rad),
-        ):
-            if mover == BASE:
-                continue
-            towards = self.places.direction(mover, other)
-            if towards is None:
-                towards = self.views[mover][other]
-            angle, length, anchors = near, hop, (mover, other)
-            if far < near - 1e-9:  # bisected at the other end: keep that end's angle and distance
-                angle, length, anchors = math.pi / 2.0 - far / 2.0, 2.0 * hop * math.sin(far / 2.0), (other,)
-            elif near < SIXTY_RAD - 1e-9:
-                anchors = (mover,)
-            direction = towards + sign * angle
-            if (key, mover) in self._failed or self._walled(mover, self.views[mover][other] + sign * near):
-                continue
-            clear = min(self.parameters.clear_m, 0.85 * length)
-            plans.append(Plan(key, mover, direction, length, clear, anchors))
-        return plans
-
-    def _vertex_plans(self) -> Iterable[Plan]:
-        """Yield the ways on for robots with a wide gap in what they see: single files, and doors."""
-        hop = self.parameters.link_m - self.parameters.margin_m
-        for i, a, _, gap in wedges(self.views, self.complex):
-            if i == BASE:
-                continue
-            for turn in VERTEX_TURNS_RAD:
-                # The bisector first; aside only as far as the gap is wide.
-                direction = self.views[i][a] + gap / 2.0 + turn
-                key = (i, a, 0, round(math.degrees(turn)))
-                if gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD or key in self._closed or self._walled(i, direction):
-                    continue
-                if any(_apart(each, direction) < SIXTY_RAD / 2.0 for each in self._blocked.get(i, ())):
-                    continue
-                yield Plan(key, i, direction, hop, self.parameters.clear_vertex_m, (i,))
-
-    def _failed_elsewhere(self, plan: Plan) -> bool:
-        return any((plan.key, end) in self._failed for end in plan.key[:2] if end != plan.mover)
-
-    def _walled(self, place: int, direction: float) -> bool:
-        return any(_apart(each, direction) < SIXTY_RAD for each in self.places.walls.get(place, ()))
-
-    def _spare(self, found: Fence) -> None:
-        """Look for redundant robots; section III-D."""
-        fenced: dict[Edge, None] = dict.fromkeys((*found.corners, *(side.edge for side in found.sides)))
-        for i, a, b, _ in wedges(self.views, self.complex):
-            fenced[edge(i, a)] = fenced[edge(i, b)] = None
-        missed_max = 1 + len(self.complex.vertices) // 50
-        self.redundant = list(sparing(self.complex, fenced, (BASE,), missed_max).redundant)
 
     # --- pushing ----------------------------------------------------------------------------------------------------
 
@@ -363,9 +238,7 @@ class SensorCoverage:
         places, cycle, path = self.places, self.cycle, plan.path
         robots = [places.occupant[place] for place in path]
         leader = robots[-1]
-        self._attempts[plan.key] = self._attempts.get(plan.key, 0) + 1
-        if self._attempts[plan.key] >= self.parameters.attempts_max:
-            self._closed[plan.key] = None
+        self.planner.note_attempt(plan)
         if path[0] == BASE and self._waiting is None and not any(each not in path for each in self.views[BASE]):
             # Whom the base sees is about to move: the next robot must look around before that.
             yield from self._let_out(path)
@@ -378,10 +251,7 @@ class SensorCoverage:
         )
         first = news[0][1] if news else None
         if first is None or (isinstance(first, Arrived) and not first.ok):
-            if first is None or first.driven_m > self.parameters.near_wall_m or plan.key[2] == 0 or self._failed_elsewhere(plan):
-                self._closed[plan.key] = None
-            self._failed[plan.key, plan.mover] = None
-            self._blocked.setdefault(plan.mover, []).append(plan.direction)
+            self.planner.note_failure(plan, math.inf if first is None else first.driven_m)
             return (leader,)
         followers = robots[:-1]
         if path[0] == BASE:
@@ -430,7 +300,9 @@ class SensorCoverage:
                 y += math.sin(base[place] - bearing)
         return math.atan2(y, x)
 
-    def _move(self, robots: Sequence[int], origins: Sequence[int], goals: Sequence[int], future: dict[int, int]) -> None:
+    def _move(
+        self, robots: Sequence[int], origins: Sequence[int], goals: Sequence[int], future: dict[int, int]
+    ) -> None:
         """Tell robots to take the places ahead of them; `future` is who will be where among the places that change."""
         places = self.places
         hop = self.parameters.link_m - self.parameters.margin_m

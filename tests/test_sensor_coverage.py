@@ -39,7 +39,9 @@ Link = Callable[[bytes], bytes]
 
 
 def drive(
-    scenario: Scenario, on_tick: Callable[[World], None] | None = None, around: Callable[[int, Link], Link] | None = None
+    scenario: Scenario,
+    on_tick: Callable[[World], None] | None = None,
+    around: Callable[[int, Link], Link] | None = None,
 ) -> tuple[str, World]:
     """Run inline; `on_tick` may meddle with the world, `around` with what a node hears and says."""
     world = assemble(scenario, 1)
@@ -178,7 +180,9 @@ def test_the_frame_of_a_robot_changes_nothing() -> None:
                 touch=seen.touch and tuple(Contact(c.bearing_rad - angle, c.half_width_rad) for c in seen.touch),
                 odometry=odometry
                 and Displacement(
-                    cos * odometry.forward_m + sin * odometry.left_m, cos * odometry.left_m - sin * odometry.forward_m, 0.0
+                    cos * odometry.forward_m + sin * odometry.left_m,
+                    cos * odometry.left_m - sin * odometry.forward_m,
+                    0.0,
                 ),
             )
             from zwerm.protocol import open_answer

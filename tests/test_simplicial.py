@@ -42,7 +42,7 @@ def gudhi_betti(complex_: FlagComplex, dimensions: int) -> list[int]:
     for simplex in (*((v,) for v in complex_.vertices), *complex_.edges, *complex_.triangles):
         tree.insert(list(simplex))
     tree.compute_persistence(homology_coeff_field=2, persistence_dim_max=True)
-    return (tree.betti_numbers() + [0, 0, 0])[:dimensions]
+    return [*tree.betti_numbers(), 0, 0, 0][:dimensions]
 
 
 def gudhi_relative_b2(complex_: FlagComplex, fence: list[tuple[int, int]]) -> int:
@@ -53,7 +53,7 @@ def gudhi_relative_b2(complex_: FlagComplex, fence: list[tuple[int, int]]) -> in
     for i, j in fence:
         tree.insert([i, j, apex])
     tree.compute_persistence(homology_coeff_field=2, persistence_dim_max=True)
-    return (tree.betti_numbers() + [0, 0, 0])[2]
+    return [*tree.betti_numbers(), 0, 0, 0][2]
 
 
 @st.composite

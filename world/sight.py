@@ -1,9 +1,9 @@
 """What a swarm sees of its arena, and how few robots might have done: the measures of sensor coverage.
 
-A robot covers what is within its range and not behind a wall, as exact polygons but for the disc, which has 256 sides. The ideal
-to compare with is Ramaithitima et al. 2015's, section V: a hexagonal packing overlaid on the free space, its points the range
-apart. How many of them fall into the free space depends on where the packing lies; the mean over all ways is the free area
-divided by that of a point's cell, and that is what is used here.
+A robot covers what is within its range and not behind a wall, as exact polygons but for the disc, which has 256 sides.
+The ideal to compare with is that of Ramaithitima et al. 2015, section V: a hexagonal packing overlaid on the free space,
+its points the range apart. How many of them fall into the free space depends on where the packing lies; the mean over
+all ways is the free area divided by that of a point's cell, and that is what is used here.
 """
 
 import math
@@ -38,11 +38,7 @@ def seen_from(place: Floats, range_m: float, arena: Arena) -> shapely.Geometry:
     """Return what is seen from a place (2,) within `range_m`: the disc, less the shadows of the walls."""
     disc = shapely.buffer(shapely.Point(place), range_m, quad_segs=_QUARTER_SIDES)
     walls = arena.segments[arena.walls_within(place[None, :], range_m).segment]
-    shadows = [
-        piece
-        for x0, y0, x1, y1 in walls.tolist()
-        for piece in _shadow(place, (x0, y0), (x1, y1), range_m)
-    ]
+    shadows = [piece for x0, y0, x1, y1 in walls.tolist() for piece in _shadow(place, (x0, y0), (x1, y1), range_m)]
     near = shapely.intersection(disc, arena.free)
     return shapely.difference(near, shapely.union_all(shadows)) if shadows else near
 
@@ -69,9 +65,7 @@ def _shadow(
         walls.append((place[0] + length * cos, place[1] + length * sin))
         far = max(length, 0.0) + 2.0 * range_m
         rays.append((place[0] + far * cos, place[1] + far * sin))
-    return [
-        shapely.Polygon([walls[n], walls[n + 1], rays[n + 1], rays[n]]) for n in range(pieces)
-    ]
+    return [shapely.Polygon([walls[n], walls[n + 1], rays[n + 1], rays[n]]) for n in range(pieces)]
 
 
 def holes(pairs: Ints, robots: Ints) -> int:

@@ -160,7 +160,7 @@ class Robot(Controller):
     def _deploy(self, order: Deploy) -> Story:
         """Algorithm 1, line 8, with the test drive of section III-A, item iv.
 
-        The robot may lose sight of everyone on its way: its follower comes to where it was, and the link is re-established then.
+        The robot may lose sight of everyone on its way: its follower comes to where it was, and the link is restored then.
         """
         senses = self.senses
         self.senses.forget()
@@ -261,9 +261,7 @@ class Robot(Controller):
                 break
         return way
 
-    def _towards(
-        self, landmarks: Sequence[Landmark], seen: dict[int, float], goal: Vector
-    ) -> Way:
+    def _towards(self, landmarks: Sequence[Landmark], seen: dict[int, float], goal: Vector) -> Way:
         """Return the way to go.
 
         Landmarks that stand still are preferred, where they are enough.
@@ -283,7 +281,13 @@ class Robot(Controller):
             return Way(rx, ry, True, False, 0.0)
         bx, by = found.blind
         along = rx * bx + ry * by
-        return Way(found.x * self.hop_m + along * bx, found.y * self.hop_m + along * by, True, not all(each.still for each in landmarks if each.node in seen), found.spread)
+        return Way(
+            found.x * self.hop_m + along * bx,
+            found.y * self.hop_m + along * by,
+            True,
+            not all(each.still for each in landmarks if each.node in seen),
+            found.spread,
+        )
 
     # --- the ruler --------------------------------------------------------------------------------------------------
 
