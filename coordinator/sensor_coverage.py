@@ -127,7 +127,7 @@ class SensorCoverage:
 
     def _tell_complex(self, best: Plan | None) -> None:
         """Tell who watches what the swarm looks like, by robots."""
-        self._told = {
+        self._told["complex"] = {
             "cycle": self.cycle,
             "edges": self._by_robot(self.complex.edges),
             "frontier": self._by_robot(self.planner.frontier),

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from zwerm.running import run
 from zwerm.scenario import ArenaTable
 from zwerm.world.arena import Arena
 from zwerm.world.sight import hexagonal_packing_robots, holes, obstacles, sight_coverage_fraction
@@ -59,3 +60,20 @@ def test_holes_are_those_of_the_complex_and_obstacles_those_of_the_arena() -> No
     assert holes(ring, np.arange(4)) == 1
     assert holes(ring, np.arange(3)) == 0
     assert obstacles(arena(size_m=[4.0, 4.0], obstacles=[[[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]])) == 1
+
+
+def test_the_complex_of_a_run_can_be_drawn_at_any_cycle(tmp_path: Path) -> None:
+    pictures = pytest.importorskip("zwerm.world.pictures_complex")
+    settings = ["arena.size_m=[2.2,1.6]", "base.pose=[0.2,0.8,0.0]", "robots.count=14"]
+    result = run("sensor-coverage", runner="inline", overrides=settings)
+    told = pictures.cycles(result.told)
+    assert [each.told["complex"]["cycle"] for each in told] == list(
+        range(2, int(result.metrics["deployment_cycles"]) + 1)
+    )
+    assert told[0].told["complex"]["frontier"]
+    assert not told[-1].told["complex"]["frontier"]
+    for path in (
+        result.picture_complex(tmp_path / "complex.png", cycle=1),
+        pictures.draw_coverage(tmp_path / "coverage.png", result.arena, result.told, 1.0),
+    ):
+        assert path.stat().st_size > 5_000

@@ -50,8 +50,8 @@ def measure(world: World, table: MetricsTable) -> dict[str, float]:
         found["area_coverage_fraction"] = area_coverage_fraction(position, table.coverage_radius_m, world.arena)
     if table.sight_range_m is not None:
         found |= _sight(world, table.sight_range_m)
-    for _, _, told in world.told:
-        found |= {name: float(value) for name, value in told.items() if isinstance(value, int | float)}
+    for each in world.told:
+        found |= {name: float(value) for name, value in each.told.items() if isinstance(value, int | float)}
     return found
 
 

@@ -10,7 +10,7 @@ The world is deterministic: its state after a tick is a function of the scenario
 from collections import Counter
 from collections.abc import Sequence
 from itertools import repeat
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -42,6 +42,16 @@ from zwerm.world.wakes import SIGNATURES, Wakes
 NO_ANSWER: Final = b""
 
 
+class Told(NamedTuple):
+    """What a node told those who watch the run, and where the robots were then."""
+
+    tick: int
+    time_s: float
+    node: int
+    told: dict[str, Any]
+    position: Floats  # (n, 2) [m]
+
+
 class World:
     """One run's world. Every robot carries the `sensors`; `seed` keys all randomness."""
 
@@ -59,7 +69,7 @@ class World:
         self.late_allowed = False
         self.late_commands = 0
         self.exited: list[int] = []
-        self.told: list[tuple[int, int, dict[str, Any]]] = []  # (tick, node, what it told those who watch)
+        self.told: list[Told] = []
         self.gave_up = ""
         self.trace = Trace()
         self.coordinator = count if scenario.coordinator is not None else None
@@ -293,7 +303,7 @@ class World:
             if answer.wake is not None:
                 self._wakes.sleep(node, answer.wake, self.tick)
             if answer.told:
-                self.told.append((self.tick, node, answer.told))
+                self.told.append(Told(self.tick, self.time_s, node, answer.told, self.scene.position.copy()))
             if answer.gave_up and node in self._fixed:
                 self.gave_up = f"node {node} gave up: {answer.gave_up}"
             if answer.release and node == 0 and self._depot is not None:

@@ -188,5 +188,6 @@ def _result(
         history=history,
         cell_counts=counts,
         refused=dict(world.refused),
+        told=world.told,
         tracebacks={node: failure.traceback for node, failure in world.failures.items()},
     )
