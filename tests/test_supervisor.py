@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from support import ROBOTS, ROOT, children_of, until
+from support import ROBOTS, ROOT, children_of, gone, until
 
 from zwerm.agents.contract import Setup
 from zwerm.deploy.remote import run_robots
@@ -188,14 +188,6 @@ def read_until(running: subprocess.Popen[str], line: str) -> None:
         if printed.strip() == line:
             return
     pytest.fail(f"the program ended before it printed {line!r}")
-
-
-def gone(pids: set[int]) -> bool:
-    """Tell whether none of `pids` lives; a zombie is dead."""
-    return not any(
-        path.exists() and "\nState:\tZ" not in path.read_text()
-        for path in (Path(f"/proc/{pid}/status") for pid in pids)
-    )
 
 
 @pytest.mark.parametrize("when", ["1", "17", "joined"])
