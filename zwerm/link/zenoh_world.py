@@ -39,6 +39,7 @@ class Member(Struct, frozen=True):
     incarnation: int
     controller: str
     setup: bytes
+    paced: bool = False
 
 
 class ZenohWorldLink:
@@ -121,6 +122,8 @@ class ZenohWorldLink:
     def dismiss(self, reason: str) -> None:
         """Tell every joined node that its life is over; their leaving is no loss and is not reported."""
         self._dismissed = True
+        if self._session.is_closed():
+            return
         farewell = encode(Goodbye(reason))
         for node in sorted(self._joined):
             self._put[node](farewell)
@@ -168,7 +171,9 @@ class ZenohWorldLink:
                 query.reply(key, encode(Welcome(refused=reason)))
                 return
             member = self._members[node]
-            query.reply(key, encode(Welcome(controller=member.controller, setup=msgspec.Raw(member.setup))))
+            query.reply(
+                key, encode(Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced))
+            )
 
     def _refusal(self, node: int, payload: bytes) -> str:
         """Let the node join, or return the reason why not."""
