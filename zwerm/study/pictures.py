@@ -77,8 +77,10 @@ def _bars(figure: "Figure", results: Results) -> None:
         lines = [results.line(point, metric) for point in results.points]
         places = list(range(len(lines)))
         half = [0.0 if math.isnan(line.sample.half_width) else line.sample.half_width for line in lines]
-        panel.bar(places, [line.sample.mean for line in lines], yerr=half, color="C0", alpha=0.7, capsize=4)
+        means = [line.sample.mean for line in lines]
+        panel.bar(places, means, yerr=half, color="C0", alpha=0.7, capsize=4, label="ours, with its 95 % interval")
         _draw_paper(panel, places, lines, "C3")
+        panel.legend()
         panel.set_xticks(places, names, rotation=20, ha="right")
         _show_range(panel, metric)
         panel.grid(axis="y", alpha=0.3)
