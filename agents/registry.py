@@ -11,6 +11,7 @@ from zwerm.errors import ControllerError
 BUILT_IN: Final = {
     "computation-free": "zwerm.agents.computation_free:ComputationFree",
     "random-walk": "zwerm.agents.computation_free:RandomWalk",
+    "voronoi-coverage": "zwerm.agents.voronoi_coverage:VoronoiCoverage",
 }
 
 

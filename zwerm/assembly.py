@@ -10,7 +10,8 @@ from zwerm.agents.registry import find, parameters_of
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario import Scenario
 from zwerm.world.arena import Arena
-from zwerm.world.fields import make_field
+from zwerm.world.fields import Field, make_field
+from zwerm.world.meters import make_meters
 from zwerm.world.sensors import Sensor, Surroundings
 from zwerm.world.sensors.registry import make_sensors
 from zwerm.world.world import World
@@ -36,18 +37,21 @@ def assemble(scenario: Scenario, seed: int) -> World:
 
     arena = attempt(lambda: Arena.from_table(scenario.arena, scenario.folder))
     attempt(lambda: check_controller(scenario))
-    sensors = None if arena is None else attempt(lambda: _sensors(scenario, arena))
-    if arena is not None and sensors is not None and not mistakes:
-        world = attempt(lambda: World(scenario, seed, arena, sensors))
-        if world is not None:
-            return world
+    field, table = None, scenario.field
+    if arena is not None and table is not None:
+        field = attempt(lambda: make_field(table, arena.bounds, scenario.folder, scenario.place))
+    # What needs the field is not told that there is none where the mistake is in the field's own table.
+    if arena is not None and (field is not None or table is None):
+        sensors = attempt(lambda: _sensors(scenario, arena, field))
+        meters = attempt(lambda: make_meters(scenario.metrics, arena, field, scenario.time.dt_s))
+        if sensors is not None and meters is not None and not mistakes:
+            world = attempt(lambda: World(scenario, seed, arena, sensors, meters))
+            if world is not None:
+                return world
     raise ScenarioError(mistakes)
 
 
-def _sensors(scenario: Scenario, arena: Arena) -> Sequence[Sensor]:
-    field = None
-    if scenario.field is not None:
-        field = make_field(scenario.field, arena.bounds, scenario.folder, scenario.place)
+def _sensors(scenario: Scenario, arena: Arena, field: Field | None) -> Sequence[Sensor]:
     landmarks = np.array(scenario.landmarks, dtype=np.float64).reshape(-1, 2)
     surroundings = Surroundings(arena, scenario.robots.count, landmarks=landmarks, field=field)
     return make_sensors(scenario.robots.sensors, surroundings, "robots.sensors", scenario.place)
