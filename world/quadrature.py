@@ -59,5 +59,4 @@ def integrate(cells: Sequence[Polygon], points: Floats, field: Field) -> CellInt
 
 def _sums(owner: Ints, values: Floats, count: int) -> Floats:
     """Return (count,) the sums of the values of each owner."""
-    sums: Floats = np.bincount(owner, values, count)
-    return sums
+    return np.asarray(np.bincount(owner, values, count), dtype=np.float64)

@@ -50,7 +50,9 @@ class VoronoiCoverage(Controller):
     def step(self, observation: Observation) -> Command:
         """Return the velocity u = k (C_hat - p). Schwager 2006, eq. 8."""
         here = observation.field
-        assert observation.boundary is not None and observation.neighbours is not None and here is not None
+        assert observation.boundary is not None
+        assert observation.neighbours is not None
+        assert here is not None
         others = [(other.x_m, other.y_m) for other in observation.neighbours]
         x, y = target(observation.boundary, others, here.value, here.gradient_x, here.gradient_y)
         k = self._gain_per_s
