@@ -76,7 +76,9 @@ def test_a_robot_that_is_turned_moves_the_same_way_in_the_room(others, heading, 
 
 
 @settings(max_examples=200, deadline=None)
-@given(PLACES, st.lists(PLACES, max_size=12), FIELDS, FIELDS, FIELDS, st.sampled_from(["coverage", "integer", "swarmbot"]))
+@given(
+    PLACES, st.lists(PLACES, max_size=12), FIELDS, FIELDS, FIELDS, st.sampled_from(["coverage", "integer", "swarmbot"])
+)
 def test_whatever_a_robot_observes_its_command_is_finite_and_leads_into_the_region(here, others, value, gx, gy, kind):
     found = velocity(controller(f"voronoi-{kind}").step(observe(here, [*others, here], value, (gx, gy))))
     assert all(map(math.isfinite, found))

@@ -2,7 +2,7 @@
 
 Lengths are whole multiples of 2^-LENGTH_BITS m (a quarter of a millimetre), a field whole steps of its own unit times
 `field_scale`. The same cell is clipped and the same moments are summed as in `zwerm.polygons`; products are shifted right
-as soon as that costs no accuracy, so that everything fits into 64 bits for regions up to 4 m wide. Divisions round down.
+as soon as that costs no accuracy, so that everything fits into 64 bits for regions up to 4 m wide.
 Plain integers go in and come out, so that whatever behaves like an integer can be put through it and be counted.
 """
 
@@ -23,8 +23,13 @@ _DROPPED_BITS: Final = 8
 Corner = tuple[int, int]
 
 
+def _quotient(numerator: int, denominator: int) -> int:
+    """Return the quotient to the nearest whole number: rounded down, every corner would be half a unit off."""
+    return (2 * numerator + denominator) // (2 * denominator)
+
+
 def clip(polygon: Sequence[Corner], a: int, b: int, twice_c: int) -> list[Corner]:
-    """Return the part of `polygon` where 2 (a x + b y) <= twice_c, its new corners rounded down to whole units."""
+    """Return the part of `polygon` where 2 (a x + b y) <= twice_c, its new corners rounded to whole units."""
     kept: list[Corner] = []
     if not polygon:
         return kept
@@ -35,7 +40,7 @@ def clip(polygon: Sequence[Corner], a: int, b: int, twice_c: int) -> list[Corner
         over1 = 2 * (a * x1 + b * y1) - twice_c
         if (over0 < 0 < over1) or (over1 < 0 < over0):
             fall = over0 - over1
-            kept.append((x0 + over0 * (x1 - x0) // fall, y0 + over0 * (y1 - y0) // fall))
+            kept.append((x0 + _quotient(over0 * (x1 - x0), fall), y0 + _quotient(over0 * (y1 - y0), fall)))
         if over1 <= 0:
             kept.append(corner)
         x0, y0, over0 = x1, y1, over1
@@ -78,8 +83,8 @@ def centroid(cell: Sequence[Corner], value: int, gx: int, gy: int) -> Corner | N
     if mass <= 0:
         return None
     second = LENGTH_BITS - _DROPPED_BITS
-    x = (4 * c1 * s10 + ((2 * gx * s20 + gy * s11) >> second)) // mass  # eq. 17
-    y = (4 * c1 * s01 + ((gx * s11 + 2 * gy * s02) >> second)) // mass
+    x = _quotient(4 * c1 * s10 + ((2 * gx * s20 + gy * s11) >> second), mass)  # eq. 17
+    y = _quotient(4 * c1 * s01 + ((gx * s11 + 2 * gy * s02) >> second), mass)
     return ox + x, oy + y
 
 
