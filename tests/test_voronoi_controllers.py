@@ -171,7 +171,7 @@ def test_what_is_heard_counts_as_what_is_sensed():
     others = [(0.8, 0.5), (0.1, 0.9), (0.4, 0.2)]
     sensed = controller("voronoi-coverage").step(observe((0.3, 0.5), others, 1.0, (0.5, 0.2), 0.7))
     inbox = tuple(heard(node, 0.0, place) for node, place in enumerate(others, 1))
-    told = controller("voronoi-radio").step(observe((0.3, 0.5), [], 1.0, (0.5, 0.2), 0.7, inbox=inbox))
+    told = controller("voronoi-radio").step(observe((0.3, 0.5), [], 1.0, (0.5, 0.2), 0.7, inbox=inbox, tick=2))
     assert velocity(told) == pytest.approx(velocity(sensed), abs=1e-12)
 
 
@@ -181,7 +181,16 @@ def test_a_late_packet_does_not_undo_a_newer_one_and_what_is_old_is_forgotten():
     newer, older = heard(1, 0.5, (0.8, 0.5)), heard(1, 0.4, (0.4, 0.5))
     assert velocity(robot.step(observe((0.2, 0.5), [], inbox=(newer, older), tick=6)))[0] == pytest.approx(half)
     assert velocity(robot.step(observe((0.2, 0.5), [], tick=15)))[0] == pytest.approx(half)
-    assert velocity(robot.step(observe((0.2, 0.5), [], tick=16)))[0] == pytest.approx(5.0 * (0.5 - 0.2))
+    assert velocity(robot.step(observe((0.2, 0.5), [], tick=16))) == (0.0, 0.0)
+
+
+def test_a_robot_listens_for_a_period_before_it_first_moves():
+    robot = controller("voronoi-radio", every_s=0.2)
+    moves = [
+        velocity(robot.step(observe((0.2, 0.5), [], inbox=(heard(1, 0.0, (0.8, 0.5)),), tick=t))) for t in range(4)
+    ]
+    assert moves[:3] == [(0.0, 0.0)] * 3
+    assert moves[3] != (0.0, 0.0)
 
 
 @given(st.integers(0, 39), st.integers(1, 255))

@@ -2,6 +2,7 @@
 
 import operator
 from collections import Counter
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ HILL = Gaussians([0.5641895835477563], [(0.2, 0.2)], 0.5**0.5)
 class Tally(int):
     """An integer that counts what is done with it, and remembers the widest result."""
 
-    counts: Counter[str] = Counter()
+    counts: ClassVar[Counter[str]] = Counter()
     widest_bits = 0
 
     @classmethod
@@ -38,6 +39,10 @@ def _counting(name, kind):
     return operate
 
 
+def _reflected(operate):
+    return lambda self, other: operate(Tally(other), self)
+
+
 for _name, _kind in {
     **dict.fromkeys(("add", "sub"), "add"),
     "mul": "multiply",
@@ -45,9 +50,10 @@ for _name, _kind in {
     **dict.fromkeys(("lshift", "rshift"), "shift"),
     **dict.fromkeys(("lt", "le", "gt", "ge"), "compare"),
 }.items():
-    setattr(Tally, f"__{_name}__", _counting(_name, _kind))
+    _operate = _counting(_name, _kind)
+    setattr(Tally, f"__{_name}__", _operate)
     if _kind != "compare":
-        setattr(Tally, f"__r{_name}__", lambda self, other, do=_counting(_name, _kind): do(other, self))
+        setattr(Tally, f"__r{_name}__", _reflected(_operate))
 Tally.__neg__ = lambda self: Tally(-int(self))
 
 

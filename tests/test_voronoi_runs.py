@@ -38,7 +38,7 @@ def test_ten_robots_converge_and_are_then_near_the_optimum():
     order = ["mean_squared_", "max_squared_", "", "max_"]
     times = [found[f"convergence_time_{statistic}s"] for statistic in order]
     assert times == sorted(times)
-    assert 0.0 < times[0]
+    assert times[0] > 0.0
     assert times[3] <= result.sim_s <= times[3] + 0.2
 
 
@@ -101,9 +101,9 @@ def test_robots_spread_from_a_corner_and_beacons_stay_on_the_walls():
 
 def test_who_can_hear_all_covers_as_who_can_see_all():
     few = ("robots.count=12", "time.duration_s=10.0")
-    seen = inline("voronoi-radio", "robots.controller=voronoi-coverage", *_SENSED, *few).metrics
-    heard = inline("voronoi-radio", *few).metrics
-    assert heard["coverage_cost"] == pytest.approx(seen["coverage_cost"], rel=0.03)
+    seen = inline("voronoi-radio", "robots.controller=voronoi-coverage", *_SENSED, *few, seed=2).metrics
+    heard = inline("voronoi-radio", *few, seed=2).metrics
+    assert heard["coverage_cost"] == pytest.approx(seen["coverage_cost"], rel=0.01)
 
 
 def test_integers_cover_as_well_as_floating_point():
@@ -142,9 +142,9 @@ def test_sensing_voronoi_neighbours_only_changes_no_command():
 
 
 def test_voronoi_metrics_without_a_field_or_in_a_room_with_walls_are_a_mistake():
-    with pytest.raises(ScenarioError, match="metrics.voronoi: needs a convex arena"):
+    with pytest.raises(ScenarioError, match=r"metrics\.voronoi: needs a convex arena"):
         run(TABLE1, 1, "inline", ["arena.walls=[[[0.2, 0.2], [0.4, 0.4]]]"])
-    with pytest.raises(ScenarioError, match="metrics.voronoi: needs a field"):
+    with pytest.raises(ScenarioError, match=r"metrics\.voronoi: needs a field"):
         run("computation-free", 1, "inline", ["metrics.voronoi={}"])
     with pytest.raises(ScenarioError, match="expected voronoi or robots_occlude"):
         run(TABLE1, 1, "inline", ["robots.sensors.0.robots_occlude=true"])

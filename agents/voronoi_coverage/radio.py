@@ -1,8 +1,10 @@
 """Voronoi coverage with neighbours learned by radio instead of sensed, so that lost and late packets matter.
 
 Every robot knows its own pose, tells it and the field's value there to whoever hears, and takes the others to be where they
-last said they were. What it has not heard of for `memory_s` it forgets. A packet carries a checksum; one that is not ours,
-or is damaged, is passed over. With `estimate = "quadratic"` the values heard bend the estimate of the field.
+last said they were. What it has not heard of for `memory_s` it forgets. It listens for one period before it first moves,
+and a robot that knows of nobody stays where it is, as the SwarmBots did: alone, its cell would be the whole region. A packet
+carries a checksum; one that is not ours, or is damaged, is passed over. With `estimate = "quadratic"` the values heard bend
+the estimate of the field.
 """
 
 import math
@@ -94,13 +96,14 @@ class RadioCoverage(Controller):
         else:
             centroid = estimated_centroid(cell, *field)
         x, y = centroid or nearest_point(observation.boundary)
+        moves = bool(samples) and observation.tick > self._every_ticks
         # Robots take turns, so that not all speak at once.
         speaks = (observation.tick + self.setup.node) % self._every_ticks == 0
         say = Heard(observation.time_s, pose.x_m, pose.y_m, here.value)
         return Command(
-            drive=BodyVelocity(table.gain_per_s * x, table.gain_per_s * y),
+            drive=BodyVelocity(table.gain_per_s * x, table.gain_per_s * y) if moves else BodyVelocity(),
             outbox=(Transmission(CHANNEL, pack(self.setup.node, say)),) if speaks else (),
-            done=math.hypot(x, y) < table.tolerance_m,
+            done=moves and math.hypot(x, y) < table.tolerance_m,
         )
 
     def _listen(self, observation: Observation) -> None:
