@@ -50,8 +50,9 @@ class _Swarm(ABC):
     link: ZenohWorldLink
     credentials: Credentials
 
-    def __init__(self, run: str, members: Members, progress: Progress | None, deadline_s: float) -> None:
+    def __init__(self, run: str, members: Members, progress: Progress | None, deadline_s: float, paced: bool) -> None:
         self._run = run
+        self._paced = paced
         self._members = members
         self._progress = progress or (lambda joined, total: None)
         self._deadline_s = deadline_s
@@ -96,7 +97,7 @@ class _Swarm(ABC):
 
     def _member(self, credential: Credential) -> Member:
         controller, setup = self._members[credential.node]
-        return Member(credential.incarnation, controller, encode(setup))
+        return Member(credential.incarnation, controller, encode(setup), self._paced)
 
     @abstractmethod
     def _open(self, directory: Path) -> None:
@@ -120,9 +121,10 @@ class LocalSwarm(_Swarm):
         progress: Progress | None = None,
         order: Sequence[int] | None = None,
         deadline_s: float = JOIN_DEADLINE_S,
+        paced: bool = False,
     ) -> None:
-        """`order` is the order of starting; `deadline_s` is given to each wave of processes to join."""
-        super().__init__(run, members, progress, deadline_s)
+        """`order` is the order of starting; `deadline_s` is given to each wave of processes to join; `paced` is real time."""
+        super().__init__(run, members, progress, deadline_s, paced)
         self._order = order
 
     def _open(self, directory: Path) -> None:
@@ -166,9 +168,10 @@ class RemoteSwarm(_Swarm):
         tls: Certificate | None = None,
         progress: Progress | None = None,
         deadline_s: float = JOIN_DEADLINE_S,
+        paced: bool = False,
     ) -> None:
         """`listen` are Zenoh endpoints, such as `tcp/0.0.0.0:7447`; `deadline_s` is given to all nodes to join."""
-        super().__init__(run, members, progress, deadline_s)
+        super().__init__(run, members, progress, deadline_s, paced)
         self._endpoints = list(listen)
         self._credentials_file = credentials_file
         self._tls = tls

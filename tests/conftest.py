@@ -1,5 +1,7 @@
 """Fixtures for every test."""
 
+import multiprocessing.util
+import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,10 +16,20 @@ def _robots_importable(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def nothing_left() -> Iterator[None]:
-    """Fail the test if it leaves a robot process or a private directory behind."""
-    directory = Path(tempfile.gettempdir())
-    before = set(directory.glob("zwerm-*"))
+def private_tmp(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A directory for temporary files of this test's alone, with a path short enough for a socket."""
+    multiprocessing.util.get_temp_dir()  # the start server's socket stays there for later tests
+    directory = Path(tempfile.mkdtemp(prefix="zt-"))
+    monkeypatch.setattr(tempfile, "tempdir", str(directory))
+    monkeypatch.setenv("TMPDIR", str(directory))
+    yield directory
+    shutil.rmtree(directory)
+
+
+@pytest.fixture
+def nothing_left(private_tmp: Path) -> Iterator[None]:
+    """Fail the test if it leaves a robot process, a socket or a private directory behind."""
     yield
     assert robots_of_this_process() == set(), "robot processes left"
-    assert set(directory.glob("zwerm-*")) - before == set(), "private directories left"
+    left = [path for path in private_tmp.iterdir() if path.name.startswith("zwerm-")]
+    assert left == [], "private directories left"

@@ -39,12 +39,12 @@ HOSTILE = {
     b"\xc1": "malformed",
     encode(GOOD)[:-3]: "malformed",
     encode(GOOD) + b"\x00": "malformed",
-    b"\x91" * 30_000: "malformed",
+    b"\x91" * 30_000: "schema",
     bytes(MESSAGE_BYTES_MAX + 1): "oversized",
     encode(GOOD).replace(b"command/1", b"command/2"): "version",
     b"\x80": "schema",
-    encode(GOOD).replace(b"tick", b"tock"): "schema",
-    encode(Observation(0, 0.0)): "version",
+    encode(GOOD).replace(b"drive", b"drove"): "schema",
+    encode(Observation(0, 0.0)): "schema",
     encode(Command(tick=0, drive=WheelSpeeds(NAN, 0.0))): "not-finite",
     encode(Command(tick=0, drive=BodyVelocity(float("inf")))): "not-finite",
     encode(Command(tick=0, drive=BodyVelocity(0.1))): "wrong-drive",
@@ -104,13 +104,13 @@ def test_no_bytes_at_all_do_more_than_be_refused_or_be_a_valid_command(waiting_w
     before = world.refused.total()
     try:
         world.accept(1, payload)
-    except ProtocolError as error:
-        assert world.refused.total() == before + 1
-        assert error.reason in world.refused
-        assert 1 in world.awaited()
+    except ProtocolError:
+        refused = 1
     else:
-        assert world.refused.total() == before
-        world._answers.pop(1)  # so that the next example is not refused as a duplicate
+        refused = 0
+        del world._answers[1]  # so that the next example is not refused as a duplicate
+    assert world.refused.total() == before + refused
+    assert 1 in world.awaited()
 
 
 class Stranger(threading.Thread):
@@ -172,7 +172,7 @@ def test_a_robot_that_babbles_over_zenoh_changes_nothing_and_is_counted(tmp_path
 
 
 def test_a_robot_that_only_babbles_ends_the_run_as_a_straggler(tmp_path: Path) -> None:
-    result = run_with_a_stranger(tmp_path, lambda node, seen: [b"?"], time={"straggler_s": 0.5})
+    result = run_with_a_stranger(tmp_path, lambda node, seen: [b"\xc1"], time={"straggler_s": 0.5})
     assert result.outcome == "failed"
     assert result.reason == "tick 0: no command from node 0 within 0.5 s"
     assert result.refused == {"malformed": 1}

@@ -22,19 +22,31 @@ T = TypeVar("T")
 def assemble(scenario: Scenario, seed: int) -> World:
     """Return the world of `scenario`, its robots placed for `seed`.
 
-    Raises ScenarioError with every mistake in the arena, the field, the sensors and the controller; or, where those are
-    right, in the placement.
+    Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the placement.
+    """
+    arena, sensors = prepare(scenario)
+    mistakes: list[str] = []
+    world = _attempt(lambda: World(scenario, seed, arena, sensors), scenario, mistakes)
+    if world is None:
+        raise ScenarioError(mistakes)
+    return world
+
+
+def prepare(scenario: Scenario) -> tuple[Arena, Sequence[Sensor]]:
+    """Return the arena and the sensors of `scenario`: all that does not depend on the seed.
+
+    Raises ScenarioError with every mistake in the arena, the field, the sensors and the controller.
     """
     mistakes: list[str] = []
+    arena = _attempt(lambda: Arena.from_table(scenario.arena, scenario.folder), scenario, mistakes)
+    _attempt(lambda: check_controller(scenario), scenario, mistakes)
+    sensors = None if arena is None else _attempt(lambda: _sensors(scenario, arena), scenario, mistakes)
+    if arena is None or sensors is None or mistakes:
+        raise ScenarioError(mistakes)
+    return arena, sensors
 
-    def attempt(make: Callable[[], T]) -> T | None:
-        try:
-            return make()
-        except ScenarioError as error:
-            named = scenario.place + ": "
-            mistakes.extend(line if line.startswith(named) else named + line for line in error.mistakes)
-            return None
 
+<<<<<<< HEAD
     arena = attempt(lambda: Arena.from_table(scenario.arena, scenario.folder))
     attempt(lambda: check_controller(scenario))
     field, table = None, scenario.field
@@ -49,6 +61,16 @@ def assemble(scenario: Scenario, seed: int) -> World:
             if world is not None:
                 return world
     raise ScenarioError(mistakes)
+=======
+def _attempt(make: Callable[[], T], scenario: Scenario, mistakes: list[str]) -> T | None:
+    """Return what `make` makes, or None with its mistakes added to `mistakes`, each led by the scenario's place."""
+    try:
+        return make()
+    except ScenarioError as error:
+        named = scenario.place + ": "
+        mistakes += [line if line.startswith(named) else named + line for line in error.mistakes]
+        return None
+>>>>>>> main
 
 
 def _sensors(scenario: Scenario, arena: Arena, field: Field | None) -> Sequence[Sensor]:

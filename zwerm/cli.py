@@ -75,11 +75,17 @@ def _root(version: Annotated[bool, typer.Option("--version", help="Print the ver
         raise typer.Exit
 
 
-@app.command("list", help="List the built-in scenarios.\n\nExample: [bold]zwerm list[/bold]")
+@app.command("list", help="List the built-in scenarios and studies.\n\nExample: [bold]zwerm list[/bold]")
 def list_scenarios() -> None:
-    """Print a table of the built-in scenarios."""
+    """Print a table of the built-in scenarios, and one of the studies."""
+    from zwerm.study.report import print_studies
+    from zwerm.study.tables import built_in as built_in_studies
+    from zwerm.study.tables import load_study
+
     with _mistakes_in_one_line():
         print_scenarios(out, [load(name) for name in built_in()])
+        out.print()
+        print_studies(out, [load_study(name) for name in built_in_studies()])
 
 
 @app.command(
@@ -181,6 +187,60 @@ def robot(
         for node, code in sorted(failed.items()):
             err.print(f"zwerm: node {node} ended with exit code {code}", style="red", markup=False, highlight=False)
         raise typer.Exit(EXIT_FAILED if failed else 0)
+
+
+@app.command(
+    help="Run a study: scenarios over a grid of settings and many seeds, set beside a paper's numbers.\n\n"
+    "Trials run inline, many at a time, and every row is kept as soon as it is there: after Ctrl-C the same command goes "
+    "on where it was. Makes a Parquet file, one row a trial, and a picture of the same name.\n\n"
+    "Examples:\n\n"
+    "[bold]zwerm study computation-free-comparison --seeds 20[/bold]\n\n"
+    "[bold]zwerm study my-study.toml --seeds 501-1000 --out second-half.parquet[/bold]"
+)
+def study(
+    study: Annotated[str, typer.Argument(metavar="STUDY", help="A built-in study (see `zwerm list`) or a TOML file.")],
+    seeds: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--seeds", metavar="N|FIRST-LAST", help="Seeds 1 to N, or FIRST to LAST, instead of the study's."),
+    ] = None,
+    jobs: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--jobs", min=1, help="How many trials to run at a time; one a core by default."),
+    ] = None,
+    output: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--out", metavar="FILE.parquet", help="Where the rows go; runs/STUDY.parquet by default."),
+    ] = None,
+    sets: Sets = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Run trials again that failed.")] = False,
+) -> None:
+    """Run what is missing of a study, print its table and draw it."""
+    with _mistakes_in_one_line():
+        try:
+            from zwerm.study.pictures import draw_study
+            from zwerm.study.report import StudyProgress, print_results
+            from zwerm.study.running import run_study
+            from zwerm.study.tables import load_study, parse_seeds
+        except ModuleNotFoundError as error:
+            raise ZwermError(f"study: needs {error.name}; install it with: pip install 'zwerm[study]'") from None
+        loaded = load_study(study)
+        chosen = None if seeds is None else parse_seeds(seeds)
+        path = output or Path("runs") / f"{loaded.name}.parquet"
+        with StudyProgress(err, loaded.name) as progress:
+            result = run_study(
+                loaded, path, seeds=chosen, jobs=jobs, sets=tuple(sets or ()), retry=retry, watcher=progress
+            )
+        if result.done:
+            drawn = draw_study(path.with_suffix(".png"), result.results)
+            print_results(out, result.results)
+            err.print(
+                f"{result.done} of {result.planned} trials, {result.ran} of them run now: {path}", highlight=False
+            )
+            err.print(f"picture: {drawn}", highlight=False, soft_wrap=True)
+    if result.interrupted:
+        err.print("zwerm: interrupted; the same command goes on from here", style="red")
+        raise typer.Exit(EXIT_INTERRUPTED)
+    raise typer.Exit(EXIT_FAILED if result.failed else 0)
 
 
 def _report(result: RunResult, picture: Path | None, animate: Path | None, as_json: bool) -> NoReturn:

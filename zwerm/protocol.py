@@ -200,11 +200,15 @@ class Hello(_Message, frozen=True):
 
 
 class Welcome(_Message, frozen=True):
-    """The world's answer to `Hello`: what the node is and what it may know of itself, or why it is refused."""
+    """The world's answer to `Hello`: what the node is and what it may know of itself, or why it is refused.
+
+    In a `paced` run, one in real time, observations come whether or not the node has answered the one before.
+    """
 
     refused: str = ""
     controller: str = ""
     setup: msgspec.Raw = msgspec.Raw(b"\xc0")
+    paced: bool = False
 
 
 class Goodbye(_Message, frozen=True):

@@ -74,7 +74,7 @@ def run(
         watcher.joined(len(nodes), len(nodes))
         link = MemoryLink({node: each.answer for node, each in nodes.items()})
         return drive(world, link, seed, runner, realtime, watcher)
-    with LocalSwarm(new_run_id(), members, progress=watcher.joined) as swarm:
+    with LocalSwarm(new_run_id(), members, progress=watcher.joined, paced=realtime is not None) as swarm:
         return drive(world, swarm.link, seed, runner, realtime, watcher)
 
 
@@ -100,6 +100,7 @@ def serve(
         credentials_file=credentials_file,
         progress=watcher.joined,
         deadline_s=deadline_s,
+        paced=realtime is not None,
     ) as swarm:
         return drive(world, swarm.link, seed, "remote", realtime, watcher)
 

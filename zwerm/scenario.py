@@ -151,7 +151,7 @@ class BaseTable(Table):
 
     controller: str
     parameters: dict[str, Any] = {}
-    pose: tuple[Finite, Finite, Finite]
+    pose: Pose
 
 
 class CoordinatorTable(Table):

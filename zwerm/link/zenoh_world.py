@@ -39,6 +39,7 @@ class Member(Struct, frozen=True):
     incarnation: int
     controller: str
     setup: bytes
+    paced: bool = False
 
 
 class ZenohWorldLink:
@@ -168,7 +169,9 @@ class ZenohWorldLink:
                 query.reply(key, encode(Welcome(refused=reason)))
                 return
             member = self._members[node]
-            query.reply(key, encode(Welcome(controller=member.controller, setup=msgspec.Raw(member.setup))))
+            query.reply(
+                key, encode(Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced))
+            )
 
     def _refusal(self, node: int, payload: bytes) -> str:
         """Let the node join, or return the reason why not."""

@@ -1,0 +1,46 @@
+"""What many trials say together: means, and how far to trust them.
+
+Intervals are Student's, over trials that are independent of each other; they say nothing of a bias that all trials share.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+CONFIDENCE: Final = 0.95
+
+
+class Sample(NamedTuple):
+    """A sample condensed. `sd` and `half_width` are nan where one trial does not tell."""
+
+    n: int
+    mean: float
+    sd: float
+    half_width: float  # of the interval of the mean
+
+
+def condense(values: Sequence[float]) -> Sample:
+    """Return the size, mean, standard deviation (n - 1) and half the 95 % interval of the mean; nan for no values."""
+    n = len(values)
+    if n == 0:
+        return Sample(0, math.nan, math.nan, math.nan)
+    mean = float(np.mean(values))
+    if n == 1:
+        return Sample(1, mean, math.nan, math.nan)
+    sd = float(np.std(values, ddof=1))
+    return Sample(n, mean, sd, half_width(sd, n))
+
+
+def half_width(sd: float, n: int, n_other: int | None = None) -> float:
+    """Return half the 95 % interval of a mean of `n` values, nan for fewer than two.
+
+    With `n_other`, of the difference between it and the mean of that many other values, whose standard deviation is
+    taken to be the same and is not known.
+    """
+    if n < 2:
+        return math.nan
+    quantile = float(student.ppf(0.5 + CONFIDENCE / 2.0, n - 1))
+    return quantile * sd * math.sqrt(1.0 / n + (0.0 if n_other is None else 1.0 / n_other))

@@ -1,0 +1,75 @@
+"""Many trials at a time, each in one of `jobs` worker processes that compute with one thread each.
+
+Rows come as trials end, in any order. A worker that dies (out of memory, a fault in a library) takes no trial with it:
+those that were under way are run again one by one, and the one that kills its process becomes a failed row. When the
+iteration ends, or is closed, no worker is left.
+"""
+
+import re
+import signal
+import threading
+import warnings
+from collections.abc import Generator, Iterator, Sequence
+
+from joblib import Parallel, delayed, parallel_config
+from joblib.externals.loky import get_reusable_executor
+from joblib.externals.loky.process_executor import BrokenProcessPool
+
+from zwerm.study.plan import Trial
+from zwerm.study.trial import Row, failed_row, run_trial
+
+
+def run_trials(trials: Sequence[Trial], jobs: int) -> Generator[Row, None, None]:
+    """Yield the row of every trial. Close the iterator to stop early."""
+    if jobs == 1:
+        yield from map(run_trial, trials)
+        return
+    with warnings.catch_warnings():
+        # joblib warns of results that nobody takes when it is closed early, and of workers that it replaces.
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            with parallel_config(backend="loky", inner_max_num_threads=1):
+                yield from _in_parallel(trials, jobs)
+        finally:
+            get_reusable_executor().shutdown(wait=True, kill_workers=True)
+
+
+def _in_parallel(trials: Sequence[Trial], jobs: int) -> Iterator[Row]:
+    left = list(range(len(trials)))
+    while left:
+        begun: list[int] = []
+        done: set[int] = set()
+
+        def feed(left: list[int] = left, begun: list[int] = begun) -> Iterator[object]:
+            for index in left:
+                begun.append(index)
+                yield delayed(_work)(index, trials[index])
+
+        try:
+            for index, row in Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered")(feed()):
+                done.add(index)
+                yield row
+        except BrokenProcessPool:
+            for index in begun:
+                if index not in done:
+                    done.add(index)
+                    yield _alone(trials[index])
+        left = [index for index in left if index not in done]
+
+
+def _alone(trial: Trial) -> Row:
+    """Return the row of a trial that has a pool of its own."""
+    try:
+        _, row = Parallel(n_jobs=2, batch_size=1)([delayed(_work)(0, trial)])[0]
+    except BrokenProcessPool as error:
+        codes = re.search(r"exit codes of the workers are \{(.*)\}", str(error))
+        return failed_row(trial, f"its process died: {codes[1] if codes else type(error).__name__}")
+    result: Row = row
+    return result
+
+
+def _work(index: int, trial: Trial) -> tuple[int, Row]:
+    """Run a trial in a worker. Ctrl-C at a terminal reaches workers too; it is for the parent to end them."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return index, run_trial(trial)

@@ -1,0 +1,139 @@
+"""The rows of a study on disk: one Parquet file, and beside it, while a study runs, a journal of what is new.
+
+A row is written to the journal the moment its trial ends, and survives whatever happens to the process then; `merge` turns
+file and journal into a new file, all or nothing. One study at a time writes to a file.
+"""
+
+import fcntl
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import msgspec
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from zwerm.errors import ScenarioError
+from zwerm.study.tables import RESERVED
+from zwerm.study.trial import Row
+
+Key = tuple[str, str, int]
+
+_TEXTS = ("study", "variant", "outcome", "reason", "trace", "fingerprint")
+_FIRST = ("seed", "outcome", "reason", "trace", "fingerprint", "ticks", "sim_s", "wall_s")
+
+
+def key_of(row: Row) -> Key:
+    """Return what tells a row's trial from all others: variant, fingerprint of the scenario, seed."""
+    return row["variant"], row["fingerprint"], row["seed"]
+
+
+def read_rows(path: Path) -> list[Row]:
+    """Return the rows of a Parquet file of results, without their empty fields.
+
+    Raises ScenarioError where it is none.
+    """
+    try:
+        rows = pq.read_table(path).to_pylist()
+        for row in rows:
+            key_of(row)
+    except (pa.ArrowException, OSError, KeyError):
+        raise ScenarioError([f"{path}: expected a Parquet file of a study's results"]) from None
+    return [{name: value for name, value in row.items() if value is not None} for row in rows]
+
+
+class Rows:
+    """The rows in `path` and in its journal, by key; more can be added."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._journal_path = path.with_name(path.name + ".journal")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.held: dict[Key, Row] = {}
+        self._journal = self._journal_path.open("a+b", buffering=0)
+        try:
+            fcntl.flock(self._journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if path.exists():
+                self.held = {key_of(row): row for row in read_rows(path)}
+            self._replay()
+        except BlockingIOError:
+            self._journal.close()
+            raise ScenarioError([f"{path}: another study is writing to it"]) from None
+        except ScenarioError:
+            self._journal.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._journal.close()
+
+    def add(self, row: Row) -> None:
+        """Take a row, and keep it."""
+        self._journal.write(msgspec.json.encode(row) + b"\n")
+        self.held[key_of(row)] = row
+
+    def merge(self, axes: Sequence[str], superseded: Iterable[Key] = ()) -> None:
+        """Write all rows but the `superseded` to the Parquet file, with the settings `axes` first, and end the journal."""
+        for key in superseded:
+            self.held.pop(key, None)
+        rows = sorted(self.held.values(), key=lambda row: _order(row, axes))
+        if rows:
+            schema = _schema(rows, axes)
+            fresh = self.path.with_name(self.path.name + ".new")
+            pq.write_table(pa.Table.from_pylist([_fitted(row, schema) for row in rows], schema), fresh)
+            fresh.replace(self.path)
+        self._journal_path.unlink()
+
+    def _replay(self) -> None:
+        """Take the rows of a study that was cut short; its last line may be half of one."""
+        self._journal.seek(0)
+        text = self._journal.read()
+        whole = text.rfind(b"\n") + 1
+        try:
+            rows: list[Row] = [msgspec.json.decode(line) for line in text[:whole].splitlines()]
+            self.held |= {key_of(row): {k: v for k, v in row.items() if v is not None} for row in rows}
+        except (msgspec.DecodeError, KeyError, TypeError, AttributeError):
+            raise ScenarioError([f"{self._journal_path}: expected the journal of a study's results"]) from None
+        if whole < len(text):
+            self._journal.truncate(whole)
+
+
+def _order(row: Row, axes: Sequence[str]) -> tuple[Any, ...]:
+    settings = tuple((axis in row, str(type(row.get(axis))), row.get(axis, 0)) for axis in axes)
+    return row["variant"], settings, row["seed"], row["fingerprint"]
+
+
+def _schema(rows: Sequence[Row], axes: Sequence[str]) -> pa.Schema:
+    """Return columns for whatever the rows hold: who they are, settings, how it went, metrics by name, and lists."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    lists = [name for name in names if name == "cell_counts" or name.endswith(("_series", "series_time_s"))]
+    known = dict.fromkeys(["study", "variant", *axes, *_FIRST])
+    metrics = sorted(name for name in names if name not in known and name not in lists)
+    columns = [*(name for name in known if name in names or name in RESERVED), *metrics, *lists]
+    return pa.schema([(name, _type(name, [row[name] for row in rows if name in row])) for name in columns])
+
+
+def _type(name: str, values: Sequence[Any]) -> pa.DataType:
+    kinds = {type(value) for value in values}
+    if name in _TEXTS:
+        return pa.string()
+    if name in ("seed", "ticks"):
+        return pa.int64()
+    if kinds == {list}:
+        floats = any(isinstance(each, float) for value in values for each in value)
+        return pa.list_(pa.float64() if floats else pa.int64())
+    if kinds == {bool}:
+        return pa.bool_()
+    if kinds == {int}:
+        return pa.int64()
+    return pa.float64() if kinds <= {int, float} else pa.string()
+
+
+def _fitted(row: Row, schema: pa.Schema) -> Row:
+    """Return `row` with text where the column is of text, for settings whose type changed between two studies."""
+    return {name: str(value) if pa.types.is_string(schema.field(name).type) else value for name, value in row.items()}
