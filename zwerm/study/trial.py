@@ -81,5 +81,7 @@ def _series(result: RunResult, names: tuple[str, ...]) -> Row:
     }
     noted = {name: np.array(values) for name, values in result.series.items()}
     looks = np.searchsorted(noted["time_s"], time_s + 1e-9) - 1 if noted else at
-    series = {name: (found[name][at] if name in found else noted[name][looks]) for name in names if name in found | noted}
+    series = {
+        name: (found[name][at] if name in found else noted[name][looks]) for name in names if name in found | noted
+    }
     return {"series_time_s": time_s.tolist()} | {f"{name}_series": values.tolist() for name, values in series.items()}
