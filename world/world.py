@@ -10,7 +10,7 @@ The world is deterministic: its state after a tick is a function of the scenario
 from collections import Counter
 from collections.abc import Sequence
 from itertools import repeat
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -40,6 +40,9 @@ from zwerm.world.scene import Bools, Floats, Scene
 from zwerm.world.sensors import Sensor
 from zwerm.world.wakes import SIGNATURES, Wakes
 
+if TYPE_CHECKING:
+    from zwerm.world.recording import Recording
+
 NO_ANSWER: Final = b""
 
 
@@ -64,6 +67,7 @@ class World:
         self.late_commands = 0
         self.exited: list[int] = []
         self.trace = Trace()
+        self.recording: Recording | None = None
         self.coordinator = count if scenario.coordinator is not None else None
         self.medium = Medium(scenario.radio, count, self.coordinator is not None)
         self._physics = Physics(body, arena.segments, count, scenario.time.dt_s)
@@ -178,6 +182,8 @@ class World:
                 payloads.append(NO_ANSWER)
         self._apply(commands)
         self.trace.extend(self.tick, self._nodes, self._observations, payloads)
+        if self.recording is not None:
+            self.recording.exchange(self.tick, self._nodes, self._observations, payloads, self.scene)
         if self._outboxes:
             self.medium.send(self.scene, self._outboxes)
             self._outboxes = []

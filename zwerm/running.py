@@ -54,17 +54,22 @@ def run(
     overrides: Sequence[str] = (),
     realtime: float | None = None,
     watcher: Watcher | None = None,
+    record: Path | None = None,
 ) -> RunResult:
     """Run `scenario` (a built-in name, a path, or one already loaded) and return its result.
 
-    `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock. Raises ScenarioError
-    for a mistake in the scenario. A failed or interrupted run is a result like any other: look at its `outcome`.
+    `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock; `record` is a file
+    to write an MCAP recording to. Raises ScenarioError for a mistake in the scenario, and LinkError where robots cannot
+    be started. A failed or interrupted run is a result like any other: look at its `outcome`.
     """
     if seed < 0:
         raise ScenarioError([f"seed: expected >= 0, got {seed}"])
     if realtime is not None and not realtime > 0:
         raise ScenarioError([f"realtime: expected a factor > 0, got {realtime}"])
-    if not isinstance(scenario, Scenario):
+    if isinstance(scenario, Scenario):
+        if overrides:
+            raise ScenarioError([f"overrides: a scenario that is already loaded takes none, got {list(overrides)}"])
+    else:
         scenario = load(str(scenario), tuple(overrides))
     world = assemble(scenario, seed)
     members = cast(scenario, seed)
@@ -73,9 +78,9 @@ def run(
         nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
         watcher.joined(len(nodes), len(nodes))
         link = MemoryLink({node: each.answer for node, each in nodes.items()})
-        return drive(world, link, seed, runner, realtime, watcher)
+        return drive(world, link, seed, runner, realtime, watcher, record)
     with LocalSwarm(new_run_id(), members, progress=watcher.joined, paced=realtime is not None) as swarm:
-        return drive(world, swarm.link, seed, runner, realtime, watcher)
+        return drive(world, swarm.link, seed, runner, realtime, watcher, record)
 
 
 def serve(
@@ -85,6 +90,7 @@ def serve(
     credentials_file: Path,
     realtime: float | None = None,
     watcher: Watcher | None = None,
+    record: Path | None = None,
     deadline_s: float = 600.0,
 ) -> RunResult:
     """Run a world whose robots are started elsewhere, with the credentials that are written to `credentials_file`.
@@ -102,7 +108,7 @@ def serve(
         deadline_s=deadline_s,
         paced=realtime is not None,
     ) as swarm:
-        return drive(world, swarm.link, seed, "remote", realtime, watcher)
+        return drive(world, swarm.link, seed, "remote", realtime, watcher, record)
 
 
 def new_run_id() -> str:
@@ -111,10 +117,27 @@ def new_run_id() -> str:
 
 
 def drive(
-    world: World, link: WorldLink, seed: int, runner: str, realtime: float | None = None, watcher: Watcher | None = None
+    world: World,
+    link: WorldLink,
+    seed: int,
+    runner: str,
+    realtime: float | None = None,
+    watcher: Watcher | None = None,
+    record: Path | None = None,
 ) -> RunResult:
-    """Run `world` over a link on which all nodes have joined, and return the result."""
-    watcher = watcher or Nobody()
+    """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`."""
+    if record is None:
+        return _drive(world, link, seed, runner, realtime, watcher or Nobody())
+    from zwerm.world.recording import Recording
+
+    about = {"scenario": world.scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
+    with Recording(record, world.scenario.time.dt_s, about) as world.recording:
+        return _drive(world, link, seed, runner, realtime, watcher or Nobody())
+
+
+def _drive(
+    world: World, link: WorldLink, seed: int, runner: str, realtime: float | None, watcher: Watcher
+) -> RunResult:
     table = world.scenario.time
     ticks = round(table.duration_s / table.dt_s)
     stride = max(1, ticks // HISTORY_SAMPLES)
