@@ -42,6 +42,7 @@ class Neighbours:
         self._sd_m = parameters.sd_m
         self._visibility = surroundings.visibility
         self._tessellation = Tessellation() if parameters.voronoi else None
+        self._last: tuple[Ints, Ints, Sightings] | None = None
 
     def read(self, scene: Scene, robots: Ints) -> list[tuple[Neighbour, ...]]:
         """Return where each of `robots` has the robots it sees."""
@@ -58,15 +59,22 @@ class Neighbours:
         if self._tessellation is None:
             return self._visibility.sightings(scene, robots, *self._sight)
         ids = scene.present_ids()
-        pairs = ids[self._tessellation.pairs(scene.position[ids])]
+        found = self._tessellation.pairs(scene.position[ids])
         range_m, through_walls, _ = self._sight
+        # Without a range or walls everyone sees the same robots until the triangulation changes.
+        lasting = range_m is None and (through_walls or scene.arena.is_convex) and len(robots) == len(ids)
+        if lasting and self._last is not None and found is self._last[0] and np.array_equal(robots, self._last[1]):
+            return self._last[2]
+        pairs = ids[found]
         start, end = scene.position[pairs[:, 0]], scene.position[pairs[:, 1]]
         if range_m is not None:
             pairs = pairs[np.hypot(*(end - start).T) <= range_m]
             start, end = scene.position[pairs[:, 0]], scene.position[pairs[:, 1]]
         if not (through_walls or scene.arena.is_convex):
             pairs = pairs[~scene.arena.blocked(start, end)]
-        return both_ways(pairs, robots, len(scene.present))
+        sightings = both_ways(pairs, robots, len(scene.present))
+        self._last = (found, robots, sightings) if lasting else None
+        return sightings
 
 
 def both_ways(pairs: Ints, robots: Ints, count: int) -> Sightings:
