@@ -40,7 +40,7 @@ format: dev  ## rewrite the code in the project's format
 	$(BIN)/ruff format .
 
 docs: dev  ## build the documentation into site/
-	$(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 bench: dev  ## run the benchmarks
 	@for each in benchmarks/bench_*.py; do \

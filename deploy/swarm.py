@@ -123,7 +123,7 @@ class LocalSwarm(_Swarm):
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
     ) -> None:
-        """`order` is the order of starting; `deadline_s` is given to each wave of processes to join; `paced` is real time."""
+        """`order` is the order of starting; `deadline_s` is given to each process to join; `paced` is real time."""
         super().__init__(run, members, progress, deadline_s, paced)
         self._order = order
         self._leave_deadline_s = 0.0  # nobody waits for those who have not joined

@@ -80,9 +80,13 @@ def bare_imports(tree: ast.Module) -> Iterator[Finding]:
 
 
 def imports_beyond_the_robot(tree: ast.Module) -> Iterator[Finding]:
-    """What runs on a robot knows neither the world nor the coordinator nor who started it."""
+    """What runs on a robot knows neither the world nor the coordinator nor who started it.
+
+    Nor does it import the package itself, which offers all of that under its own name.
+    """
+    beyond = ("world", "coordinator", "deploy", "assembly", "result", "running", "study", "console", "cli")
     for line, name in imported(tree):
-        if name.split(".")[:2] in (["zwerm", "world"], ["zwerm", "coordinator"], ["zwerm", "deploy"]):
+        if name == "zwerm" or name.startswith(tuple(f"zwerm.{part}" for part in beyond)):
             yield line, name
 
 
@@ -231,6 +235,8 @@ def test_the_code_keeps_the_rule(rule: Rule, files: Callable[[], list[Path]]) ->
         (bare_imports, "from world import scene"),
         (bare_imports, "import importlib\nimportlib.import_module('deploy.supervisor')"),
         (imports_beyond_the_robot, "from zwerm.world.scene import Scene"),
+        (imports_beyond_the_robot, "import zwerm\nzwerm.run('x')"),
+        (imports_beyond_the_robot, "from zwerm.running import run"),
         (imports_beyond_the_robot, "def f():\n    from zwerm import coordinator"),
         (wall_clock, "import time"),
         (wall_clock, "from datetime import datetime"),
