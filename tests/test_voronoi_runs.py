@@ -9,6 +9,10 @@ import shapely
 from zwerm.errors import ScenarioError
 from zwerm.running import run
 from zwerm.scenario import built_in
+from zwerm.study.plan import make_points, make_trials
+from zwerm.study.tables import built_in as built_in_studies
+from zwerm.study.tables import load_study
+from zwerm.study.trial import run_trial
 from zwerm.world.arena import Arena
 from zwerm.world.coverage import Rings
 from zwerm.world.fields import Lamp
@@ -119,6 +123,18 @@ def test_a_seed_makes_a_run_and_another_seed_another(name):
     first, again, other = (inline(name, short, seed=seed) for seed in (3, 3, 4))
     assert first.trace == again.trace != other.trace
     assert first.robot_ticks > 0
+
+
+@pytest.mark.parametrize("name", [name for name in built_in_studies() if name.startswith("voronoi-")])
+def test_a_study_can_be_planned_and_its_trials_measure_what_it_reports(name):
+    study = load_study(name)
+    points = make_points(study, ["time.duration_s=0.3"])
+    few = [point for point in points if point.scenario.robots.count <= 100][:2] or points[:1]
+    for trial in make_trials(study, few, [1]):
+        row = run_trial(trial)
+        assert row["outcome"] == "time-limit", row["reason"]
+        assert set(study.table.metrics) <= set(row)
+        assert all(len(row[f"{series}_series"]) > 100 for series in study.table.series)
 
 
 def test_measuring_changes_nothing():
