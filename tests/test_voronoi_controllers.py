@@ -134,6 +134,12 @@ def test_a_gap_of_half_a_turn_is_closed_by_a_line_across_its_middle():
     assert sorted(map(tuple, corridor.round(9))) == [(-0.1, -0.3), (-0.1, 0.3), (0.1, -0.3), (0.1, 0.3)]
 
 
+def test_a_robot_at_the_same_place_is_no_neighbour():
+    table = SwarmBotTable()
+    assert closed_cell([(0.0, 0.0)], table) == []
+    assert closed_cell([(0.0, 0.0), (-0.2, 0.1)], table) == closed_cell([(-0.2, 0.1)], table)
+
+
 def test_a_cell_that_is_bounded_by_neighbours_is_left_alone():
     others = [(0.2, 0.0), (0.0, 0.2), (-0.2, 0.0), (0.0, -0.2)]
     assert shapely.Polygon(closed_cell(others, SwarmBotTable(line_m=0.01))).area == pytest.approx(0.04)

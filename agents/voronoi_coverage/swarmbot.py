@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar, Final
 from msgspec import Meta, Struct
 
 from zwerm.agents.contract import Controller, Setup
-from zwerm.polygons import Point, Polygon, clip, estimated_centroid, voronoi_cell
+from zwerm.polygons import COINCIDENT_M, Point, Polygon, clip, estimated_centroid, voronoi_cell
 from zwerm.protocol import BodyVelocity, Command, Observation, Wake
 
 PositiveNumber = Annotated[float, Meta(gt=0.0)]
@@ -44,7 +44,11 @@ class SwarmBotTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def closed_cell(others: list[Point], table: SwarmBotTable) -> Polygon:
-    """Return the cell of a robot at the origin [m], closed by the three rules; empty for a robot without neighbours."""
+    """Return the cell of a robot at the origin [m], closed by the three rules; empty for a robot without neighbours.
+
+    One at the same place is no neighbour: it lies in no direction.
+    """
+    others = [other for other in others if math.hypot(*other) > COINCIDENT_M]
     if not others:
         return []
     directions = _directions(others)
@@ -75,7 +79,7 @@ def _directions(others: list[Point]) -> list[float]:
 def _triangle(other: Point, table: SwarmBotTable) -> Polygon:
     """Return rule 2's isosceles triangle, its base on the bisector with the only neighbour, its apex away from it."""
     distance = math.hypot(*other)
-    nx, ny = (other[0] / distance, other[1] / distance) if distance > 0.0 else (1.0, 0.0)
+    nx, ny = other[0] / distance, other[1] / distance
     x, y = 0.5 * other[0], 0.5 * other[1]
     half, height = 0.5 * table.triangle_base_m, table.triangle_height_m
     return [
