@@ -11,6 +11,10 @@ from zwerm.errors import ControllerError
 BUILT_IN: Final = {
     "computation-free": "zwerm.agents.computation_free:ComputationFree",
     "random-walk": "zwerm.agents.computation_free:RandomWalk",
+    "voronoi-coverage": "zwerm.agents.voronoi_coverage:VoronoiCoverage",
+    "voronoi-integer": "zwerm.agents.voronoi_coverage:IntegerCoverage",
+    "voronoi-radio": "zwerm.agents.voronoi_coverage:RadioCoverage",
+    "voronoi-swarmbot": "zwerm.agents.voronoi_coverage:SwarmBotCoverage",
 }
 
 

@@ -34,6 +34,7 @@ class RunResult:
     arena: Arena
     history: History
     cell_counts: Ints | None = None
+    series: dict[str, list[float]] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     tracebacks: dict[int, str] = field(default_factory=dict)
 

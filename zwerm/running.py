@@ -143,8 +143,10 @@ def _drive(
     stride = max(1, ticks // HISTORY_SAMPLES)
     history = History()
     history.append(world.scene)
+    world.meters.look(world.scene)
 
     def on_tick(world: World) -> None:
+        world.meters.look(world.scene)
         if world.tick % stride == 0:
             history.append(world.scene)
             watcher.ticked(world.tick, ticks)
@@ -174,7 +176,8 @@ def _result(
     history: History,
 ) -> RunResult:
     scenario, accounts = world.scenario, world.medium.accounts
-    metrics = measure(world, scenario.metrics)
+    world.meters.look(world.scene, now=True)
+    metrics = measure(world, scenario.metrics) | world.meters.metrics()
     metrics["refused_messages"] = float(world.refused.total())
     if isinstance(driver, RealTime):
         metrics["late_commands"] = float(world.late_commands)
@@ -211,5 +214,6 @@ def _result(
         history=history,
         cell_counts=counts,
         refused=dict(world.refused),
+        series=world.meters.series(),
         tracebacks={node: failure.traceback for node, failure in world.failures.items()},
     )

@@ -98,7 +98,7 @@ def test_pictures_of_one_pixel_and_of_sixteen_bits_are_fields_too(tmp_path):
 @pytest.mark.parametrize(
     ("table", "lines"),
     [
-        ({"kind": "hills"}, ["x.toml: field.kind: expected bitmap, constant, gaussians, linear, got 'hills'"]),
+        ({"kind": "hills"}, ["x.toml: field.kind: expected bitmap, constant, gaussians, lamp, linear, got 'hills'"]),
         ({"kind": "constant"}, ["x.toml: field.value: required, and missing"]),
         (
             {"kind": "gaussians", "amplitudes": [1, 2], "centers_m": [[0, 0]], "sd_m": 0},

@@ -137,7 +137,8 @@ def _series(figure: "Figure", results: Results) -> None:
             mean, sd = counts.mean(axis=0), counts.std(axis=0)
             panel.fill_between(time_s, mean - sd, mean + sd, color=f"C{number % 10}", alpha=0.2, linewidth=0)
             panel.plot(time_s, mean, color=f"C{number % 10}", label=point.label or "ours")
-        panel.set(xlabel="time_s", ylabel=name)
+        # What decays is seen to decay, or not, on a logarithmic axis.
+        panel.set(xlabel="time_s", ylabel=name, yscale="log" if name == "mean_error_m" else "linear")
         panel.grid(alpha=0.3)
         if panel.get_legend_handles_labels()[1]:
             panel.legend()
