@@ -49,7 +49,7 @@ _AUDITED: Final = {
 }
 _STREAMS: Final = {"random": ("getstate", "setstate"), "numpy.random": ("get_state", "set_state")}
 
-_STANDARD_LIBRARY: Final = tuple({sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib")})
+_STANDARD_LIBRARY: Final = (sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib"))
 
 
 def _forbidden_functions() -> dict[Any, str]:
