@@ -12,6 +12,10 @@ BUILT_IN: Final = {
     "computation-free": "zwerm.agents.computation_free:ComputationFree",
     "random-walk": "zwerm.agents.computation_free:RandomWalk",
     "sensor-coverage": "zwerm.agents.sensor_coverage:Robot",
+    "voronoi-coverage": "zwerm.agents.voronoi_coverage:VoronoiCoverage",
+    "voronoi-integer": "zwerm.agents.voronoi_coverage:IntegerCoverage",
+    "voronoi-radio": "zwerm.agents.voronoi_coverage:RadioCoverage",
+    "voronoi-swarmbot": "zwerm.agents.voronoi_coverage:SwarmBotCoverage",
 }
 
 

@@ -35,6 +35,9 @@ EXIT_FAILED: Final = 1
 EXIT_REFUSED: Final = 2
 EXIT_LOST: Final = 3
 
+# How long a node whose controller failed waits for the world to have heard why.
+LEAVE_TIMEOUT_S: Final = 5.0
+
 _PR_SET_PDEATHSIG: Final = 1
 
 
@@ -87,7 +90,7 @@ async def live(
             send(answer(payload))
         except REFUSABLE:
             finish_from_outside(0 if _is_goodbye(payload) else EXIT_LOST)
-        except BaseException:  # such as SystemExit: a thread of Zenoh's cannot be left that way
+        except BaseException:  # a thread of Zenoh's cannot be left that way
             finish_from_outside(EXIT_FAILED)
         if node.failed:
             finish_from_outside(EXIT_FAILED)
@@ -109,17 +112,20 @@ async def live(
         welcome = link.join()
         node = _node(link, welcome)
         answer = node.answer
-        if joined is not None:
-            with contextlib.suppress(OSError), joined:  # nobody waits for it any more
-                joined.send_bytes(str(credential.node).encode())
         loop.add_signal_handler(signal.SIGTERM, finish, 0)
         parent: Any = parent_process()
         if parent is not None:
             # Where the kernel does not do it. At once, because a controller that does not return would hold up the
             # rest.
             loop.add_reader(parent.sentinel, os._exit, EXIT_LOST)
+        if joined is not None:
+            with contextlib.suppress(OSError), joined:  # nobody waits for it any more
+                joined.send_bytes(str(credential.node).encode())
         link.listen(receive_in_loop if welcome.paced else receive)
-        return await end
+        code = await end
+        if code == EXIT_FAILED:
+            link.take_leave("its controller failed", LEAVE_TIMEOUT_S)
+        return code
     finally:
         link.close()
 
@@ -131,6 +137,7 @@ def _node(link: ZenohNodeLink, welcome: Welcome) -> Node:
         return Node(welcome.controller, setup)
     except ControllerError as error:
         link.send(encode(Failure(0, str(error), "")))
+        link.take_leave("it has no controller", LEAVE_TIMEOUT_S)
         raise
 
 

@@ -123,9 +123,10 @@ class LocalSwarm(_Swarm):
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
     ) -> None:
-        """`order` is the order of starting; `deadline_s` is given to each wave of processes to join; `paced` is real time."""
+        """`order` is the order of starting; `deadline_s` is given to each process to join; `paced` is real time."""
         super().__init__(run, members, progress, deadline_s, paced)
         self._order = order
+        self._leave_deadline_s = 0.0  # nobody waits for those who have not joined
 
     def _open(self, directory: Path) -> None:
         prepare(len(self._members))
@@ -137,6 +138,7 @@ class LocalSwarm(_Swarm):
 
     def _gather(self) -> None:
         self.supervisor.start(self._progress, self._deadline_s)
+        self._leave_deadline_s = LEAVE_DEADLINE_S
 
     def restart(self, node: int) -> None:
         """Kill a node, and start it with a new incarnation and no memory; return when it has joined.
@@ -152,7 +154,7 @@ class LocalSwarm(_Swarm):
 
     def _end(self) -> None:
         self.link.dismiss("the run is over")
-        self.supervisor.stop(LEAVE_DEADLINE_S)
+        self.supervisor.stop(self._leave_deadline_s)
 
 
 class RemoteSwarm(_Swarm):

@@ -10,7 +10,7 @@ The world is deterministic: its state after a tick is a function of the scenario
 from collections import Counter
 from collections.abc import Sequence
 from itertools import repeat
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -33,11 +33,15 @@ from zwerm.world.arena import Arena
 from zwerm.world.drives import Drives
 from zwerm.world.inflow import Depot, Inflow
 from zwerm.world.medium import Medium
+from zwerm.world.meters import Meters
 from zwerm.world.physics import Physics
 from zwerm.world.placement import place
 from zwerm.world.scene import Bools, Floats, Scene
 from zwerm.world.sensors import Sensor
 from zwerm.world.wakes import SIGNATURES, Wakes
+
+if TYPE_CHECKING:
+    from zwerm.world.recording import Recording
 
 NO_ANSWER: Final = b""
 
@@ -53,12 +57,15 @@ class Told(NamedTuple):
 
 
 class World:
-    """One run's world. Every robot carries the `sensors`; `seed` keys all randomness."""
+    """One run's world. Every robot carries the `sensors`; `seed` keys all randomness. `meters` are for whoever drives it."""
 
-    def __init__(self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor]) -> None:
+    def __init__(
+        self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor], meters: Meters | None = None
+    ) -> None:
         count, body = scenario.robots.count, scenario.robots.body
         self.scenario = scenario
         self.arena = arena
+        self.meters = meters or Meters()
         self.draws = Draws(seed)
         self.tick = 0
         self.count = count
@@ -72,6 +79,7 @@ class World:
         self.told: list[Told] = []
         self.gave_up = ""
         self.trace = Trace()
+        self.recording: Recording | None = None
         self.coordinator = count if scenario.coordinator is not None else None
         self.medium = Medium(scenario.radio, count, self.coordinator is not None)
         self._physics = Physics(body, arena.segments, count, scenario.time.dt_s)
@@ -186,6 +194,8 @@ class World:
                 payloads.append(NO_ANSWER)
         self._apply(commands)
         self.trace.extend(self.tick, self._nodes, self._observations, payloads)
+        if self.recording is not None:
+            self.recording.exchange(self.tick, self._nodes, self._observations, payloads, self.scene)
         if self._outboxes:
             self.medium.send(self.scene, self._outboxes)
             self._outboxes = []

@@ -35,6 +35,7 @@ class RunResult:
     arena: Arena
     history: History
     cell_counts: Ints | None = None
+    series: dict[str, list[float]] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     tracebacks: dict[int, str] = field(default_factory=dict)
     told: list[Told] = field(default_factory=list)

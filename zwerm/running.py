@@ -54,17 +54,22 @@ def run(
     overrides: Sequence[str] = (),
     realtime: float | None = None,
     watcher: Watcher | None = None,
+    record: Path | None = None,
 ) -> RunResult:
     """Run `scenario` (a built-in name, a path, or one already loaded) and return its result.
 
-    `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock. Raises ScenarioError
-    for a mistake in the scenario. A failed or interrupted run is a result like any other: look at its `outcome`.
+    `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock; `record` is a file
+    to write an MCAP recording to. Raises ScenarioError for a mistake in the scenario, and LinkError where robots cannot
+    be started. A failed or interrupted run is a result like any other: look at its `outcome`.
     """
     if seed < 0:
         raise ScenarioError([f"seed: expected >= 0, got {seed}"])
     if realtime is not None and not realtime > 0:
         raise ScenarioError([f"realtime: expected a factor > 0, got {realtime}"])
-    if not isinstance(scenario, Scenario):
+    if isinstance(scenario, Scenario):
+        if overrides:
+            raise ScenarioError([f"overrides: a scenario that is already loaded takes none, got {list(overrides)}"])
+    else:
         scenario = load(str(scenario), tuple(overrides))
     world = assemble(scenario, seed)
     members = cast(scenario, seed)
@@ -73,9 +78,9 @@ def run(
         nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
         watcher.joined(len(nodes), len(nodes))
         link = MemoryLink({node: each.answer for node, each in nodes.items()})
-        return drive(world, link, seed, runner, realtime, watcher)
+        return drive(world, link, seed, runner, realtime, watcher, record)
     with LocalSwarm(new_run_id(), members, progress=watcher.joined, paced=realtime is not None) as swarm:
-        return drive(world, swarm.link, seed, runner, realtime, watcher)
+        return drive(world, swarm.link, seed, runner, realtime, watcher, record)
 
 
 def serve(
@@ -85,6 +90,7 @@ def serve(
     credentials_file: Path,
     realtime: float | None = None,
     watcher: Watcher | None = None,
+    record: Path | None = None,
     deadline_s: float = 600.0,
 ) -> RunResult:
     """Run a world whose robots are started elsewhere, with the credentials that are written to `credentials_file`.
@@ -102,7 +108,7 @@ def serve(
         deadline_s=deadline_s,
         paced=realtime is not None,
     ) as swarm:
-        return drive(world, swarm.link, seed, "remote", realtime, watcher)
+        return drive(world, swarm.link, seed, "remote", realtime, watcher, record)
 
 
 def new_run_id() -> str:
@@ -111,17 +117,36 @@ def new_run_id() -> str:
 
 
 def drive(
-    world: World, link: WorldLink, seed: int, runner: str, realtime: float | None = None, watcher: Watcher | None = None
+    world: World,
+    link: WorldLink,
+    seed: int,
+    runner: str,
+    realtime: float | None = None,
+    watcher: Watcher | None = None,
+    record: Path | None = None,
 ) -> RunResult:
-    """Run `world` over a link on which all nodes have joined, and return the result."""
-    watcher = watcher or Nobody()
+    """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`."""
+    if record is None:
+        return _drive(world, link, seed, runner, realtime, watcher or Nobody())
+    from zwerm.world.recording import Recording
+
+    about = {"scenario": world.scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
+    with Recording(record, world.scenario.time.dt_s, about) as world.recording:
+        return _drive(world, link, seed, runner, realtime, watcher or Nobody())
+
+
+def _drive(
+    world: World, link: WorldLink, seed: int, runner: str, realtime: float | None, watcher: Watcher
+) -> RunResult:
     table = world.scenario.time
     ticks = round(table.duration_s / table.dt_s)
     stride = max(1, ticks // HISTORY_SAMPLES)
     history = History()
     history.append(world.scene)
+    world.meters.look(world.scene)
 
     def on_tick(world: World) -> None:
+        world.meters.look(world.scene)
         if world.tick % stride == 0:
             history.append(world.scene)
             watcher.ticked(world.tick, ticks)
@@ -151,7 +176,8 @@ def _result(
     history: History,
 ) -> RunResult:
     scenario, accounts = world.scenario, world.medium.accounts
-    metrics = measure(world, scenario.metrics)
+    world.meters.look(world.scene, now=True)
+    metrics = measure(world, scenario.metrics) | world.meters.metrics()
     metrics["refused_messages"] = float(world.refused.total())
     if isinstance(driver, RealTime):
         metrics["late_commands"] = float(world.late_commands)
@@ -188,6 +214,7 @@ def _result(
         history=history,
         cell_counts=counts,
         refused=dict(world.refused),
+        series=world.meters.series(),
         told=world.told,
         tracebacks={node: failure.traceback for node, failure in world.failures.items()},
     )
