@@ -18,8 +18,13 @@ from zwerm.simplicial import Edge, FlagComplex, edge, sparing
 BASE: Final = 0
 
 # Which ways a robot with a wide gap in what it sees may go, off the middle of the gap, and how far beside its neighbours.
-VERTEX_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 60, -60, 100, -100))
+VERTEX_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 60, -60))
+# The same for the end of a single file, which has but this chance; it is told by a gap wider than END_RAD.
+END_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 30, -30, 60, -60, 90, -90))
+END_RAD: Final = math.radians(285.0)
 VERTEX_BESIDE_RAD: Final = math.radians(75.0)
+# A drive that a wall stopped says that much about the directions beside it.
+BLOCKED_RAD: Final = math.radians(20.0)
 
 
 class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
@@ -153,13 +158,17 @@ class Planner:
         for i, a, _, gap in wedges(self._views, self._complex):
             if i == BASE:
                 continue
-            for turn in VERTEX_TURNS_RAD:
+            end = gap > END_RAD
+            for turn in END_TURNS_RAD if end else VERTEX_TURNS_RAD:
                 # The bisector first; aside only as far as the gap is wide.
                 direction = self._views[i][a] + gap / 2.0 + turn
                 key = (i, a, 0, round(math.degrees(turn)))
                 if gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD or key in self._closed or self._walled(i, direction):
                     continue
-                if any(_apart(each, direction) < SIXTY_RAD / 2.0 for each in self._blocked.get(i, ())):
+                if any(
+                    _apart(each, direction) < (BLOCKED_RAD if end else SIXTY_RAD / 2.0)
+                    for each in self._blocked.get(i, ())
+                ):
                     continue
                 yield Plan(key, i, direction, hop, self._rules.clear_vertex_m, (i,))
 
