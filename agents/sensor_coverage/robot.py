@@ -264,10 +264,10 @@ class Robot(Controller):
     def _towards(self, landmarks: Sequence[Landmark], seen: dict[int, float], goal: Vector) -> Way:
         """Return the way to go.
 
-        Landmarks that stand still are preferred, where they are enough.
+        Landmarks that stand still are preferred, where they are enough. One landmark is none: odometry must do.
         """
         rx, ry = goal[0] - self.senses.x_m, goal[1] - self.senses.y_m
-        found = Offset(0.0, 0.0, None, False)
+        found, pairs = Offset(0.0, 0.0, None, False), []
         for still in (True, False):
             pairs = [
                 (unit(seen[each.node]), unit(each.bearing_rad))
@@ -277,7 +277,7 @@ class Robot(Controller):
             found = offset(pairs)
             if found.known and found.blind is None:
                 return Way(found.x * self.hop_m, found.y * self.hop_m, False, not still, found.spread)
-        if not found.known or found.blind is None:
+        if len(pairs) < 2 or not found.known or found.blind is None:
             return Way(rx, ry, True, False, 0.0)
         bx, by = found.blind
         along = rx * bx + ry * by
