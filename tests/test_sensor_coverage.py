@@ -23,6 +23,7 @@ from zwerm.protocol import (
     Observation,
     Packet,
     decode_observation,
+    open_answer,
 )
 from zwerm.protocol import encode as to_wire
 from zwerm.running import run
@@ -151,13 +152,16 @@ def test_the_ruler_sets_the_distance_whatever_it_was(start: float) -> None:
 # --- the whole swarm ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("settings", [(), (NOISE,), (OBSTACLE, "base.pose=[0.2,0.4,0.0]")])
-def test_a_small_hall_is_covered_with_no_hole_but_the_obstacle(settings: tuple[str, ...]) -> None:
+# In so small a hall most robots stand at walls; beside an obstacle that fills a tenth of it, all do.
+@pytest.mark.parametrize(
+    ("settings", "ratio_max"), [((), 1.6), ((NOISE,), 1.6), ((OBSTACLE, "base.pose=[0.2,0.4,0.0]"), 2.0)]
+)
+def test_a_small_hall_is_covered_with_no_hole_but_the_obstacle(settings: tuple[str, ...], ratio_max: float) -> None:
     result = run("sensor-coverage", runner="inline", overrides=[*HALL, *settings])
     assert result.outcome == "completed"
     assert result.metrics["coverage_fraction"] >= 0.99
     assert result.metrics["holes"] == result.metrics["obstacles"]
-    assert result.metrics["robots_over_hexagonal"] < 1.6
+    assert result.metrics["robots_over_hexagonal"] < ratio_max
     assert result.metrics["deployment_cycles"] > result.metrics["robots_released"] > 5
     assert result.robot_ticks < 0.35 * result.ticks * result.metrics["robots_deployed"], "parked robots cost"
 
@@ -185,8 +189,6 @@ def test_the_frame_of_a_robot_changes_nothing() -> None:
                     0.0,
                 ),
             )
-            from zwerm.protocol import open_answer
-
             command = open_answer(answer(to_wire(mine)))
             assert isinstance(command, Command)
             drive = command.drive
