@@ -32,9 +32,9 @@ from zwerm.trace import Trace
 from zwerm.world.arena import Arena
 from zwerm.world.drives import Drives
 from zwerm.world.inflow import Depot, Inflow
-from zwerm.world.medium import Medium
 from zwerm.world.physics import Physics
 from zwerm.world.placement import place
+from zwerm.world.radio.medium import Medium
 from zwerm.world.scene import Bools, Floats, Scene
 from zwerm.world.sensors import Sensor
 from zwerm.world.wakes import SIGNATURES, Wakes
@@ -61,7 +61,7 @@ class World:
         self.exited: list[int] = []
         self.trace = Trace()
         self.coordinator = count if scenario.coordinator is not None else None
-        self.medium = Medium(scenario.radio, count, self.coordinator is not None)
+        self.medium = Medium(scenario, arena, self.draws)
         self._physics = Physics(body, arena.segments, count, scenario.time.dt_s)
         self._drives = Drives(body, count, self.draws)
         nodes = count + (self.coordinator is not None)
@@ -103,7 +103,7 @@ class World:
     def observe(self) -> tuple[list[int], list[bytes]]:
         """Sense, and return the ids of the nodes that are awake, ascending, with each one's encoded observation."""
         scene, tick = self.scene, self.tick
-        receivers = self.medium.waiting()
+        receivers = self.medium.arrive(tick)
         if self._wakes.sleeping:
             self._wakes.note_packets(receivers, tick)
             self._note_changes()
@@ -115,7 +115,7 @@ class World:
         for field in SIGNATURES:
             if field in readings:
                 self._wakes.remember(field, nodes[: len(robots)], readings[field])
-        inboxes: Any = [self.medium.deliver(node) for node in nodes] if receivers else repeat(())
+        inboxes: Any = self.medium.deliver(nodes, tick) if receivers else repeat(())
         columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]
         ticks, times = repeat(tick, len(robots)), repeat(scene.time_s)
         self._observations = list(map(encode, map(Observation, ticks, times, inboxes, *columns)))
@@ -267,7 +267,7 @@ class World:
         self._wakes.retire(node)
         if node < self.count:
             self._drives.stop(node)
-        self.medium.lose(node, cause)
+        self.medium.switch_off(node, cause)
 
     def _note_changes(self) -> None:
         """Wake the sleepers whose contacts or visible ids have changed."""

@@ -150,7 +150,7 @@ def _result(
     driver: LockStep | RealTime,
     history: History,
 ) -> RunResult:
-    scenario, accounts = world.scenario, world.medium.accounts
+    scenario = world.scenario
     metrics = measure(world, scenario.metrics)
     metrics["refused_messages"] = float(world.refused.total())
     if isinstance(driver, RealTime):
@@ -174,13 +174,7 @@ def _result(
         robots=world.count,
         robot_ticks=world.robot_ticks,
         metrics=metrics,
-        radio={
-            "sent": accounts.sent,
-            "delivered": accounts.delivered,
-            "dropped": dict(sorted(accounts.dropped.items())),
-            "in_flight": accounts.in_flight,
-            "bytes": accounts.bytes,
-        },
+        radio=world.medium.summary(),
         middleware_lost=driver.lost,
         crashed=sorted(world.crashed),
         restarted=[],

@@ -161,12 +161,46 @@ class CoordinatorTable(Table):
     parameters: dict[str, Any] = {}
 
 
-class RadioTable(Table):
+class ChannelTable(Table):
+    """What happens to packets on a channel: `loss` is independent loss, `models` judge in order. `check` audits every tick.
+
+    An `anonymous` channel tells no receiver who sent a packet.
+    """
+
+    loss: Fraction = 0.0
+    models: list[OpenTable] = []
+    anonymous: bool = False
+    check: bool = False
+
+
+class RadioTable(ChannelTable):
     """The radio between robots, channel `robots`: who hears whom. Without this table there is none."""
 
     range_m: Positive | None = None
     line_of_sight: bool = False
-    anonymous: bool = False
+
+
+Rate = NonNegative
+
+
+class RandomFaultsTable(Table):
+    """Faults at random times: for each kind how many to expect an hour, over the whole swarm. Each lasts `mean_s` on average.
+
+    The schedule is drawn from `seed`, or else from the run's; the run's result holds it as `[[faults]]` tables.
+    """
+
+    seed: Annotated[int, Field(ge=0)] | None = None
+    mean_s: Positive = 10.0
+    crash_per_h: Rate = 0.0
+    pause_per_h: Rate = 0.0
+    slow_per_h: Rate = 0.0
+    partition_per_h: Rate = 0.0
+    jam_per_h: Rate = 0.0
+    blackout_per_h: Rate = 0.0
+    cut_per_h: Rate = 0.0
+    camera_blackout_per_h: Rate = 0.0
+    dead_beacon_per_h: Rate = 0.0
+    stuck_touch_per_h: Rate = 0.0
 
 
 class MetricsTable(Table):
@@ -191,6 +225,9 @@ class Scenario(Table):
     field: OpenTable | None = None
     landmarks: list[Point] = []
     radio: RadioTable | None = None
+    uplink: ChannelTable | None = None
+    faults: list[OpenTable] = []
+    random_faults: RandomFaultsTable | None = None
     metrics: MetricsTable = MetricsTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")
