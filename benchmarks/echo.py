@@ -54,6 +54,9 @@ def echo(credential: Credential, endpoint: str) -> None:
     session.declare_subscriber(
         observation_key(RUN, credential.node), Callback(lambda sample: put(sample.payload), indirect=False)
     )
+    # What is published before the session knows of a listener is lost.
+    while not publisher.matching_status.matching:
+        time.sleep(0.01)
     put(b"")  # arrives after the subscription
     signal.pause()
 

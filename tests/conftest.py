@@ -1,5 +1,6 @@
 """Fixtures for every test."""
 
+import multiprocessing.util
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ def _robots_importable(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def private_tmp(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A directory for temporary files of this test's alone, with a path short enough for a socket."""
+    multiprocessing.util.get_temp_dir()  # the start server's socket stays there for later tests
     directory = Path(tempfile.mkdtemp(prefix="zt-"))
     monkeypatch.setattr(tempfile, "tempdir", str(directory))
     monkeypatch.setenv("TMPDIR", str(directory))

@@ -9,7 +9,7 @@ from unittest import mock
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
 
@@ -58,6 +58,7 @@ WAYS = ("comparing all with all", "the index")
 
 
 @pytest.mark.parametrize("way", WAYS)
+@settings(deadline=None, max_examples=50)
 @given(walls=st.lists(lattice_line, min_size=1, max_size=6), lines=st.lists(lattice_line, min_size=1, max_size=6))
 def test_a_line_is_blocked_where_its_inside_meets_a_wall_be_it_in_a_point_or_along_it(
     way: str, walls: Any, lines: Any
@@ -78,6 +79,7 @@ def test_a_line_is_blocked_where_its_inside_meets_a_wall_be_it_in_a_point_or_alo
 
 
 @pytest.mark.parametrize("way", WAYS)
+@settings(deadline=None, max_examples=50)
 @given(arena=arenas(), ends=st.lists(st.tuples(place, place), min_size=1, max_size=8))
 def test_sight_is_blocked_where_shapely_finds_a_crossing(way: str, arena: Arena, ends: Any) -> None:
     start, end = np.array(ends).transpose(1, 0, 2)
@@ -90,6 +92,7 @@ def test_sight_is_blocked_where_shapely_finds_a_crossing(way: str, arena: Arena,
 
 
 @pytest.mark.parametrize("way", WAYS)
+@settings(deadline=None, max_examples=50)
 @given(
     arena=arenas(),
     rays=st.lists(st.tuples(place, st.floats(-np.pi, np.pi)), min_size=1, max_size=8),
@@ -115,6 +118,7 @@ def test_a_ray_along_a_wall_ends_at_its_near_end_and_one_that_only_points_away_g
 
 
 @pytest.mark.parametrize("way", WAYS)
+@settings(deadline=None, max_examples=50)
 @given(arena=arenas(), points=st.lists(place, min_size=1, max_size=8), margin_m=st.sampled_from([0.0, 0.1, 0.4]))
 def test_clearance_nearest_wall_and_margin_are_shapelys(way: str, arena: Arena, points: Any, margin_m: float) -> None:
     at, dots = np.array(points), shapely.points(np.array(points))
@@ -128,6 +132,7 @@ def test_clearance_nearest_wall_and_margin_are_shapelys(way: str, arena: Arena, 
         assert arena.contains(at, margin_m).tolist() == inside.tolist()
 
 
+@settings(deadline=None, max_examples=50)
 @given(arena=arenas(), points=st.lists(place, min_size=1, max_size=8), reach_m=st.sampled_from([0.05, 0.5]))
 def test_the_walls_within_reach_are_those_that_shapely_finds(arena: Arena, points: Any, reach_m: float) -> None:
     distance = shapely.distance(shapely.points(points)[:, None], shapely.linestrings(arena.segments.reshape(-1, 2, 2)))

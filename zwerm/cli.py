@@ -231,9 +231,11 @@ def study(
                 loaded, path, seeds=chosen, jobs=jobs, sets=tuple(sets or ()), retry=retry, watcher=progress
             )
         if result.done:
-            print_results(out, result.results)
             drawn = draw_study(path.with_suffix(".png"), result.results)
-            err.print(f"{result.done} of {result.planned} trials, {result.ran} of them run now: {path}", highlight=False)
+            print_results(out, result.results)
+            err.print(
+                f"{result.done} of {result.planned} trials, {result.ran} of them run now: {path}", highlight=False
+            )
             err.print(f"picture: {drawn}", highlight=False, soft_wrap=True)
     if result.interrupted:
         err.print("zwerm: interrupted; the same command goes on from here", style="red")

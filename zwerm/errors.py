@@ -36,3 +36,7 @@ class StragglerError(ZwermError):
 
 class LinkError(ZwermError):
     """The connection between the world and its nodes could not be made, or was lost."""
+
+
+class PictureError(ZwermError):
+    """A picture or an animation cannot be drawn or written."""

@@ -22,6 +22,9 @@ SETTINGS: Final[Mapping[str, Any]] = {
     "scouting/gossip/enabled": False,
     "transport/shared_memory/enabled": False,
     "transport/unicast/qos/enabled": False,
+    # How many pieces of 64 KiB can wait to be sent: with the least, 2, a longer message would wait for the very thread that
+    # it is sent from. Memory for them is taken only when needed.
+    "transport/link/tx/queue/size/data": 16,
 }
 
 UNIX_PROTOCOL: Final = "unixsock-stream"

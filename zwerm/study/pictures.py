@@ -5,13 +5,14 @@ values, and triangles point upward from bounds that it claims.
 """
 
 import math
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from zwerm.study.plan import Point, label
+from zwerm.study.plan import label
 from zwerm.study.summary import Line, Results
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _PANEL_IN: Final = (6.0, 4.2)
+_CELL_IN: Final = 0.4
+_TITLE_IN: Final = 0.8
 _DPI: Final = 150
 
 
@@ -29,11 +32,13 @@ def draw_study(path: Path, results: Results) -> Path:
     table = results.study.table
     kind = table.picture
     if kind is None:
-        numeric = bool(table.grid) and all(not isinstance(value, str | bool) for value in next(iter(table.grid.values())))
+        numeric = bool(table.grid) and all(
+            not isinstance(value, str | bool) for value in next(iter(table.grid.values()))
+        )
         kind = "series" if table.series else "line" if numeric else "bars"
     figure = Figure(dpi=_DPI, layout="constrained")
     {"line": _lines, "bars": _bars, "heatmap": _heat_maps, "series": _series}[kind](figure, results)
-    figure.suptitle(table.summary or table.name)
+    figure.suptitle("\n".join(textwrap.wrap(table.summary or table.name, 60)))
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
     return path
@@ -57,7 +62,8 @@ def _lines(figure: "Figure", results: Results) -> None:
             panel.fill_between(x, mean - half, mean + half, color=color, alpha=0.35, linewidth=0)
             panel.plot(x, mean, ".-", color=color, label=name or "ours")
             _draw_paper(panel, x.tolist(), lines, color)
-        panel.set(xlabel=axis, ylabel=metric)
+        panel.set(xlabel=axis)
+        _show_range(panel, metric)
         panel.grid(alpha=0.3)
         panel.legend()
 
@@ -74,13 +80,17 @@ def _bars(figure: "Figure", results: Results) -> None:
         panel.bar(places, [line.sample.mean for line in lines], yerr=half, color="C0", alpha=0.7, capsize=4)
         _draw_paper(panel, places, lines, "C3")
         panel.set_xticks(places, names, rotation=20, ha="right")
-        panel.set(ylabel=metric)
+        _show_range(panel, metric)
         panel.grid(axis="y", alpha=0.3)
 
 
 def _draw_paper(panel: "Axes", places: Sequence[float], lines: Sequence[Line], color: str) -> None:
     for marker, bound, name in (("D", False, "paper"), ("^", True, "paper: at least")):
-        shown = [(x, line.paper) for x, line in zip(places, lines, strict=True) if line.paper is not None and line.is_bound == bound]
+        shown = [
+            (x, line.paper)
+            for x, line in zip(places, lines, strict=True)
+            if line.paper is not None and line.is_bound == bound
+        ]
         if shown:
             x, y = zip(*shown, strict=True)
             named = panel.get_legend_handles_labels()[1]
@@ -89,20 +99,24 @@ def _draw_paper(panel: "Axes", places: Sequence[float], lines: Sequence[Line], c
 
 
 def _heat_maps(figure: "Figure", results: Results) -> None:
-    """One panel a point: the mean number of robots in each cell at the end, the number written into it."""
-    shown = [point for point in results.points if len(results.cell_counts(point)) and point.scenario.metrics.cells]
-    panels = _panels(figure, max(1, len(shown)), 1 if _is_flat(shown) else 3)
-    for panel, point in zip(panels, shown, strict=False):
-        columns, rows = point.scenario.metrics.cells or (1, 1)
-        counts = results.cell_counts(point)
-        mean = counts.mean(axis=0).reshape(rows, columns)
-        image = panel.imshow(mean, origin="lower", cmap="viridis", vmin=0.0)
+    """One panel a point: the mean number of robots in each cell at the end, one scale for all, numbers written in."""
+    shown = [(point, cells) for point in results.points if (cells := point.scenario.metrics.cells)]
+    shown = [(point, cells) for point, cells in shown if len(results.cell_counts(point))]
+    means = [results.cell_counts(point).mean(axis=0).reshape(cells[::-1]) for point, cells in shown]
+    highest = max((float(mean.max()) for mean in means), default=1.0)
+    columns, rows = (max((cells[side] for _, cells in shown), default=1) for side in (0, 1))
+    size = (max(6.0, _CELL_IN * columns), max(0.8, _CELL_IN * rows) + 0.7)
+    panels = _panels(figure, max(1, len(shown)), max(1, round(18.0 / size[0])), size)
+    for panel, (point, (columns, rows)), mean in zip(panels, shown, means, strict=False):
+        image = panel.imshow(mean, origin="lower", cmap="viridis", vmin=0.0, vmax=highest)
         for row in range(rows):
             for column in range(columns):
-                color = "black" if mean[row, column] > 0.6 * mean.max() else "white"
+                color = "black" if mean[row, column] > 0.6 * highest else "white"
                 panel.text(column, row, f"{mean[row, column]:.2f}", ha="center", va="center", color=color, fontsize=6)
-        figure.colorbar(image, ax=panel, label="mean number of robots", shrink=0.6)
-        panel.set(title=f"{point.label or point.scenario.name}, {len(counts)} trials", xticks=[], yticks=[])
+        number = len(results.rows(point))
+        panel.set(title=f"{point.label or point.scenario.name}, {number} trials", xticks=[], yticks=[])
+    if shown:
+        figure.colorbar(image, ax=panels, label="mean number of robots", location="bottom", shrink=0.5)
 
 
 def _series(figure: "Figure", results: Results) -> None:
@@ -127,16 +141,19 @@ def _series(figure: "Figure", results: Results) -> None:
             panel.legend()
 
 
-def _panels(figure: "Figure", count: int, columns: int) -> "list[Axes]":
+def _panels(figure: "Figure", count: int, columns: int, size: tuple[float, float] = _PANEL_IN) -> "list[Axes]":
+    """Return `count` panels of `size` [inches], row by row."""
     columns = min(count, columns)
     rows = -(-count // columns)
-    figure.set_size_inches(_PANEL_IN[0] * columns, _PANEL_IN[1] * rows)
+    figure.set_size_inches(size[0] * columns, size[1] * rows + _TITLE_IN)
     panels: list[Axes] = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
     for empty in panels[count:]:
         empty.set_axis_off()
     return panels[:count]
 
 
-def _is_flat(points: Sequence[Point]) -> bool:
-    """Tell whether the grids are so wide that panels must stand above each other."""
-    return any((point.scenario.metrics.cells or (1, 1))[0] > 4 * (point.scenario.metrics.cells or (1, 1))[1] for point in points)
+def _show_range(panel: "Axes", metric: str) -> None:
+    """Show all of what a fraction can be, and no more: few trials make wide intervals."""
+    panel.set(ylabel=metric)
+    if metric.endswith("_fraction"):
+        panel.set_ylim(0.0, 1.02)

@@ -9,7 +9,7 @@ import re
 import signal
 import threading
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 
 from joblib import Parallel, delayed, parallel_config
 from joblib.externals.loky import get_reusable_executor
@@ -19,7 +19,7 @@ from zwerm.study.plan import Trial
 from zwerm.study.trial import Row, failed_row, run_trial
 
 
-def run_trials(trials: Sequence[Trial], jobs: int) -> Iterator[Row]:
+def run_trials(trials: Sequence[Trial], jobs: int) -> Generator[Row, None, None]:
     """Yield the row of every trial. Close the iterator to stop early."""
     if jobs == 1:
         yield from map(run_trial, trials)

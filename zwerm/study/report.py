@@ -1,6 +1,7 @@
 """What a person sees of a study on the terminal: its progress, and the table at its end."""
 
 import math
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
@@ -68,42 +69,54 @@ def print_studies(console: Console, studies: list[Study]) -> None:
 
 
 def print_results(console: Console, results: Results) -> None:
-    """Print every point and metric with its mean, interval and paper's value, and what went wrong."""
-    study, lines = results.study, results.lines()
-    named = any(line.variant for line in lines)
-    compared = any(line.published for line in lines)
-    table = Table(title=f"{study.name}: {study.table.summary}", title_justify="left", box=None, padding=(0, 2, 0, 0))
-    for heading in [*(["variant"] if named else []), *study.table.grid, "metric"]:
-        table.add_column(heading, style="bold", no_wrap=True)
-    for heading in ["n", "mean", "sd", "95 % interval", *(["paper", "difference", ""] if compared else [])]:
-        table.add_column(heading, justify="right", no_wrap=True)
-    for line in lines:
-        cells = [*([line.variant] if named else []), *(f"{value}" for value in line.settings.values()), line.metric]
-        table.add_row(*cells, *_ours(line), *(_theirs(line) if compared else []))
-    console.print(table)
+    """Print a table for each metric, each point with its mean, interval and paper's value; then what went wrong."""
+    study = results.study
+    console.print(": ".join(filter(None, [study.name, study.table.summary])), style="bold", markup=False)
+    for metric in study.table.metrics:
+        console.print()
+        console.print(_table(metric, [results.line(point, metric) for point in results.points], list(study.table.grid)))
     if study.table.paper.note:
-        console.print(study.table.paper.note, markup=False, highlight=False)
+        console.print(f"\nThe paper: {study.table.paper.note}", markup=False, highlight=False)
     for metric in results.unknown_metrics():
         known = ", ".join(results.known_metrics) or "none"
         console.print(f"{metric}: no trial measured it; they measured: {known}", style="red", markup=False)
+    _print_failures(console, results)
+
+
+def _table(metric: str, lines: Sequence[Line], axes: Sequence[str]) -> Table:
+    """Return a table of one metric: who and where, ours, the paper's."""
+    named = any(line.variant for line in lines)
+    compared = any(line.published for line in lines)
+    table = Table(title=metric, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0))
+    for heading in [*(["variant"] if named else []), *axes]:
+        table.add_column(heading, overflow="fold")
+    for heading in ["n", "mean", "± 95 %", "sd", *(["paper", "difference", ""] if compared else [])]:
+        table.add_column(heading, justify="right", no_wrap=True)
+    for line in lines:
+        who = [*([line.variant] if named else []), *(f"{value}" for value in line.settings.values())]
+        table.add_row(*who, *_ours(line), *(_theirs(line) if compared else []))
+    return table
+
+
+def _print_failures(console: Console, results: Results) -> None:
     total = results.failures.total()
-    if total:
-        console.print(f"{total} trials failed:", style="red")
-        for reason, count in results.failures.most_common(_REASONS_SHOWN):
-            console.print(f"  {count} x {reason}", style="red", markup=False, highlight=False, soft_wrap=True)
-        if len(results.failures) > _REASONS_SHOWN:
-            console.print(f"  and {len(results.failures) - _REASONS_SHOWN} other reasons", style="red")
+    if not total:
+        return
+    console.print(f"{total} trial{'s' if total > 1 else ''} failed:", style="red")
+    for reason, count in results.failures.most_common(_REASONS_SHOWN):
+        console.print(f"  {count} x {reason}", style="red", markup=False, highlight=False, soft_wrap=True)
+    if len(results.failures) > _REASONS_SHOWN:
+        console.print(f"  and {len(results.failures) - _REASONS_SHOWN} other reasons", style="red")
 
 
 def _ours(line: Line) -> list[str]:
-    n, mean, sd, half = line.sample
-    interval = f"{mean - half:.4f} .. {mean + half:.4f}" if n > 1 else "-"
-    return [str(n), f"{mean:.4f}" if n else "-", f"{sd:.4f}" if n > 1 else "-", interval]
+    n, *numbers = line.sample.n, line.sample.mean, line.sample.half_width, line.sample.sd
+    return [str(n), *("-" if math.isnan(number) else f"{number:.4f}" for number in numbers)]
 
 
 def _theirs(line: Line) -> list[str]:
     if line.paper is None:
         return ["", "", ""]
-    verdict = {True: "[green]within", False: "[bold red]OUTSIDE", None: "open"}[line.agrees]
+    verdict = {True: "[green]within", False: "[bold red]OUTSIDE", None: "?"}[line.agrees]
     difference = "-" if line.difference is None else f"{line.difference:+.4f}"
     return [f"{'>= ' if line.is_bound else ''}{line.paper:g}", difference, verdict]

@@ -136,6 +136,4 @@ def _type(name: str, values: Sequence[Any]) -> pa.DataType:
 
 def _fitted(row: Row, schema: pa.Schema) -> Row:
     """Return `row` with text where the column is of text, for settings whose type changed between two studies."""
-    return {
-        name: str(value) if pa.types.is_string(schema.field(name).type) else value for name, value in row.items()
-    }
+    return {name: str(value) if pa.types.is_string(schema.field(name).type) else value for name, value in row.items()}

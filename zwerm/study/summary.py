@@ -56,6 +56,9 @@ class Line:
         """Whether the paper's value can be that of what we ran; None where too few trials or no value leave it open."""
         if self.difference is None or self.published is None or math.isnan(self.sample.sd):
             return None
+        # Over fewer trials the least of many means is lower, whatever the swarm does.
+        if self.metric in CELL_METRICS and self.sample.n < (self.paper_trials or 0):
+            return None
         margin = half_width(self.sample.sd, self.sample.n, self.paper_trials) + (self.published.tolerance or 0.0)
         # A value that is off by a rounding error of the subtraction is not off.
         margin += 1e-12

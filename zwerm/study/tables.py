@@ -44,7 +44,11 @@ def _seeds(given: Any) -> Any:
         if given < 1:
             raise ValueError("expected a count >= 1, an array of seeds, or first and last")
         return list(range(1, given + 1))
-    if isinstance(given, dict) and set(given) == {"first", "last"} and all(type(each) is int for each in given.values()):
+    if (
+        isinstance(given, dict)
+        and set(given) == {"first", "last"}
+        and all(type(each) is int for each in given.values())
+    ):
         return list(range(given["first"], given["last"] + 1))
     return given
 
@@ -60,9 +64,7 @@ def _number_as_table(given: Any) -> Any:
 
 
 Axis = Annotated[list[Any], AfterValidator(_one_kind)]
-Seeds = Annotated[
-    list[Annotated[int, Field(ge=0)]], BeforeValidator(_seeds), AfterValidator(_different_seeds)
-]
+Seeds = Annotated[list[Annotated[int, Field(ge=0)]], BeforeValidator(_seeds), AfterValidator(_different_seeds)]
 
 
 class Published(Table):
@@ -77,7 +79,7 @@ class PaperPoint(Table):
     """A paper's values of one variant, or of all, at one point of the grid, or at all that share the settings `at`."""
 
     variant: str | None = None
-    at: dict[str, Any] = {}
+    at: dict[str, Any] = Field(default_factory=dict)
     values: dict[str, Annotated[Published, BeforeValidator(_number_as_table)]]
 
 
@@ -87,7 +89,7 @@ class PaperTable(Table):
     tolerance: NonNegative = 0.0
     trials: Annotated[int, Field(ge=1)] | None = None
     note: str = ""
-    points: list[PaperPoint] = []
+    points: list[PaperPoint] = Field(default_factory=list)
 
 
 class VariantTable(Table):
@@ -95,8 +97,8 @@ class VariantTable(Table):
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]*$")]
     scenario: str | None = None
-    set: list[str] = []
-    axes: dict[str, str] = {}
+    set: list[str] = Field(default_factory=list)
+    axes: dict[str, str] = Field(default_factory=dict)
 
 
 class StudyTable(Table):
@@ -106,13 +108,13 @@ class StudyTable(Table):
     summary: str = ""
     source: str = ""
     scenario: str | None = None
-    set: list[str] = []
+    set: list[str] = Field(default_factory=list)
     seeds: Seeds
     metrics: Annotated[list[str], Field(min_length=1)]
-    series: list[Literal["robots_in_arena", "robots_entered"]] = []
-    grid: dict[str, Axis] = {}
-    variants: list[VariantTable] = []
-    paper: PaperTable = PaperTable()
+    series: list[Literal["robots_in_arena", "robots_entered"]] = Field(default_factory=list)
+    grid: dict[str, Axis] = Field(default_factory=dict)
+    variants: list[VariantTable] = Field(default_factory=list)
+    paper: PaperTable = Field(default_factory=PaperTable)
     picture: Literal["line", "bars", "heatmap", "series"] | None = None
 
 
@@ -140,7 +142,10 @@ class Study:
             if point.variant in (None, variant) and all(settings[axis] == value for axis, value in point.at.items()):
                 found |= point.values
         rest = {"tolerance": self.table.paper.tolerance}
-        return {metric: each if each.tolerance is not None else each.model_copy(update=rest) for metric, each in found.items()}
+        return {
+            metric: each if each.tolerance is not None else each.model_copy(update=rest)
+            for metric, each in found.items()
+        }
 
 
 BUILT_IN = Path(__file__).parents[1] / "studies"

@@ -1,0 +1,76 @@
+"""A world's end of a link with access control, and sessions of well-behaved and of hostile nodes, for tests."""
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import zenoh
+
+from zwerm.deploy.identity import issue, router_settings
+from zwerm.keys import hello_key
+from zwerm.link.session import TWO_THREADS, Credential, Credentials, open_session, set_threads
+from zwerm.link.zenoh_node import ZenohNodeLink
+from zwerm.link.zenoh_world import Member, ZenohWorldLink
+from zwerm.protocol import Hello, encode
+
+RUN = "test"
+NIL = b"\xc0"
+
+
+class Network(NamedTuple):
+    """The world's link, and what nodes connect to it with."""
+
+    link: ZenohWorldLink
+    credentials: Credentials
+    endpoint: str
+
+    def node(self, number: int, **options: Any) -> ZenohNodeLink:
+        """Return the connected end of a well-behaved node that has not joined yet."""
+        return ZenohNodeLink(RUN, self.credentials.nodes[number], self.endpoint, deadline_s=20.0, **options)
+
+    def session(self, credential: Credential | None, **settings: Any) -> zenoh.Session:
+        """Return a session that may do what Zenoh lets it, with a credential, or without."""
+        identity = {}
+        if credential is not None:
+            identity = {
+                "id": credential.zid,
+                "transport/auth/usrpwd": {"user": credential.user, "password": credential.password},
+            }
+        return open_session(
+            {
+                "mode": "client",
+                "connect/endpoints": [self.endpoint],
+                "connect/timeout_ms": 1000,
+                "connect/exit_on_failure": True,
+                **identity,
+                **settings,
+            },
+            "no session",
+        )
+
+
+@contextlib.contextmanager
+def network(directory: Path, nodes: int = 3, members: Mapping[int, Member] | None = None) -> Iterator[Network]:
+    """Open a world's link that expects `members` (all `nodes`, if None) and has credentials for all `nodes`."""
+    set_threads(TWO_THREADS)
+    endpoint = f"unixsock-stream/{directory}/router"
+    credentials = issue(RUN, range(nodes))
+    if members is None:
+        members = {node: Member(1, "nobody", NIL) for node in range(nodes)}
+    link = ZenohWorldLink(RUN, members, router_settings(credentials, [endpoint], directory / "passwords"))
+    try:
+        yield Network(link, credentials, endpoint)
+    finally:
+        link.close()
+
+
+def ask(session: zenoh.Session, node: int, payload: bytes) -> list[bytes]:
+    """Say hello on the key of `node`, and return the answers."""
+    replies = session.get(hello_key(RUN, node), zenoh.handlers.FifoChannel(8), payload=payload, timeout=5.0)
+    return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+
+
+def hello(node: int, incarnation: int = 1) -> bytes:
+    """Return an encoded hello."""
+    return encode(Hello(node, incarnation))
