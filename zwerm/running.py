@@ -8,10 +8,10 @@ from typing import Literal, Protocol
 
 from zwerm.agents.node import Node
 from zwerm.assembly import assemble
-from zwerm.deploy.cast import cast
+from zwerm.deploy.cast import cast, recast
 from zwerm.deploy.swarm import LocalSwarm, RemoteSwarm
 from zwerm.errors import ScenarioError, StragglerError
-from zwerm.link import WorldLink
+from zwerm.link import Programs, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.result import RunResult
 from zwerm.scenario import Scenario, load
@@ -72,10 +72,21 @@ def run(
     if runner == "inline":
         nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
         watcher.joined(len(nodes), len(nodes))
-        link = MemoryLink({node: each.answer for node, each in nodes.items()})
-        return drive(world, link, seed, runner, realtime, watcher)
-    with LocalSwarm(new_run_id(), members, progress=watcher.joined, paced=realtime is not None) as swarm:
-        return drive(world, swarm.link, seed, runner, realtime, watcher)
+        link = MemoryLink(
+            {node: each.answer for node, each in nodes.items()},
+            lambda node, incarnation: Node(*recast(scenario, seed, node, incarnation)).answer,
+            world.schedule.unborn,
+        )
+        return drive(world, link, seed, runner, realtime, watcher, link)
+    with LocalSwarm(
+        new_run_id(),
+        members,
+        progress=watcher.joined,
+        paced=realtime is not None,
+        unborn=world.schedule.unborn,
+        recast=lambda node, incarnation: recast(scenario, seed, node, incarnation),
+    ) as swarm:
+        return drive(world, swarm.link, seed, runner, realtime, watcher, swarm)
 
 
 def serve(
@@ -92,6 +103,10 @@ def serve(
     Waits `deadline_s` for them to connect to one of the Zenoh endpoints `listen`. Raises ScenarioError and LinkError.
     """
     world = assemble(scenario, seed)
+    if world.schedule.touches_programs:
+        raise ScenarioError(
+            [f"{scenario.place}: faults: robots that run elsewhere cannot be killed, started or paused"]
+        )
     watcher = watcher or Nobody()
     with RemoteSwarm(
         new_run_id(),
@@ -111,9 +126,18 @@ def new_run_id() -> str:
 
 
 def drive(
-    world: World, link: WorldLink, seed: int, runner: str, realtime: float | None = None, watcher: Watcher | None = None
+    world: World,
+    link: WorldLink,
+    seed: int,
+    runner: str,
+    realtime: float | None = None,
+    watcher: Watcher | None = None,
+    programs: Programs | None = None,
 ) -> RunResult:
-    """Run `world` over a link on which all nodes have joined, and return the result."""
+    """Run `world` over a link on which all nodes have joined, and return the result.
+
+    `programs` does to nodes what the scenario's faults demand.
+    """
     watcher = watcher or Nobody()
     table = world.scenario.time
     ticks = round(table.duration_s / table.dt_s)
@@ -126,7 +150,11 @@ def drive(
             history.append(world.scene)
             watcher.ticked(world.tick, ticks)
 
-    driver = LockStep(world, link, on_tick) if realtime is None else RealTime(world, link, realtime, on_tick)
+    driver = (
+        LockStep(world, link, on_tick, programs)
+        if realtime is None
+        else RealTime(world, link, realtime, on_tick, programs)
+    )
     start = time.monotonic()
     try:
         outcome, reason = driver.run(), driver.reason
@@ -176,8 +204,8 @@ def _result(
         metrics=metrics,
         radio=world.medium.summary(),
         middleware_lost=driver.lost,
-        crashed=sorted(world.crashed),
-        restarted=[],
+        crashed=sorted({*world.crashed, *world.lives.ever.get("crashed", ())}),
+        restarted=sorted(world.lives.ever.get("restarted", ())),
         arena=world.arena,
         history=history,
         cell_counts=counts,

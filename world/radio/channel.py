@@ -63,8 +63,9 @@ class Channel:
         ranks: list[int] = []
         payloads: list[bytes] = []
         links: list[Ints] = []
+        sent: dict[int, int] = {}  # a node that answered late is here twice
         for node, outbox in outboxes:
-            rank = 0
+            rank = sent.get(node, 0)
             for message in outbox:
                 if message.channel == name:
                     senders.append(node)
@@ -73,7 +74,8 @@ class Channel:
                     links.append(self._audience(node) if message.to is None else self._link(node, message.to))
                     books.node_bytes[node] += len(message.payload)
                     rank += 1
-            books.node_messages[node] += rank
+            books.node_messages[node] += rank - sent.get(node, 0)
+            sent[node] = rank
         if not senders:
             return
         audience = np.fromiter(map(len, links), np.int64, len(links))
