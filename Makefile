@@ -11,7 +11,7 @@ DEV_READY := $(VENV)/.dev-ready
 
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
-	--no-emit-index-url --no-annotate --no-header --no-config pyproject.toml --extra study --group build
+	--no-emit-index-url --no-annotate --no-header --no-config pyproject.toml --extra record --extra study --group build
 
 .DEFAULT_GOAL := help
 .PHONY: help setup dev run test lint format docs bench lock clean
@@ -40,7 +40,7 @@ format: dev  ## rewrite the code in the project's format
 	$(BIN)/ruff format .
 
 docs: dev  ## build the documentation into site/
-	$(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 bench: dev  ## run the benchmarks
 	@for each in benchmarks/bench_*.py; do \

@@ -4,10 +4,15 @@ The same object runs behind the memory link and inside a robot process, so both 
 """
 
 import traceback
+from typing import Final
 
 from zwerm.agents.contract import Setup, Stepper
 from zwerm.agents.registry import make
-from zwerm.protocol import Failure, decode_observation, encode
+from zwerm.protocol import MESSAGE_BYTES_MAX, Failure, decode_observation, encode
+
+# So that a failure fits into a message, whatever its characters.
+ERROR_CHARS_MAX: Final = 2_000
+TRACEBACK_CHARS_MAX: Final = 10_000
 
 
 class Node:
@@ -25,7 +30,20 @@ class Node:
         try:
             command = self._step(observation)
             command.tick = observation.tick
-            return encode(command)
-        except Exception as error:
+            answer = encode(command)
+            if len(answer) > MESSAGE_BYTES_MAX:
+                raise ValueError(f"the command takes {len(answer)} bytes, at most {MESSAGE_BYTES_MAX} are allowed")
+            return answer
+        except (Exception, SystemExit) as error:
             self.failed = True
-            return encode(Failure(observation.tick, f"{type(error).__name__}: {error}", traceback.format_exc()))
+            return encode(
+                Failure(
+                    observation.tick,
+                    _printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX],
+                    _printable(traceback.format_exc())[-TRACEBACK_CHARS_MAX:],
+                )
+            )
+
+
+def _printable(text: str) -> str:
+    return text.encode(errors="backslashreplace").decode()

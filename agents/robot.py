@@ -87,7 +87,7 @@ async def live(
             send(answer(payload))
         except REFUSABLE:
             finish_from_outside(0 if _is_goodbye(payload) else EXIT_LOST)
-        except BaseException:  # such as SystemExit: a thread of Zenoh's cannot be left that way
+        except BaseException:  # a thread of Zenoh's cannot be left that way
             finish_from_outside(EXIT_FAILED)
         if node.failed:
             finish_from_outside(EXIT_FAILED)
@@ -109,15 +109,15 @@ async def live(
         welcome = link.join()
         node = _node(link, welcome)
         answer = node.answer
-        if joined is not None:
-            with contextlib.suppress(OSError), joined:  # nobody waits for it any more
-                joined.send_bytes(str(credential.node).encode())
         loop.add_signal_handler(signal.SIGTERM, finish, 0)
         parent: Any = parent_process()
         if parent is not None:
             # Where the kernel does not do it. At once, because a controller that does not return would hold up the
             # rest.
             loop.add_reader(parent.sentinel, os._exit, EXIT_LOST)
+        if joined is not None:
+            with contextlib.suppress(OSError), joined:  # nobody waits for it any more
+                joined.send_bytes(str(credential.node).encode())
         link.listen(receive_in_loop if welcome.paced else receive)
         return await end
     finally:

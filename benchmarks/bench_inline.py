@@ -39,9 +39,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
     repeats = parser.parse_args().repeats
-    print(
-        f"{'robots':>6} {'emulator/s':>12} {'target/s':>10} {'pymunk alone/s':>15} {'ratio':>6}   ({repeats} runs)"
-    )
+    print(f"{'robots':>6} {'emulator/s':>12} {'target/s':>10} {'pymunk alone/s':>15} {'ratio':>6}   ({repeats} runs)")
     for count, target in TARGETS.items():
         name = "computation-free" if count == 25 else "computation-free-scaling"
         scenario = load(name, (f"robots.count={count}",))

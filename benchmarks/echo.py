@@ -20,7 +20,7 @@ import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
 from zwerm.deploy.identity import issue, router_settings
-from zwerm.deploy.supervisor import WAVE, prepare
+from zwerm.deploy.supervisor import JOINING_MAX, prepare
 from zwerm.keys import EVERY, command_key, observation_key
 from zwerm.link.session import (
     ONE_THREAD,
@@ -79,8 +79,8 @@ def echo_rate(count: int, ticks: int, payload_bytes: int) -> float:
             for node in range(count)
         ]
         context = multiprocessing.get_context("forkserver")
-        for first in range(0, count, WAVE):
-            wave = credentials.nodes[first : first + WAVE]
+        for first in range(0, count, JOINING_MAX):
+            wave = credentials.nodes[first : first + JOINING_MAX]
             for credential in wave:
                 process = context.Process(target=echo, args=(credential, endpoint), daemon=True)
                 process.start()

@@ -1,4 +1,4 @@
-"""Robot processes of this machine: started in waves, watched, and ended, whatever happens.
+"""Robot processes of this machine: started a few at a time, watched, and ended, whatever happens.
 
 Promises: `stop` leaves no process, and needs no cooperation of theirs; if this process is killed the kernel ends them
 (on Linux; elsewhere they end themselves). Knows nothing of the run they take part in.
@@ -12,17 +12,19 @@ import signal
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
-from typing import Any, Final, cast
+from typing import Any, Final
 
 from zwerm.agents.robot import main
 from zwerm.errors import LinkError
 from zwerm.link.session import Credential, Credentials
 
-WAVE: Final = 16
+# How many may be starting at once: more only get in each other's way.
+JOINING_MAX: Final = 16
 JOIN_DEADLINE_S: Final = 60.0
 LEAVE_DEADLINE_S: Final = 5.0
 TERMINATE_DEADLINE_S: Final = 2.0
@@ -66,15 +68,12 @@ def _raise_file_limit(needed: int) -> None:
 class LocalSupervisor:
     """One process for each of `credentials`, connected to `endpoint`; `order` is the order of starting."""
 
-    def __init__(
-        self, endpoint: str, credentials: Credentials, *, order: Sequence[int] | None = None, wave: int = WAVE
-    ) -> None:
+    def __init__(self, endpoint: str, credentials: Credentials, *, order: Sequence[int] | None = None) -> None:
         self._endpoint = endpoint
         self._run = credentials.run
         self._authority_pem = credentials.authority_pem
         self._credentials = {credential.node: credential for credential in credentials.nodes}
         self._order = list(self._credentials) if order is None else list(order)
-        self._wave = wave
         self._context = multiprocessing.get_context("forkserver")
         self._processes: dict[int, ForkServerProcess] = {}
 
@@ -96,17 +95,15 @@ class LocalSupervisor:
         return {node: code for node, code in codes.items() if code is not None}
 
     def start(self, progress: Progress | None = None, deadline_s: float = JOIN_DEADLINE_S) -> None:
-        """Start all robots, a wave at a time, each wave once the one before has joined.
+        """Start all robots, and return when all have joined.
 
         `progress` is called with how many have joined, and of how many. Raises LinkError where a robot ends before it
-        has joined, or a wave has not joined within `deadline_s`.
+        has joined, or has not joined within `deadline_s` of its own start.
         """
-        total = len(self._order)
-        for first in range(0, total, self._wave):
-            wave = [self._credentials[node] for node in self._order[first : first + self._wave]]
-            for number, _ in enumerate(self._launch(wave, deadline_s), first + 1):
-                if progress is not None:
-                    progress(number, total)
+        credentials = [self._credentials[node] for node in self._order]
+        for number, _ in enumerate(self._launch(credentials, deadline_s), 1):
+            if progress is not None:
+                progress(number, len(credentials))
 
     def restart(self, credential: Credential, deadline_s: float = JOIN_DEADLINE_S) -> None:
         """Start a robot that has ended once more, under the incarnation in `credential`. Raises as `start`."""
@@ -153,26 +150,29 @@ class LocalSupervisor:
 
     def _launch(self, credentials: Sequence[Credential], deadline_s: float) -> Iterator[int]:
         """Start a process for each of `credentials`, and yield each node's id once it has joined."""
-        end_s = time.monotonic() + deadline_s
+        waiting = deque(credentials)
+        missing: dict[int, tuple[ForkServerProcess, float]] = {}
         reader, writer = self._context.Pipe(duplex=False)
-        with reader:
-            with writer, interrupts_held(), _main_module_hidden():
-                for credential in credentials:
-                    self._processes[credential.node] = self._started(credential, deadline_s, writer)
-            missing = {credential.node: self._processes[credential.node] for credential in credentials}
-            while missing:
-                sentinels = {process.sentinel: node for node, process in missing.items()}
+        with reader, writer:
+            while waiting or missing:
+                with interrupts_held(), _main_module_hidden():
+                    while waiting and len(missing) < JOINING_MAX:
+                        credential = waiting.popleft()
+                        process = self._started(credential, deadline_s, writer)
+                        missing[credential.node] = process, time.monotonic() + deadline_s
+                first, end_s = next(iter(missing.values()))
+                sentinels = [process.sentinel for process, _ in missing.values()]
                 ready = wait([reader, *sentinels], max(0.0, end_s - time.monotonic()))
-                if reader in ready and (node := _received(reader)) is not None:
+                if reader in ready:  # before the sentinels: who has joined may have ended since
+                    node = int(reader.recv_bytes())
                     del missing[node]
                     yield node
                     continue
-                # What a robot wrote before it ended has been read, or there is nobody left to write.
-                for sentinel in wait(list(sentinels), 1.0) if ready else []:
-                    process = missing[sentinels[cast(int, sentinel)]]
-                    process.join()
-                    raise LinkError(f"{process.name} ended with exit code {process.exitcode} before it joined")
-                raise LinkError(f"{next(iter(missing.values())).name} did not join within {deadline_s:g} s")
+                for process, _ in missing.values():
+                    if process.sentinel in ready:
+                        process.join()
+                        raise LinkError(f"{process.name} ended with exit code {process.exitcode} before it joined")
+                raise LinkError(f"{first.name} did not join within {deadline_s:g} s")
 
     def _started(self, credential: Credential, deadline_s: float, joined: Connection) -> ForkServerProcess:
         process = self._context.Process(
@@ -182,15 +182,8 @@ class LocalSupervisor:
             daemon=True,
         )
         process.start()
+        self._processes[credential.node] = process
         return process
-
-
-def _received(reader: Connection) -> int | None:
-    """Return the id of a node that has joined, or None where no robot is left that could write one."""
-    try:
-        return int(reader.recv_bytes())
-    except EOFError:
-        return None
 
 
 @contextlib.contextmanager

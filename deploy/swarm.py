@@ -129,7 +129,7 @@ class LocalSwarm(_Swarm):
         unborn: Collection[int] = (),
         recast: Recast | None = None,
     ) -> None:
-        """`order` is the order of starting; `deadline_s` is given to each wave of processes to join; `paced` is real time.
+        """`order` is the order of starting; `deadline_s` is given to each process to join; `paced` is real time.
 
         The nodes in `unborn` are not started before `start` is called; `recast` says who plays a node's next incarnation,
         the same as before if it is not given.
@@ -139,6 +139,7 @@ class LocalSwarm(_Swarm):
         self._recast = recast
         self._ran = set(self._order)
         self._stopped: set[int] = set()
+        self._leave_deadline_s = 0.0  # nobody waits for those who have not joined
 
     def _open(self, directory: Path) -> None:
         prepare(len(self._members))
@@ -150,6 +151,7 @@ class LocalSwarm(_Swarm):
 
     def _gather(self) -> None:
         self.supervisor.start(self._progress, self._deadline_s)
+        self._leave_deadline_s = LEAVE_DEADLINE_S
 
     def kill(self, node: int) -> None:
         """Kill a node with SIGKILL; the link reports its end."""
@@ -198,7 +200,7 @@ class LocalSwarm(_Swarm):
         for node in sorted(self._stopped):
             self.resume(node)
         self.link.dismiss("the run is over")
-        self.supervisor.stop(LEAVE_DEADLINE_S)
+        self.supervisor.stop(self._leave_deadline_s)
 
 
 class RemoteSwarm(_Swarm):

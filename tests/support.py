@@ -48,6 +48,17 @@ def robots_of_this_process() -> set[int]:
     return {robot for child in children_of(os.getpid()) for robot in children_of(child)}
 
 
+def gone(pids: set[int]) -> bool:
+    """Tell whether none of `pids` lives; a zombie is dead."""
+    for pid in pids:
+        try:
+            if (Path("/proc") / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()[0] != "Z":
+                return False
+        except OSError:
+            continue
+    return True
+
+
 def until(holds: Callable[[], object], what: str, deadline_s: float = 30.0) -> None:
     """Return as soon as `holds()` is true, and fail the test if it is not within `deadline_s` seconds."""
     end_s = time.monotonic() + deadline_s

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from support import ROBOTS, ROOT, ZWERM, children_of, scenario, until
+from support import ROBOTS, ROOT, ZWERM, children_of, gone, scenario, until
 
 from zwerm.running import run
 
@@ -125,7 +125,7 @@ def test_an_interrupt_stops_everything_reports_the_run_so_far_and_exits_130(
         assert found["outcome"] == "interrupted"
         assert (tmp_path / "run.png").stat().st_size > 0
     assert "Traceback" not in err
-    assert not any(Path(f"/proc/{pid}").exists() for pid in robots), "processes left"
+    until(lambda: gone(robots), "all processes ended", 5.0)
 
 
 def test_a_failed_run_exits_1_and_prints_its_traceback_and_reason() -> None:

@@ -14,7 +14,7 @@ from pydantic import Field as Key
 from pydantic import ValidationError, ValidationInfo, field_validator
 
 from zwerm.errors import ScenarioError
-from zwerm.scenario import Finite, OpenTable, Point, Positive, Table, mistakes
+from zwerm.scenario import Finite, OpenTable, Point, Positive, Size, Table, mistakes
 from zwerm.world.scene import Floats
 
 Box = tuple[float, float, float, float]
@@ -126,7 +126,7 @@ class Bitmap:
         file: str
         low: Finite = 0.0
         high: Finite = 1.0
-        size_m: tuple[Positive, Positive] | None = None
+        size_m: Size | None = None
         origin_m: Point | None = None
 
         @field_validator("origin_m")

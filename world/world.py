@@ -10,7 +10,7 @@ The world is deterministic: its state after a tick is a function of the scenario
 from collections import Counter
 from collections.abc import Sequence
 from itertools import repeat
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -44,6 +44,9 @@ from zwerm.world.scene import Bools, Floats, Ints, Scene
 from zwerm.world.sensors import Sensor
 from zwerm.world.wakes import SIGNATURES, Wakes
 
+if TYPE_CHECKING:
+    from zwerm.world.recording import Recording
+
 NO_ANSWER: Final = b""
 
 
@@ -65,6 +68,7 @@ class World:
         self.late_commands = 0
         self.exited: list[int] = []
         self.trace = Trace()
+        self.recording: Recording | None = None
         self.coordinator = count if scenario.coordinator is not None else None
         self.medium = Medium(scenario, arena, self.draws)
         self._physics = Physics(body, arena.segments, count, scenario.time.dt_s)
@@ -201,6 +205,8 @@ class World:
                 payloads.append(NO_ANSWER)
         self._apply(self.lives.finished(commands, self.tick))
         self.trace.extend(self.tick, self._nodes, self._observations, payloads)
+        if self.recording is not None:
+            self.recording.exchange(self.tick, self._nodes, self._observations, payloads, self.scene)
         if self._outboxes:
             self.medium.send(self.scene, self._outboxes)
             self._outboxes = []
@@ -242,6 +248,11 @@ class World:
         dead = sorted({*self.crashed, *self.schedule.gone()})
         over[dead] = True
         return bool(over.all()) and len(dead) < self.count
+
+    @property
+    def done_fraction(self) -> float:
+        """The fraction of robots that say that their part is done, in their newest command."""
+        return float(self._done[: self.count].mean())
 
     @property
     def time_s(self) -> float:

@@ -51,6 +51,12 @@ Animation = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--animate", metavar="FILE", help="Also draw an animation: .gif, or .mp4 where ffmpeg is installed."),
 ]
+Record = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--record", metavar="FILE.mcap", help="Record every message and the truth, for Foxglove and the like."
+    ),
+]
 RealTime = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option("--realtime", metavar="FACTOR", help="Pace the run at FACTOR times the wall clock."),
@@ -126,6 +132,7 @@ def run(
         bool, typer.Option("--inline/--processes", help="Run the robots in this process: faster, same trace.")
     ] = False,
     realtime: RealTime = None,
+    record: Record = None,
     picture: Picture = None,
     animate: Animation = None,
     as_json: Json = False,
@@ -137,7 +144,7 @@ def run(
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
             result = run_scenario(
-                loaded, seed, "inline" if inline else "processes", realtime=realtime, watcher=progress
+                loaded, seed, "inline" if inline else "processes", realtime=realtime, watcher=progress, record=record
             )
         _report(result, picture, animate, as_json)
 
@@ -154,6 +161,7 @@ def world(
     seed: Seed = 1,
     sets: Sets = None,
     realtime: RealTime = None,
+    record: Record = None,
     picture: Picture = None,
     animate: Animation = None,
     as_json: Json = False,
@@ -164,7 +172,7 @@ def world(
     with _mistakes_in_one_line():
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
-            result = serve(loaded, seed, listen, credentials, realtime=realtime, watcher=progress)
+            result = serve(loaded, seed, listen, credentials, realtime=realtime, watcher=progress, record=record)
         _report(result, picture, animate, as_json)
 
 

@@ -81,11 +81,16 @@ def print_result(console: Console, result: RunResult, drawn: Sequence[Path]) -> 
             "radio packets",
             f"{radio['sent']} sent = {radio['delivered']} delivered + {radio['in_flight']} in flight + dropped: {lost}",
         )
+        if radio["copies"] or radio["damaged"]:
+            table.add_row("of them", f"{radio['copies']} copies made on the way, {radio['damaged']} delivered damaged")
     table.add_row("lost by the middleware", str(result.middleware_lost))
     if result.refused:
         table.add_row("refused", ", ".join(f"{count} {reason}" for reason, count in sorted(result.refused.items())))
     if result.crashed:
         table.add_row("crashed", ", ".join(map(str, result.crashed)))
+    for what, nodes in (("restarted", result.restarted), *result.hindered.items()):
+        if nodes:
+            table.add_row(what, ", ".join(map(str, nodes)))
     table.add_row("wall time", f"{result.wall_s:.1f} s, {rate:,.0f} robot-ticks/s, {result.runner}")
     table.add_row("trace", result.trace)
     for path in drawn:

@@ -18,6 +18,7 @@ from zwerm.scenario import Scenario, load
 from zwerm.world.history import History
 from zwerm.world.lockstep import FAILED, INTERRUPTED, LockStep
 from zwerm.world.metrics import cell_counts, measure
+from zwerm.world.radio.report import radio_metrics, radio_report
 from zwerm.world.realtime import RealTime
 from zwerm.world.world import World
 
@@ -54,17 +55,22 @@ def run(
     overrides: Sequence[str] = (),
     realtime: float | None = None,
     watcher: Watcher | None = None,
+    record: Path | None = None,
 ) -> RunResult:
     """Run `scenario` (a built-in name, a path, or one already loaded) and return its result.
 
-    `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock. Raises ScenarioError
-    for a mistake in the scenario. A failed or interrupted run is a result like any other: look at its `outcome`.
+    `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock; `record` is a file
+    to write an MCAP recording to. Raises ScenarioError for a mistake in the scenario, and LinkError where robots cannot
+    be started. A failed or interrupted run is a result like any other: look at its `outcome`.
     """
     if seed < 0:
         raise ScenarioError([f"seed: expected >= 0, got {seed}"])
     if realtime is not None and not realtime > 0:
         raise ScenarioError([f"realtime: expected a factor > 0, got {realtime}"])
-    if not isinstance(scenario, Scenario):
+    if isinstance(scenario, Scenario):
+        if overrides:
+            raise ScenarioError([f"overrides: a scenario that is already loaded takes none, got {list(overrides)}"])
+    else:
         scenario = load(str(scenario), tuple(overrides))
     world = assemble(scenario, seed)
     members = cast(scenario, seed)
@@ -77,7 +83,7 @@ def run(
             lambda node, incarnation: Node(*recast(scenario, seed, node, incarnation)).answer,
             world.schedule.unborn,
         )
-        return drive(world, link, seed, runner, realtime, watcher, link)
+        return drive(world, link, seed, runner, realtime, watcher, record, link)
     with LocalSwarm(
         new_run_id(),
         members,
@@ -86,7 +92,7 @@ def run(
         unborn=world.schedule.unborn,
         recast=lambda node, incarnation: recast(scenario, seed, node, incarnation),
     ) as swarm:
-        return drive(world, swarm.link, seed, runner, realtime, watcher, swarm)
+        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm)
 
 
 def serve(
@@ -96,6 +102,7 @@ def serve(
     credentials_file: Path,
     realtime: float | None = None,
     watcher: Watcher | None = None,
+    record: Path | None = None,
     deadline_s: float = 600.0,
 ) -> RunResult:
     """Run a world whose robots are started elsewhere, with the credentials that are written to `credentials_file`.
@@ -117,7 +124,7 @@ def serve(
         deadline_s=deadline_s,
         paced=realtime is not None,
     ) as swarm:
-        return drive(world, swarm.link, seed, "remote", realtime, watcher)
+        return drive(world, swarm.link, seed, "remote", realtime, watcher, record)
 
 
 def new_run_id() -> str:
@@ -132,13 +139,31 @@ def drive(
     runner: str,
     realtime: float | None = None,
     watcher: Watcher | None = None,
+    record: Path | None = None,
     programs: Programs | None = None,
 ) -> RunResult:
-    """Run `world` over a link on which all nodes have joined, and return the result.
+    """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`.
 
     `programs` does to nodes what the scenario's faults demand.
     """
-    watcher = watcher or Nobody()
+    if record is None:
+        return _drive(world, link, seed, runner, realtime, watcher or Nobody(), programs)
+    from zwerm.world.recording import Recording
+
+    about = {"scenario": world.scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
+    with Recording(record, world.scenario.time.dt_s, about) as world.recording:
+        return _drive(world, link, seed, runner, realtime, watcher or Nobody(), programs)
+
+
+def _drive(
+    world: World,
+    link: WorldLink,
+    seed: int,
+    runner: str,
+    realtime: float | None,
+    watcher: Watcher,
+    programs: Programs | None,
+) -> RunResult:
     table = world.scenario.time
     ticks = round(table.duration_s / table.dt_s)
     stride = max(1, ticks // HISTORY_SAMPLES)
@@ -180,6 +205,9 @@ def _result(
 ) -> RunResult:
     scenario = world.scenario
     metrics = measure(world, scenario.metrics)
+    if scenario.radio is not None or scenario.coordinator is not None:
+        metrics["robots_done_fraction"] = world.done_fraction
+        metrics |= radio_metrics(world.medium, world.count, world.tick)
     metrics["refused_messages"] = float(world.refused.total())
     if isinstance(driver, RealTime):
         metrics["late_commands"] = float(world.late_commands)
@@ -202,10 +230,12 @@ def _result(
         robots=world.count,
         robot_ticks=world.robot_ticks,
         metrics=metrics,
-        radio=world.medium.summary(),
+        radio=radio_report(world.medium, world.tick),
         middleware_lost=driver.lost,
         crashed=sorted({*world.crashed, *world.lives.ever.get("crashed", ())}),
         restarted=sorted(world.lives.ever.get("restarted", ())),
+        hindered={what: sorted(world.lives.ever.get(what, ())) for what in ("paused", "slow", "late")},
+        faults=[table.model_dump() for _, table in world.fault_tables],
         arena=world.arena,
         history=history,
         cell_counts=counts,

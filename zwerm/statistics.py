@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 CONFIDENCE: Final = 0.95
 
@@ -42,5 +42,5 @@ def half_width(sd: float, n: int, n_other: int | None = None) -> float:
     """
     if n < 2:
         return math.nan
-    quantile = float(student.ppf(0.5 + CONFIDENCE / 2.0, n - 1))
+    quantile = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2.0))
     return quantile * sd * math.sqrt(1.0 / n + (0.0 if n_other is None else 1.0 / n_other))

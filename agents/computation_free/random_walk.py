@@ -34,8 +34,8 @@ def symmetric_stable(random: np.random.Generator, alpha: float, scale: float) ->
     wait = -math.log(1.0 - random.random())
     if alpha == 1.0:
         return scale * math.tan(angle)
-    stretch = math.sin(alpha * angle) / math.cos(angle) ** (1.0 / alpha)
-    return scale * stretch * (math.cos((1.0 - alpha) * angle) / wait) ** ((1.0 - alpha) / alpha)
+    stretch = math.sin(alpha * angle) / math.pow(math.cos(angle), 1.0 / alpha)
+    return scale * stretch * math.pow(math.cos((1.0 - alpha) * angle) / wait, (1.0 - alpha) / alpha)
 
 
 class RandomWalk(Controller):

@@ -1,5 +1,7 @@
 """Controllers for tests of links and processes; robot processes find them through sys.path."""
 
+import time
+
 from zwerm.agents.contract import Setup
 from zwerm.protocol import BodyVelocity, Command, Observation, Transmission
 
@@ -15,3 +17,56 @@ class Echo:
             drive=BodyVelocity(0.1),
             outbox=tuple(Transmission(packet.channel, packet.payload) for packet in observation.inbox),
         )
+
+
+class Spins:
+    """Never answers, and never comes back."""
+
+    def __init__(self, setup: Setup) -> None:
+        pass
+
+    def step(self, observation: Observation) -> Command:
+        while True:
+            pass
+
+
+class Exits(Echo):
+    """Leaves its process in a way that no controller should."""
+
+    def step(self, observation: Observation) -> Command:
+        raise SystemExit(0)
+
+
+class Wordy(Echo):
+    """Fails with a message longer than one packet of the transport."""
+
+    def step(self, observation: Observation) -> Command:
+        raise ValueError("x" * 60_000 + "\u2620")
+
+
+class Recurses(Echo):
+    """Calls itself without end."""
+
+    def step(self, observation: Observation) -> Command:
+        return self.step(observation)
+
+
+class Garrulous(Echo):
+    """Has more to say than a message can hold."""
+
+    def step(self, observation: Observation) -> Command:
+        return Command(outbox=(Transmission("a", bytes(100_000)),))
+
+
+class Unspeakable(Echo):
+    """Fails with words that are no text."""
+
+    def step(self, observation: Observation) -> Command:
+        raise ValueError("\udcff")
+
+
+class NeverMade(Echo):
+    """Cannot be made: its process waits for as long as it lives."""
+
+    def __init__(self, setup: Setup) -> None:
+        time.sleep(3_600.0)

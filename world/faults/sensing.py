@@ -12,19 +12,21 @@ Draws are keyed by (fault, tick, robot, item): readings of other robots, and oth
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Any, ClassVar, Final
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from zwerm.angles import wrap
-from zwerm.protocol import Bearing, Contact, LandmarkBearing, Neighbour
+from zwerm.protocol import SENSOR_FIELDS, Bearing, Contact, LandmarkBearing, Neighbour
 from zwerm.scenario import Finite, Fraction, NonNegative, Scenario
 from zwerm.world.faults import FaultTable, Robots
-from zwerm.world.scene import Bools, Ints, Scene
+from zwerm.world.scene import Bools, Floats, Ints, Scene
 from zwerm.world.sensors import Sensor
+from zwerm.world.sensors.registry import find
 
 SEEING: Final[dict[str, Any]] = {"bearings": (), "landmarks": (), "neighbours": (), "line_of_sight": False}
 _ITEMS: Final = ("bearings", "landmarks", "neighbours", "touch")
@@ -67,7 +69,7 @@ class CameraBlackoutTable(FaultTable):
 
 
 class SensingFault:
-    """One fault of sensors. `fields` are those it touches, all if empty."""
+    """One fault of sensors. `fields` are those it touches."""
 
     fields: ClassVar[Sequence[str]] = ()
 
@@ -135,7 +137,9 @@ class SensorNoise(SensingFault):
 
     def __init__(self, table: SensorNoiseTable, scenario: Scenario, purpose: str) -> None:
         super().__init__(table, scenario, purpose)
-        self.fields = (table.sensor,)  # type: ignore[misc]
+        field = find(table.sensor).field
+        self._extra = None if field in SENSOR_FIELDS else field
+        self.fields = ("extra",) if self._extra else (field,)  # type: ignore[misc]
         self._contacts = contacts_of(scenario)
         self._landmarks = len(scenario.landmarks)
         ranges = [each.parameters.get("range_m") for each in scenario.robots.sensors if each.kind == table.sensor]
@@ -144,64 +148,78 @@ class SensorNoise(SensingFault):
     def _altered(self, field: str, reading: Any, scene: Scene, robot: int) -> Any:
         table = self._table
 
-        def uniform(what: str, item: int = 0) -> float:
-            return float(scene.draws.uniform(f"{self._purpose}/{what}", scene.tick, robot, item))
+        def uniform(what: str, items: ArrayLike = 0) -> Floats:
+            return scene.draws.uniform(f"{self._purpose}/{what}", scene.tick, robot, items)
 
         if field == "line_of_sight":
-            flips = uniform("missed" if reading else "false") < (
-                table.missed_fraction if reading else table.false_fraction
-            )
-            return reading != flips
-        if field in _ITEMS:
-            seen = [
-                item for item in reading if uniform("missed", _id_of(item, self._contacts)) >= table.missed_fraction
-            ]
-            if uniform("false") < table.false_fraction:
-                seen = self._imagine(field, seen, robot, uniform)
-            return tuple([self._off(item, scene, robot, _id_of(item, self._contacts)) for item in seen])
-        return self._off(reading, scene, robot, 0)
+            chance = table.missed_fraction if reading else table.false_fraction
+            return reading != bool(uniform("missed" if reading else "false") < chance)
+        if self._extra is not None:
+            return reading | {self._extra: self._off(reading[self._extra], scene, robot, [0])}
+        if field not in _ITEMS:
+            return self._off((reading,), scene, robot, [0])[0]
+        seen = reading
+        if table.missed_fraction and reading:
+            kept = uniform("missed", [_id_of(item, self._contacts) for item in reading]) >= table.missed_fraction
+            seen = tuple([item for item, there in zip(reading, kept, strict=True) if there])
+        if table.false_fraction and float(uniform("false")) < table.false_fraction:
+            seen = self._imagine(field, seen, robot, uniform)
+        return self._off(seen, scene, robot, [_id_of(item, self._contacts) for item in seen])
 
-    def _off(self, value: Any, scene: Scene, robot: int, item: int, place: int = 0) -> Any:
-        """Return `value` with bias and noise on every float in it."""
-        if not (self._table.sd or self._table.bias):
-            return value
-        if isinstance(value, float):
-            draw = float(scene.draws.normal(f"{self._purpose}/sd", scene.tick, robot, item, place))
-            return value + self._table.bias + self._table.sd * draw
-        if isinstance(value, msgspec.Struct):
-            changed = {}
-            for number, name in enumerate(value.__struct_fields__):
-                old = getattr(value, name)
-                if isinstance(old, float):
-                    new = self._off(old, scene, robot, item, number)
-                    changed[name] = float(wrap(np.array(new))) if name.endswith("_rad") else new
-            return msgspec.structs.replace(value, **changed)
-        if isinstance(value, tuple):
-            return tuple([self._off(part, scene, robot, item, 100 * place + at) for at, part in enumerate(value)])
-        if isinstance(value, dict):
-            return {key: self._off(part, scene, robot, item, at) for at, (key, part) in enumerate(value.items())}
-        return value
+    def _off(self, parts: tuple[Any, ...], scene: Scene, robot: int, ids: Sequence[int]) -> tuple[Any, ...]:
+        """Return `parts` with bias and noise on every float; draws are keyed by a part's id, or by where it stands."""
+        table = self._table
+        if not (table.sd or table.bias) or not parts:
+            return parts
+        key = np.asarray(ids if len(ids) == len(parts) else range(len(parts)))
+        floats = max(map(_floats, parts))
+        draw = scene.draws.normal(f"{self._purpose}/sd", scene.tick, robot, key[:, None], np.arange(floats))
+        offsets = (table.bias + table.sd * draw).tolist()
+        return tuple([_shifted(part, iter(row)) for part, row in zip(parts, offsets, strict=True)])
 
-    def _imagine(self, field: str, seen: list[Any], robot: int, uniform: Callable[..., float]) -> list[Any]:
+    def _imagine(
+        self, field: str, seen: tuple[Any, ...], robot: int, uniform: Callable[[str], Floats]
+    ) -> tuple[Any, ...]:
         """Return `seen` and an item that is not there, in the sensor's order."""
-        angle = math.pi * (2.0 * uniform("where") - 1.0)
-        known = {_id_of(item, self._contacts) for item in seen} | (
-            {robot} if field in ("bearings", "neighbours") else set()
-        )
+        known = {_id_of(item, self._contacts) for item in seen}
+        if field in ("bearings", "neighbours"):
+            known.add(robot)
         total = {"landmarks": self._landmarks, "touch": len(self._contacts)}.get(field, self._count)
         others = [number for number in range(total) if number not in known]
         if not others:
             return seen
-        number = others[int(uniform("which") * len(others))]
-        if field == "touch":
-            return sorted([*seen, self._contacts[number]], key=lambda contact: _id_of(contact, self._contacts))
+        number = others[int(float(uniform("which")) * len(others))]
+        angle = math.pi * (2.0 * float(uniform("where")) - 1.0)
         made: Any
-        if field == "neighbours":
-            far = self._range_m * math.sqrt(uniform("far"))
+        if field == "touch":
+            made = self._contacts[number]
+        elif field == "neighbours":
+            far = self._range_m * math.sqrt(float(uniform("far")))
             made = Neighbour(number, far * math.cos(angle), far * math.sin(angle))
         else:
             made = Bearing(number, angle) if field == "bearings" else LandmarkBearing(number, angle)
-        return sorted([*seen, made], key=lambda item: _id_of(item, self._contacts))
+        return tuple(sorted([*seen, made], key=lambda item: _id_of(item, self._contacts)))
+
+
+def _floats(value: Any) -> int:
+    """Return how many floats there are in a reading, or in an item of one."""
+    if isinstance(value, msgspec.Struct):
+        return sum(map(_floats, msgspec.structs.astuple(value)))
+    if isinstance(value, tuple):
+        return sum(map(_floats, value))
+    return int(isinstance(value, float))
+
+
+def _shifted(value: Any, offsets: Iterator[float], angle: bool = False) -> Any:
+    """Return `value` with the next of `offsets` added to every float; angles, which are named so, are wrapped."""
+    if isinstance(value, float):
+        shifted = value + next(offsets)
+        return float(wrap(shifted)) if angle else shifted
+    if isinstance(value, msgspec.Struct):
+        names = value.__struct_fields__
+        new = {name: _shifted(getattr(value, name), offsets, name.endswith("_rad")) for name in names}
+        return type(value)(**new)
+    return tuple([_shifted(part, offsets) for part in value]) if isinstance(value, tuple) else value
 
 
 KINDS: Final[dict[type[FaultTable], type[SensingFault]]] = {
@@ -220,7 +238,7 @@ def read(sensor: Sensor, faults: Sequence[SensingFault], scene: Scene, robots: I
         sensor.read(scene, robots) if not unseen else _look_past(sensor, np.any(unseen, axis=0), scene, robots)
     )
     for fault in faults:
-        if not fault.fields or field in fault.fields:
+        if field in fault.fields:
             fault.alter(field, readings, scene, robots)
     return readings
 

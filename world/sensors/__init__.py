@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
-from pydantic import ConfigDict
 
 from zwerm.scenario import Table
 from zwerm.world.arena import Arena
@@ -19,12 +18,6 @@ from zwerm.world.scene import Floats, Ints, Scene
 from zwerm.world.visibility import Visibility
 
 Item = TypeVar("Item")
-
-
-class SensorTable(Table):
-    """A sensor's parameters: numbers must be numbers, not strings of them."""
-
-    model_config = ConfigDict(strict=True)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,10 +13,10 @@ from zwerm.angles import wrap
 from zwerm.protocol import Bearing
 from zwerm.scenario import Finite, NonNegative, Positive, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import SensorTable, Surroundings, portions
+from zwerm.world.sensors import Surroundings, portions
 
 
-class BearingsTable(SensorTable):
+class BearingsTable(Table):
     """Who is seen, and how well."""
 
     range_m: Positive | None = None

@@ -12,10 +12,10 @@ from shapely.geometry import Polygon
 
 from zwerm.scenario import NonNegative, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import SensorTable, Surroundings
+from zwerm.world.sensors import Surroundings
 
 
-class BoundaryTable(SensorTable):
+class BoundaryTable(Table):
     """How well the corners are known."""
 
     sd_m: NonNegative = 0.0

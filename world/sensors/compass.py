@@ -8,10 +8,10 @@ from typing import ClassVar
 from zwerm.angles import wrap
 from zwerm.scenario import Finite, NonNegative, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import SensorTable, Surroundings
+from zwerm.world.sensors import Surroundings
 
 
-class CompassTable(SensorTable):
+class CompassTable(Table):
     """How well the heading is known."""
 
     sd_rad: NonNegative = 0.0

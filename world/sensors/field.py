@@ -11,10 +11,10 @@ import numpy as np
 from zwerm.protocol import FieldSample
 from zwerm.scenario import NonNegative, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import SensorTable, Surroundings
+from zwerm.world.sensors import Surroundings
 
 
-class FieldTable(SensorTable):
+class FieldTable(Table):
     """How well the field is sensed."""
 
     sd: NonNegative = 0.0

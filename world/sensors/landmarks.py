@@ -14,14 +14,14 @@ from zwerm.angles import wrap
 from zwerm.protocol import LandmarkBearing
 from zwerm.scenario import NonNegative, Positive, Table
 from zwerm.world.scene import Bools, Ints, Scene
-from zwerm.world.sensors import SensorTable, Surroundings, portions
+from zwerm.world.sensors import Surroundings, portions
 from zwerm.world.visibility import WallVerdicts
 
 # A line of sight ends this fraction of its length short, so that a wall does not hide the landmark that hangs on it.
 _SHORT = 1e-9
 
 
-class LandmarksTable(SensorTable):
+class LandmarksTable(Table):
     """Which landmarks are seen, and how well."""
 
     range_m: Positive | None = None

@@ -12,13 +12,13 @@ from pydantic import ValidationInfo, field_validator
 
 from zwerm.scenario import Fraction, Positive, Table
 from zwerm.world.scene import Bools, Ints, Scene
-from zwerm.world.sensors import SensorTable, Surroundings
+from zwerm.world.sensors import Surroundings
 
 # So many (observer, other) pairs are worked on at a time: few enough for a core's cache (measured).
 _PAIRS_AT_ONCE = 1 << 15
 
 
-class LineOfSightTable(SensorTable):
+class LineOfSightTable(Table):
     """With these probabilities a reading becomes a random bit: one that is True, one that is False, or any."""
 
     range_m: Positive | None = None
@@ -45,6 +45,7 @@ class LineOfSight:
         # A bit that is replaced by a random one changes half of the time.
         self._missed = max(parameters.false_negative, parameters.combined) / 2.0
         self._imagined = max(parameters.false_positive, parameters.combined) / 2.0
+        # No wall comes between bodies that are inside a convex arena, so it does not matter where the ray enters one.
         self._any_entry_will_do = surroundings.arena.is_convex and parameters.range_m is None
         self._total = 0
 

@@ -11,10 +11,10 @@ import numpy as np
 from zwerm.protocol import Neighbour
 from zwerm.scenario import NonNegative, Positive, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import SensorTable, Surroundings, portions
+from zwerm.world.sensors import Surroundings, portions
 
 
-class NeighboursTable(SensorTable):
+class NeighboursTable(Table):
     """Who is seen, and how well."""
 
     range_m: Positive | None = None

@@ -15,10 +15,10 @@ from zwerm.angles import wrap
 from zwerm.protocol import Displacement
 from zwerm.scenario import NonNegative, Table
 from zwerm.world.scene import Floats, Ints, Scene
-from zwerm.world.sensors import SensorTable, Surroundings
+from zwerm.world.sensors import Surroundings
 
 
-class OdometryTable(SensorTable):
+class OdometryTable(Table):
     """The noise: of the distance in 1 and m per root m, of the turn in 1 and rad per root rad."""
 
     distance_sd_fraction: NonNegative = 0.0

@@ -10,10 +10,10 @@ from zwerm.angles import wrap
 from zwerm.protocol import Pose
 from zwerm.scenario import NonNegative, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import SensorTable, Surroundings
+from zwerm.world.sensors import Surroundings
 
 
-class PoseTable(SensorTable):
+class PoseTable(Table):
     """How well the pose is known."""
 
     sd_m: NonNegative = 0.0

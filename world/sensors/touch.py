@@ -17,10 +17,10 @@ from zwerm.angles import wrap
 from zwerm.protocol import Contact
 from zwerm.scenario import Fraction, Positive, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import SensorTable, Surroundings, portions
+from zwerm.world.sensors import Surroundings, portions
 
 
-class TouchTable(SensorTable):
+class TouchTable(Table):
     """The ring, and how it errs."""
 
     switches: Annotated[int, Field(ge=1, le=360)] = 8

@@ -122,6 +122,8 @@ class ZenohWorldLink:
     def dismiss(self, reason: str) -> None:
         """Tell every joined node that its life is over; their leaving is no loss and is not reported."""
         self._dismissed = True
+        if self._session.is_closed():
+            return
         farewell = encode(Goodbye(reason))
         for node in sorted(self._joined):
             self._put[node](farewell)

@@ -2,9 +2,10 @@
 
 Rows come as trials end, in any order. A worker that dies (out of memory, a fault in a library) takes no trial with it:
 those that were under way are run again one by one, and the one that kills its process becomes a failed row. When the
-iteration ends, or is closed, no worker is left.
+iteration ends, is closed, or its process is killed, no worker is left.
 """
 
+import os
 import re
 import signal
 import threading
@@ -43,7 +44,7 @@ def _in_parallel(trials: Sequence[Trial], jobs: int) -> Iterator[Row]:
         def feed(left: list[int] = left, begun: list[int] = begun) -> Iterator[object]:
             for index in left:
                 begun.append(index)
-                yield delayed(_work)(index, trials[index])
+                yield delayed(_work)(index, trials[index], os.getpid())
 
         try:
             for index, row in Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered")(feed()):
@@ -60,7 +61,7 @@ def _in_parallel(trials: Sequence[Trial], jobs: int) -> Iterator[Row]:
 def _alone(trial: Trial) -> Row:
     """Return the row of a trial that has a pool of its own."""
     try:
-        _, row = Parallel(n_jobs=2, batch_size=1)([delayed(_work)(0, trial)])[0]
+        _, row = Parallel(n_jobs=2, batch_size=1)([delayed(_work)(0, trial, os.getpid())])[0]
     except BrokenProcessPool as error:
         codes = re.search(r"exit codes of the workers are \{(.*)\}", str(error))
         return failed_row(trial, f"its process died: {codes[1] if codes else type(error).__name__}")
@@ -68,8 +69,22 @@ def _alone(trial: Trial) -> Row:
     return result
 
 
-def _work(index: int, trial: Trial) -> tuple[int, Row]:
+_watched: list[int] = []
+_LOOK_S = 1.0
+
+
+def _work(index: int, trial: Trial, parent: int) -> tuple[int, Row]:
     """Run a trial in a worker. Ctrl-C at a terminal reaches workers too; it is for the parent to end them."""
-    if threading.current_thread() is threading.main_thread():
+    if not _watched:
+        _watched.append(parent)
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        threading.Thread(target=_die_with, args=(parent,), daemon=True).start()
     return index, run_trial(trial)
+
+
+def _die_with(parent: int) -> None:
+    """End this worker once `parent` is no longer its parent, because it was killed."""
+    never = threading.Event()
+    while os.getppid() == parent:
+        never.wait(_LOOK_S)
+    os._exit(1)

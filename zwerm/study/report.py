@@ -36,16 +36,17 @@ class StudyProgress:
         self._failed = 0
 
     def __enter__(self) -> Self:
-        self._progress.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._progress.stop()
+        if self._progress.live.is_started:
+            self._progress.stop()
 
     def begin(self, total: int) -> None:
         """Take note that `total` trials are to be run now."""
+        self._progress.start()
         self._task = self._progress.add_task(self._name, total=total, failed="")
 
     def ended(self, failed: bool) -> None:

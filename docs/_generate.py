@@ -1,0 +1,282 @@
+"""What the documentation says of tables, sensors, messages and commands, taken from the code each time it is built.
+
+A MkDocs hook: a line `<!-- generated: NAME -->` in a page is replaced by what the function of that name returns. So these
+parts cannot go stale; a test checks that every name is known, used and complete.
+"""
+
+import atexit
+import inspect
+import re
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import typer
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from pydantic import BaseModel
+
+from zwerm import protocol, scenario
+from zwerm.agents import registry as controllers
+from zwerm.cli import app
+from zwerm.running import run
+from zwerm.scenario import OpenTable, Scenario
+from zwerm.study.tables import StudyTable
+from zwerm.world import fields
+from zwerm.world.sensors import registry as sensors
+
+MARK: Final = re.compile(r"^<!-- generated: ([a-z-]+) -->$", re.MULTILINE)
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Fill in a page's generated parts; called by MkDocs."""
+    return MARK.sub(lambda found: GENERATED[found[1]](), markdown)
+
+
+# --- from JSON schemas to words -------------------------------------------------------------------------------------
+
+Schema = dict[str, Any]
+
+
+def in_words(schema: Schema) -> str:
+    """Return what a schema allows, for a person: `number > 0`, `[number, number]`, `array of string`."""
+    if "$ref" in schema:
+        return "table"
+    if "anyOf" in schema:
+        return " or ".join(in_words(each) for each in schema["anyOf"] if each.get("type") != "null")
+    if "const" in schema or "enum" in schema:
+        return " or ".join(f'"{each}"' for each in schema.get("enum", [schema.get("const")]))
+    kind = str(schema.get("type"))
+    if kind in ("integer", "number"):
+        return kind + _limits(schema)
+    if kind == "array" and "prefixItems" in schema:
+        return "[" + ", ".join(in_words(each) for each in schema["prefixItems"]) + "]"
+    if kind == "array":
+        least = f", {schema['minItems']} at least" if schema.get("minItems") else ""
+        return f"array of {in_words(schema.get('items', {}))}{least}".replace("array of array", "array of arrays")
+    return {"boolean": "true or false", "object": "table", "string": "string"}.get(kind, "any")
+
+
+def _limits(schema: Schema) -> str:
+    low, high = schema.get("minimum"), schema.get("maximum")
+    if low is not None and high is not None:
+        return f" {low:g} to {high:g}"
+    limits = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}
+    return "".join(f" {sign} {schema[key]:g}" for key, sign in limits.items() if key in schema)
+
+
+def as_toml(value: Any) -> str:
+    """Return a default as a scenario would have it, or nothing where there is none to show."""
+    if value is None or isinstance(value, dict):
+        return ""
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    return f"`{value}`" if not isinstance(value, str) else f'`"{value}"`'
+
+
+def rows(schema: Schema, links: dict[str, str] | None = None) -> str:
+    """Return the keys of an object's schema as a Markdown table; `links` lead to tables of their own."""
+    required = schema.get("required", [])
+    lines = ["| key | value | default |", "| --- | --- | --- |"]
+    for name, each in schema.get("properties", {}).items():
+        default = "required" if name in required else as_toml(each.get("default"))
+        value = (links or {}).get(name) or escaped(in_words(each))
+        lines.append(f"| `{name}` | {value} | {escaped(default)} |")
+    return "\n".join(lines) if schema.get("properties") else "No parameters."
+
+
+def escaped(text: str) -> str:
+    """Return text that cannot end a cell of a Markdown table."""
+    return text.replace("|", "\\|")
+
+
+def first_paragraph(text: str | None) -> str:
+    """Return a docstring's first paragraph on one line."""
+    return " ".join(inspect.cleandoc(text or "").split("\n\n")[0].split())
+
+
+def paragraphs(text: str | None) -> str:
+    """Return a docstring as Markdown."""
+    return inspect.cleandoc(text or "")
+
+
+# --- scenarios ------------------------------------------------------------------------------------------------------
+
+
+def scenario_tables() -> str:
+    """Return every table of a scenario with its keys."""
+    return _tables(Scenario, "a scenario")
+
+
+def study_tables() -> str:
+    """Return every table of a study with its keys."""
+    return _tables(StudyTable, "a study")
+
+
+def _tables(model: type[BaseModel], root: str) -> str:
+    schema = model.model_json_schema()
+    definitions = schema.get("$defs", {})
+    parts: list[str] = []
+
+    def describe(table: Schema, path: str, title: str) -> None:
+        parts.append(f"### {title} {{ #{anchor(path or root)} }}\n\n{paragraphs(table.get('description'))}")
+        inner = {key: found for key, each in table.get("properties", {}).items() if (found := _table_in(each))}
+        below = {key: f"{path}.{key}" if path else key for key in inner}
+        parts.append(rows(table, {key: f"[{words}](#{anchor(below[key])})" for key, (_, words) in inner.items()}))
+        for key, (name, words) in inner.items():
+            describe(definitions[name], below[key], TITLES[words].format(below[key]))
+
+    describe(schema, "", f"The top of {root}")
+    return "\n\n".join(parts)
+
+
+TITLES: Final = {"table": "`[{}]`", "array of tables": "`[[{}]]`", "table of tables": "`[{}.NAME]`"}
+
+
+def _table_in(schema: Schema) -> tuple[str, str] | None:
+    """Return the name of the table that a key holds and whether it is one or many; None for any other key."""
+    for each in [schema, *schema.get("anyOf", [])]:
+        parts = (each, each.get("items", {}), each.get("additionalProperties", {}))
+        for part, words in zip(parts, TITLES, strict=True):
+            name = part.get("$ref", "").rpartition("/")[2] if isinstance(part, dict) else ""
+            if name and name != OpenTable.__name__:  # a plug-in's own: the page lists those by kind
+                return name, words
+    return None
+
+
+def anchor(path: str) -> str:
+    """Return the name a heading is linked by."""
+    return "table-" + re.sub(r"[^a-z0-9]+", "-", path.lower()).strip("-")
+
+
+def built_in_scenarios() -> str:
+    """Return the scenarios that ship with Zwerm."""
+    lines = ["| scenario | robots | lasts | what it is |", "| --- | --- | --- | --- |"]
+    for name in scenario.built_in():
+        each = scenario.load(name)
+        lines.append(f"| `{name}` | {each.robots.count} | {each.time.duration_s:g} s | {escaped(each.summary)} |")
+    return "\n".join(lines)
+
+
+# --- plug-ins -------------------------------------------------------------------------------------------------------
+
+
+def sensor_list() -> str:
+    """Return every built-in sensor: what it is, what it fills and what it takes."""
+    parts = []
+    for kind, found in sensors.BUILT_IN.items():
+        module = inspect.getmodule(found)
+        text = module.__doc__ if module else found.__doc__
+        parts.append(f"### `{kind}` {{ #sensor-{kind.replace('_', '-')} }}\n\n{paragraphs(text)}")
+        parts.append(f"Fills `{found.field}` of the observation.")
+        parts.append(rows(found.Parameters.model_json_schema()))
+    return "\n\n".join(parts)
+
+
+def field_list() -> str:
+    """Return every kind of scalar field and what it takes."""
+    parts = []
+    for kind, found in fields.KINDS.items():
+        parts.append(f"### `{kind}` {{ #field-{kind} }}\n\n{paragraphs(found.__doc__)}")
+        parts.append(rows(found.Parameters.model_json_schema()))
+    return "\n\n".join(parts)
+
+
+def controller_list() -> str:
+    """Return every built-in controller and what it takes."""
+    parts = []
+    for name in controllers.BUILT_IN:
+        found = controllers.find(name)
+        parameters = controllers.parameters_of(found)
+        needs = ", ".join(f"`{each}`" for each in getattr(found, "sensors", ())) or "no sensor"
+        (schema,), components = msgspec.json.schema_components([parameters])
+        parts.append(f"### `{name}` {{ #controller-{name} }}\n\n{paragraphs(found.__doc__)}\n\nNeeds {needs}.")
+        parts.append(f"{paragraphs(parameters.__doc__)}\n\n{rows(components[schema['$ref'].rpartition('/')[2]])}")
+    return "\n\n".join(parts)
+
+
+# --- the wire -------------------------------------------------------------------------------------------------------
+
+MESSAGES: Final = (
+    protocol.Observation, protocol.Command, protocol.Failure, protocol.Hello, protocol.Welcome, protocol.Goodbye
+)  # fmt: skip
+
+
+def messages() -> str:
+    """Return every message and every part of one."""
+    of_protocol = [each for _, each in inspect.getmembers(protocol, _is_struct) if not each.__name__.startswith("_")]
+    parts = sorted((each for each in of_protocol if each not in MESSAGES), key=lambda each: each.__name__)
+    return "\n\n".join(map(_struct, [*MESSAGES, *parts]))
+
+
+def _is_struct(found: object) -> bool:
+    return isinstance(found, type) and issubclass(found, msgspec.Struct) and found.__module__ == protocol.__name__
+
+
+def _struct(struct: type[msgspec.Struct]) -> str:
+    config = struct.__struct_config__
+    shape = "An array" if config.array_like else "A map"
+    tag = f' with `"{config.tag_field}": "{config.tag}"`' if config.tag else ""
+    lines = ["| field | type | default |", "| --- | --- | --- |"]
+    for each in msgspec.structs.fields(struct):
+        default = None if isinstance(each.default, msgspec.Raw) else each.default
+        given = "required" if each.required else f"`{default!r}`"
+        lines.append(f"| `{each.encode_name}` | `{escaped(_type(each.type))}` | {escaped(given)} |")
+    return f"### {struct.__name__}\n\n{paragraphs(struct.__doc__)}\n\n{shape}{tag}.\n\n" + "\n".join(lines)
+
+
+def _type(annotation: Any) -> str:
+    text = (
+        annotation.__name__ if isinstance(annotation, type) and not hasattr(annotation, "__args__") else str(annotation)
+    )
+    return re.sub(r"\b(?:zwerm\.protocol|typing|msgspec)\.", "", text)
+
+
+# --- the command line -----------------------------------------------------------------------------------------------
+
+
+def commands() -> str:
+    """Return every command with its arguments and options."""
+    group: Any = typer.main.get_command(app)
+    return "\n\n".join(_command(name, each) for name, each in group.commands.items())
+
+
+def _command(name: str, command: Any) -> str:
+    lines = [f"### `zwerm {name}` {{ #command-{name} }}", _plain(command.help)]
+    table = ["| | |", "| --- | --- |"] if command.params else []
+    for each in command.params:
+        names = each.metavar or each.name.upper() if each.param_type_name == "argument" else ", ".join(each.opts)
+        takes = f" {each.metavar}" if each.param_type_name == "option" and each.metavar else ""
+        off = f" / {', '.join(each.secondary_opts)}" if each.secondary_opts else ""
+        table.append(f"| `{names}{takes}{off}` | {escaped(_plain(each.help))} |")
+    return "\n\n".join([*lines, "\n".join(table)])
+
+
+def _plain(text: str | None) -> str:
+    """Return help text as Markdown: what the terminal shows bold is code."""
+    return re.sub(r"\[/?bold\]", "`", inspect.cleandoc(text or ""))
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the picture of the index: a run of the first scenario, drawn as it is today; called by MkDocs."""
+    folder = Path(tempfile.mkdtemp(prefix="zwerm-docs-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    name = "images/computation-free.png"
+    run("computation-free", seed=7, runner="inline").picture(folder / name)
+    files.append(File.generated(config, name, abs_src_path=str(folder / name)))
+    return files
+
+
+GENERATED: Final[dict[str, Callable[[], str]]] = {
+    "built-in-scenarios": built_in_scenarios,
+    "commands": commands,
+    "controllers": controller_list,
+    "fields": field_list,
+    "messages": messages,
+    "scenario-tables": scenario_tables,
+    "sensors": sensor_list,
+    "study-tables": study_tables,
+}

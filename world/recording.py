@@ -1,0 +1,90 @@
+"""A recording of a run in MCAP, the log format of robotics (opens in Foxglove, Lichtblick and the `mcap` command).
+
+Topics: `/node/<id>/obs` and `/node/<id>/cmd` carry the messages as they crossed the wire (MessagePack); `/truth/poses`
+carries where every robot was (JSON), which no robot knows. Times are virtual. A recording that is closed, after Ctrl-C too,
+is complete and indexed; one cut off by a kill holds all chunks written until then.
+"""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+from mcap.writer import Writer
+
+from zwerm import __version__
+from zwerm.errors import ScenarioError
+from zwerm.world.scene import Scene
+
+_POSES_SCHEMA: Final = {
+    "title": "Poses",
+    "description": "Robots in the arena: parallel arrays of ids, positions [m] and headings [rad].",
+    "type": "object",
+    "properties": {
+        "tick": {"type": "integer"},
+        "id": {"type": "array", "items": {"type": "integer"}},
+        "x_m": {"type": "array", "items": {"type": "number"}},
+        "y_m": {"type": "array", "items": {"type": "number"}},
+        "heading_rad": {"type": "array", "items": {"type": "number"}},
+    },
+}
+
+
+class Recording:
+    """Writes one run to `path`. Raises ScenarioError where that cannot be written."""
+
+    def __init__(self, path: Path, dt_s: float, about: dict[str, str]) -> None:
+        self._dt_s = dt_s
+        self._channels: dict[str, int] = {}
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open("wb")
+        except OSError as error:
+            raise ScenarioError([f"{path}: cannot write a recording: {error.strerror}"]) from None
+        self._writer = Writer(self._file)
+        self._writer.start(profile="", library=f"zwerm {__version__}")
+        self._writer.add_metadata("run", about)
+        schema = self._writer.register_schema("zwerm.Poses", "jsonschema", json.dumps(_POSES_SCHEMA).encode())
+        self._poses = self._writer.register_channel("/truth/poses", "json", schema)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def exchange(
+        self, tick: int, nodes: Sequence[int], observations: Sequence[bytes], answers: Sequence[bytes], scene: Scene
+    ) -> None:
+        """Write one tick: what `nodes` were sent, what they answered (b"" for nothing), and where all robots were."""
+        robots = scene.present_ids()
+        poses = {
+            "tick": tick,
+            "id": robots.tolist(),
+            "x_m": scene.position[robots, 0].tolist(),
+            "y_m": scene.position[robots, 1].tolist(),
+            "heading_rad": scene.heading[robots].tolist(),
+        }
+        self._write(self._poses, tick, json.dumps(poses).encode())
+        for node, observation, answer in zip(nodes, observations, answers, strict=True):
+            self._write(self._channel(f"/node/{node}/obs"), tick, observation)
+            if answer:
+                self._write(self._channel(f"/node/{node}/cmd"), tick, answer)
+
+    def close(self) -> None:
+        """Write the index and close the file; idempotent."""
+        if not self._file.closed:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._file.close()
+
+    def _channel(self, topic: str) -> int:
+        if topic not in self._channels:
+            self._channels[topic] = self._writer.register_channel(topic, "msgpack", 0)
+        return self._channels[topic]
+
+    def _write(self, channel: int, tick: int, message: bytes) -> None:
+        time_ns = round(tick * self._dt_s * 1e9)
+        self._writer.add_message(channel, time_ns, message, time_ns, sequence=tick)
