@@ -46,11 +46,15 @@ class RunProgress:
         """Show that `tick` of `ticks` are done."""
         self._show(self._name, "ticks", tick, ticks)
 
-    def _show(self, title: str, unit: str, done: int, total: int) -> None:
+    def shrunk(self, tried: int, faults: int) -> None:
+        """Show how many runs were tried, and how many faults the smallest failing schedule has."""
+        self._show(f"{self._name}: shrinking", f"runs, {faults} faults still fail", tried, None)
+
+    def _show(self, title: str, unit: str, done: int, total: int | None) -> None:
         task = self._tasks.get(title)
         if task is None:
             task = self._tasks[title] = self._progress.add_task(title, total=total, unit=unit)
-        self._progress.update(task, completed=done)
+        self._progress.update(task, completed=done, unit=unit)
 
 
 def print_scenarios(console: Console, scenarios: Sequence[Scenario]) -> None:
@@ -94,5 +98,5 @@ def print_result(console: Console, result: RunResult, drawn: Sequence[Path]) -> 
     table.add_row("wall time", f"{result.wall_s:.1f} s, {rate:,.0f} robot-ticks/s, {result.runner}")
     table.add_row("trace", result.trace)
     for path in drawn:
-        table.add_row("picture" if path.suffix == ".png" else "animation", str(path))
+        table.add_row({".png": "picture", ".toml": "faults drawn"}.get(path.suffix, "animation"), str(path))
     console.print(table)
