@@ -1,5 +1,8 @@
 """A failing schedule is reduced to the faults that it takes to fail, and written so that it can be run again."""
 
+import os
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -7,11 +10,11 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support import scenario
+from support import ROOT, ZWERM, scenario
 
 from zwerm.errors import ScenarioError
 from zwerm.running import run
-from zwerm.scenario import Scenario, validate
+from zwerm.scenario import Scenario, load, validate
 from zwerm.shrink import Shrinker, parse_failing, tables_of, with_faults
 from zwerm.toml import write_toml
 
@@ -133,3 +136,33 @@ def test_a_scenarios_tables_are_written_without_its_defaults() -> None:
     )
     text = write_toml(tables_of(chosen))
     assert text == 'name = "x"\n\n[arena]\nsize_m = [1.0, 2.0]\n\n[robots]\ncount = 1\ncontroller = "beacon"\n'
+
+
+def command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, *ZWERM, *arguments], cwd=folder, env=environment, capture_output=True, text=True, timeout=120
+    )
+
+
+def test_the_command_writes_the_smallest_schedule_as_a_scenario_that_still_fails(tmp_path: Path) -> None:
+    (tmp_path / "big.toml").write_text(write_toml(tables_of(relay([*PLANTED, *harmless(4)]))))
+    ran = command(tmp_path, "shrink", "big.toml", "--failing", "robots_done_fraction < 0.8", "--out", "least.toml")
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.startswith("2 faults are enough, found in ")
+    found = load(str(tmp_path / "least.toml"))
+    assert [fault.model_dump() for fault in found.faults] == PLANTED
+    assert run(found, 1, "inline").metrics["robots_done_fraction"] < 0.8
+    none = command(tmp_path, "shrink", "least.toml", "--failing", "ticks < 3")
+    assert none.returncode == 2
+    assert none.stderr == "zwerm: least.toml: with seed 1 and all 2 faults the run does not fail\n"
+
+
+def test_a_run_leaves_the_faults_that_it_drew_as_tables_that_run_again(tmp_path: Path) -> None:
+    chosen = relay([], random_faults={"pause_per_h": 9_000.0, "cut_per_h": 9_000.0, "mean_s": 0.5})
+    (tmp_path / "drawn.toml").write_text(write_toml(tables_of(chosen)))
+    ran = command(tmp_path, "run", "drawn.toml", "--inline", "--seed", "4")
+    assert ran.returncode == 0, ran.stderr
+    faults = tomllib.loads((tmp_path / "runs" / "small-seed4-faults.toml").read_text())["faults"]
+    assert len(faults) > 5
+    assert run(relay(faults), 4, "inline").trace == run(chosen, 4, "inline").trace

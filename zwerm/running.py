@@ -2,6 +2,7 @@
 
 import secrets
 import time
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, Protocol
@@ -190,7 +191,7 @@ def _drive(
     wall_s = time.monotonic() - start
     if world.tick % stride:
         history.append(world.scene)
-    return _result(world, seed, runner, outcome, reason, wall_s, driver, history)
+    return _result(world, seed, runner, outcome, reason, wall_s, driver, history, link)
 
 
 def _result(
@@ -202,6 +203,7 @@ def _result(
     wall_s: float,
     driver: LockStep | RealTime,
     history: History,
+    link: WorldLink,
 ) -> RunResult:
     scenario = world.scenario
     metrics = measure(world, scenario.metrics)
@@ -239,6 +241,6 @@ def _result(
         arena=world.arena,
         history=history,
         cell_counts=counts,
-        refused=dict(world.refused),
+        refused=dict(world.refused + Counter(getattr(link, "refused", {}))),
         tracebacks={node: failure.traceback for node, failure in world.failures.items()},
     )
