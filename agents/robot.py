@@ -35,6 +35,9 @@ EXIT_FAILED: Final = 1
 EXIT_REFUSED: Final = 2
 EXIT_LOST: Final = 3
 
+# How long a node whose controller failed waits for the world to have heard why.
+LEAVE_TIMEOUT_S: Final = 5.0
+
 _PR_SET_PDEATHSIG: Final = 1
 
 
@@ -119,7 +122,10 @@ async def live(
             with contextlib.suppress(OSError), joined:  # nobody waits for it any more
                 joined.send_bytes(str(credential.node).encode())
         link.listen(receive_in_loop if welcome.paced else receive)
-        return await end
+        code = await end
+        if code == EXIT_FAILED:
+            link.take_leave("its controller failed", LEAVE_TIMEOUT_S)
+        return code
     finally:
         link.close()
 
@@ -131,6 +137,7 @@ def _node(link: ZenohNodeLink, welcome: Welcome) -> Node:
         return Node(welcome.controller, setup)
     except ControllerError as error:
         link.send(encode(Failure(0, str(error), "")))
+        link.take_leave("it has no controller", LEAVE_TIMEOUT_S)
         raise
 
 

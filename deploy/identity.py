@@ -20,9 +20,13 @@ import msgspec
 from zwerm.errors import LinkError
 from zwerm.keys import EVERY, alive_key, command_key, hello_key, observation_key
 from zwerm.link.session import Credential, Credentials, transport_settings
+from zwerm.protocol import MESSAGE_BYTES_MAX
 
 PRIVATE_FILE_MODE: Final = 0o600
 SECRET_BYTES: Final = 24
+
+# The router does not put a longer message together. Those between MESSAGE_BYTES_MAX and this are refused, and counted.
+_MESSAGE_BYTES_MAX: Final = 16 * MESSAGE_BYTES_MAX
 
 # What a node may do on each of its keys: (key, message, flow seen from the router).
 _PERMISSIONS: Final = (
@@ -68,6 +72,7 @@ def router_settings(credentials: Credentials, endpoints: list[str], dictionary: 
         "transport/unicast/accept_pending": 2 * capacity + 100,
         "transport/unicast/max_sessions": 2 * capacity + 100,
         "transport/auth/usrpwd/dictionary_file": str(dictionary),
+        "transport/link/rx/max_message_size": _MESSAGE_BYTES_MAX,
         "access_control": access_control(credentials),
         **transport_settings(endpoints),
     }

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from network import NIL, RUN, Network, ask, hello, network
+from support import until
 
 from zwerm.agents.contract import Setup
 from zwerm.deploy.swarm import LocalSwarm
@@ -132,7 +133,7 @@ HELLOS = {
     b"\x80": "schema",
     hello(0).replace(b"hello/1", b"hello/2"): "version",
     encode(Command()): "schema",
-    encode(Goodbye("x")): "identity",
+    encode(Goodbye("x")): "not-joined",
     hello(1): "identity",
     hello(-1): "identity",
     hello(0, 2): "incarnation",
@@ -203,11 +204,12 @@ def test_a_dismissed_node_hears_goodbye_and_its_leaving_is_no_loss(net: Network)
     other.close()
 
 
-def test_the_end_of_a_session_arrives_after_its_last_message_and_its_place_is_free_again(net: Network) -> None:
+def test_a_node_that_takes_leave_has_been_heard_out_and_its_place_is_free_again(net: Network) -> None:
     node = net.node(0)
     node.join()
     for number in range(500):
         node.send(str(number).encode())
+    assert node.take_leave("tired", 20.0)
     node.close()
     for number in range(500):
         assert net.link.receive(20.0) == Arrival(0, str(number).encode())
@@ -230,6 +232,15 @@ def test_a_node_learns_that_the_world_is_gone(private_tmp: Path) -> None:
         node = net.node(0, on_lost=gone.set)
         node.join()
     assert gone.wait(20.0)
+    node.close()
+
+
+def test_a_message_that_is_far_too_long_is_not_even_put_together(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    node.send(bytes(20 * MESSAGE_BYTES_MAX))
+    node.send(b"short")
+    assert net.link.receive(20.0) == Arrival(0, b"short")
     node.close()
 
 
@@ -267,6 +278,8 @@ def test_a_killed_process_is_reported_promptly_and_comes_back_as_a_new_incarnati
 def test_a_stopped_process_is_not_lost_and_answers_when_it_goes_on(nothing_left: None) -> None:
     with echo_swarm(2) as swarm:
         swarm.supervisor.send_signal(0, signal.SIGSTOP)
+        status = Path(f"/proc/{swarm.supervisor.pids[0]}/status")
+        until(lambda: "\nState:\tT" in status.read_text(), "stopped")
         swarm.link.send(0, encode(Observation(3, 0.0)))
         answer = said(swarm.link, 1, 3)
         assert answer is not None

@@ -64,9 +64,10 @@ PATH_POINTS: Final = 0.8
 PATH_SAMPLES_MAX: Final = 300_000
 # What is covered is a tint, a cell with a robot a frame just inside its edges: two tints would make a third colour.
 COVERED: Final[dict[str, Any]] = {"facecolor": SKY, "edgecolor": "none", "alpha": 0.25}
-FRAME: Final[dict[str, Any]] = {"facecolor": "none", "edgecolor": ORANGE, "alpha": 0.7, "linewidth": 1.5}
+FRAME: Final[dict[str, Any]] = {"facecolor": "none", "edgecolor": ORANGE, "alpha": 0.7}
 TINT: Final[dict[str, Any]] = {"facecolor": YELLOW, "edgecolor": "none", "alpha": 0.35}
 FRAME_INSET: Final = 0.035
+FRAME_POINTS: Final = (0.4, 1.5)  # as thin as cells are small
 NOTHING: Final = Outline(np.zeros((0, 2)))
 
 
@@ -226,7 +227,8 @@ class Swarm:
         xmin, ymin, xmax, ymax = arena.bounds
         least = RADIUS_MIN_FRACTION * max(xmax - xmin, ymax - ymin)
         self._radius, self._enlarged = max(radius_m, least), radius_m < least
-        self._cell_style = TINT if coverage_radius_m is None else FRAME
+        self._framed = coverage_radius_m is not None
+        self._cell_style = FRAME | {"linewidth": self._frame_width(sheet)} if self._framed else TINT
         path_width_m = PATH_POINTS / 72.0 / sheet.inches_per_m
         self._ink_per_m = path_width_m / arena.area_m2
         self._paths = [LineCollection([], colors=WALL, linewidths=PATH_POINTS, zorder=2) for _ in range(FADES)]
@@ -262,7 +264,7 @@ class Swarm:
         if self._cells is not None:
             row, column = np.nonzero(cell_counts(position, self._arena.bounds, self._cells))
             x, y = self._grid_lines(self._cells)
-            inset = FRAME_INSET * min(x[1] - x[0], y[1] - y[0]) if self._cell_style is FRAME else 0.0
+            inset = FRAME_INSET * min(x[1] - x[0], y[1] - y[0]) if self._framed else 0.0
             boxes = shapely.box(x[column] + inset, y[row] + inset, x[column + 1] - inset, y[row + 1] - inset)
             self._occupied.set_path(outline(shapely.union_all(boxes)))
 
@@ -320,6 +322,13 @@ class Swarm:
     def _grid_lines(self, grid: tuple[int, int]) -> tuple[Floats, Floats]:
         xmin, ymin, xmax, ymax = self._arena.bounds
         return np.linspace(xmin, xmax, grid[0] + 1), np.linspace(ymin, ymax, grid[1] + 1)
+
+    def _frame_width(self, sheet: Sheet) -> float:
+        if self._cells is None:
+            return 0.0
+        x, y = self._grid_lines(self._cells)
+        points = 1.7 * sheet.inches_per_m * min(x[1] - x[0], y[1] - y[0])
+        return float(np.clip(points, *FRAME_POINTS))
 
     def _draw_grid(self, sheet: Sheet, grid: tuple[int, int]) -> None:
         xmin, ymin, xmax, ymax = self._arena.bounds

@@ -1,6 +1,6 @@
 """Scalar fields over the arena: what there is to be sensed at a place, and how it changes from there.
 
-A scenario's `[field]` table names one by `kind`: `constant`, `linear`, `gaussians` or `bitmap`. A field is known
+A scenario's `[field]` table names one by `kind`: `constant`, `linear`, `gaussians`, `lamp` or `bitmap`. A field is known
 everywhere, also outside the arena, and never changes. Gradients are exact, not differences.
 """
 
@@ -113,6 +113,36 @@ class Gaussians:
         return self._amplitudes * np.exp(-0.5 * distance2 * self._precision), apart
 
 
+class Lamp:
+    """A lamp `height_m` above `center_m`, as a sensor that faces it from the floor sees it.
+
+    `peak` right below, and from there as one over the square of the distance.
+    """
+
+    class Parameters(Table):
+        """The lamp."""
+
+        peak: Finite
+        center_m: Point
+        height_m: Positive
+
+    def __init__(self, peak: float, center_m: Point, height_m: float) -> None:
+        self._peak, self._center, self._height2 = peak, np.array(center_m), height_m**2
+
+    def value(self, points: Floats) -> Floats:
+        """Return (k,) the value at points (k, 2) [m]."""
+        apart = points - self._center
+        value: Floats = self._peak * self._height2 / (self._height2 + np.square(apart).sum(axis=1))
+        return value
+
+    def gradient(self, points: Floats) -> Floats:
+        """Return (k, 2) the gradient [1/m] at points (k, 2) [m]."""
+        apart = points - self._center
+        distance2 = self._height2 + np.square(apart).sum(axis=1)
+        gradient: Floats = (-2.0 * self._peak * self._height2 / distance2**2)[:, None] * apart
+        return gradient
+
+
 class Bitmap:
     """A picture: black is `low`, white `high`, bilinear between centres of pixels, constant beyond the outer ones.
 
@@ -170,10 +200,11 @@ class Bitmap:
         return (held - low).T, (at == held).astype(np.float64), corners
 
 
-KINDS: Final[dict[str, type[Linear | Gaussians | Bitmap]]] = {
+KINDS: Final[dict[str, type[Linear | Gaussians | Lamp | Bitmap]]] = {
     "bitmap": Bitmap,
     "constant": Constant,
     "gaussians": Gaussians,
+    "lamp": Lamp,
     "linear": Linear,
 }
 

@@ -37,6 +37,7 @@ from zwerm.world.faults.schedule import Schedule, unite
 from zwerm.world.faults.sensing import SensingFault, read
 from zwerm.world.inflow import Depot, Inflow
 from zwerm.world.lives import Lives, Order
+from zwerm.world.meters import Meters
 from zwerm.world.physics import Physics
 from zwerm.world.placement import place
 from zwerm.world.radio.medium import Medium
@@ -51,12 +52,15 @@ NO_ANSWER: Final = b""
 
 
 class World:
-    """One run's world. Every robot carries the `sensors`; `seed` keys all randomness."""
+    """One run's world. Every robot carries the `sensors`; `seed` keys all randomness. `meters` are for whoever drives it."""
 
-    def __init__(self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor]) -> None:
+    def __init__(
+        self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor], meters: Meters | None = None
+    ) -> None:
         count, body = scenario.robots.count, scenario.robots.body
         self.scenario = scenario
         self.arena = arena
+        self.meters = meters or Meters()
         self.draws = Draws(seed)
         self.tick = 0
         self.count = count

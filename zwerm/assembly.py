@@ -1,7 +1,7 @@
 """From a scenario to a world ready to run, with every mistake that the typed tables could not see."""
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -10,7 +10,8 @@ from zwerm.agents.registry import find, parameters_of
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario import Scenario
 from zwerm.world.arena import Arena
-from zwerm.world.fields import make_field
+from zwerm.world.fields import Field, make_field
+from zwerm.world.meters import Meters, make_meters
 from zwerm.world.sensors import Sensor, Surroundings
 from zwerm.world.sensors.registry import make_sensors
 from zwerm.world.world import World
@@ -23,26 +24,42 @@ def assemble(scenario: Scenario, seed: int) -> World:
 
     Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the placement.
     """
-    arena, sensors = prepare(scenario)
+    prepared = prepare(scenario)
     mistakes: list[str] = []
-    world = _attempt(lambda: World(scenario, seed, arena, sensors), scenario, mistakes)
+    world = _attempt(lambda: World(scenario, seed, *prepared), scenario, mistakes)
     if world is None:
         raise ScenarioError(mistakes)
     return world
 
 
-def prepare(scenario: Scenario) -> tuple[Arena, Sequence[Sensor]]:
-    """Return the arena and the sensors of `scenario`: all that does not depend on the seed.
+class Prepared(NamedTuple):
+    """All of a world that does not depend on the seed. Sensors and meters are for one run each."""
 
-    Raises ScenarioError with every mistake in the arena, the field, the sensors and the controller.
+    arena: Arena
+    sensors: Sequence[Sensor]
+    meters: Meters
+
+
+def prepare(scenario: Scenario) -> Prepared:
+    """Return the arena, the sensors and the meters of `scenario`.
+
+    Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
     """
     mistakes: list[str] = []
+    field, table = None, scenario.field
+    sensors, meters = None, None
     arena = _attempt(lambda: Arena.from_table(scenario.arena, scenario.folder), scenario, mistakes)
     _attempt(lambda: check_controller(scenario), scenario, mistakes)
-    sensors = None if arena is None else _attempt(lambda: _sensors(scenario, arena), scenario, mistakes)
-    if arena is None or sensors is None or mistakes:
+    if arena is not None and table is not None:
+        bounds = arena.bounds
+        field = _attempt(lambda: make_field(table, bounds, scenario.folder, scenario.place), scenario, mistakes)
+    # What needs the field is not told that there is none where the mistake is in the field's own table.
+    if arena is not None and (field is not None or table is None):
+        sensors = _attempt(lambda: _sensors(scenario, arena, field), scenario, mistakes)
+        meters = _attempt(lambda: make_meters(scenario.metrics, arena, field, scenario.time.dt_s), scenario, mistakes)
+    if arena is None or sensors is None or meters is None or mistakes:
         raise ScenarioError(mistakes)
-    return arena, sensors
+    return Prepared(arena, sensors, meters)
 
 
 def _attempt(make: Callable[[], T], scenario: Scenario, mistakes: list[str]) -> T | None:
@@ -55,10 +72,7 @@ def _attempt(make: Callable[[], T], scenario: Scenario, mistakes: list[str]) -> 
         return None
 
 
-def _sensors(scenario: Scenario, arena: Arena) -> Sequence[Sensor]:
-    field = None
-    if scenario.field is not None:
-        field = make_field(scenario.field, arena.bounds, scenario.folder, scenario.place)
+def _sensors(scenario: Scenario, arena: Arena, field: Field | None) -> Sequence[Sensor]:
     landmarks = np.array(scenario.landmarks, dtype=np.float64).reshape(-1, 2)
     surroundings = Surroundings(arena, scenario.robots.count, landmarks=landmarks, field=field)
     return make_sensors(scenario.robots.sensors, surroundings, "robots.sensors", scenario.place)

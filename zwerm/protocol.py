@@ -212,7 +212,7 @@ class Welcome(_Message, frozen=True):
 
 
 class Goodbye(_Message, frozen=True):
-    """The world tells a node that its life is over, and why; the node closes and exits."""
+    """The world tells a node that its life is over, and why; the node closes and exits. Or a node says that it leaves."""
 
     reason: str
 

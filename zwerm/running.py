@@ -170,8 +170,10 @@ def _drive(
     stride = max(1, ticks // HISTORY_SAMPLES)
     history = History()
     history.append(world.scene)
+    world.meters.look(world.scene)
 
     def on_tick(world: World) -> None:
+        world.meters.look(world.scene)
         if world.tick % stride == 0:
             history.append(world.scene)
             watcher.ticked(world.tick, ticks)
@@ -206,7 +208,8 @@ def _result(
     link: WorldLink,
 ) -> RunResult:
     scenario = world.scenario
-    metrics = measure(world, scenario.metrics)
+    world.meters.look(world.scene, now=True)
+    metrics = measure(world, scenario.metrics) | world.meters.metrics()
     if scenario.radio is not None or scenario.coordinator is not None:
         metrics["robots_done_fraction"] = world.done_fraction
         metrics |= radio_metrics(world.medium, world.count, world.tick)
@@ -242,5 +245,6 @@ def _result(
         history=history,
         cell_counts=counts,
         refused=dict(world.refused + Counter(getattr(link, "refused", {}))),
+        series=world.meters.series(),
         tracebacks={node: failure.traceback for node, failure in world.failures.items()},
     )

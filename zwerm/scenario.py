@@ -203,12 +203,28 @@ class RandomFaultsTable(Table):
     stuck_touch_per_h: Rate = 0.0
 
 
+class VoronoiMetricsTable(Table):
+    """Coverage of the field by Voronoi cells: errors, cost, when statistics of the error fall below `converged_m`.
+
+    With `peak_m` also the density in `rings` about it. The first `stationary` robots have cells, and no errors.
+    """
+
+    converged_m: Positive = 1e-7
+    peak_m: Point | None = None
+    rings: Count = 10
+    stationary: Annotated[int, Field(ge=0)] = 0
+
+
 class MetricsTable(Table):
-    """What is measured of the run; metrics whose settings are absent are not computed."""
+    """What is measured of the run; metrics whose settings are absent are not computed.
+
+    What is measured all through the run is looked at every `every_s`.
+    """
 
     cells: Grid | None = None
     coverage_radius_m: Positive | None = None
     every_s: Positive | None = None
+    voronoi: VoronoiMetricsTable | None = None
 
 
 class Scenario(Table):

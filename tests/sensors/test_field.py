@@ -98,7 +98,7 @@ def test_pictures_of_one_pixel_and_of_sixteen_bits_are_fields_too(tmp_path):
 @pytest.mark.parametrize(
     ("table", "lines"),
     [
-        ({"kind": "hills"}, ["x.toml: field.kind: expected bitmap, constant, gaussians, linear, got 'hills'"]),
+        ({"kind": "hills"}, ["x.toml: field.kind: expected bitmap, constant, gaussians, lamp, linear, got 'hills'"]),
         ({"kind": "constant"}, ["x.toml: field.value: required, and missing"]),
         (
             {"kind": "gaussians", "amplitudes": [1, 2], "centers_m": [[0, 0]], "sd_m": 0},
@@ -129,10 +129,11 @@ def test_a_mistake_in_the_table_is_one_line(tmp_path, table, lines):
 @pytest.mark.parametrize("heading", [0.0, 0.7, math.pi, -2.5])
 def test_the_sensor_gives_the_gradient_in_the_body_frame(make_scene, sensor_for, heading):
     scene = make_scene([(1.0, 0.5, heading)])
-    sensor = sensor_for(scene, "field", {"field": field_of("linear", offset=1.0, gradient_per_m=[2.0, 0.0])})
+    sensor = sensor_for(scene, "field", {"field": field_of("linear", offset=1.0, gradient_per_m=[2.0, -1.0])})
     (sample,) = sensor.read(scene, scene.present_ids())
-    assert sample.value == pytest.approx(3.0)
-    assert (sample.gradient_x, sample.gradient_y) == pytest.approx((2 * math.cos(heading), -2 * math.sin(heading)))
+    assert sample.value == pytest.approx(2.5)
+    turn_back = complex(math.cos(heading), -math.sin(heading))
+    assert complex(sample.gradient_x, sample.gradient_y) == pytest.approx(complex(2.0, -1.0) * turn_back)
 
 
 def test_the_sensors_noise_has_the_given_spread_and_is_keyed(make_scene, sensor_for):

@@ -2,6 +2,9 @@
 
 Who is in sight is settled as for `bearings`. The noise is Gaussian, alike and independent in x and y, for each tick,
 observer and robot seen. Headings of others are not sensed.
+
+With `voronoi`, of those only the ones whose Voronoi cells border on the observer's in the plane: what Voronoi coverage
+presumes that a robot can measure (Schwager et al. 2006), and far less to say in a swarm without a range.
 """
 
 from typing import ClassVar
@@ -12,6 +15,8 @@ from zwerm.protocol import Neighbour
 from zwerm.scenario import NonNegative, Positive, Table
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings, portions
+from zwerm.world.tessellation import Tessellation
+from zwerm.world.visibility import Sightings
 
 
 class NeighboursTable(Table):
@@ -20,6 +25,7 @@ class NeighboursTable(Table):
     range_m: Positive | None = None
     through_walls: bool = False
     robots_occlude: bool = False
+    voronoi: bool = False
     sd_m: NonNegative = 0.0
 
 
@@ -30,13 +36,17 @@ class Neighbours:
     Parameters: ClassVar[type[Table]] = NeighboursTable
 
     def __init__(self, parameters: NeighboursTable, surroundings: Surroundings) -> None:
+        if parameters.voronoi and parameters.robots_occlude:
+            raise ValueError("expected voronoi or robots_occlude, not both")
         self._sight = (parameters.range_m, parameters.through_walls, parameters.robots_occlude)
         self._sd_m = parameters.sd_m
         self._visibility = surroundings.visibility
+        self._tessellation = Tessellation() if parameters.voronoi else None
+        self._last: tuple[Ints, Ints, Sightings] | None = None
 
     def read(self, scene: Scene, robots: Ints) -> list[tuple[Neighbour, ...]]:
         """Return where each of `robots` has the robots it sees."""
-        observer, seen, ends = self._visibility.sightings(scene, robots, *self._sight)
+        observer, seen, ends = self._sightings(scene, robots)
         dx, dy = (scene.position[seen] - scene.position[observer]).T
         cos, sin = np.cos(scene.heading)[observer], np.sin(scene.heading)[observer]
         x, y = cos * dx + sin * dy, cos * dy - sin * dx
@@ -44,3 +54,35 @@ class Neighbours:
             x += self._sd_m * scene.draws.normal("sensor.neighbours.x", scene.tick, observer, seen)
             y += self._sd_m * scene.draws.normal("sensor.neighbours.y", scene.tick, observer, seen)
         return portions(list(map(Neighbour, seen.tolist(), x.tolist(), y.tolist())), ends)
+
+    def _sightings(self, scene: Scene, robots: Ints) -> Sightings:
+        if self._tessellation is None:
+            return self._visibility.sightings(scene, robots, *self._sight)
+        ids = scene.present_ids()
+        found = self._tessellation.pairs(scene.position[ids])
+        range_m, through_walls, _ = self._sight
+        # Without a range or walls everyone sees the same robots until the triangulation changes.
+        lasting = range_m is None and (through_walls or scene.arena.is_convex) and len(robots) == len(ids)
+        if lasting and self._last is not None and found is self._last[0] and np.array_equal(robots, self._last[1]):
+            return self._last[2]
+        pairs = ids[found]
+        start, end = scene.position[pairs[:, 0]], scene.position[pairs[:, 1]]
+        if range_m is not None:
+            pairs = pairs[np.hypot(*(end - start).T) <= range_m]
+            start, end = scene.position[pairs[:, 0]], scene.position[pairs[:, 1]]
+        if not (through_walls or scene.arena.is_convex):
+            pairs = pairs[~scene.arena.blocked(start, end)]
+        sightings = both_ways(pairs, robots, len(scene.present))
+        self._last = (found, robots, sightings) if lasting else None
+        return sightings
+
+
+def both_ways(pairs: Ints, robots: Ints, count: int) -> Sightings:
+    """Return both directions of pairs (k, 2) of ids below count, for the observers `robots` (ascending ids)."""
+    observer, seen = np.concatenate([pairs, pairs[:, ::-1]]).T
+    order = np.argsort(observer * count + seen)
+    observer, seen = observer[order], seen[order]
+    if len(robots) < count:
+        rows = np.isin(observer, robots)
+        observer, seen = observer[rows], seen[rows]
+    return Sightings(observer, seen, np.searchsorted(observer, robots, side="right"))

@@ -18,7 +18,7 @@ from zenoh.handlers import Callback, FifoChannel
 from zwerm.errors import LinkError
 from zwerm.keys import alive_key, command_key, hello_key, observation_key
 from zwerm.link.session import Credential, open_session, transport_settings, trust_settings
-from zwerm.protocol import REFUSABLE, Hello, Welcome, decode_welcome, encode, refusal
+from zwerm.protocol import REFUSABLE, Goodbye, Hello, Welcome, decode_welcome, encode, refusal
 
 RETRY_S: Final = 0.05
 
@@ -111,8 +111,21 @@ class ZenohNodeLink:
             return self._inbox.get(timeout=max(timeout_s, 0.0))
         return None
 
+    def take_leave(self, reason: str, timeout_s: float) -> bool:
+        """Say goodbye, and return once the world has confirmed it: then all that was sent before has arrived.
+
+        Tell whether it was within `timeout_s` seconds. Closing at once could lose what is just being sent.
+        """
+        key = hello_key(self._run, self._credential.node)
+        farewell = encode(Goodbye(reason))
+        try:
+            replies = self._session.get(key, FifoChannel(1), payload=farewell, timeout=timeout_s, express=True)
+            return any(reply.ok is not None for reply in replies)
+        except zenoh.ZError:
+            return False  # closed already
+
     def close(self) -> None:
-        """Release all that the link holds, after what was sent has left; idempotent."""
+        """Release all that the link holds; idempotent."""
         self._on_lost = None
         self._session.close()  # type: ignore[no-untyped-call]
 

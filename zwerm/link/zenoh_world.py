@@ -24,7 +24,7 @@ from zwerm.errors import LinkError
 from zwerm.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
 from zwerm.link import Arrival
 from zwerm.link.session import TWO_THREADS, open_session, set_threads
-from zwerm.protocol import REFUSABLE, Goodbye, Hello, Welcome, decode_hello, encode, refusal
+from zwerm.protocol import REFUSABLE, Goodbye, Welcome, decode_hello, encode, refusal
 
 # More than can wait at once when every node answers each message with one; past it Zenoh holds the senders back.
 CHANNEL_CAPACITY: Final = 16_384
@@ -157,44 +157,39 @@ class ZenohWorldLink:
             self._ring(encode((node, incarnation)))
 
     def _on_hello(self, query: zenoh.Query) -> None:
-        """A node asks to join. Runs in a thread of its own."""
+        """A node asks to join, or says goodbye. Runs in a thread of its own."""
         with query:
             key = str(query.key_expr)
             try:
-                node = node_of(key)
+                welcome = self._welcome(node_of(key), query.payload.to_bytes() if query.payload else b"")
             except ValueError:
-                self.refused["identity"] += 1
-                return
-            reason = self._refusal(node, query.payload.to_bytes() if query.payload else b"")
-            if reason:
-                self.refused[reason] += 1
-                query.reply(key, encode(Welcome(refused=reason)))
-                return
-            member = self._members[node]
-            query.reply(
-                key, encode(Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced))
-            )
+                welcome = Welcome(refused="identity")
+            if welcome.refused:
+                self.refused[welcome.refused] += 1
+            query.reply(key, encode(welcome))
 
-    def _refusal(self, node: int, payload: bytes) -> str:
-        """Let the node join, or return the reason why not."""
+    def _welcome(self, node: int, payload: bytes) -> Welcome:
+        """Let the node join and say what it is, or say why not."""
         try:
             hello = decode_hello(payload)
         except REFUSABLE as error:
-            return refusal(error).reason
-        if not isinstance(hello, Hello) or hello.node != node:
-            return "identity"
+            return Welcome(refused=refusal(error).reason)
         with self._changed:
+            if isinstance(hello, Goodbye):
+                return Welcome(refused="" if node in self._joined else "not-joined")
             member = self._members.get(node)
+            if hello.node != node:
+                return Welcome(refused="identity")
             if member is None:
-                return "unknown"
+                return Welcome(refused="unknown")
             if hello.incarnation != member.incarnation:
-                return "incarnation"
+                return Welcome(refused="incarnation")
             if node in self._joined:
-                return "joined"
+                return Welcome(refused="joined")
             self._joined[node] = member.incarnation
             self._source_of[command_key(self._run, node)] = node
             self._changed.notify_all()
-        return ""
+        return Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced)
 
 
 class _Alarm:

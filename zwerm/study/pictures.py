@@ -77,8 +77,10 @@ def _bars(figure: "Figure", results: Results) -> None:
         lines = [results.line(point, metric) for point in results.points]
         places = list(range(len(lines)))
         half = [0.0 if math.isnan(line.sample.half_width) else line.sample.half_width for line in lines]
-        panel.bar(places, [line.sample.mean for line in lines], yerr=half, color="C0", alpha=0.7, capsize=4)
+        means = [line.sample.mean for line in lines]
+        panel.bar(places, means, yerr=half, color="C0", alpha=0.7, capsize=4, label="ours, with its 95 % interval")
         _draw_paper(panel, places, lines, "C3")
+        panel.legend()
         panel.set_xticks(places, names, rotation=20, ha="right")
         _show_range(panel, metric)
         panel.grid(axis="y", alpha=0.3)
@@ -135,7 +137,8 @@ def _series(figure: "Figure", results: Results) -> None:
             mean, sd = counts.mean(axis=0), counts.std(axis=0)
             panel.fill_between(time_s, mean - sd, mean + sd, color=f"C{number % 10}", alpha=0.2, linewidth=0)
             panel.plot(time_s, mean, color=f"C{number % 10}", label=point.label or "ours")
-        panel.set(xlabel="time_s", ylabel=name)
+        # What decays is seen to decay, or not, on a logarithmic axis.
+        panel.set(xlabel="time_s", ylabel=name, yscale="log" if name == "mean_error_m" else "linear")
         panel.grid(alpha=0.3)
         if panel.get_legend_handles_labels()[1]:
             panel.legend()

@@ -94,7 +94,7 @@ def _make_point(study: Study, variant: VariantTable, settings: dict[str, Setting
         name = str(beside)
     axes = [f"{variant.axes.get(axis, axis)}={json.dumps(value)}" for axis, value in settings.items()]
     scenario = load(name, (*study.table.set, *variant.set, *sets, *axes))
-    arena, _ = prepare(scenario)
+    arena = prepare(scenario).arena
     return Point(variant.name, settings, scenario, _fingerprint(scenario, arena.segments.tobytes()))
 
 

@@ -111,7 +111,7 @@ class StudyTable(Table):
     set: list[str] = Field(default_factory=list)
     seeds: Seeds
     metrics: Annotated[list[str], Field(min_length=1)]
-    series: list[Literal["robots_in_arena", "robots_entered"]] = Field(default_factory=list)
+    series: list[Literal["robots_in_arena", "robots_entered", "mean_error_m"]] = Field(default_factory=list)
     grid: dict[str, Axis] = Field(default_factory=dict)
     variants: list[VariantTable] = Field(default_factory=list)
     paper: PaperTable = Field(default_factory=PaperTable)

@@ -67,13 +67,21 @@ def _head(trial: Trial) -> Row:
 
 
 def _series(result: RunResult, names: tuple[str, ...]) -> Row:
-    """Return each named count of robots over time, at even intervals of the scenario's duration, as far as the run went."""
+    """Return each named series, at even intervals of the scenario's duration, as far as the run went.
+
+    It is a count of robots, or what a meter of the run noted: then the newest at each time, and nothing where none looked.
+    """
     tracks = result.history.arrays()
     time_s = np.linspace(0.0, result.scenario.time.duration_s, SERIES_INTERVALS + 1)
     time_s = time_s[time_s <= result.sim_s + 1e-9]
     at = np.searchsorted(tracks.time_s, time_s + 1e-9) - 1
-    counts = {
+    found = {
         "robots_in_arena": tracks.present.sum(axis=1),
         "robots_entered": np.logical_or.accumulate(tracks.present, axis=0).sum(axis=1),
     }
-    return {"series_time_s": time_s.tolist()} | {f"{name}_series": counts[name][at].tolist() for name in names}
+    noted = {name: np.array(values) for name, values in result.series.items()}
+    looks = np.searchsorted(noted["time_s"], time_s + 1e-9) - 1 if noted else at
+    series = {
+        name: (found[name][at] if name in found else noted[name][looks]) for name in names if name in found | noted
+    }
+    return {"series_time_s": time_s.tolist()} | {f"{name}_series": values.tolist() for name, values in series.items()}

@@ -1,0 +1,59 @@
+"""The coverage control algorithm as printed: move towards the estimated centroid of one's own Voronoi cell.
+
+The robot knows the positions of its neighbours relative to itself, the corners of the region, and the field's value and
+gradient where it stands; all in its body frame, so that it needs no compass. It keeps nothing between observations.
+
+Where the paper says nothing:
+- a robot at the same place as another has the same cell, and both move as one until something parts them;
+- a robot outside the region whose cell is empty heads for the nearest place of the region;
+- where no neighbour is sensed the cell is the whole region, which is what the definition gives;
+- where the field is zero or negative all over the cell, its centroid is that of a constant field.
+"""
+
+from typing import Annotated, Any, ClassVar
+
+from msgspec import Meta, Struct
+
+from zwerm.agents.contract import Controller, Setup
+from zwerm.polygons import Point, Polygon, estimated_centroid, nearest_point, voronoi_cell
+from zwerm.protocol import BodyVelocity, Command, Observation
+
+
+class CoverageTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """The gain k of eq. 8 [1/s], and the error at and below which the robot says that it is done [m]; 0 is never."""
+
+    gain_per_s: Annotated[float, Meta(gt=0.0)] = 5.0
+    tolerance_m: Annotated[float, Meta(ge=0.0)] = 0.0
+
+
+def target(region: Polygon, others: list[Point], value: float, gx: float, gy: float) -> Point:
+    """Return where a robot at the origin should go: the centroid of its cell under the linear estimate of the field.
+
+    Everything is relative to the robot, so that the centroid is the error vector. The region must have corners.
+    """
+    cell = voronoi_cell(region, others)
+    return estimated_centroid(cell, value, gx, gy) or nearest_point(region)
+
+
+class VoronoiCoverage(Controller):
+    """Schwager 2006, algorithm 1."""
+
+    sensors: ClassVar[tuple[str, ...]] = ("neighbours", "boundary", "field")
+    Parameters: ClassVar[type[Struct]] = CoverageTable
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        table: Any = self.parameters
+        self._gain_per_s = table.gain_per_s
+        self._tolerance2 = table.tolerance_m**2
+
+    def step(self, observation: Observation) -> Command:
+        """Return the velocity u = k (C_hat - p). Schwager 2006, eq. 8."""
+        here = observation.field
+        assert observation.boundary is not None
+        assert observation.neighbours is not None
+        assert here is not None
+        others = [(other.x_m, other.y_m) for other in observation.neighbours]
+        x, y = target(observation.boundary, others, here.value, here.gradient_x, here.gradient_y)
+        k = self._gain_per_s
+        return Command(drive=BodyVelocity(k * x, k * y), done=x * x + y * y < self._tolerance2)

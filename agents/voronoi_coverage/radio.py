@@ -1,0 +1,118 @@
+"""Voronoi coverage with neighbours learned by radio instead of sensed, so that lost and late packets matter.
+
+Every robot knows its own pose, tells it and the field's value there to whoever hears, and takes the others to be where they
+last said they were. What it has not heard of for `memory_s` it forgets. It listens for one period before it first moves,
+and a robot that knows of nobody stays where it is, as the SwarmBots did: alone, its cell would be the whole region. A packet
+carries a checksum; one that is not ours, or is damaged, is passed over. With `estimate = "quadratic"` the values heard bend
+the estimate of the field.
+"""
+
+import math
+import struct
+import zlib
+from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
+
+from msgspec import Meta, Struct
+
+from zwerm.agents.contract import Controller, Setup
+from zwerm.agents.voronoi_coverage.quadratic import Sample, bordering, fit, quadratic_centroid
+from zwerm.polygons import estimated_centroid, nearest_point, voronoi_cell
+from zwerm.protocol import BodyVelocity, Command, Observation, Transmission
+
+CHANNEL: Final = "robots"
+
+# The sender's id, when it was sent [s], position [m] and field value there; then the checksum of those.
+_LAYOUT: Final = struct.Struct("<Idddd")
+_SUM: Final = struct.Struct("<I")
+
+
+class Heard(NamedTuple):
+    """What a robot last said: when [s], where it was [m] in the frame of the arena, and the field's value there."""
+
+    time_s: float
+    x_m: float
+    y_m: float
+    value: float
+
+
+def pack(node: int, heard: Heard) -> bytes:
+    """Return the packet that says it."""
+    body = _LAYOUT.pack(node, *heard)
+    return body + _SUM.pack(zlib.crc32(body))
+
+
+def unpack(payload: bytes) -> tuple[int, Heard] | None:
+    """Return who said what, or None for a packet that is not ours, or is damaged."""
+    if len(payload) != _LAYOUT.size + _SUM.size:
+        return None
+    body = payload[: _LAYOUT.size]
+    if _SUM.unpack(payload[_LAYOUT.size :])[0] != zlib.crc32(body):
+        return None
+    node, *numbers = _LAYOUT.unpack(body)
+    return (node, Heard(*numbers)) if all(map(math.isfinite, numbers)) else None
+
+
+class RadioTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """The gain k, how often the robot speaks and for how long it remembers [s], how it estimates the field.
+
+    It is done while its own error is below `tolerance_m`.
+    """
+
+    gain_per_s: Annotated[float, Meta(gt=0.0)] = 5.0
+    every_s: Annotated[float, Meta(ge=0.0)] = 0.1
+    memory_s: Annotated[float, Meta(gt=0.0)] = 2.0
+    estimate: Literal["linear", "quadratic"] = "linear"
+    tolerance_m: Annotated[float, Meta(ge=0.0)] = 0.0
+
+
+class RadioCoverage(Controller):
+    """Schwager 2006, algorithm 1, over a radio."""
+
+    sensors: ClassVar[tuple[str, ...]] = ("pose", "boundary", "field")
+    Parameters: ClassVar[type[Struct]] = RadioTable
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        self._table: Any = self.parameters
+        self._every_ticks = max(1, round(self._table.every_s / setup.dt_s))
+        self._heard: dict[int, Heard] = {}
+
+    def step(self, observation: Observation) -> Command:
+        """Return the velocity u = k (C_hat - p) for where the others were heard to be, and speak if it is time to."""
+        table, pose, here = self._table, observation.pose, observation.field
+        assert pose is not None
+        assert observation.boundary is not None
+        assert here is not None
+        self._listen(observation)
+        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+        samples = []
+        for _, heard in sorted(self._heard.items()):
+            dx, dy = heard.x_m - pose.x_m, heard.y_m - pose.y_m
+            samples.append(Sample(cos * dx + sin * dy, cos * dy - sin * dx, heard.value))
+        cell = voronoi_cell(observation.boundary, [(sample.x, sample.y) for sample in samples])
+        field = here.value, here.gradient_x, here.gradient_y
+        if table.estimate == "quadratic":
+            centroid = quadratic_centroid(cell, *field, fit(*field, bordering(cell, samples)))
+        else:
+            centroid = estimated_centroid(cell, *field)
+        x, y = centroid or nearest_point(observation.boundary)
+        moves = bool(samples) and observation.tick > self._every_ticks
+        # Robots take turns, so that not all speak at once.
+        speaks = (observation.tick + self.setup.node) % self._every_ticks == 0
+        say = Heard(observation.time_s, pose.x_m, pose.y_m, here.value)
+        return Command(
+            drive=BodyVelocity(table.gain_per_s * x, table.gain_per_s * y) if moves else BodyVelocity(),
+            outbox=(Transmission(CHANNEL, pack(self.setup.node, say)),) if speaks else (),
+            done=moves and math.hypot(x, y) < table.tolerance_m,
+        )
+
+    def _listen(self, observation: Observation) -> None:
+        """Remember the newest that each robot said; packets may overtake one another."""
+        for packet in observation.inbox:
+            said = unpack(packet.payload) if packet.channel == CHANNEL else None
+            if said is not None and said[0] != self.setup.node:
+                node, heard = said
+                if node not in self._heard or self._heard[node].time_s <= heard.time_s:
+                    self._heard[node] = heard
+        oldest_s = observation.time_s - self._table.memory_s
+        self._heard = {node: heard for node, heard in self._heard.items() if heard.time_s >= oldest_s}

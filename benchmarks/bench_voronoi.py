@@ -1,0 +1,59 @@
+"""How fast Voronoi coverage is inline on one core: 100 robots with a control period of 0.02 s, and where the time goes.
+
+Prints the factor over real time and the microseconds of processor time of one robot's tick: the whole emulator, and the
+controller's share of it (the same observations answered by the bare controllers).
+"""
+
+import argparse
+import time
+
+from zwerm.agents.node import Node
+from zwerm.assembly import assemble
+from zwerm.deploy.cast import cast
+from zwerm.protocol import decode_observation
+from zwerm.running import run
+from zwerm.scenario import Scenario, load
+
+TARGET = 20.0
+
+
+def emulator(scenario: Scenario, seed: int) -> tuple[float, float]:
+    """Return the factor over real time, and the processor time of one robot's tick [us], of one inline run."""
+    start = time.process_time()
+    result = run(scenario, seed, "inline")
+    spent_s = time.process_time() - start
+    return result.sim_s / spent_s, 1e6 * spent_s / result.robot_ticks
+
+
+def controller(scenario: Scenario, seed: int) -> float:
+    """Return the processor time of one step of a controller, without wire format [us]."""
+    members = cast(scenario, seed)
+    nodes = {node: Node(name, setup) for node, (name, setup) in members.items()}
+    steps = []
+    for node, payload in zip(*assemble(scenario, seed).observe(), strict=True):
+        steps.append((nodes[node]._controller.step, decode_observation(payload)))
+    start = time.process_time()
+    for _ in range(20):
+        for step, observation in steps:
+            step(observation)
+    return 1e6 * (time.process_time() - start) / (20 * len(steps))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--duration_s", type=float, default=5.0)
+    arguments = parser.parse_args()
+    print(f"best of {arguments.repeats}")
+    print(f"{'robots':>6} {'x real time':>12} {'target':>7} {'us/robot-tick':>14} {'controller us':>14}")
+    for count in (10, 100, 1000):
+        overrides = (f"robots.count={count}", "time.dt_s=0.02", f"time.duration_s={arguments.duration_s}")
+        scenario = load("voronoi-coverage-table1", (*overrides, "robots.parameters.tolerance_m=0.0", "metrics={}"))
+        rates = [emulator(scenario, seed) for seed in range(1, arguments.repeats + 1)]
+        own = min(controller(scenario, seed) for seed in range(1, arguments.repeats + 1))
+        factor, spent = max(rate for rate, _ in rates), min(spent for _, spent in rates)
+        print(f"{count:>6} {factor:>12.1f} {TARGET if count == 100 else '':>7} {spent:>14.1f} {own:>14.1f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,27 @@
+"""Controllers that break the contract, each in one way; a new interpreter can import them."""
+
+from zwerm.agents.contract import Controller
+from zwerm.protocol import Command, Observation, WheelSpeeds
+
+
+class OrderOfASet(Controller):
+    """What it does depends on the order in which a set of strings happens to be."""
+
+    def step(self, observation: Observation) -> Command:
+        order = "".join({"1", "2", "3", "4", "5", "6", "7", "8"})
+        return Command(drive=WheelSpeeds(1e-9 * int(order), 0.0))
+
+
+class HashOfAName(Controller):
+    """What it does depends on the hash of a string."""
+
+    def step(self, observation: Observation) -> Command:
+        return Command(drive=WheelSpeeds(0.01 * (hash("name") % 97), 0.0))
+
+
+class OrderOfASortedSet(Controller):
+    """The same as the first, and no fault of it."""
+
+    def step(self, observation: Observation) -> Command:
+        order = "".join(sorted({"1", "2", "3", "4", "5", "6", "7", "8"}))
+        return Command(drive=WheelSpeeds(1e-9 * int(order), 0.0))
