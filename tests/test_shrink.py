@@ -155,7 +155,7 @@ def test_the_command_writes_the_smallest_schedule_as_a_scenario_that_still_fails
     assert run(found, 1, "inline").metrics["robots_done_fraction"] < 0.8
     none = command(tmp_path, "shrink", "least.toml", "--failing", "ticks < 3")
     assert none.returncode == 2
-    assert none.stderr == "zwerm: least.toml: with seed 1 and all 2 faults the run does not fail\n"
+    assert none.stderr.strip() == "zwerm: least.toml: with seed 1 and all 2 faults the run does not fail"
 
 
 def test_a_run_leaves_the_faults_that_it_drew_as_tables_that_run_again(tmp_path: Path) -> None:
