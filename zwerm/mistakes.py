@@ -52,7 +52,7 @@ def _mistake(each: ErrorDetails) -> tuple[tuple[int | str, ...], str, str | None
     if kind == "too_long" and context["field_type"] == "Tuple":
         rule = f"expected {context['max_length']} items"
     elif kind in _RULES:
-        rule = _RULES[kind].format(**context)
+        rule = _RULES[kind].format(**context).replace("'", '"')
     else:
         rule = re.sub(r"^(Value error, |Input should be |Input )", "", each["msg"])
         rule = rule if rule.startswith("expected") else f"expected {rule}"
