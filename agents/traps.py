@@ -7,9 +7,11 @@ interpreter it does not see: it is there to find mistakes, and is no prison.
 """
 
 import contextlib
+import datetime
 import importlib
 import io
 import os
+import random
 import sys
 import sysconfig
 import threading
@@ -69,8 +71,7 @@ class Watch:
     def __init__(self) -> None:
         self.found: list[str] = []
         self._functions = _forbidden_functions()
-        self._dates: Any = importlib.import_module("datetime").date
-        self._hidden_random: Any = importlib.import_module("random")._inst
+        self._global_random: Any = getattr(random, "_inst")  # noqa: B009 - typeshed hides it
         self._read_environment = type(os.environ).__getitem__.__code__
         self._printed = io.StringIO()
         self._stack = contextlib.ExitStack()
@@ -105,9 +106,9 @@ class Watch:
         """Look at a call: the interpreter's profiling hook."""
         if event == "c_call":
             owner = getattr(argument, "__self__", None)
-            if owner is self._hidden_random:
+            if owner is self._global_random:
                 self._note("draws from a global random stream: random", frame)
-            elif isinstance(owner, type) and argument.__name__ in _NOW and issubclass(owner, self._dates):
+            elif isinstance(owner, type) and argument.__name__ in _NOW and issubclass(owner, datetime.date):
                 self._note(f"reads the wall clock: {owner.__name__}.{argument.__name__}()", frame)
             elif argument in self._functions and not _is_numpy_seeding(frame):
                 self._note(self._functions[argument], frame)

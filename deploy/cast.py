@@ -2,6 +2,8 @@
 
 from typing import Any, Final
 
+import msgspec
+
 from zwerm.agents.contract import Body, Setup
 from zwerm.draws import Draws
 from zwerm.scenario import Scenario
@@ -15,6 +17,15 @@ PARTS: Final = {
     (BASE, "sensor-coverage"): "zwerm.agents.sensor_coverage:Base",
     (COORDINATOR, "sensor-coverage"): "zwerm.coordinator.sensor_coverage:SensorCoverage",
 }
+
+
+def recast(scenario: Scenario, seed: int, node: int, incarnation: int) -> tuple[str, Setup]:
+    """Return (controller, setup) of a node's later life: all as before, but for a random stream of its own."""
+    controller, setup = cast(scenario, seed)[node]
+    if incarnation == 1:
+        return controller, setup
+    key = Draws(seed).stream_key("controller", node, incarnation)
+    return controller, msgspec.structs.replace(setup, stream_key=key)
 
 
 def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:

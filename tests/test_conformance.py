@@ -2,8 +2,10 @@
 
 import builtins
 import datetime
+import doctest
 import os
 import random
+import re
 import secrets
 import socket
 import subprocess
@@ -11,7 +13,7 @@ import sys
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import date
 from pathlib import Path
 from time import monotonic
@@ -20,6 +22,7 @@ from typing import Any, ClassVar
 import msgspec
 import numpy as np
 import pytest
+from support import ROOT
 
 from zwerm.agents.conformance import ConformanceError, check
 from zwerm.agents.contract import Controller, Setup
@@ -105,6 +108,38 @@ def test_a_sensor_of_ones_own_is_read_from_extra() -> None:
     check(stepping(step, sensors=("my_sensors:Light",)), extra={"light": (0.5,)})
     (found,) = violations(stepping(step, sensors=("my_sensors:Light",)))
     assert found.startswith("sensors: 'my_sensors:Light' is none that Zwerm knows")
+
+
+def documented() -> dict[str, str]:
+    """Return the text of every controller in the documentation and the README, by file name."""
+    guide = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
+    found = dict(re.findall(r'^```python title="(\w+)\.py"\n(.*?)^```$', guide, re.M | re.S))
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    return found | {"my_file": re.findall(r"^```python\n(from zwerm.agents.*?)^```$", readme, re.M | re.S)[0]}
+
+
+@pytest.fixture
+def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[type[Any]]]:
+    """Every controller of the documentation, in files that can be imported."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    for name, text in documented().items():
+        (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
+    yield [find(f"{name}:{'MyController' if name == 'my_file' else name.capitalize()}") for name in documented()]
+    for name in documented():
+        sys.modules.pop(name, None)
+
+
+def test_every_controller_of_the_documentation_conforms(shelf: list[type[Any]]) -> None:
+    assert {each.__name__ for each in shelf} >= {"Shy", "MyController"}
+    for controller in shelf:
+        check(controller)
+
+
+def test_the_guides_example_of_the_kit_says_what_the_kit_says(shelf: list[type[Any]]) -> None:
+    guide = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"^```pycon\n(.*?)^```$", guide, re.M | re.S)
+    example = doctest.DocTestParser().get_doctest(text, {}, "the guide", None, None)
+    assert doctest.DocTestRunner().run(example) == (0, 5)
 
 
 # --- the bad: what it is --------------------------------------------------------------------------------------------

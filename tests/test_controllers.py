@@ -1,13 +1,20 @@
 """The computation-free controllers and the random walk, against the paper's numbers and against scipy's distributions."""
 
+import json
 import math
+import os
+import re
+import subprocess
+import sys
 from collections.abc import Callable
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
+from support import ROOT, ZWERM
 
 from zwerm.agents.computation_free.random_walk import symmetric_stable, wrapped_cauchy
 from zwerm.agents.computation_free.reactive import WheelTable
@@ -16,6 +23,7 @@ from zwerm.agents.registry import make
 from zwerm.draws import Draws
 from zwerm.errors import ControllerError
 from zwerm.protocol import Command, Observation, WheelSpeeds
+from zwerm.running import run
 from zwerm.scenario import load
 
 # The e-puck of the paper.
@@ -80,6 +88,31 @@ def test_a_wheel_speed_beyond_the_motor_is_refused() -> None:
         make("computation-free", setup({"left_0": 1.01}))
     with pytest.raises(ControllerError, match="needs a body with wheels"):
         make("computation-free", setup(body=None))
+
+
+# --- a controller of the user's --------------------------------------------------------------------------------------
+
+
+def test_the_guides_first_controller_runs_from_the_users_folder_by_the_guides_command(tmp_path: Path) -> None:
+    guide = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r'^```python title="shy\.py"\n(.*?)^```$', guide, re.M | re.S)
+    command = "zwerm run computation-free --set robots.controller=shy:Shy"
+    assert f"\n$ {command}\n" in guide
+    (tmp_path / "shy.py").write_text(text, encoding="utf-8")
+    arguments = [*command.split()[1:], "--inline", "--json", "--set", "time.duration_s=5"]
+    ran = subprocess.run(
+        [sys.executable, *ZWERM, *arguments],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stderr
+    said = json.loads(ran.stdout)
+    assert (said["outcome"], said["ticks"], said["robot_ticks"]) == ("time-limit", 50, 50 * 25)
+    other = run("computation-free", 1, "inline", ["time.duration_s=5"])
+    assert said["trace"] != other.trace
 
 
 # --- random walk ----------------------------------------------------------------------------------------------------

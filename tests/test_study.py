@@ -221,19 +221,20 @@ def test_every_variant_is_run_at_every_point_with_every_seed(write: Callable[...
         ("computation-free-shapes", 3 * 1000),
     ],
 )
-def test_a_built_in_study_is_ready_to_run(name: str, trials: int) -> None:
+def test_a_study_of_the_computation_free_swarm_is_as_large_as_the_papers(name: str, trials: int) -> None:
     study = load_study(name)
     points = make_points(study)
     assert len(make_trials(study, points, study.table.seeds)) == trials
-    assert study.table.summary
-    assert study.table.source
     seconds = {point.scenario.time.duration_s for point in points}
     assert seconds <= {120.0, 240.0, 600.0, 3600.0}
 
 
-def test_no_built_in_study_goes_untested() -> None:
-    (marks,) = (m for m in test_a_built_in_study_is_ready_to_run.pytestmark if m.name == "parametrize")  # type: ignore[attr-defined]
-    assert {name for name, _ in marks.args[1]} == set(built_in())
+@pytest.mark.parametrize("name", sorted(built_in()))
+def test_a_built_in_study_is_ready_to_run(name: str) -> None:
+    study = load_study(name)
+    assert make_points(study)
+    assert study.table.summary
+    assert study.table.source
 
 
 # --- what is run, and kept ------------------------------------------------------------------------------------------
@@ -323,6 +324,28 @@ def test_a_file_of_something_else_is_left_alone(write: Callable[..., Study], tmp
     with pytest.raises(ScenarioError, match="expected a Parquet file of a study's results"):
         run_here(write(TINY), out)
     assert out.read_text() == "my notes"
+
+
+def test_a_file_that_cannot_be_written_is_one_line(write: Callable[..., Study], tmp_path: Path) -> None:
+    out = tmp_path / "tiny-scenario.toml" / "out.parquet"
+    study = write(TINY)
+    with pytest.raises(ScenarioError) as raised:
+        run_here(study, out)
+    assert raised.value.mistakes[0].startswith(f"{out}: cannot be written: ")
+
+
+def test_a_file_that_the_scenario_names_is_part_of_what_a_row_stands_for(
+    write: Callable[..., Study], tmp_path: Path
+) -> None:
+    study = write(TINY)
+    (tmp_path / "hall.geojson").write_text('{"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [2, 1], [0, 0]]]}')
+    text = (tmp_path / "tiny-scenario.toml").read_text().replace("size_m = [1.0, 1.0]", 'geojson = "hall.geojson"')
+    (tmp_path / "tiny-scenario.toml").write_text(text)
+    (before,) = make_points(study)
+    (same,) = make_points(study)
+    (tmp_path / "hall.geojson").write_text('{"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [2, 2], [0, 0]]]}')
+    (after,) = make_points(study)
+    assert before.fingerprint == same.fingerprint != after.fingerprint
 
 
 def test_a_trial_that_fails_is_a_row_with_its_reason(write: Callable[..., Study], tmp_path: Path) -> None:

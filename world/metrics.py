@@ -1,5 +1,7 @@
 """What is measured of a run, by name; units are last in the names."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import shapely
 
@@ -8,7 +10,9 @@ from zwerm.world.arena import Arena
 from zwerm.world.scene import Floats, Ints
 from zwerm.world.sight import hexagonal_packing_robots, holes, living, obstacles, sight_coverage_fraction
 from zwerm.world.visibility import Visibility
-from zwerm.world.world import World
+
+if TYPE_CHECKING:  # the world's faults wait for metrics
+    from zwerm.world.world import World
 
 # Sides of the polygon that stands for a disc, a quarter: the area is off by 2e-5 of the disc's.
 _QUARTER_SIDES = 64
@@ -37,7 +41,7 @@ def area_coverage_fraction(position: Floats, radius_m: float, arena: Arena) -> f
     return float(covered.area / arena.area_m2)
 
 
-def measure(world: World, table: MetricsTable) -> dict[str, float]:
+def measure(world: "World", table: MetricsTable) -> dict[str, float]:
     """Return the metrics of the world as it is now."""
     position = world.scene.position[world.scene.present]
     found = {"robots_in_arena": float(len(position))}
@@ -50,15 +54,15 @@ def measure(world: World, table: MetricsTable) -> dict[str, float]:
         found["area_coverage_fraction"] = area_coverage_fraction(position, table.coverage_radius_m, world.arena)
     if table.sight_range_m is not None:
         found |= _sight(world, table.sight_range_m)
-    for each in world.told:
+    for each in world.audience.told:
         found |= {name: float(value) for name, value in each.told.items() if isinstance(value, int | float)}
     return found
 
 
-def _sight(world: World, range_m: float) -> dict[str, float]:
+def _sight(world: "World", range_m: float) -> dict[str, float]:
     """Return how well the living robots cover the arena by sight, and how that compares with the ideal packing."""
     scene = world.scene
-    robots = living(scene.present_ids(), sorted(world.crashed))
+    robots = living(scene.present_ids(), sorted({*world.crashed, *world.schedule.gone()}))
     ideal = hexagonal_packing_robots(world.arena, range_m)
     return {
         "coverage_fraction": sight_coverage_fraction(scene.position[robots], range_m, world.arena),

@@ -16,7 +16,7 @@ from zwerm.simplicial import FlagComplex
 from zwerm.world.arena import Arena
 from zwerm.world.scene import Floats
 from zwerm.world.sight import sight_coverage_fraction
-from zwerm.world.world import Told
+from zwerm.world.told import Told
 
 try:
     from matplotlib.axes import Axes

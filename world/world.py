@@ -10,7 +10,7 @@ The world is deterministic: its state after a tick is a function of the scenario
 from collections import Counter
 from collections.abc import Sequence
 from itertools import repeat
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -31,29 +31,25 @@ from zwerm.scenario import Scenario
 from zwerm.trace import Trace
 from zwerm.world.arena import Arena
 from zwerm.world.drives import Drives
+from zwerm.world.faults import ticks
+from zwerm.world.faults.generator import scheduled
+from zwerm.world.faults.schedule import Schedule, unite
+from zwerm.world.faults.sensing import SensingFault, read
 from zwerm.world.inflow import Depot, Inflow
-from zwerm.world.medium import Medium
+from zwerm.world.lives import Lives, Order
 from zwerm.world.meters import Meters
 from zwerm.world.physics import Physics
 from zwerm.world.placement import place
-from zwerm.world.scene import Bools, Floats, Scene
+from zwerm.world.radio.medium import Medium
+from zwerm.world.scene import Bools, Floats, Ints, Scene
 from zwerm.world.sensors import Sensor
+from zwerm.world.told import Audience
 from zwerm.world.wakes import SIGNATURES, Wakes
 
 if TYPE_CHECKING:
     from zwerm.world.recording import Recording
 
 NO_ANSWER: Final = b""
-
-
-class Told(NamedTuple):
-    """What a node told those who watch the run, and where the robots were then."""
-
-    tick: int
-    time_s: float
-    node: int
-    told: dict[str, Any]
-    position: Floats  # (n, 2) [m]
 
 
 class World:
@@ -76,16 +72,22 @@ class World:
         self.late_allowed = False
         self.late_commands = 0
         self.exited: list[int] = []
-        self.told: list[Told] = []
-        self.gave_up = ""
+        self.audience = Audience()
         self.trace = Trace()
         self.recording: Recording | None = None
         self.coordinator = count if scenario.coordinator is not None else None
-        self.medium = Medium(scenario.radio, count, self.coordinator is not None)
+        self.medium = Medium(scenario, arena, self.draws)
         self._physics = Physics(body, arena.segments, count, scenario.time.dt_s)
         self._drives = Drives(body, count, self.draws)
         nodes = count + (self.coordinator is not None)
         self._wakes = Wakes(nodes, scenario.time.dt_s)
+        self.fault_tables = scheduled(scenario, seed, arena)
+        self.schedule = Schedule(self.fault_tables, scenario)
+        self.lives = Lives(nodes, self.schedule.unborn)
+        for node in self.schedule.unborn:
+            self.medium.switch_off(node, "receiver-down")
+        self._blinding: list[SensingFault] = []
+        self._deadman_at: dict[int, int] = {}  # the tick at which a paused robot's motors stop
         self._sensors = {sensor.field: sensor for sensor in sensors}
         # One column of readings a field, up to the last field that any sensor fills.
         last = max((SENSOR_FIELDS.index(field) for field in self._sensors), default=-1)
@@ -105,12 +107,12 @@ class World:
         self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
         self._depot = Depot(scenario.base, count, arena, body.radius_m, self.draws) if scenario.base else None
         if self.coordinator is not None:
-            self._wakes.admit(self.coordinator)
+            self._admit(self.coordinator)
         if self._depot is not None:
             base, position, heading = self._depot.base
             self._physics.fix(base, position, heading)
             self._set_present(base, True)
-            self._wakes.admit(base)
+            self._admit(base)
         elif self._inflow is None:
             positions, headings = place(scenario.robots.placement, arena, count, body.radius_m, self.draws)
             for robot in range(count):
@@ -120,22 +122,37 @@ class World:
 
     # --- one tick, in order -----------------------------------------------------------------------------------------
 
+    def begin(self) -> list[Order]:
+        """Let the faults of this tick happen, and return what is to be done to programs before anybody is observed."""
+        orders: list[Order] = []
+        if self.schedule.faults and self.schedule.turn(self.tick, self.scene):
+            changes = self.lives.change(*self.schedule.states(self.tick))
+            restarts = [node for node in self.schedule.restarts() if not self.lives.down[node]]
+            orders = [order for order in unite(changes, restarts) if self._happens(order)]
+            self.medium.faults = self.schedule.on_air()
+            self._blinding = self.schedule.on_sensors()
+        for node, tick in list(self._deadman_at.items()):
+            if self.tick >= tick:
+                self.halt(node)
+                del self._deadman_at[node]
+        return orders
+
     def observe(self) -> tuple[list[int], list[bytes]]:
         """Sense, and return the ids of the nodes that are awake, ascending, with each one's encoded observation."""
         scene, tick = self.scene, self.tick
-        receivers = self.medium.waiting()
+        receivers = self.medium.arrive(tick)
         if self._wakes.sleeping:
             self._wakes.note_packets(receivers, tick)
             self._note_changes()
-        awake = self._wakes.awake(tick)
+        awake = self.lives.able(self._wakes.awake(tick), tick)
         nodes: list[int] = awake.tolist()
         # Ids ascend, and the coordinator's, which has no sensors, is the largest.
         robots = awake[:-1] if nodes and nodes[-1] == self.coordinator else awake
-        readings = {field: sensor.read(scene, robots) for field, sensor in self._sensors.items()} if len(robots) else {}
+        readings = {field: self._read(sensor, robots) for field, sensor in self._sensors.items()} if len(robots) else {}
         for field in SIGNATURES:
             if field in readings:
                 self._wakes.remember(field, nodes[: len(robots)], readings[field])
-        inboxes: Any = [self.medium.deliver(node) for node in nodes] if receivers else repeat(())
+        inboxes: Any = self.medium.deliver(nodes, tick) if receivers else repeat(())
         columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]
         ticks, times = repeat(tick, len(robots)), repeat(scene.time_s)
         self._observations = list(map(encode, map(Observation, ticks, times, inboxes, *columns)))
@@ -192,7 +209,7 @@ class World:
                 commands.append((node, answer))
             else:
                 payloads.append(NO_ANSWER)
-        self._apply(commands)
+        self._apply(self.lives.finished(commands, self.tick))
         self.trace.extend(self.tick, self._nodes, self._observations, payloads)
         if self.recording is not None:
             self.recording.exchange(self.tick, self._nodes, self._observations, payloads, self.scene)
@@ -213,13 +230,14 @@ class World:
 
     def crash(self, node: int, reason: str) -> None:
         """Take note that a node is dead: its motors stop, it is never awaited again, its body stays where it is."""
-        if node not in self.crashed:
+        if node not in self.crashed and not self.lives.down[node]:
             self.crashed[node] = reason
             self._retire(node, "receiver-crashed")
 
     def halt(self, node: int) -> None:
         """Stop a robot's motors until its next command."""
-        self._drives.stop(node)
+        if node < self.count:
+            self._drives.stop(node)
 
     @property
     def completed(self) -> bool:
@@ -233,8 +251,14 @@ class World:
             return False
         over = self._done.copy()
         over[self.exited] = True
-        over[list(self.crashed)] = True
-        return bool(over.all()) and len(self.crashed) < self.count
+        dead = sorted({*self.crashed, *self.schedule.gone()})
+        over[dead] = True
+        return bool(over.all()) and len(dead) < self.count
+
+    @property
+    def done_fraction(self) -> float:
+        """The fraction of robots that say that their part is done, in their newest command."""
+        return float(self._done[: self.count].mean())
 
     @property
     def time_s(self) -> float:
@@ -279,7 +303,12 @@ class World:
     def _enter(self, robot: int, position: Floats, heading: float) -> None:
         self._physics.add(robot, position, heading)
         self._set_present(robot, True)
-        self._wakes.admit(robot)
+        self._admit(robot)
+
+    def _admit(self, node: int) -> None:
+        """Let a node be observed from now on, if its program runs."""
+        if not self.lives.down[node]:
+            self._wakes.admit(node)
 
     def _set_present(self, robot: int, present: bool) -> None:
         self._present = self._present.copy()  # scenes of earlier ticks keep theirs
@@ -289,7 +318,34 @@ class World:
         self._wakes.retire(node)
         if node < self.count:
             self._drives.stop(node)
-        self.medium.lose(node, cause)
+        self.medium.switch_off(node, cause)
+
+    def _read(self, sensor: Sensor, robots: Ints) -> Sequence[Any]:
+        return read(sensor, self._blinding, self.scene, robots) if self._blinding else sensor.read(self.scene, robots)
+
+    def _happens(self, order: Order) -> bool:
+        """Let what an order does to a program have its effect on the world; tell whether there is a program to do it to."""
+        deed, node = order
+        if deed == "kill":
+            alive = self.crashed.pop(node, None) is None
+            self.lives.note("crashed", node)
+            self.lives.forget(node)
+            self._retire(node, "receiver-crashed")
+            self._done[node] = False
+            self._deadman_at.pop(node, None)
+            return alive
+        if deed == "start":
+            if node in self.lives.ever.get("crashed", ()):
+                self.lives.note("restarted", node)
+            if node not in self.exited:
+                self.medium.switch_on(node)
+            if node == self.coordinator or self._present[node]:
+                self._admit(node)
+        elif deed == "pause":
+            self._deadman_at[node] = self.tick + ticks(self.scenario.time.deadman_s, self.scenario.time.dt_s)
+        else:
+            self._deadman_at.pop(node, None)
+        return node not in self.crashed
 
     def _note_changes(self) -> None:
         """Wake the sleepers whose contacts or visible ids have changed."""
@@ -298,7 +354,7 @@ class World:
         for field in SIGNATURES:
             sensor = self._sensors.get(field)
             if sensor is not None and len(watchers := self._wakes.watchers(field)):
-                self._wakes.note_readings(field, watchers, sensor.read(self.scene, watchers), self.tick)
+                self._wakes.note_readings(field, watchers, self._read(sensor, watchers), self.tick)
 
     def _apply(self, answers: list[tuple[int, Command | Failure]]) -> None:
         drives: list[tuple[int, BodyVelocity | WheelSpeeds]] = []
@@ -312,10 +368,8 @@ class World:
                 self._outboxes.append((node, answer.outbox))
             if answer.wake is not None:
                 self._wakes.sleep(node, answer.wake, self.tick)
-            if answer.told:
-                self.told.append(Told(self.tick, self.time_s, node, answer.told, self.scene.position.copy()))
-            if answer.gave_up and node in self._fixed:
-                self.gave_up = f"node {node} gave up: {answer.gave_up}"
+            if answer.told or answer.gave_up:
+                self.audience.hear(self.scene, node, answer, node in self._fixed)
             if answer.release and node == 0 and self._depot is not None:
                 self._depot.release()
             if answer.done or self._any_done:

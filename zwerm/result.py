@@ -9,7 +9,7 @@ from zwerm.scenario import Scenario
 from zwerm.world.arena import Arena
 from zwerm.world.history import History
 from zwerm.world.scene import Ints
-from zwerm.world.world import Told
+from zwerm.world.told import Told
 
 
 @dataclass(slots=True)
@@ -35,6 +35,8 @@ class RunResult:
     arena: Arena
     history: History
     cell_counts: Ints | None = None
+    hindered: dict[str, list[int]] = field(default_factory=dict)
+    faults: list[dict[str, Any]] = field(default_factory=list)
     series: dict[str, list[float]] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     tracebacks: dict[int, str] = field(default_factory=dict)
@@ -61,7 +63,8 @@ class RunResult:
             "metrics": self.metrics,
             "radio": self.radio,
             "middleware_lost": self.middleware_lost,
-            "nodes": {"crashed": self.crashed, "restarted": self.restarted},
+            "nodes": {"crashed": self.crashed, "restarted": self.restarted, **self.hindered},
+            "faults": self.faults,
         }
 
     def picture(self, path: str | Path) -> Path:

@@ -1,12 +1,12 @@
 """From a study to its trials: every variant at every point of the grid with every seed, each scenario checked beforehand.
 
 A point's fingerprint names everything that decides what a trial gives, but for its seed and Zwerm's own code between two
-releases: the scenario, the shape of the arena, the files it names and the controller of the user's.
+releases: the scenario, the shape of the arena, the files it names and the user's own modules that it names.
 """
 
-import inspect
 import itertools
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 from zwerm import __version__
-from zwerm.agents.registry import find
 from zwerm.assembly import prepare
 from zwerm.errors import ScenarioError
 from zwerm.scenario import Scenario, load
@@ -23,6 +22,7 @@ from zwerm.study.tables import Setting, Study, VariantTable
 
 # What a scenario says of itself and no run depends on.
 _WORDS = {"name", "summary", "source"}
+_PATH_LENGTH_MAX = 255
 
 
 @dataclass(frozen=True)
@@ -104,14 +104,18 @@ def _fingerprint(scenario: Scenario, walls: bytes) -> str:
     digest.update(json.dumps(tables, sort_keys=True).encode())
     digest.update(walls)
     for text in _strings(tables):
-        file = scenario.folder / text
-        if len(text) < 256 and file.is_file():
-            digest.update(file.read_bytes())
-    controller = find(scenario.robots.controller)
-    if not controller.__module__.startswith("zwerm."):
-        source = inspect.getsourcefile(controller)
-        digest.update(Path(source).read_bytes() if source else b"")
+        for file in (scenario.folder / text[:_PATH_LENGTH_MAX], _source(text)):
+            if file is not None and file.is_file():
+                digest.update(file.read_bytes())
     return digest.hexdigest()
+
+
+def _source(text: str) -> Path | None:
+    """Return the file of the user's module that `module:Class` names, and that checking the scenario has imported."""
+    name, colon, _ = text.partition(":")
+    module = sys.modules.get(name) if colon and not name.startswith("zwerm.") else None
+    file = getattr(module, "__file__", None)
+    return None if file is None else Path(file)
 
 
 def _strings(value: Any) -> list[str]:
