@@ -9,7 +9,7 @@ import cmath
 import math
 from collections.abc import Iterable, Mapping
 
-from zwerm.deployment import Sighting
+from zwerm.orders import Sighting
 
 # How much of a new reading goes into a place's reference directions, once there are some.
 REFERENCE_WEIGHT = 0.1

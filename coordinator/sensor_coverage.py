@@ -12,7 +12,7 @@ import msgspec
 
 from zwerm.coordinator.places import Places
 from zwerm.coordinator.planner import BASE, Parameters, Plan, Planner
-from zwerm.deployment import (
+from zwerm.orders import (
     Answer,
     Arrived,
     Cleared,

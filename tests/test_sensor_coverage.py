@@ -12,8 +12,8 @@ from zwerm.agents.sensor_coverage import Robot
 from zwerm.agents.sensor_coverage.homing import offset, slid, unit
 from zwerm.assembly import assemble
 from zwerm.deploy.cast import cast
-from zwerm.deployment import Arrived, Correct, Deploy, Sighting, decode_answer, encode
 from zwerm.link.memory import MemoryLink
+from zwerm.orders import Arrived, Correct, Deploy, Sighting, decode_answer, encode
 from zwerm.protocol import (
     Bearing,
     BodyVelocity,

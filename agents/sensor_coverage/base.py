@@ -2,7 +2,7 @@
 
 from zwerm.agents.contract import Setup
 from zwerm.agents.sensor_coverage.robot import Robot, Story
-from zwerm.deployment import Order, Release, Survey
+from zwerm.orders import Order, Release, Survey
 from zwerm.protocol import Command, Observation
 
 

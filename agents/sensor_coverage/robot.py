@@ -15,7 +15,7 @@ from msgspec import Struct
 from zwerm.agents.contract import Controller, Setup
 from zwerm.agents.sensor_coverage.homing import Offset, Vector, offset, slid, unit
 from zwerm.agents.sensor_coverage.senses import Senses
-from zwerm.deployment import (
+from zwerm.orders import (
     Answer,
     Arrived,
     Cleared,

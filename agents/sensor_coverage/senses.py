@@ -7,7 +7,7 @@ the odometry's turn. Bearings of robots that stand still are averaged while this
 import cmath
 import math
 
-from zwerm.deployment import Sighting
+from zwerm.orders import Sighting
 from zwerm.protocol import Observation
 
 # A touch switch faces a robot, not a wall, if one is seen this far beside its sector [rad].
