@@ -155,7 +155,7 @@ class LocalSupervisor:
         reader, writer = self._context.Pipe(duplex=False)
         with reader, writer:
             while waiting or missing:
-                with interrupts_held(), _main_module_hidden():
+                with interrupts_held(), main_module_hidden():
                     while waiting and len(missing) < JOINING_MAX:
                         credential = waiting.popleft()
                         process = self._started(credential, deadline_s, writer)
@@ -203,7 +203,7 @@ def interrupts_held() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _main_module_hidden() -> Iterator[None]:
+def main_module_hidden() -> Iterator[None]:
     """Keep robot processes from importing the program that starts them, and all that it imports."""
     module = sys.modules["__main__"]
     names: dict[str, Any] = vars(module)
