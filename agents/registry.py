@@ -9,7 +9,9 @@ from zwerm.agents.contract import NoParameters, Setup, Stepper
 from zwerm.errors import ControllerError
 
 BUILT_IN: Final = {
+    "beacon": "zwerm.agents.gossip:Beacon",
     "computation-free": "zwerm.agents.computation_free:ComputationFree",
+    "gossip-max": "zwerm.agents.gossip:GossipMax",
     "random-walk": "zwerm.agents.computation_free:RandomWalk",
     "voronoi-coverage": "zwerm.agents.voronoi_coverage:VoronoiCoverage",
     "voronoi-integer": "zwerm.agents.voronoi_coverage:IntegerCoverage",

@@ -17,9 +17,12 @@ from zwerm.scenario import Scenario, load
 
 TARGET = 0.7
 
+# Evenly spread, so that a robot has about eight neighbours in range, as in a swarm that covers an area.
 SENSORS = (
+    "arena.size_m=[4.0, 4.0]",
+    "robots.placement={kind='uniform'}",
     "robots.sensors=[{kind='line_of_sight'}, {kind='bearings', range_m=0.6}, {kind='touch'}, {kind='odometry'},"
-    " {kind='compass'}]"
+    " {kind='compass'}]",
 )
 
 
@@ -46,7 +49,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     base = (f"robots.count={options.robots}", f"time.duration_s={options.seconds}")
-    cases = {"line of sight": base, "five sensors": (*base, SENSORS)}
+    cases = {"line of sight": base, "five sensors": (*base, *SENSORS)}
     print(f"{'observation':<14} {'bytes':>6} {'emulator/s':>11} {'echo/s':>9} {'ratio':>6} {'target':>7}")
     for name, overrides in cases.items():
         scenario = load("computation-free-scaling", overrides)

@@ -2,6 +2,8 @@
 
 from typing import Any, Final
 
+import msgspec
+
 from zwerm.agents.contract import Body, Setup
 from zwerm.draws import Draws
 from zwerm.scenario import Scenario
@@ -9,6 +11,15 @@ from zwerm.scenario import Scenario
 ROBOT: Final = "robot"
 BASE: Final = "base"
 COORDINATOR: Final = "coordinator"
+
+
+def recast(scenario: Scenario, seed: int, node: int, incarnation: int) -> tuple[str, Setup]:
+    """Return (controller, setup) of a node's later life: all as before, but for a random stream of its own."""
+    controller, setup = cast(scenario, seed)[node]
+    if incarnation == 1:
+        return controller, setup
+    key = Draws(seed).stream_key("controller", node, incarnation)
+    return controller, msgspec.structs.replace(setup, stream_key=key)
 
 
 def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:

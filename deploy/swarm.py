@@ -7,10 +7,11 @@ Promises: entering returns when every node has joined; leaving, in whatever way,
 """
 
 import contextlib
+import signal
 import tempfile
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple, Self
@@ -31,6 +32,9 @@ from zwerm.link.zenoh_world import Member, ZenohWorldLink
 from zwerm.protocol import encode
 
 Members = Mapping[int, tuple[str, Setup]]
+
+# Of a node's id and incarnation: who plays it.
+Recast = Callable[[int, int], tuple[str, Setup]]
 
 # The path of a Unix socket has at most 107 bytes, on macOS 103.
 _SOCKET_PATH_BYTES_MAX: Final = 100
@@ -122,10 +126,19 @@ class LocalSwarm(_Swarm):
         order: Sequence[int] | None = None,
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
+        unborn: Collection[int] = (),
+        recast: Recast | None = None,
     ) -> None:
-        """`order` is the order of starting; `deadline_s` is given to each process to join; `paced` is real time."""
+        """`order` is the order of starting; `deadline_s` is given to each process to join; `paced` is real time.
+
+        The nodes in `unborn` are not started before `start` is called; `recast` says who plays a node's next incarnation,
+        the same as before if it is not given.
+        """
         super().__init__(run, members, progress, deadline_s, paced)
-        self._order = order
+        self._order = [node for node in (members if order is None else order) if node not in unborn]
+        self._recast = recast
+        self._ran = set(self._order)
+        self._stopped: set[int] = set()
         self._leave_deadline_s = 0.0  # nobody waits for those who have not joined
 
     def _open(self, directory: Path) -> None:
@@ -140,19 +153,52 @@ class LocalSwarm(_Swarm):
         self.supervisor.start(self._progress, self._deadline_s)
         self._leave_deadline_s = LEAVE_DEADLINE_S
 
+    def kill(self, node: int) -> None:
+        """Kill a node with SIGKILL; the link reports its end."""
+        self._stopped.discard(node)
+        self.supervisor.kill(node)
+
+    def start(self, node: int) -> None:
+        """Start a node that has not run yet, or that has ended: then with a new incarnation and no memory.
+
+        Returns when it has joined. Raises LinkError where it does not.
+        """
+        if node in self._ran:
+            self._revive(node)
+            return
+        self._ran.add(node)
+        self.supervisor.restart(self._current[node], self._deadline_s)
+
+    def pause(self, node: int) -> None:
+        """Stop a node's process with SIGSTOP."""
+        self._stopped.add(node)
+        self.supervisor.send_signal(node, signal.SIGSTOP)
+
+    def resume(self, node: int) -> None:
+        """Let a stopped process go on, with SIGCONT."""
+        self._stopped.discard(node)
+        self.supervisor.send_signal(node, signal.SIGCONT)
+
     def restart(self, node: int) -> None:
         """Kill a node, and start it with a new incarnation and no memory; return when it has joined.
 
         Its end is reported by the link all the same. Raises LinkError where it does not join.
         """
-        self.supervisor.kill(node)
+        self.kill(node)
+        self._revive(node)
+
+    def _revive(self, node: int) -> None:
         self.link.wait_joined(lambda joined: node not in joined, LEAVE_DEADLINE_S)
         credential = renew(self._current[node])
+        if self._recast is not None:
+            self._members = {**self._members, node: self._recast(node, credential.incarnation)}
         self.link.expect(node, self._member(credential))
         self._current[node] = credential
         self.supervisor.restart(credential, self._deadline_s)
 
     def _end(self) -> None:
+        for node in sorted(self._stopped):
+            self.resume(node)
         self.link.dismiss("the run is over")
         self.supervisor.stop(self._leave_deadline_s)
 

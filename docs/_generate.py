@@ -8,6 +8,7 @@ import atexit
 import inspect
 import re
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -26,6 +27,10 @@ from zwerm.running import run
 from zwerm.scenario import OpenTable, Scenario
 from zwerm.study.tables import StudyTable
 from zwerm.world import fields
+from zwerm.world.faults import FaultTable
+from zwerm.world.faults import schedule as faults
+from zwerm.world.radio import LinkTable
+from zwerm.world.radio import registry as radio
 from zwerm.world.sensors import registry as sensors
 
 MARK: Final = re.compile(r"^<!-- generated: ([a-z-]+) -->$", re.MULTILINE)
@@ -176,6 +181,28 @@ def sensor_list() -> str:
     return "\n\n".join(parts)
 
 
+def radio_models() -> str:
+    """Return every link model: its cause, what it is, and its parameters."""
+    return _kinds({kind: (model, model.Parameters) for kind, model in radio.BUILT_IN.items()}, LinkTable)
+
+
+def fault_list() -> str:
+    """Return every kind of fault and its parameters."""
+    return _kinds({kind: (table, table) for kind, table in faults.KINDS.items()}, FaultTable)
+
+
+def _kinds(kinds: dict[str, tuple[type, type[BaseModel]]], base: type[BaseModel]) -> str:
+    parts = []
+    for kind, (described, table) in kinds.items():
+        schema = table.model_json_schema()
+        own = {key: each for key, each in schema["properties"].items() if key not in base.model_fields}
+        text = first_paragraph(described.__doc__)
+        if hasattr(described, "cause"):
+            text = f"{paragraphs(sys.modules[described.__module__].__doc__)}\n\nDrops for `{described.cause}`."
+        parts.append(f"### `{kind}`\n\n{text}\n\n{rows(schema | {'properties': own}) if own else ''}")
+    return "\n\n".join(parts)
+
+
 def field_list() -> str:
     """Return every kind of scalar field and what it takes."""
     parts = []
@@ -275,7 +302,9 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
     "commands": commands,
     "controllers": controller_list,
     "fields": field_list,
+    "faults": fault_list,
     "messages": messages,
+    "radio-models": radio_models,
     "scenario-tables": scenario_tables,
     "sensors": sensor_list,
     "study-tables": study_tables,

@@ -220,8 +220,8 @@ BROKEN = {
     "missing image": ({"image": "none.pgm"}, "image: no such file, got none.pgm"),
     "missing key": ({"free_thresh": None}, "free_thresh: required, and missing"),
     "resolution 0": ({"resolution": 0}, "resolution: expected > 0, got 0"),
-    "short origin": ({"origin": [0, 0]}, "origin.2: required, and missing"),
-    "mode": ({"mode": "exact"}, "mode: expected 'trinary', 'scale' or 'raw', got 'exact'"),
+    "short origin": ({"origin": [0, 0]}, "origin: expected 3 items, got [0, 0]"),
+    "mode": ({"mode": "exact"}, 'mode: expected "trinary", "scale" or "raw", got "exact"'),
     "negate": ({"negate": 2}, "negate: expected <= 1, got 2"),
     "thresholds": (
         {"free_thresh": 0.7},

@@ -71,7 +71,7 @@ def test_every_built_in_scenario_is_without_mistake_and_says_what_it_is(name: st
         ("robots.count=0", "robots.count: expected >= 1, got 0"),
         ("robots.count=200000", "robots.count: expected <= 100000, got 200000"),
         ("robots.cuont=3", "robots.cuont: unknown key"),
-        ("robots.on_crash=explode", "robots.on_crash: expected 'fail' or 'continue', got \"explode\""),
+        ("robots.on_crash=explode", 'robots.on_crash: expected "fail" or "continue", got "explode"'),
         ("robots.body.radius_m=-0.1", "robots.body.radius_m: expected > 0, got -0.1"),
         ("robots.body.collide=1", "robots.body.collide: expected true or false, got 1"),
         ("robots.body=car", 'robots.body: expected a table, got "car"'),

@@ -141,7 +141,7 @@ def test_a_packet_wakes_a_sleeper_that_asked_for_packets_and_no_other() -> None:
     observed = tick(world)
     assert list(observed) == [0, 2]
     assert [packet.payload for packet in observed[0].inbox] == [b"up"]
-    assert world.medium.accounts.in_flight == 1, "the packet to the sleeper waits for it"
+    assert world.medium.summary()["in_flight"] == 1, "the packet to the sleeper waits for it"
 
 
 def test_a_contact_wakes_a_sleeper_that_asked_for_contacts() -> None:
@@ -163,22 +163,31 @@ def test_a_change_of_visible_ids_wakes_a_sleeper_that_asked_for_it() -> None:
 def test_radio_packets_arrive_one_tick_later_and_every_one_is_accounted_for() -> None:
     world = world_at((0.5, 0.5, 0.0), (1.0, 0.5, 0.0), (3.5, 3.5, 0.0), radio={"range_m": 1.0})
     tick(world, n0=Command(outbox=(Transmission("robots", b"hello"), Transmission("robots", b"you", to=1))))
-    accounts = world.medium.accounts
-    assert (accounts.sent, accounts.delivered, dict(accounts.dropped), accounts.in_flight) == (
-        3,
-        0,
-        {"out-of-range": 1},
-        2,
-    )
+    assert world.medium.summary() | {"bytes": 0} == {
+        "sent": 3,
+        "delivered": 0,
+        "dropped": {"out-of-range": 1},
+        "in_flight": 2,
+        "bytes": 0,
+        "copies": 0,
+        "damaged": 0,
+    }
     observed = tick(world)
     assert [(p.payload, p.sender, p.channel) for p in observed[1].inbox] == [
         (b"hello", 0, "robots"),
         (b"you", 0, "robots"),
     ]
     assert observed[2].inbox == ()
-    assert (accounts.sent, accounts.delivered, accounts.in_flight, accounts.bytes) == (3, 2, 0, 13)
-    assert accounts.links_delivered == {(0, 1): 2}
-    assert accounts.links_dropped[0, 2] == {"out-of-range": 1}
+    found = world.medium.summary()
+    assert (found["sent"], found["delivered"], found["in_flight"], found["bytes"]) == (3, 2, 0, 13)
+    assert world.medium.channels["robots"].accounts.by_link() == {
+        "sender": [0, 0],
+        "receiver": [1, 2],
+        "sent": [2, 1],
+        "delivered": [2, 0],
+        "dropped": {"out-of-range": [0, 1]},
+        "in_flight": [0, 0],
+    }
 
 
 def test_walls_block_radio_where_the_scenario_says_so() -> None:
@@ -191,7 +200,7 @@ def test_walls_block_radio_where_the_scenario_says_so() -> None:
     )  # fmt: skip
     world = assemble(walled, 1)
     tick(world, n0=Command(outbox=(Transmission("robots", b"x"),)))
-    assert world.medium.accounts.dropped == {"no-line-of-sight": 1}
+    assert world.medium.summary()["dropped"] == {"no-line-of-sight": 1}
 
 
 def test_an_anonymous_channel_hides_the_sender() -> None:

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from typing import Final
 
 from zwerm.errors import ProtocolError, StragglerError
-from zwerm.link import WorldLink
+from zwerm.link import Arrival, Programs, WorldLink
+from zwerm.world.programs import Undertaker
 from zwerm.world.world import World
 
 OnTick = Callable[[World], None]
@@ -23,9 +24,12 @@ INTERRUPTED: Final = "interrupted"
 class LockStep:
     """Drives a world over a link. `lost` counts observations that were never answered by a living node."""
 
-    def __init__(self, world: World, link: WorldLink, on_tick: OnTick | None = None) -> None:
+    def __init__(
+        self, world: World, link: WorldLink, on_tick: OnTick | None = None, programs: Programs | None = None
+    ) -> None:
         self._world = world
         self._link = link
+        self._undertaker = Undertaker(world, link, programs, self._take)
         self._on_tick = on_tick
         self._last_tick = round(world.scenario.time.duration_s / world.scenario.time.dt_s)
         self.reason = ""
@@ -47,6 +51,7 @@ class LockStep:
 
     def _tick(self) -> None:
         world, link = self._world, self._link
+        self._undertaker.carry_out(world.begin())
         nodes, observations = world.observe()
         for node, observation in zip(nodes, observations, strict=True):
             link.send(node, observation)
@@ -67,17 +72,24 @@ class LockStep:
             if arrival is None:
                 self.lost += len(world.awaited())
                 raise StragglerError(world.awaited(), world.tick, straggler_s)
-            if arrival.payload is None:
-                world.crash(arrival.node, "process ended")
+            if self._take(arrival):
+                missing -= 1
+            elif arrival.payload is None:
                 missing = len(world.awaited())
-                continue
-            try:
-                world.accept(arrival.node, arrival.payload)
-            except ProtocolError:
-                # Counted by the world. Time that a babbling node uses up is not given back to it.
+            else:
+                # Time that a babbling node uses up is not given back to it.
                 deadline = deadline or time.monotonic() + straggler_s
-                continue
-            missing -= 1
+
+    def _take(self, arrival: Arrival) -> bool:
+        """Tell the world what has come; return whether it was an answer to this tick's observation."""
+        if arrival.payload is None:
+            self._world.crash(arrival.node, "process ended")
+            return False
+        try:
+            self._world.accept(arrival.node, arrival.payload)
+        except ProtocolError:
+            return False  # counted by the world
+        return True
 
     def _fail(self) -> str:
         node, reason = next(iter(self._world.crashed.items()))

@@ -1,12 +1,16 @@
 """What is measured of a run, by name; units are last in the names."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import shapely
 
 from zwerm.scenario import MetricsTable
 from zwerm.world.arena import Arena
 from zwerm.world.scene import Floats, Ints
-from zwerm.world.world import World
+
+if TYPE_CHECKING:  # the world's faults wait for metrics
+    from zwerm.world.world import World
 
 # Sides of the polygon that stands for a disc, a quarter: the area is off by 2e-5 of the disc's.
 _QUARTER_SIDES = 64
@@ -35,7 +39,7 @@ def area_coverage_fraction(position: Floats, radius_m: float, arena: Arena) -> f
     return float(covered.area / arena.area_m2)
 
 
-def measure(world: World, table: MetricsTable) -> dict[str, float]:
+def measure(world: "World", table: MetricsTable) -> dict[str, float]:
     """Return the metrics of the world as it is now."""
     position = world.scene.position[world.scene.present]
     found = {"robots_in_arena": float(len(position))}

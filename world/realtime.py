@@ -4,19 +4,31 @@ A command that misses its tick is counted and applied when it arrives. A robot t
 time is stopped until it speaks again. Runs in real time are not repeatable, and promise no trace.
 """
 
+import contextlib
 import time
+from collections.abc import Sequence
 
 from zwerm.errors import ProtocolError
-from zwerm.link import WorldLink
+from zwerm.link import Arrival, Programs, WorldLink
+from zwerm.world.lives import Order
 from zwerm.world.lockstep import COMPLETED, FAILED, TIME_LIMIT, OnTick
+from zwerm.world.programs import Undertaker
 from zwerm.world.world import World
 
 
 class RealTime:
     """Drives a world over a link at `factor` times the speed of the wall clock."""
 
-    def __init__(self, world: World, link: WorldLink, factor: float, on_tick: OnTick | None = None) -> None:
+    def __init__(
+        self,
+        world: World,
+        link: WorldLink,
+        factor: float,
+        on_tick: OnTick | None = None,
+        programs: Programs | None = None,
+    ) -> None:
         self._world = world
+        self._undertaker = Undertaker(world, link, programs, self._take)
         self._link = link
         self._dt_s = world.scenario.time.dt_s / factor
         self._on_tick = on_tick
@@ -41,6 +53,7 @@ class RealTime:
         start = time.monotonic()
         while world.tick < self._last_tick:
             deadline = start + (world.tick + 1) * self._dt_s
+            self._bring_about(world.begin())
             nodes, observations = world.observe()
             for node, observation in zip(nodes, observations, strict=True):
                 self._link.send(node, observation)
@@ -61,22 +74,31 @@ class RealTime:
 
     def _listen(self, deadline: float) -> None:
         """Take what arrives until `deadline` on the monotonic clock; once, without waiting, where that has passed."""
-        world = self._world
         if time.monotonic() > deadline:
             self.overruns += 1
         while (arrival := self._link.receive(max(0.0, deadline - time.monotonic()))) is not None:
-            if arrival.payload is None:
-                world.crash(arrival.node, "process ended")
-                continue
-            self._outstanding[arrival.node] = max(0, self._outstanding.get(arrival.node, 0) - 1)
-            self._unanswered_since_s.pop(arrival.node, None)
-            self._stopped.pop(arrival.node, None)
-            try:
-                world.accept(arrival.node, arrival.payload)
-            except ProtocolError:
-                continue  # counted by the world
+            self._take(arrival)
         # A link in memory answers at once and cannot wait: sleep the rest of the tick away.
         time.sleep(max(0.0, deadline - time.monotonic()))
+
+    def _take(self, arrival: Arrival) -> None:
+        """Tell the world what has come."""
+        if arrival.payload is None:
+            self._world.crash(arrival.node, "process ended")
+            return
+        self._outstanding[arrival.node] = max(0, self._outstanding.get(arrival.node, 0) - 1)
+        self._unanswered_since_s.pop(arrival.node, None)
+        self._stopped.pop(arrival.node, None)
+        with contextlib.suppress(ProtocolError):  # counted by the world
+            self._world.accept(arrival.node, arrival.payload)
+
+    def _bring_about(self, orders: Sequence[Order]) -> None:
+        """Do to programs what faults demand; a dead one owes no answers."""
+        self._undertaker.carry_out(orders)
+        for deed, node in orders:
+            if deed == "kill":
+                for kept in (self._outstanding, self._unanswered_since_s, self._stopped):
+                    kept.pop(node, None)
 
     def _stop_the_silent(self) -> None:
         limit_s = self._world.time_s - self._world.scenario.time.deadman_s

@@ -31,12 +31,17 @@ from zwerm.scenario import Scenario
 from zwerm.trace import Trace
 from zwerm.world.arena import Arena
 from zwerm.world.drives import Drives
+from zwerm.world.faults import ticks
+from zwerm.world.faults.generator import scheduled
+from zwerm.world.faults.schedule import Schedule, unite
+from zwerm.world.faults.sensing import SensingFault, read
 from zwerm.world.inflow import Depot, Inflow
-from zwerm.world.medium import Medium
+from zwerm.world.lives import Lives, Order
 from zwerm.world.meters import Meters
 from zwerm.world.physics import Physics
 from zwerm.world.placement import place
-from zwerm.world.scene import Bools, Floats, Scene
+from zwerm.world.radio.medium import Medium
+from zwerm.world.scene import Bools, Floats, Ints, Scene
 from zwerm.world.sensors import Sensor
 from zwerm.world.wakes import SIGNATURES, Wakes
 
@@ -69,11 +74,18 @@ class World:
         self.trace = Trace()
         self.recording: Recording | None = None
         self.coordinator = count if scenario.coordinator is not None else None
-        self.medium = Medium(scenario.radio, count, self.coordinator is not None)
+        self.medium = Medium(scenario, arena, self.draws)
         self._physics = Physics(body, arena.segments, count, scenario.time.dt_s)
         self._drives = Drives(body, count, self.draws)
         nodes = count + (self.coordinator is not None)
         self._wakes = Wakes(nodes, scenario.time.dt_s)
+        self.fault_tables = scheduled(scenario, seed, arena)
+        self.schedule = Schedule(self.fault_tables, scenario)
+        self.lives = Lives(nodes, self.schedule.unborn)
+        for node in self.schedule.unborn:
+            self.medium.switch_off(node, "receiver-down")
+        self._blinding: list[SensingFault] = []
+        self._deadman_at: dict[int, int] = {}  # the tick at which a paused robot's motors stop
         self._sensors = {sensor.field: sensor for sensor in sensors}
         # One column of readings a field, up to the last field that any sensor fills.
         last = max((SENSOR_FIELDS.index(field) for field in self._sensors), default=-1)
@@ -93,12 +105,12 @@ class World:
         self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
         self._depot = Depot(scenario.base, count) if scenario.base else None
         if self.coordinator is not None:
-            self._wakes.admit(self.coordinator)
+            self._admit(self.coordinator)
         if self._depot is not None:
             base, position, heading = self._depot.base
             self._physics.fix(base, position, heading)
             self._set_present(base, True)
-            self._wakes.admit(base)
+            self._admit(base)
         elif self._inflow is None:
             positions, headings = place(scenario.robots.placement, arena, count, body.radius_m, self.draws)
             for robot in range(count):
@@ -108,22 +120,37 @@ class World:
 
     # --- one tick, in order -----------------------------------------------------------------------------------------
 
+    def begin(self) -> list[Order]:
+        """Let the faults of this tick happen, and return what is to be done to programs before anybody is observed."""
+        orders: list[Order] = []
+        if self.schedule.faults and self.schedule.turn(self.tick, self.scene):
+            changes = self.lives.change(*self.schedule.states(self.tick))
+            restarts = [node for node in self.schedule.restarts() if not self.lives.down[node]]
+            orders = [order for order in unite(changes, restarts) if self._happens(order)]
+            self.medium.faults = self.schedule.on_air()
+            self._blinding = self.schedule.on_sensors()
+        for node, tick in list(self._deadman_at.items()):
+            if self.tick >= tick:
+                self.halt(node)
+                del self._deadman_at[node]
+        return orders
+
     def observe(self) -> tuple[list[int], list[bytes]]:
         """Sense, and return the ids of the nodes that are awake, ascending, with each one's encoded observation."""
         scene, tick = self.scene, self.tick
-        receivers = self.medium.waiting()
+        receivers = self.medium.arrive(tick)
         if self._wakes.sleeping:
             self._wakes.note_packets(receivers, tick)
             self._note_changes()
-        awake = self._wakes.awake(tick)
+        awake = self.lives.able(self._wakes.awake(tick), tick)
         nodes: list[int] = awake.tolist()
         # Ids ascend, and the coordinator's, which has no sensors, is the largest.
         robots = awake[:-1] if nodes and nodes[-1] == self.coordinator else awake
-        readings = {field: sensor.read(scene, robots) for field, sensor in self._sensors.items()} if len(robots) else {}
+        readings = {field: self._read(sensor, robots) for field, sensor in self._sensors.items()} if len(robots) else {}
         for field in SIGNATURES:
             if field in readings:
                 self._wakes.remember(field, nodes[: len(robots)], readings[field])
-        inboxes: Any = [self.medium.deliver(node) for node in nodes] if receivers else repeat(())
+        inboxes: Any = self.medium.deliver(nodes, tick) if receivers else repeat(())
         columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]
         ticks, times = repeat(tick, len(robots)), repeat(scene.time_s)
         self._observations = list(map(encode, map(Observation, ticks, times, inboxes, *columns)))
@@ -180,7 +207,7 @@ class World:
                 commands.append((node, answer))
             else:
                 payloads.append(NO_ANSWER)
-        self._apply(commands)
+        self._apply(self.lives.finished(commands, self.tick))
         self.trace.extend(self.tick, self._nodes, self._observations, payloads)
         if self.recording is not None:
             self.recording.exchange(self.tick, self._nodes, self._observations, payloads, self.scene)
@@ -201,13 +228,14 @@ class World:
 
     def crash(self, node: int, reason: str) -> None:
         """Take note that a node is dead: its motors stop, it is never awaited again, its body stays where it is."""
-        if node not in self.crashed:
+        if node not in self.crashed and not self.lives.down[node]:
             self.crashed[node] = reason
             self._retire(node, "receiver-crashed")
 
     def halt(self, node: int) -> None:
         """Stop a robot's motors until its next command."""
-        self._drives.stop(node)
+        if node < self.count:
+            self._drives.stop(node)
 
     @property
     def completed(self) -> bool:
@@ -221,8 +249,14 @@ class World:
             return False
         over = self._done.copy()
         over[self.exited] = True
-        over[list(self.crashed)] = True
-        return bool(over.all()) and len(self.crashed) < self.count
+        dead = sorted({*self.crashed, *self.schedule.gone()})
+        over[dead] = True
+        return bool(over.all()) and len(dead) < self.count
+
+    @property
+    def done_fraction(self) -> float:
+        """The fraction of robots that say that their part is done, in their newest command."""
+        return float(self._done[: self.count].mean())
 
     @property
     def time_s(self) -> float:
@@ -267,7 +301,12 @@ class World:
     def _enter(self, robot: int, position: Floats, heading: float) -> None:
         self._physics.add(robot, position, heading)
         self._set_present(robot, True)
-        self._wakes.admit(robot)
+        self._admit(robot)
+
+    def _admit(self, node: int) -> None:
+        """Let a node be observed from now on, if its program runs."""
+        if not self.lives.down[node]:
+            self._wakes.admit(node)
 
     def _set_present(self, robot: int, present: bool) -> None:
         self._present = self._present.copy()  # scenes of earlier ticks keep theirs
@@ -277,7 +316,34 @@ class World:
         self._wakes.retire(node)
         if node < self.count:
             self._drives.stop(node)
-        self.medium.lose(node, cause)
+        self.medium.switch_off(node, cause)
+
+    def _read(self, sensor: Sensor, robots: Ints) -> Sequence[Any]:
+        return read(sensor, self._blinding, self.scene, robots) if self._blinding else sensor.read(self.scene, robots)
+
+    def _happens(self, order: Order) -> bool:
+        """Let what an order does to a program have its effect on the world; tell whether there is a program to do it to."""
+        deed, node = order
+        if deed == "kill":
+            alive = self.crashed.pop(node, None) is None
+            self.lives.note("crashed", node)
+            self.lives.forget(node)
+            self._retire(node, "receiver-crashed")
+            self._done[node] = False
+            self._deadman_at.pop(node, None)
+            return alive
+        if deed == "start":
+            if node in self.lives.ever.get("crashed", ()):
+                self.lives.note("restarted", node)
+            if node not in self.exited:
+                self.medium.switch_on(node)
+            if node == self.coordinator or self._present[node]:
+                self._admit(node)
+        elif deed == "pause":
+            self._deadman_at[node] = self.tick + ticks(self.scenario.time.deadman_s, self.scenario.time.dt_s)
+        else:
+            self._deadman_at.pop(node, None)
+        return node not in self.crashed
 
     def _note_changes(self) -> None:
         """Wake the sleepers whose contacts or visible ids have changed."""
@@ -286,7 +352,7 @@ class World:
         for field in SIGNATURES:
             sensor = self._sensors.get(field)
             if sensor is not None and len(watchers := self._wakes.watchers(field)):
-                self._wakes.note_readings(field, watchers, sensor.read(self.scene, watchers), self.tick)
+                self._wakes.note_readings(field, watchers, self._read(sensor, watchers), self.tick)
 
     def _apply(self, answers: list[tuple[int, Command | Failure]]) -> None:
         drives: list[tuple[int, BodyVelocity | WheelSpeeds]] = []

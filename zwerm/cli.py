@@ -198,6 +198,38 @@ def robot(
 
 
 @app.command(
+    help="Reduce a failing schedule of faults to a smallest one that still fails, and write it as a scenario.\n\n"
+    "Example: [bold]zwerm shrink my.toml --seed 7 --failing 'cell_coverage_fraction < 0.5'[/bold]"
+)
+def shrink(
+    scenario: ScenarioName,
+    failing: Annotated[str, typer.Option("--failing", metavar="CONDITION", help="Such as 'METRIC < 0.5'.")],
+    seed: Seed = 1,
+    sets: Sets = None,
+    output: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--out", metavar="FILE.toml", help="Where to write it; runs/SCENARIO-shrunk.toml by default."),
+    ] = None,
+) -> None:
+    """Shrink, and say which faults it takes."""
+    from zwerm.shrink import Shrinker, parse_failing, tables_of, with_faults
+    from zwerm.toml import write_toml
+
+    with _mistakes_in_one_line():
+        loaded = load(scenario, tuple(sets or ()))
+        path = output or Path("runs") / f"{loaded.name}-shrunk.toml"
+        with RunProgress(err, loaded.name) as progress:
+            shrinker = Shrinker(loaded, seed, parse_failing(failing), progress.shrunk)
+            faults = shrinker.shrink()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(write_toml(tables_of(with_faults(loaded, faults))), encoding="utf-8")
+    out.print(
+        f"{len(faults)} faults are enough, found in {shrinker.tried} runs: {path}", highlight=False, soft_wrap=True
+    )
+    out.print(write_toml({"faults": list(faults)}), markup=False, highlight=False, end="")
+
+
+@app.command(
     help="Run a study: scenarios over a grid of settings and many seeds, set beside a paper's numbers.\n\n"
     "Trials run inline, many at a time, and every row is kept as soon as it is there: after Ctrl-C the same command goes "
     "on where it was. Makes a Parquet file, one row a trial, and a picture of the same name.\n\n"
@@ -258,6 +290,12 @@ def _report(result: RunResult, picture: Path | None, animate: Path | None, as_js
         picture = Path("runs") / f"{result.scenario.name}-seed{result.seed}.png"
     if picture is not None:
         drawn.append(result.picture(picture))
+    if result.scenario.random_faults is not None and not as_json:
+        from zwerm.toml import write_toml
+
+        drawn.append(Path("runs") / f"{result.scenario.name}-seed{result.seed}-faults.toml")
+        drawn[-1].parent.mkdir(exist_ok=True)
+        drawn[-1].write_text(write_toml({"faults": result.faults}), encoding="utf-8")
     if animate is not None:
         with RunProgress(err, "animation", quiet=as_json) as progress:
             drawn.append(result.animate(animate, progress.ticked))

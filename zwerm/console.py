@@ -46,11 +46,15 @@ class RunProgress:
         """Show that `tick` of `ticks` are done."""
         self._show(self._name, "ticks", tick, ticks)
 
-    def _show(self, title: str, unit: str, done: int, total: int) -> None:
+    def shrunk(self, tried: int, faults: int) -> None:
+        """Show how many runs were tried, and how many faults the smallest failing schedule has."""
+        self._show(f"{self._name}: shrinking", f"runs, {faults} faults still fail", tried, None)
+
+    def _show(self, title: str, unit: str, done: int, total: int | None) -> None:
         task = self._tasks.get(title)
         if task is None:
             task = self._tasks[title] = self._progress.add_task(title, total=total, unit=unit)
-        self._progress.update(task, completed=done)
+        self._progress.update(task, completed=done, unit=unit)
 
 
 def print_scenarios(console: Console, scenarios: Sequence[Scenario]) -> None:
@@ -81,13 +85,18 @@ def print_result(console: Console, result: RunResult, drawn: Sequence[Path]) -> 
             "radio packets",
             f"{radio['sent']} sent = {radio['delivered']} delivered + {radio['in_flight']} in flight + dropped: {lost}",
         )
+        if radio["copies"] or radio["damaged"]:
+            table.add_row("of them", f"{radio['copies']} copies made on the way, {radio['damaged']} delivered damaged")
     table.add_row("lost by the middleware", str(result.middleware_lost))
     if result.refused:
         table.add_row("refused", ", ".join(f"{count} {reason}" for reason, count in sorted(result.refused.items())))
     if result.crashed:
         table.add_row("crashed", ", ".join(map(str, result.crashed)))
+    for what, nodes in (("restarted", result.restarted), *result.hindered.items()):
+        if nodes:
+            table.add_row(what, ", ".join(map(str, nodes)))
     table.add_row("wall time", f"{result.wall_s:.1f} s, {rate:,.0f} robot-ticks/s, {result.runner}")
     table.add_row("trace", result.trace)
     for path in drawn:
-        table.add_row("picture" if path.suffix == ".png" else "animation", str(path))
+        table.add_row({".png": "picture", ".toml": "faults drawn"}.get(path.suffix, "animation"), str(path))
     console.print(table)

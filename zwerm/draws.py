@@ -27,6 +27,23 @@ def splitmix64(state: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return z ^ (z >> _S31)
 
 
+def key_part(part: ArrayLike) -> NDArray[np.uint64]:
+    """Return what one part of a key (non-negative integers) is mixed in as."""
+    return splitmix64(np.atleast_1d(np.asarray(part, dtype=np.uint64)) * _GOLDEN)
+
+
+def unit(words: NDArray[np.uint64]) -> NDArray[np.float64]:
+    """Return the 64-bit words as numbers in [0, 1)."""
+    return (words >> _S11).astype(np.float64) * _TO_UNIT
+
+
+def gaussian(words: NDArray[np.uint64]) -> NDArray[np.float64]:
+    """Return the 64-bit words as standard normal numbers (Box and Muller 1958)."""
+    u = ((words >> _S11) + _ONE) * _TO_UNIT  # (0, 1], so that the logarithm is finite
+    draw: NDArray[np.float64] = np.sqrt(-2.0 * np.log(u)) * np.cos(2.0 * np.pi * unit(splitmix64(words)))
+    return draw
+
+
 class Draws:
     """All the randomness of one run."""
 
@@ -38,28 +55,32 @@ class Draws:
         key = f"{self.seed}/{purpose}/{'/'.join(map(str, ids))}"
         return blake2b(key.encode(), digest_size=16, person=b"zwerm-draws").digest()
 
-    def bits(self, purpose: str, *ids: ArrayLike) -> NDArray[np.uint64]:
-        """Return one 64-bit word per broadcast element of `ids` (non-negative integers)."""
+    def states(self, purpose: str, *ids: ArrayLike) -> NDArray[np.uint64]:
+        """Return the states of the chain after `ids`, at least one-dimensional: where many draws share the head of a key.
+
+        `splitmix64(splitmix64(states(purpose, a) ^ key_part(b)))` is `bits(purpose, a, b)`.
+        """
         root = self._roots.get(purpose)
         if root is None:
             root = np.frombuffer(self._digest(purpose)[:8], dtype="<u8").astype(np.uint64)
             self._roots[purpose] = root
         state = root
         for part in ids:
-            state = splitmix64(state ^ splitmix64(np.atleast_1d(np.asarray(part, dtype=np.uint64)) * _GOLDEN))
+            state = splitmix64(state ^ key_part(part))
+        return state
+
+    def bits(self, purpose: str, *ids: ArrayLike) -> NDArray[np.uint64]:
+        """Return one 64-bit word per broadcast element of `ids` (non-negative integers)."""
         shape = np.broadcast_shapes(*(np.shape(part) for part in ids))
-        return splitmix64(state).reshape(shape)
+        return splitmix64(self.states(purpose, *ids)).reshape(shape)
 
     def uniform(self, purpose: str, *ids: ArrayLike) -> NDArray[np.float64]:
         """Return draws in [0, 1), one per broadcast element of `ids`."""
-        return (self.bits(purpose, *ids) >> _S11).astype(np.float64) * _TO_UNIT
+        return unit(self.bits(purpose, *ids))
 
     def normal(self, purpose: str, *ids: ArrayLike) -> NDArray[np.float64]:
-        """Return standard normal draws, one per broadcast element of `ids` (Box and Muller 1958)."""
-        word = np.atleast_1d(self.bits(purpose, *ids))
-        u = ((word >> _S11) + _ONE) * _TO_UNIT  # (0, 1], so that the logarithm is finite
-        v = (splitmix64(word) >> _S11) * _TO_UNIT
-        draw: NDArray[np.float64] = np.sqrt(-2.0 * np.log(u)) * np.cos(2.0 * np.pi * v)
+        """Return standard normal draws, one per broadcast element of `ids`."""
+        draw = gaussian(np.atleast_1d(self.bits(purpose, *ids)))
         return draw.reshape(np.broadcast_shapes(*(np.shape(part) for part in ids)))
 
     def stream_key(self, purpose: str, *ids: int) -> bytes:

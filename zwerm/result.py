@@ -34,6 +34,8 @@ class RunResult:
     arena: Arena
     history: History
     cell_counts: Ints | None = None
+    hindered: dict[str, list[int]] = field(default_factory=dict)
+    faults: list[dict[str, Any]] = field(default_factory=list)
     series: dict[str, list[float]] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     tracebacks: dict[int, str] = field(default_factory=dict)
@@ -59,7 +61,8 @@ class RunResult:
             "metrics": self.metrics,
             "radio": self.radio,
             "middleware_lost": self.middleware_lost,
-            "nodes": {"crashed": self.crashed, "restarted": self.restarted},
+            "nodes": {"crashed": self.crashed, "restarted": self.restarted, **self.hindered},
+            "faults": self.faults,
         }
 
     def picture(self, path: str | Path) -> Path:

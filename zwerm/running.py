@@ -2,22 +2,24 @@
 
 import secrets
 import time
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, Protocol
 
 from zwerm.agents.node import Node
 from zwerm.assembly import assemble
-from zwerm.deploy.cast import cast
+from zwerm.deploy.cast import cast, recast
 from zwerm.deploy.swarm import LocalSwarm, RemoteSwarm
 from zwerm.errors import ScenarioError, StragglerError
-from zwerm.link import WorldLink
+from zwerm.link import Programs, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.result import RunResult
 from zwerm.scenario import Scenario, load
 from zwerm.world.history import History
 from zwerm.world.lockstep import FAILED, INTERRUPTED, LockStep
 from zwerm.world.metrics import cell_counts, measure
+from zwerm.world.radio.report import radio_metrics, radio_report
 from zwerm.world.realtime import RealTime
 from zwerm.world.world import World
 
@@ -77,10 +79,21 @@ def run(
     if runner == "inline":
         nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
         watcher.joined(len(nodes), len(nodes))
-        link = MemoryLink({node: each.answer for node, each in nodes.items()})
-        return drive(world, link, seed, runner, realtime, watcher, record)
-    with LocalSwarm(new_run_id(), members, progress=watcher.joined, paced=realtime is not None) as swarm:
-        return drive(world, swarm.link, seed, runner, realtime, watcher, record)
+        link = MemoryLink(
+            {node: each.answer for node, each in nodes.items()},
+            lambda node, incarnation: Node(*recast(scenario, seed, node, incarnation)).answer,
+            world.schedule.unborn,
+        )
+        return drive(world, link, seed, runner, realtime, watcher, record, link)
+    with LocalSwarm(
+        new_run_id(),
+        members,
+        progress=watcher.joined,
+        paced=realtime is not None,
+        unborn=world.schedule.unborn,
+        recast=lambda node, incarnation: recast(scenario, seed, node, incarnation),
+    ) as swarm:
+        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm)
 
 
 def serve(
@@ -98,6 +111,10 @@ def serve(
     Waits `deadline_s` for them to connect to one of the Zenoh endpoints `listen`. Raises ScenarioError and LinkError.
     """
     world = assemble(scenario, seed)
+    if world.schedule.touches_programs:
+        raise ScenarioError(
+            [f"{scenario.place}: faults: robots that run elsewhere cannot be killed, started or paused"]
+        )
     watcher = watcher or Nobody()
     with RemoteSwarm(
         new_run_id(),
@@ -124,19 +141,29 @@ def drive(
     realtime: float | None = None,
     watcher: Watcher | None = None,
     record: Path | None = None,
+    programs: Programs | None = None,
 ) -> RunResult:
-    """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`."""
+    """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`.
+
+    `programs` does to nodes what the scenario's faults demand.
+    """
     if record is None:
-        return _drive(world, link, seed, runner, realtime, watcher or Nobody())
+        return _drive(world, link, seed, runner, realtime, watcher or Nobody(), programs)
     from zwerm.world.recording import Recording
 
     about = {"scenario": world.scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
     with Recording(record, world.scenario.time.dt_s, about) as world.recording:
-        return _drive(world, link, seed, runner, realtime, watcher or Nobody())
+        return _drive(world, link, seed, runner, realtime, watcher or Nobody(), programs)
 
 
 def _drive(
-    world: World, link: WorldLink, seed: int, runner: str, realtime: float | None, watcher: Watcher
+    world: World,
+    link: WorldLink,
+    seed: int,
+    runner: str,
+    realtime: float | None,
+    watcher: Watcher,
+    programs: Programs | None,
 ) -> RunResult:
     table = world.scenario.time
     ticks = round(table.duration_s / table.dt_s)
@@ -151,7 +178,11 @@ def _drive(
             history.append(world.scene)
             watcher.ticked(world.tick, ticks)
 
-    driver = LockStep(world, link, on_tick) if realtime is None else RealTime(world, link, realtime, on_tick)
+    driver = (
+        LockStep(world, link, on_tick, programs)
+        if realtime is None
+        else RealTime(world, link, realtime, on_tick, programs)
+    )
     start = time.monotonic()
     try:
         outcome, reason = driver.run(), driver.reason
@@ -162,7 +193,7 @@ def _drive(
     wall_s = time.monotonic() - start
     if world.tick % stride:
         history.append(world.scene)
-    return _result(world, seed, runner, outcome, reason, wall_s, driver, history)
+    return _result(world, seed, runner, outcome, reason, wall_s, driver, history, link)
 
 
 def _result(
@@ -174,10 +205,14 @@ def _result(
     wall_s: float,
     driver: LockStep | RealTime,
     history: History,
+    link: WorldLink,
 ) -> RunResult:
-    scenario, accounts = world.scenario, world.medium.accounts
+    scenario = world.scenario
     world.meters.look(world.scene, now=True)
     metrics = measure(world, scenario.metrics) | world.meters.metrics()
+    if scenario.radio is not None or scenario.coordinator is not None:
+        metrics["robots_done_fraction"] = world.done_fraction
+        metrics |= radio_metrics(world.medium, world.count, world.tick)
     metrics["refused_messages"] = float(world.refused.total())
     if isinstance(driver, RealTime):
         metrics["late_commands"] = float(world.late_commands)
@@ -200,20 +235,16 @@ def _result(
         robots=world.count,
         robot_ticks=world.robot_ticks,
         metrics=metrics,
-        radio={
-            "sent": accounts.sent,
-            "delivered": accounts.delivered,
-            "dropped": dict(sorted(accounts.dropped.items())),
-            "in_flight": accounts.in_flight,
-            "bytes": accounts.bytes,
-        },
+        radio=radio_report(world.medium, world.tick),
         middleware_lost=driver.lost,
-        crashed=sorted(world.crashed),
-        restarted=[],
+        crashed=sorted({*world.crashed, *world.lives.ever.get("crashed", ())}),
+        restarted=sorted(world.lives.ever.get("restarted", ())),
+        hindered={what: sorted(world.lives.ever.get(what, ())) for what in ("paused", "slow", "late")},
+        faults=[table.model_dump() for _, table in world.fault_tables],
         arena=world.arena,
         history=history,
         cell_counts=counts,
-        refused=dict(world.refused),
+        refused=dict(world.refused + Counter(getattr(link, "refused", {}))),
         series=world.meters.series(),
         tracebacks={node: failure.traceback for node, failure in world.failures.items()},
     )

@@ -5,16 +5,15 @@ are reported at once, each as `file: path: rule, got value`. What a sensor or a 
 to type; the tables here carry them as they are.
 """
 
-import json
 import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
-from pydantic_core import ErrorDetails
 
 from zwerm.errors import ScenarioError
+from zwerm.mistakes import mistakes as mistakes  # for those who type tables of their own
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -161,12 +160,46 @@ class CoordinatorTable(Table):
     parameters: dict[str, Any] = {}
 
 
-class RadioTable(Table):
+class ChannelTable(Table):
+    """What happens to packets on a channel: `loss` is independent loss, `models` judge in order. `check` audits every tick.
+
+    An `anonymous` channel tells no receiver who sent a packet.
+    """
+
+    loss: Fraction = 0.0
+    models: list[OpenTable] = []
+    anonymous: bool = False
+    check: bool = False
+
+
+class RadioTable(ChannelTable):
     """The radio between robots, channel `robots`: who hears whom. Without this table there is none."""
 
     range_m: Positive | None = None
     line_of_sight: bool = False
-    anonymous: bool = False
+
+
+Rate = NonNegative
+
+
+class RandomFaultsTable(Table):
+    """Faults at random times: for each kind how many to expect an hour, over the whole swarm. Each lasts `mean_s` on average.
+
+    The schedule is drawn from `seed`, or else from the run's; the run's result holds it as `[[faults]]` tables.
+    """
+
+    seed: Annotated[int, Field(ge=0)] | None = None
+    mean_s: Positive = 10.0
+    crash_per_h: Rate = 0.0
+    pause_per_h: Rate = 0.0
+    slow_per_h: Rate = 0.0
+    partition_per_h: Rate = 0.0
+    jam_per_h: Rate = 0.0
+    blackout_per_h: Rate = 0.0
+    cut_per_h: Rate = 0.0
+    camera_blackout_per_h: Rate = 0.0
+    dead_beacon_per_h: Rate = 0.0
+    stuck_touch_per_h: Rate = 0.0
 
 
 class VoronoiMetricsTable(Table):
@@ -207,6 +240,9 @@ class Scenario(Table):
     field: OpenTable | None = None
     landmarks: list[Point] = []
     radio: RadioTable | None = None
+    uplink: ChannelTable | None = None
+    faults: list[OpenTable] = []
+    random_faults: RandomFaultsTable | None = None
     metrics: MetricsTable = MetricsTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")
@@ -319,60 +355,3 @@ def validate(tables: dict[str, Any], place: str, folder: Path) -> Scenario:
         raise ScenarioError(mistakes(error, place)) from None
     scenario._folder, scenario._place = folder, place
     return scenario
-
-
-def mistakes(error: ValidationError, place: str, prefix: str = "") -> list[str]:
-    """Return one line for every mistake in `error`: `place: path: rule, got value`."""
-    lines = {}
-    for each in error.errors(include_url=False):
-        where, rule, got = _mistake(each)
-        path = prefix + ".".join(map(str, where))
-        lines[f"{place}: {path}" if path else place] = rule if got is None else f"{rule}, got {got}"
-    return [f"{where}: {what}" for where, what in lines.items()]
-
-
-_RULES = {
-    "bool_type": "expected true or false",
-    "dict_type": "expected a table",
-    "finite_number": "expected a finite number",
-    "float_type": "expected a number",
-    "greater_than": "expected > {gt:g}",
-    "greater_than_equal": "expected >= {ge:g}",
-    "int_type": "expected an integer",
-    "less_than": "expected < {lt:g}",
-    "less_than_equal": "expected <= {le:g}",
-    "list_type": "expected an array",
-    "literal_error": "expected {expected}",
-    "model_type": "expected a table",
-    "string_pattern_mismatch": "expected a match of {pattern}",
-    "string_type": "expected a string",
-    "too_long": "expected {max_length} items at most",
-    "too_short": "expected {min_length} items at least",
-    "tuple_type": "expected an array",
-}
-_GOT_LENGTH_MAX = 60
-
-
-def _mistake(each: ErrorDetails) -> tuple[tuple[int | str, ...], str, str | None]:
-    """Return where the mistake is, the rule, and the value as the file has it, or None where that says nothing."""
-    where, kind, context, got = each["loc"], each["type"], each.get("ctx", {}), each["input"]
-    if kind == "extra_forbidden":
-        return where, "unknown key", None
-    if kind == "missing" and isinstance(where[-1], int):
-        return where[:-1], f"expected {where[-1] + 1} items", _shown(got)
-    if kind == "missing":
-        return where, "required, and missing", None
-    if kind == "too_long" and context["field_type"] == "Tuple":
-        rule = f"expected {context['max_length']} items"
-    elif kind in _RULES:
-        rule = _RULES[kind].format(**context)
-    else:
-        rule = re.sub(r"^(Value error, |Input should be |Input )", "", each["msg"])
-        rule = rule if rule.startswith("expected") else f"expected {rule}"
-    return where, rule, None if isinstance(got, dict) else _shown(got)
-
-
-def _shown(value: Any) -> str:
-    """Return the value as TOML would have it, cut where it is long."""
-    text = json.dumps(value, ensure_ascii=False, default=str)
-    return text if len(text) <= _GOT_LENGTH_MAX else text[:_GOT_LENGTH_MAX] + "..."

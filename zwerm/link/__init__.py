@@ -28,6 +28,22 @@ class WorldLink(Protocol):
         """Release all that the link holds; idempotent."""
 
 
+class Programs(Protocol):
+    """Whoever runs the nodes' programs, and can do to them what faults demand."""
+
+    def kill(self, node: int) -> None:
+        """End a node's program without a word; the link then reports the node lost."""
+
+    def start(self, node: int) -> None:
+        """Start a node's program, its next incarnation if it ran before; return when it has joined."""
+
+    def pause(self, node: int) -> None:
+        """Stop a node's program where it is."""
+
+    def resume(self, node: int) -> None:
+        """Let it go on."""
+
+
 class NodeLink(Protocol):
     """A node's end of the link to the world."""
 

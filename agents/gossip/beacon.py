@@ -1,0 +1,58 @@
+"""The beacon: every robot broadcasts a numbered packet at even intervals, and counts what it hears of others.
+
+For statistics of links. A receiver that hears number 7 after number 4 knows that two are missing, or late.
+"""
+
+from struct import Struct as Layout
+from typing import Annotated, Any, ClassVar, Final
+
+from msgspec import Meta, Struct
+
+from zwerm.agents.contract import Controller, Setup
+from zwerm.agents.gossip.frame import HEAD_BYTES, seal, unseal
+from zwerm.errors import ProtocolError
+from zwerm.protocol import Command, Observation, Transmission
+
+_LAYOUT: Final = Layout(">II")
+
+
+class BeaconTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A beacon every `every_ticks`, each of `payload_bytes` in all."""
+
+    every_ticks: Annotated[int, Meta(ge=1)] = 1
+    payload_bytes: Annotated[int, Meta(ge=HEAD_BYTES + _LAYOUT.size, le=1_024)] = 16
+
+
+class Beacon(Controller):
+    """Broadcasts (id, number); `heard` and `missed` count packets by sender."""
+
+    Parameters: ClassVar[type[Struct]] = BeaconTable
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        self.heard: dict[int, int] = {}
+        self.missed: dict[int, int] = {}
+        self.refused = 0
+        self._next: dict[int, int] = {}
+        self._number = 0
+
+    def step(self, observation: Observation) -> Command:
+        """Count what was heard, and send the next beacon if it is time."""
+        for packet in observation.inbox:
+            try:
+                sender, number = _LAYOUT.unpack_from(unseal(packet.payload))
+            except ProtocolError:
+                self.refused += 1
+                continue
+            self.heard[sender] = self.heard.get(sender, 0) + 1
+            expected = self._next.get(sender, number)
+            if number >= expected:
+                self.missed[sender] = self.missed.get(sender, 0) + number - expected
+                self._next[sender] = number + 1
+        table: Any = self.parameters
+        if observation.tick % table.every_ticks:
+            return Command()
+        numbered = _LAYOUT.pack(self.setup.node, self._number)
+        self._number += 1
+        frame = seal(numbered.ljust(table.payload_bytes - HEAD_BYTES, b"\0"))
+        return Command(outbox=tuple([Transmission(channel, frame) for channel in self.setup.channels]))

@@ -1,0 +1,53 @@
+"""Gossip: every robot learns the largest id in the swarm by telling its neighbours the largest it has heard of.
+
+The maximum is idempotent, commutative and associative, so lost, copied, late and reordered packets cost time and never the
+result; damaged ones are refused by their checksum. A restarted robot knows only its own id again, and learns anew.
+"""
+
+from struct import Struct as Layout
+from typing import Annotated, Any, ClassVar, Final
+
+from msgspec import Meta, Struct
+
+from zwerm.agents.contract import Controller, Setup
+from zwerm.agents.gossip.frame import seal, unseal
+from zwerm.errors import ProtocolError
+from zwerm.protocol import Command, Observation, Transmission
+
+_LAYOUT: Final = Layout(">I")
+
+
+class GossipTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A broadcast every `every_ticks`; a robot that knows of `done_at`, or a larger id, says that it is done."""
+
+    every_ticks: Annotated[int, Meta(ge=1)] = 1
+    done_at: Annotated[int, Meta(ge=0)] | None = None
+
+
+class GossipMax(Controller):
+    """Broadcasts the largest id heard of, its own at first."""
+
+    Parameters: ClassVar[type[Struct]] = GossipTable
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        self.largest = setup.node
+        self.refused = 0
+        self._channels = setup.channels
+
+    def step(self, observation: Observation) -> Command:
+        """Take in what was heard, and pass it on."""
+        for packet in observation.inbox:
+            try:
+                (heard,) = _LAYOUT.unpack(unseal(packet.payload))
+            except ProtocolError:
+                self.refused += 1
+                continue
+            if heard > self.largest:
+                self.largest = heard
+        table: Any = self.parameters
+        outbox: tuple[Transmission, ...] = ()
+        if observation.tick % table.every_ticks == 0:
+            frame = seal(_LAYOUT.pack(self.largest))
+            outbox = tuple([Transmission(channel, frame) for channel in self._channels])
+        return Command(outbox=outbox, done=table.done_at is not None and self.largest >= table.done_at)

@@ -1,0 +1,57 @@
+"""Controllers for tests of faults: what they say shows what happened to them."""
+
+from zlib import crc32
+
+from zwerm.agents.contract import Controller, Setup
+from zwerm.protocol import BodyVelocity, Command, Observation, Transmission, Wake, WheelSpeeds
+
+
+class Counts(Controller):
+    """Drives on, and tells everyone how many observations it has had, and a random number of its own."""
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        self.steps = 0
+
+    def step(self, observation: Observation) -> Command:
+        self.steps += 1
+        word = f"{self.setup.node} {self.steps} {self.random.random():.6f}".encode()
+        return Command(
+            drive=BodyVelocity(0.01) if self.setup.body else None,
+            outbox=tuple([Transmission(channel, word) for channel in self.setup.channels]),
+        )
+
+
+class Raises(Controller):
+    """Divides by zero at tick 3 of its life."""
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        self.steps = 0
+
+    def step(self, observation: Observation) -> Command:
+        self.steps += 1
+        if self.setup.node == 1 and self.steps == 3:
+            raise ZeroDivisionError
+        return Command()
+
+
+class Babbles(Controller):
+    """Lets all that it hears, sees and draws into what it says and does; sleeps now and then."""
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        self.sum = setup.node
+
+    def step(self, observation: Observation) -> Command:
+        seen = repr((observation.bearings, observation.touch, observation.line_of_sight)).encode()
+        for payload in (*(packet.payload for packet in observation.inbox), seen):
+            self.sum = crc32(payload, self.sum)
+        number = self.random.random()
+        word = f"{self.sum} {number}".encode()
+        share = self.sum / 2**32
+        return Command(
+            drive=WheelSpeeds(0.1 * share, 0.1 * number) if self.setup.body else None,
+            outbox=tuple([Transmission(channel, word) for channel in self.setup.channels]),
+            wake=Wake(at_s=observation.time_s + 0.4, on_packet=self.sum % 2 == 0) if self.sum % 5 == 0 else None,
+        )

@@ -1,0 +1,181 @@
+"""A channel of the radio: who may send to whom, and the models that judge each packet, in order.
+
+What a node hears of a packet's sender is the channel's to say. Whatever else stands in a packet's way for a while (a fault,
+a receiver that is switched off) judges before the models.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwerm.draws import key_part
+from zwerm.protocol import Packet, Transmission
+from zwerm.world.radio import Air, LinkModel, Packets, Verdict
+from zwerm.world.radio.accounts import Accounts
+from zwerm.world.radio.links import Links
+from zwerm.world.radio.mail import Mail, Parcel
+from zwerm.world.scene import Ints, Scene
+
+Outboxes = Sequence[tuple[int, Sequence[Transmission]]]
+
+# A packet's key: its tick, which of its sender's at that tick it is, and which copy of it.
+_TICK_BITS: Final = np.uint64(32)
+_COPY_BITS: Final = np.uint64(16)
+
+
+class Channel:
+    """A named channel among `members`, ids below `nodes`; with a `center`, everyone else speaks with that node only."""
+
+    def __init__(
+        self,
+        name: str,
+        members: range,
+        center: int | None,
+        nodes: int,
+        dt_s: float,
+        models: Sequence[LinkModel] = (),
+        anonymous: bool = False,
+        links: Links | None = None,
+    ) -> None:
+        self.name = name
+        self.models = list(models)
+        self.links = links or Links(nodes)
+        self.accounts = Accounts(self.links, nodes, dt_s)
+        self.mail = Mail(nodes)
+        self._members = members
+        self._center = center
+        self._dt_s = dt_s
+        self._anonymous = anonymous
+        self._audiences: dict[int, Ints] = {}
+
+    def carries(self, sender: int, to: int) -> bool:
+        """Tell whether `sender` may address `to` at all."""
+        if to == sender or to not in self._members:
+            return False
+        return self._center is None or self._center in (sender, to)
+
+    def send(self, scene: Scene, outboxes: Outboxes, before: Sequence[LinkModel] = ()) -> None:
+        """Take what the nodes sent on this channel at this tick, (node, its outbox) in id order, and judge every packet."""
+        name, books = self.name, self.accounts
+        senders: list[int] = []
+        ranks: list[int] = []
+        payloads: list[bytes] = []
+        links: list[Ints] = []
+        sent: dict[int, int] = {}  # a node that answered late is here twice
+        for node, outbox in outboxes:
+            rank = sent.get(node, 0)
+            for message in outbox:
+                if message.channel == name:
+                    senders.append(node)
+                    ranks.append(rank)
+                    payloads.append(message.payload)
+                    links.append(self._audience(node) if message.to is None else self._link(node, message.to))
+                    books.node_bytes[node] += len(message.payload)
+                    rank += 1
+            books.node_messages[node] += rank - sent.get(node, 0)
+            sent[node] = rank
+        if not senders:
+            return
+        audience = np.fromiter(map(len, links), np.int64, len(links))
+        air = Air(scene, self._dt_s, np.array(senders), np.array(ranks), payloads)
+        link = np.concatenate(links)
+        transmission = np.repeat(np.arange(len(senders)), audience)
+        key = key_part(_stamp(air))[transmission]
+        books.send(link)
+        books.bytes += int(audience @ air.sizes())
+        packets = Packets(self.links, link, transmission, transmission, key)
+        for model in (*before, *self.models):
+            if not len(packets):
+                return
+            packets = self._carry_out(model.judge(air, packets), model.cause, air, packets)
+        self._post(air, packets)
+
+    def _carry_out(self, verdict: Verdict, cause: str, air: Air, packets: Packets) -> Packets:
+        """Return what is left of `packets` after a verdict."""
+        drop, after_s, copies, payload, attenuation_db = verdict
+        if payload is not None:
+            packets.payload = payload
+        if after_s is not None:
+            packets.delay_s = after_s if packets.delay_s is None else packets.delay_s + after_s
+        if attenuation_db is not None:
+            before_db = packets.attenuation_db
+            packets.attenuation_db = attenuation_db if before_db is None else before_db + attenuation_db
+        if copies is not None and copies.any():
+            packets = self._copied(air, packets, copies)
+        if drop is not None and drop.any():
+            self.accounts.drop(packets.link[drop], cause)
+            packets = packets.take(np.flatnonzero(~drop))
+        return packets
+
+    def _copied(self, air: Air, packets: Packets, copies: Ints) -> Packets:
+        """Return `packets` with `copies` (k,) of each right after it; a copy has a key of its own."""
+        original = np.repeat(np.arange(len(packets)), copies + 1)
+        number = np.arange(len(original)) - np.repeat(np.cumsum(copies + 1) - copies - 1, copies + 1)
+        made = packets.take(original)
+        # Copies of copies count on from the largest number that there is.
+        made.copy = number if made.copy is None else made.copy * (int(copies.max()) + 1) + number
+        fresh = number > 0
+        stamp = _stamp(air)[made.transmission] | made.copy.astype(np.uint64)
+        made.key = np.where(fresh, key_part(stamp), made.key)
+        self.accounts.send(made.link[fresh])
+        self.accounts.copies += int(np.count_nonzero(fresh))
+        self.accounts.bytes += int(air.sizes()[made.payload[fresh]].sum())
+        return made
+
+    def _post(self, air: Air, packets: Packets) -> None:
+        """Send on their way what nothing has dropped."""
+        if not len(packets):
+            return
+        sent = air.payloads
+        objects: NDArray[np.object_] = np.empty(len(sent), dtype=np.object_)
+        name, anonymous = self.name, self._anonymous
+        whose = air.sender.tolist()
+        whole = len(whose)
+        objects[:whole] = [
+            Packet(name, payload, None if anonymous else sender)
+            for payload, sender in zip(sent[:whole], whose, strict=True)
+        ]
+        sender = packets.sender
+        if len(sent) > whole:
+            damaged = np.flatnonzero(packets.payload >= whole)
+            for row in damaged.tolist():
+                which = int(packets.payload[row])
+                objects[which] = Packet(name, sent[which], None if anonymous else int(sender[row]))
+            self.accounts.damaged += len(damaged)
+        delay_s = packets.delay_s
+        tick, now_s = air.tick, air.scene.time_s
+        due: Ints | int = tick + 1
+        arrival_s = np.full(len(packets), now_s)
+        if delay_s is not None:
+            arrival_s = now_s + delay_s
+            due = tick + np.maximum(1, np.ceil(delay_s / self._dt_s - 1e-9)).astype(np.int64)
+        parcel = Parcel(
+            sender,
+            packets.receiver,
+            packets.link,
+            np.full(len(packets), tick),
+            arrival_s,
+            objects[packets.payload],
+        )
+        self.mail.post(parcel, due)
+
+    def _audience(self, sender: int) -> Ints:
+        """Return the links of a broadcast of `sender`: to everyone, or to the center where there is one."""
+        links = self._audiences.get(sender)
+        if links is None:
+            if self._center is not None and sender != self._center:
+                receivers = np.array([self._center])
+            else:
+                receivers = np.array([node for node in self._members if node != sender], dtype=np.int64)
+            links = self._audiences[sender] = self.links.rows(np.full(len(receivers), sender), receivers)
+        return links
+
+    def _link(self, sender: int, to: int) -> Ints:
+        return self.links.rows(np.array([sender]), np.array([to]))
+
+
+def _stamp(air: Air) -> NDArray[np.uint64]:
+    """Return what keys each transmission (t,) of a sender: when it was sent, and which of that tick's it is."""
+    return np.uint64(air.tick) << _TICK_BITS | air.rank.astype(np.uint64) << _COPY_BITS

@@ -1,0 +1,1 @@
+"""The models of the radio, one file each; `zwerm.world.radio.registry` names them."""

@@ -1,0 +1,57 @@
+"""What a run says of its radio: the books in all, by channel and by link, messages by node, and the age of information."""
+
+from typing import Any, Final
+
+import numpy as np
+
+from zwerm.world.radio.medium import Medium
+
+# The books of more links than this are not in the JSON object: it would be all that is in it.
+LINKS_IN_JSON_MAX: Final = 10_000
+
+
+def radio_report(medium: Medium, tick: int) -> dict[str, Any]:
+    """Return the books ready for a JSON encoder: the summary over all channels, and each channel by itself."""
+    return {**medium.summary(), "channels": {name: _channel(medium, name, tick) for name in medium.channels}}
+
+
+def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
+    channel = medium.channels[name]
+    books = channel.accounts
+    age = books.ages_s(tick)
+    links = None
+    if channel.links.count <= LINKS_IN_JSON_MAX:
+        links = books.by_link()
+    return {
+        "sent": int(books.sent().sum()),
+        "delivered": int(books.delivered().sum()),
+        "dropped": {cause: int(column.sum()) for cause, column in books.dropped().items() if column.any()},
+        "in_flight": int(books.in_flight().sum()),
+        "messages": books.node_messages.tolist(),
+        "message_bytes": books.node_bytes.tolist(),
+        "age_mean_s": None if age is None else age[0],
+        "age_max_s": None if age is None else age[1],
+        "links": links,
+    }
+
+
+def radio_metrics(medium: Medium, robots: int, tick: int) -> dict[str, float]:
+    """Return what may be measured of a radio, over all channels; nothing where nobody sent anything."""
+    books = [channel.accounts for channel in medium.channels.values()]
+    sent = sum(int(each.sent().sum()) for each in books)
+    if not sent:
+        return {}
+    messages = np.sum([each.node_messages[:robots] for each in books], axis=0)
+    message_bytes = np.sum([each.node_bytes[:robots] for each in books], axis=0)
+    found = {
+        "delivered_fraction": sum(int(each.delivered().sum()) for each in books) / sent,
+        "messages_per_robot_mean": float(messages.mean()),
+        "messages_per_robot_max": float(messages.max()),
+        "bytes_per_robot_mean": float(message_bytes.mean()),
+        "bytes_per_robot_max": float(message_bytes.max()),
+    }
+    ages = [age for age in (each.ages_s(tick) for each in books) if age is not None]
+    if ages:
+        found["information_age_mean_s"] = float(np.mean([mean for mean, _ in ages]))
+        found["information_age_max_s"] = max(peak for _, peak in ages)
+    return found

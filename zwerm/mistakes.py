@@ -1,0 +1,65 @@
+"""A user's mistakes as a person would say them: one line for each, `place: path: rule, got value`."""
+
+import json
+import re
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+
+def mistakes(error: ValidationError, place: str, prefix: str = "") -> list[str]:
+    """Return one line for every mistake in `error`: `place: path: rule, got value`."""
+    lines = {}
+    for each in error.errors(include_url=False):
+        where, rule, got = _mistake(each)
+        path = prefix + ".".join(map(str, where))
+        lines[f"{place}: {path}" if path else place] = rule if got is None else f"{rule}, got {got}"
+    return [f"{where}: {what}" for where, what in lines.items()]
+
+
+_RULES = {
+    "bool_type": "expected true or false",
+    "dict_type": "expected a table",
+    "finite_number": "expected a finite number",
+    "float_type": "expected a number",
+    "greater_than": "expected > {gt:g}",
+    "greater_than_equal": "expected >= {ge:g}",
+    "int_type": "expected an integer",
+    "less_than": "expected < {lt:g}",
+    "less_than_equal": "expected <= {le:g}",
+    "list_type": "expected an array",
+    "literal_error": "expected {expected}",
+    "model_type": "expected a table",
+    "string_pattern_mismatch": "expected a match of {pattern}",
+    "string_type": "expected a string",
+    "too_long": "expected {max_length} items at most",
+    "too_short": "expected {min_length} items at least",
+    "tuple_type": "expected an array",
+}
+_GOT_LENGTH_MAX = 60
+
+
+def _mistake(each: ErrorDetails) -> tuple[tuple[int | str, ...], str, str | None]:
+    """Return where the mistake is, the rule, and the value as the file has it, or None where that says nothing."""
+    where, kind, context, got = each["loc"], each["type"], each.get("ctx", {}), each["input"]
+    if kind == "extra_forbidden":
+        return where, "unknown key", None
+    if kind == "missing" and isinstance(where[-1], int):
+        return where[:-1], f"expected {where[-1] + 1} items", _shown(got)
+    if kind == "missing":
+        return where, "required, and missing", None
+    if kind == "too_long" and context["field_type"] == "Tuple":
+        rule = f"expected {context['max_length']} items"
+    elif kind in _RULES:
+        rule = _RULES[kind].format(**context).replace("'", '"')
+    else:
+        rule = re.sub(r"^(Value error, |Input should be |Input )", "", each["msg"])
+        rule = rule if rule.startswith("expected") else f"expected {rule}"
+    return where, rule, None if isinstance(got, dict) else _shown(got)
+
+
+def _shown(value: Any) -> str:
+    """Return the value as TOML would have it, cut where it is long."""
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= _GOT_LENGTH_MAX else text[:_GOT_LENGTH_MAX] + "..."
