@@ -8,6 +8,7 @@ interpreter it does not see: it is there to find mistakes, and is no prison.
 
 import contextlib
 import datetime
+import gc
 import importlib
 import io
 import os
@@ -83,6 +84,9 @@ class Watch:
         self._stack.enter_context(contextlib.redirect_stderr(self._printed))
         self._profiler = sys.getprofile()
         _active[threading.get_ident()] = self
+        # What others hang on the garbage collector is not the controller's doing, whenever it happens to run.
+        self._collecting = gc.isenabled()
+        gc.disable()
         sys.setprofile(self._called)
         return self
 
@@ -90,6 +94,8 @@ class Watch:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         sys.setprofile(self._profiler)
+        if self._collecting:
+            gc.enable()
         del _active[threading.get_ident()]
         self._stack.close()
         printed = self._printed.getvalue().strip()

@@ -12,6 +12,12 @@ ROBOT: Final = "robot"
 BASE: Final = "base"
 COORDINATOR: Final = "coordinator"
 
+# What plays a part that is no robot's, by the name that scenarios give it.
+PARTS: Final = {
+    (BASE, "sensor-coverage"): "zwerm.agents.sensor_coverage:Base",
+    (COORDINATOR, "sensor-coverage"): "zwerm.coordinator.sensor_coverage:SensorCoverage",
+}
+
 
 def recast(scenario: Scenario, seed: int, node: int, incarnation: int) -> tuple[str, Setup]:
     """Return (controller, setup) of a node's later life: all as before, but for a random stream of its own."""
@@ -43,7 +49,7 @@ def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
         placed = role != COORDINATOR
         key = draws.stream_key("controller", node)
         players[node] = (
-            controller,
+            PARTS.get((role, controller), controller),
             Setup(
                 node=node,
                 role=role,

@@ -370,7 +370,7 @@ def test_what_one_robot_sends_changes_nobody_elses_draws() -> None:
          "radio.models.0: loss_fraction: expected < bad_loss_fraction 0.5, got 0.5"),
         ({"kind": "collision"}, "radio.models.0: expected either airtime_s or rate_bytes_s"),
         ({"kind": "delay", "distribution": "normal"},
-         "radio.models.0.distribution: expected 'uniform', 'exponential', 'lognormal' or 'pareto', got \"normal\""),
+         'radio.models.0.distribution: expected "uniform", "exponential", "lognormal" or "pareto", got "normal"'),
     ],
 )  # fmt: skip
 def test_a_mistake_in_a_model_is_one_line(model: dict[str, Any], line: str) -> None:

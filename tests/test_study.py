@@ -326,6 +326,28 @@ def test_a_file_of_something_else_is_left_alone(write: Callable[..., Study], tmp
     assert out.read_text() == "my notes"
 
 
+def test_a_file_that_cannot_be_written_is_one_line(write: Callable[..., Study], tmp_path: Path) -> None:
+    out = tmp_path / "tiny-scenario.toml" / "out.parquet"
+    study = write(TINY)
+    with pytest.raises(ScenarioError) as raised:
+        run_here(study, out)
+    assert raised.value.mistakes[0].startswith(f"{out}: cannot be written: ")
+
+
+def test_a_file_that_the_scenario_names_is_part_of_what_a_row_stands_for(
+    write: Callable[..., Study], tmp_path: Path
+) -> None:
+    study = write(TINY)
+    (tmp_path / "hall.geojson").write_text('{"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [2, 1], [0, 0]]]}')
+    text = (tmp_path / "tiny-scenario.toml").read_text().replace("size_m = [1.0, 1.0]", 'geojson = "hall.geojson"')
+    (tmp_path / "tiny-scenario.toml").write_text(text)
+    (before,) = make_points(study)
+    (same,) = make_points(study)
+    (tmp_path / "hall.geojson").write_text('{"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [2, 2], [0, 0]]]}')
+    (after,) = make_points(study)
+    assert before.fingerprint == same.fingerprint != after.fingerprint
+
+
 def test_a_trial_that_fails_is_a_row_with_its_reason(write: Callable[..., Study], tmp_path: Path) -> None:
     out = tmp_path / "out.parquet"
     study = write(TINY.replace("seeds = 3", "seeds = 8"), "Raises")

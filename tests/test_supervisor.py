@@ -202,7 +202,7 @@ def test_ctrl_c_while_starting_or_running_leaves_no_process_socket_or_directory(
         assert time.monotonic() - began_s < LEAVE_PATIENCE_S + TERMINATE_PATIENCE_S, "nobody had to be killed"
         assert said.splitlines()[-1] == "KeyboardInterrupt"
         assert said.count("Traceback") == 1, "only of the program itself"
-        until(lambda: gone(started), "all processes ended", 5.0)
+        until(lambda: gone(started), "all processes ended")
         assert [path for path in private_tmp.iterdir() if not path.name.startswith("pymp-")] == []
 
 
@@ -217,7 +217,7 @@ def test_no_robot_survives_the_kill_of_its_program_not_even_one_that_hangs_or_is
         os.kill(max(children_of(server)), signal.SIGSTOP)
         assert len(started) > 3
         running.kill()
-        until(lambda: gone(started), "all processes ended", 5.0)
+        until(lambda: gone(started), "all processes ended")
 
 
 def test_a_controller_that_cannot_be_found_is_one_line_and_no_swarm(private_tmp: Path) -> None:

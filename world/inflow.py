@@ -7,8 +7,10 @@ enter when it releases them, where it stands.
 
 import numpy as np
 
-from zwerm.scenario import BaseTable, InflowTable
-from zwerm.world.placement import free_spot
+from zwerm.draws import Draws
+from zwerm.scenario import BaseTable, InflowTable, PlacementTable
+from zwerm.world.arena import Arena
+from zwerm.world.placement import free_spot, place
 from zwerm.world.scene import Floats, Ints, Scene
 
 
@@ -49,9 +51,13 @@ class Inflow:
 class Depot:
     """The robots, ids from 1 to `count` - 1, that wait at a base station, which is robot 0."""
 
-    def __init__(self, table: BaseTable, count: int) -> None:
-        x, y, heading = table.pose
-        self.base: tuple[int, Floats, float] = (0, np.array([x, y]), heading)
+    def __init__(self, table: BaseTable, count: int, arena: Arena, radius_m: float, draws: Draws) -> None:
+        if table.pose is not None:
+            x, y, heading = table.pose
+            self.base: tuple[int, Floats, float] = (0, np.array([x, y]), heading)
+        else:
+            positions, headings = place(PlacementTable(), arena, 1, radius_m, draws)
+            self.base = (0, positions[0], float(headings[0]))
         self._count = count
         self._next_robot = 1
         self._ordered = 0

@@ -8,6 +8,8 @@ import shapely
 from zwerm.scenario import MetricsTable
 from zwerm.world.arena import Arena
 from zwerm.world.scene import Floats, Ints
+from zwerm.world.sight import hexagonal_packing_robots, holes, living, obstacles, sight_coverage_fraction
+from zwerm.world.visibility import Visibility
 
 if TYPE_CHECKING:  # the world's faults wait for metrics
     from zwerm.world.world import World
@@ -50,4 +52,23 @@ def measure(world: "World", table: MetricsTable) -> dict[str, float]:
         found["cell_coverage_fraction"] = cell_coverage_fraction(counts)
     if table.coverage_radius_m is not None:
         found["area_coverage_fraction"] = area_coverage_fraction(position, table.coverage_radius_m, world.arena)
+    if table.sight_range_m is not None:
+        found |= _sight(world, table.sight_range_m)
+    for each in world.audience.told:
+        found |= {name: float(value) for name, value in each.told.items() if isinstance(value, int | float)}
     return found
+
+
+def _sight(world: "World", range_m: float) -> dict[str, float]:
+    """Return how well the living robots cover the arena by sight, and how that compares with the ideal packing."""
+    scene = world.scene
+    robots = living(scene.present_ids(), sorted({*world.crashed, *world.schedule.gone()}))
+    ideal = hexagonal_packing_robots(world.arena, range_m)
+    return {
+        "coverage_fraction": sight_coverage_fraction(scene.position[robots], range_m, world.arena),
+        "robots_deployed": float(len(robots)),
+        "hexagonal_packing_robots": ideal,
+        "robots_over_hexagonal": len(robots) / ideal,
+        "holes": float(holes(Visibility().pairs(scene, range_m), robots)),
+        "obstacles": float(obstacles(world.arena)),
+    }

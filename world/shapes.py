@@ -5,6 +5,7 @@ there are no degrees here). `scale` multiplies them all. Every mistake of the ta
 """
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -46,9 +47,14 @@ def read_shape(table: ArenaTable, folder: Path) -> tuple[Space, list[LineString]
     free = shapely.difference(space, shapely.union_all(obstacles))
     if free.is_empty:
         raise ScenarioError(["arena.obstacles: expected some free space beside them, got none"])
-    if table.scale == 1.0:
+    factor = table.scale
+    if table.free_area_m2 is not None:
+        if factor != 1.0:
+            raise ScenarioError([f"arena.scale: expected none beside free_area_m2, got {factor:g}"])
+        factor = math.sqrt(table.free_area_m2 / free.area)
+    if factor == 1.0:
         return free, walls
-    by = {"xfact": table.scale, "yfact": table.scale, "origin": (0.0, 0.0)}
+    by = {"xfact": factor, "yfact": factor, "origin": (0.0, 0.0)}
     return scale(free, **by), [scale(wall, **by) for wall in walls]
 
 

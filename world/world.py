@@ -43,6 +43,7 @@ from zwerm.world.placement import place
 from zwerm.world.radio.medium import Medium
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 from zwerm.world.sensors import Sensor
+from zwerm.world.told import Audience
 from zwerm.world.wakes import SIGNATURES, Wakes
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ class World:
         self.late_allowed = False
         self.late_commands = 0
         self.exited: list[int] = []
+        self.audience = Audience()
         self.trace = Trace()
         self.recording: Recording | None = None
         self.coordinator = count if scenario.coordinator is not None else None
@@ -103,7 +105,7 @@ class World:
         self._last_answer: dict[int, int] = {}
         self._outboxes: list[tuple[int, tuple[Transmission, ...]]] = []
         self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
-        self._depot = Depot(scenario.base, count) if scenario.base else None
+        self._depot = Depot(scenario.base, count, arena, body.radius_m, self.draws) if scenario.base else None
         if self.coordinator is not None:
             self._admit(self.coordinator)
         if self._depot is not None:
@@ -366,6 +368,8 @@ class World:
                 self._outboxes.append((node, answer.outbox))
             if answer.wake is not None:
                 self._wakes.sleep(node, answer.wake, self.tick)
+            if answer.told or answer.gave_up:
+                self.audience.hear(self.scene, node, answer, node in self._fixed)
             if answer.release and node == 0 and self._depot is not None:
                 self._depot.release()
             if answer.done or self._any_done:

@@ -13,7 +13,7 @@ from zwerm.world.arena import Arena
 from zwerm.world.fields import Field, make_field
 from zwerm.world.meters import Meters, make_meters
 from zwerm.world.sensors import Sensor, Surroundings
-from zwerm.world.sensors.registry import make_sensors
+from zwerm.world.sensors.registry import BUILT_IN, make_sensors
 from zwerm.world.world import World
 
 T = TypeVar("T")
@@ -88,7 +88,9 @@ def check_controller(scenario: Scenario) -> None:
         found = find(robots.controller)
     except ControllerError as error:
         raise ScenarioError([f"robots.controller: {error}"]) from None
-    given = {table.kind for table in robots.sensors}
+    kinds = [table.kind for table in robots.sensors]
+    # A controller may name what it needs by the sensor's kind or by the field of the observation that it fills.
+    given = {*kinds, *(BUILT_IN[kind].field for kind in kinds if kind in BUILT_IN)}
     mistakes = [
         f"robots.sensors: the controller {robots.controller} needs the sensor {sensor!r}"
         for sensor in getattr(found, "sensors", ())

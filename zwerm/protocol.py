@@ -12,7 +12,7 @@ are radians in (-pi, pi], counter-clockwise; a bearing is measured in the body f
 import math
 import re
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 from msgspec import Struct
@@ -170,7 +170,9 @@ class Command(Struct, forbid_unknown_fields=True, omit_defaults=True, tag_field=
 
     `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation
     at every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of
-    the task is complete. `tick` is set by whatever runs the controller: the tick of the observation answered.
+    the task is complete, `gave_up`, unless empty, why it never will be. `told` is what the node has to tell those who
+    watch the run, numbers and more; nobody in the run hears it. `tick` is set by whatever runs the controller: the tick of
+    the observation answered.
     """
 
     tick: int = 0
@@ -179,6 +181,8 @@ class Command(Struct, forbid_unknown_fields=True, omit_defaults=True, tag_field=
     wake: Wake | None = None
     release: bool = False
     done: bool = False
+    gave_up: str = ""
+    told: dict[str, Any] = {}
 
 
 class Failure(_Message, frozen=True):

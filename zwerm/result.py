@@ -9,6 +9,7 @@ from zwerm.scenario import Scenario
 from zwerm.world.arena import Arena
 from zwerm.world.history import History
 from zwerm.world.scene import Ints
+from zwerm.world.told import Told
 
 
 @dataclass(slots=True)
@@ -39,6 +40,7 @@ class RunResult:
     series: dict[str, list[float]] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     tracebacks: dict[int, str] = field(default_factory=dict)
+    told: list[Told] = field(default_factory=list)
 
     @property
     def ok(self) -> bool:
@@ -79,6 +81,12 @@ class RunResult:
             coverage_radius_m=self.scenario.metrics.coverage_radius_m,
             cells=self.scenario.metrics.cells,
         )
+
+    def picture_complex(self, path: str | Path, cycle: int = -1) -> Path:
+        """Draw the simplicial complex at a cycle (from 0; -1 is the last) at `path`, and return the path."""
+        from zwerm.world.pictures_complex import cycles, draw_complex
+
+        return draw_complex(Path(path), self.arena, cycles(self.told)[cycle])
 
     def animate(self, path: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
         """Draw the run as an animation at `path`, .gif or .mp4, and return the path."""

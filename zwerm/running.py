@@ -246,5 +246,6 @@ def _result(
         cell_counts=counts,
         refused=dict(world.refused + Counter(getattr(link, "refused", {}))),
         series=world.meters.series(),
+        told=world.audience.told,
         tracebacks={node: failure.traceback for node, failure in world.failures.items()},
     )

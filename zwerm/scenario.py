@@ -78,7 +78,7 @@ class ArenaTable(Table):
 
     `map` is a ROS map_server YAML, or a bitmap (dark is wall), which needs `resolution_m`, or `size_m` to stretch it to;
     `start` is a place [m] in the part of the map to keep, else the largest is. Paths are relative to the scenario.
-    `scale` multiplies every length of this table.
+    `scale` multiplies every length of this table; or `free_area_m2` says how much free space there shall be after scaling.
     """
 
     size_m: Size | None = None
@@ -89,6 +89,7 @@ class ArenaTable(Table):
     resolution_m: Positive | None = None
     start: Point | None = None
     scale: Positive = 1.0
+    free_area_m2: Positive | None = None
     obstacles: list[Annotated[list[Point], Field(min_length=3)]] = []
     walls: list[Annotated[list[Point], Field(min_length=2)]] = []
 
@@ -146,11 +147,14 @@ class RobotsTable(Table):
 
 
 class BaseTable(Table):
-    """A base station: robot 0, which never moves. The others wait in its depot until it releases them, one at a time."""
+    """A base station: robot 0, which never moves. The others wait in its depot until it releases them, one at a time.
+
+    Without a `pose` it stands at a random free place.
+    """
 
     controller: str
     parameters: dict[str, Any] = {}
-    pose: Pose
+    pose: Pose | None = None
 
 
 class CoordinatorTable(Table):
@@ -222,6 +226,7 @@ class MetricsTable(Table):
 
     cells: Grid | None = None
     coverage_radius_m: Positive | None = None
+    sight_range_m: Positive | None = None
     every_s: Positive | None = None
     voronoi: VoronoiMetricsTable | None = None
 

@@ -49,9 +49,12 @@ class Rows:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._journal_path = path.with_name(path.name + ".journal")
-        path.parent.mkdir(parents=True, exist_ok=True)
         self.held: dict[Key, Row] = {}
-        self._journal = self._journal_path.open("a+b", buffering=0)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._journal = self._journal_path.open("a+b", buffering=0)
+        except OSError as error:
+            raise ScenarioError([f"{path}: cannot be written: {error.strerror}"]) from None
         try:
             fcntl.flock(self._journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if path.exists():

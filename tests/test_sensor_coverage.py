@@ -1,0 +1,250 @@
+"""Sensor coverage, run for real in small halls: coverage, noise, failures, frames, outcomes, processes."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from zwerm.agents.contract import Body, Setup
+from zwerm.agents.node import Node
+from zwerm.agents.sensor_coverage import Robot
+from zwerm.agents.sensor_coverage.homing import offset, slid, unit
+from zwerm.assembly import assemble
+from zwerm.deploy.cast import cast
+from zwerm.deployment import Arrived, Correct, Deploy, Sighting, decode_answer, encode
+from zwerm.link.memory import MemoryLink
+from zwerm.protocol import (
+    Bearing,
+    BodyVelocity,
+    Command,
+    Contact,
+    Displacement,
+    Observation,
+    Packet,
+    decode_observation,
+    open_answer,
+)
+from zwerm.protocol import encode as to_wire
+from zwerm.running import run
+from zwerm.scenario import Scenario, load
+from zwerm.world.lockstep import LockStep
+from zwerm.world.metrics import measure
+from zwerm.world.world import World
+
+HALL = ("arena.size_m=[3.4,2.8]", "base.pose=[0.2,1.4,0.0]", "robots.count=40")
+NOISE = "robots.sensors.0.sd_rad=0.0436332"
+OBSTACLE = "arena.obstacles=[[[1.5,1.0],[2.3,1.0],[2.3,1.8],[1.5,1.8]]]"
+
+Link = Callable[[bytes], bytes]
+
+
+def drive(
+    scenario: Scenario,
+    on_tick: Callable[[World], None] | None = None,
+    around: Callable[[int, Link], Link] | None = None,
+) -> tuple[str, World]:
+    """Run inline; `on_tick` may meddle with the world, `around` with what a node hears and says."""
+    world = assemble(scenario, 1)
+    answers: dict[int, Link] = {n: Node(*each).answer for n, each in cast(scenario, 1).items()}
+    if around is not None:
+        answers = {n: around(n, each) for n, each in answers.items()}
+    driver = LockStep(world, MemoryLink(answers), on_tick)
+    outcome = driver.run()
+    return outcome, world
+
+
+# --- the mathematics of one robot -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("aside", [(0.05, 0.0), (-0.03, 0.04), (0.0, -0.06)])
+def test_homing_tells_how_far_the_place_is(aside: tuple[float, float]) -> None:
+    landmarks = [unit(math.radians(each)) for each in (10, 130, 200, 290)]
+    pairs = []
+    for x, y in landmarks:
+        dx, dy = x - aside[0], y - aside[1]
+        length = math.hypot(dx, dy)
+        pairs.append(((dx / length, dy / length), (x, y)))
+    found = offset(pairs)
+    assert (found.x, found.y) == pytest.approx((-aside[0], -aside[1]), abs=0.01)
+
+
+def test_landmarks_in_one_line_leave_the_way_along_it_unknown() -> None:
+    found = offset([((1.0, 0.0), (1.0, 0.0)), ((-1.0, 0.0), (-1.0, 0.0))])
+    assert found.blind is not None
+    assert abs(found.blind[0]) == pytest.approx(1.0)
+
+
+def test_a_robot_slides_along_a_wall_and_away_from_it() -> None:
+    assert slid(1.0, 1.0, (0.0,)) == pytest.approx((0.0, 1.0))
+    assert slid(-1.0, 1.0, (0.0,)) == pytest.approx((-1.0, 1.0))
+
+
+class OneRobot:
+    """A robot alone with a made-up world: one neighbour in sight within 1 m, one wall across its way."""
+
+    def __init__(self, neighbour: tuple[float, float], wall_x_m: float) -> None:
+        body = Body("holonomic", 0.07, 0.5, 6.0)
+        self.robot = Robot(Setup(1, "robot", 0.1, Robot.sensors, b"0" * 16, body))
+        self.neighbour, self.wall_x_m = neighbour, wall_x_m
+        self.x = self.y = 0.0
+        self.moved = (0.0, 0.0)
+        self.said: list[object] = []
+
+    def tick(self, *orders: bytes) -> Command:
+        dx, dy = self.neighbour[0] - self.x, self.neighbour[1] - self.y
+        seen = (Bearing(7, math.atan2(dy, dx)),) if math.hypot(dx, dy) <= 1.0 else ()
+        touch = (Contact(0.0, math.pi / 12.0),) if self.x >= self.wall_x_m - 0.075 else ()
+        command = self.robot.step(
+            Observation(
+                0,
+                0.0,
+                tuple(Packet("uplink", each, 9) for each in orders),
+                bearings=seen,
+                touch=touch,
+                odometry=Displacement(*self.moved, 0.0),
+            )
+        )
+        drive = command.drive
+        assert isinstance(drive, BodyVelocity)
+        x = min(self.x + 0.1 * drive.forward_m_s, self.wall_x_m - 0.07)
+        self.moved = (x - self.x, 0.1 * drive.left_m_s)
+        self.x, self.y = x, self.y + self.moved[1]
+        self.said += [decode_answer(each.payload) for each in command.outbox]
+        return command
+
+    def until_arrived(self, order: bytes) -> Arrived:
+        for _ in range(30):
+            self.tick()
+        self.tick(order)
+        for _ in range(300):
+            self.tick()
+        found = [each for each in self.said if isinstance(each, Arrived)]
+        assert len(found) == 1
+        return found[0]
+
+
+def test_a_test_drive_that_meets_a_wall_leads_back() -> None:
+    """Figure 6(d)."""
+    alone = OneRobot((-0.9, 0.0), 0.5)
+    arrived = alone.until_arrived(encode(Deploy(1, 0.0, 0.95, 0.8)))
+    assert not arrived.ok
+    assert arrived.touched == (0.0,)
+    assert arrived.driven_m == pytest.approx(0.43, abs=0.06)
+    assert (alone.x, alone.y) == pytest.approx((0.0, 0.0), abs=0.01)
+
+
+def test_a_wall_behind_the_clear_distance_is_where_the_new_place_is() -> None:
+    alone = OneRobot((-0.9, 0.0), 0.93)
+    arrived = alone.until_arrived(encode(Deploy(1, 0.0, 0.95, 0.8)))
+    assert arrived.ok
+    assert alone.x == pytest.approx(0.86, abs=0.02)
+
+
+@pytest.mark.parametrize("start", [-0.7, -0.9, -1.1])
+def test_the_ruler_sets_the_distance_whatever_it_was(start: float) -> None:
+    """Scale correction: break the link, re-establish it, and a margin."""
+    alone = OneRobot((start, 0.0), 9.0)
+    assert alone.until_arrived(encode(Correct(1, (Sighting(7, math.pi),)))).ok
+    assert math.dist((alone.x, alone.y), alone.neighbour) == pytest.approx(0.95, abs=0.011)
+
+
+# --- the whole swarm ------------------------------------------------------------------------------------------------
+
+
+# In so small a hall most robots stand at walls; beside an obstacle that fills a tenth of it, all do.
+@pytest.mark.parametrize(
+    ("settings", "ratio_max"), [((), 1.6), ((NOISE,), 1.6), ((OBSTACLE, "base.pose=[0.2,0.4,0.0]"), 2.0)]
+)
+def test_a_small_hall_is_covered_with_no_hole_but_the_obstacle(settings: tuple[str, ...], ratio_max: float) -> None:
+    result = run("sensor-coverage", runner="inline", overrides=[*HALL, *settings])
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.99
+    assert result.metrics["holes"] == result.metrics["obstacles"]
+    assert result.metrics["robots_over_hexagonal"] < ratio_max
+    assert result.metrics["deployment_cycles"] > result.metrics["robots_released"] > 5
+    assert result.robot_ticks < 0.35 * result.ticks * result.metrics["robots_deployed"], "parked robots cost"
+
+
+def test_the_frame_of_a_robot_changes_nothing() -> None:
+    """Frames turned by whole switches of the touch ring: the same places. Robot 1 is straight: it says where forward is."""
+
+    def turned(node: int, answer: Link) -> Link:
+        angle = 0.0 if node in (0, 1, 40) else math.radians(30.0) * ((node * 5) % 12)
+        cos, sin = math.cos(angle), math.sin(angle)
+
+        def through(payload: bytes) -> bytes:
+            seen = decode_observation(payload)
+            odometry = seen.odometry
+            mine = Observation(
+                seen.tick,
+                seen.time_s,
+                seen.inbox,
+                bearings=seen.bearings and tuple(Bearing(b.node, b.bearing_rad - angle) for b in seen.bearings),
+                touch=seen.touch and tuple(Contact(c.bearing_rad - angle, c.half_width_rad) for c in seen.touch),
+                odometry=odometry
+                and Displacement(
+                    cos * odometry.forward_m + sin * odometry.left_m,
+                    cos * odometry.left_m - sin * odometry.forward_m,
+                    0.0,
+                ),
+            )
+            command = open_answer(answer(to_wire(mine)))
+            assert isinstance(command, Command)
+            drive = command.drive
+            if isinstance(drive, BodyVelocity):
+                command.drive = BodyVelocity(
+                    cos * drive.forward_m_s - sin * drive.left_m_s, sin * drive.forward_m_s + cos * drive.left_m_s
+                )
+            return to_wire(command)
+
+        return through if angle else answer
+
+    scenario = load("sensor-coverage", (*HALL, "robots.sensors.2.distance_sd_fraction=0.0"))
+    straight, crooked = drive(scenario)[1].scene, drive(scenario, around=turned)[1].scene
+    here, there = (np.round(each.position[each.present], 3) for each in (straight, crooked))
+    assert len(here) == len(there) > 8
+    for place in here:
+        assert np.hypot(*(there - place).T).min() < 0.01
+
+
+def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
+    scenario = load("sensor-coverage", (*HALL, "robots.on_crash=continue"))
+    killed: list[int] = []
+
+    def kill(world: World) -> None:
+        if world.tick in (300, 450):
+            alive = [r for r in world.scene.present_ids().tolist() if r and r not in world.crashed]
+            killed.append(alive[len(alive) // 2])
+            world.crash(killed[-1], "struck by lightning")
+
+    outcome, world = drive(scenario, kill)
+    found = measure(world, scenario.metrics)
+    assert outcome == "completed"
+    assert len(killed) == 2
+    assert found["coverage_fraction"] >= 0.99
+    assert found["holes"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        (("robots.count=6",), "depot-dry: the depot is empty"),
+        (("arena.size_m=[0.5,0.5]", "base.pose=[0.2,0.2,0.0]"), "source-blocked: no robot gets away from the base"),
+    ],
+)
+def test_a_deployment_that_cannot_go_on_says_why(settings: tuple[str, ...], reason: str) -> None:
+    result = run("sensor-coverage", runner="inline", overrides=[*HALL, *settings])
+    assert result.outcome == "failed"
+    assert reason in result.reason
+    assert not result.crashed
+
+
+def test_robots_in_processes_leave_the_same_trace() -> None:
+    settings = ["arena.size_m=[2.2,1.6]", "base.pose=[0.2,0.8,0.0]", "robots.count=14", NOISE]
+    inline = run("sensor-coverage", runner="inline", overrides=settings)
+    processes = run("sensor-coverage", runner="processes", overrides=settings)
+    other = run("sensor-coverage", seed=2, runner="inline", overrides=settings)
+    assert inline.outcome == processes.outcome == "completed"
+    assert inline.trace == processes.trace
+    assert inline.trace != other.trace

@@ -1,0 +1,88 @@
+"""What a swarm sees of its arena, and how few robots might have done: the measures of sensor coverage.
+
+A robot covers what is within its range and not behind a wall, as exact polygons but for the disc, which has 256 sides.
+The ideal to compare with is that of Ramaithitima et al. 2015, section V: a hexagonal packing overlaid on the free space,
+its points the range apart. How many of them fall into the free space depends on where the packing lies; the mean over
+all ways is the free area divided by that of a point's cell, and that is what is used here.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from zwerm.simplicial import FlagComplex, betti
+from zwerm.world.arena import Arena
+from zwerm.world.scene import Floats, Ints
+
+_QUARTER_SIDES = 64
+# A wall's shadow is cut into pieces that span at most this much of the view [rad].
+_PIECE_RAD = 0.5
+
+
+def hexagonal_packing_robots(arena: Arena, range_m: float) -> float:
+    """Return the mean number of points in the arena of a hexagonal packing whose points are `range_m` apart."""
+    return float(arena.area_m2 / (math.sqrt(3.0) / 2.0 * range_m**2))
+
+
+def sight_coverage_fraction(position: Floats, range_m: float, arena: Arena) -> float:
+    """Return the fraction of the arena that is within `range_m` and in sight of a robot at one of position (n, 2)."""
+    if not len(position):
+        return 0.0
+    seen = shapely.union_all([seen_from(each, range_m, arena) for each in position])
+    return float(shapely.intersection(seen, arena.free).area / arena.area_m2)
+
+
+def seen_from(place: Floats, range_m: float, arena: Arena) -> shapely.Geometry:
+    """Return what is seen from a place (2,) within `range_m`: the disc, less the shadows of the walls."""
+    disc = shapely.buffer(shapely.Point(place), range_m, quad_segs=_QUARTER_SIDES)
+    walls = arena.segments[arena.walls_within(place[None, :], range_m).segment]
+    shadows = [piece for x0, y0, x1, y1 in walls.tolist() for piece in _shadow(place, (x0, y0), (x1, y1), range_m)]
+    near = shapely.intersection(disc, arena.free)
+    return shapely.difference(near, shapely.union_all(shadows)) if shadows else near
+
+
+def _shadow(
+    place: Floats, start: tuple[float, float], end: tuple[float, float], range_m: float
+) -> Sequence[shapely.Polygon]:
+    """Return polygons that cover what a wall hides from a place, as far as `range_m`, or nothing if it is too far."""
+    ax, ay = start[0] - place[0], start[1] - place[1]
+    bx, by = end[0] - place[0], end[1] - place[1]
+    dx, dy = bx - ax, by - ay
+    along = min(1.0, max(0.0, -(ax * dx + ay * dy) / (dx * dx + dy * dy)))
+    cross = ax * by - ay * bx
+    if math.hypot(ax + along * dx, ay + along * dy) >= range_m or abs(cross) < 1e-12:
+        return []
+    turn = math.atan2(cross, ax * bx + ay * by)
+    pieces = math.ceil(abs(turn) / _PIECE_RAD)
+    rays: list[tuple[float, float]] = []
+    walls: list[tuple[float, float]] = []
+    for n in range(pieces + 1):
+        angle = math.atan2(ay, ax) + turn * n / pieces
+        cos, sin = math.cos(angle), math.sin(angle)
+        length = cross / (cos * dy - sin * dx)  # where the ray meets the wall's line
+        walls.append((place[0] + length * cos, place[1] + length * sin))
+        far = max(length, 0.0) + 2.0 * range_m
+        rays.append((place[0] + far * cos, place[1] + far * sin))
+    return [shapely.Polygon([walls[n], walls[n + 1], rays[n + 1], rays[n]]) for n in range(pieces)]
+
+
+def holes(pairs: Ints, robots: Ints) -> int:
+    """Return the number of holes (b1) of the complex of `robots` (n,) that see each other in `pairs` (k, 2)."""
+    lists: dict[int, list[int]] = {robot: [] for robot in robots.tolist()}
+    for i, j in pairs.tolist():
+        if i in lists and j in lists:
+            lists[i].append(j)
+            lists[j].append(i)
+    return betti(FlagComplex(lists))[1]
+
+
+def obstacles(arena: Arena) -> int:
+    """Return how many obstacles stand free in the arena."""
+    return sum(len(part.interiors) for part in getattr(arena.free, "geoms", (arena.free,))) + len(arena.walls)
+
+
+def living(present: Ints, dead: Sequence[int]) -> Ints:
+    """Return the robots that are there and alive."""
+    return np.setdiff1d(present, np.array(dead, dtype=np.int64))

@@ -1,0 +1,132 @@
+"""What robots, base and coordinator say to each other to deploy a swarm by pushing: all of it crosses the radio.
+
+Directions are bearings in the frame of the robot that is spoken to, or that speaks; the coordinator translates. No message
+tells a position, and no distance but those that a robot drove by its own odometry.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+import msgspec
+from msgspec import Struct
+
+
+def _tag(class_name: str) -> str:
+    return class_name.lower()
+
+
+class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A part of a message that comes in numbers."""
+
+
+class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=_tag):
+    """A whole message, led by its name."""
+
+
+class Sighting(_Part, frozen=True):
+    """A robot seen, and its bearing, averaged while nothing moved."""
+
+    node: int
+    bearing_rad: float
+
+
+class Landmark(_Part, frozen=True):
+    """Where a robot shall be seen from the place to go to. `still`: it does not move meanwhile."""
+
+    node: int
+    bearing_rad: float
+    still: bool
+
+
+# --- to a robot -----------------------------------------------------------------------------------------------------
+
+
+class Survey(_Message, frozen=True):
+    """Say what you see and touch. These robots have moved since the last survey."""
+
+    cycle: int
+    moved: tuple[int, ...]
+
+
+class Release(_Message, frozen=True):
+    """To the base: let a robot out."""
+
+    cycle: int
+
+
+class Deploy(_Message, frozen=True):
+    """Drive into the unknown along a bearing.
+
+    If a wall stops it before `clear_m`, the robot drives back; else it goes on to `hop_m`.
+    """
+
+    cycle: int
+    bearing_rad: float
+    hop_m: float
+    clear_m: float
+
+
+class Move(_Message, frozen=True):
+    """Take the place about `hop_m` away along a bearing, from which the landmarks are seen as told."""
+
+    cycle: int
+    bearing_rad: float
+    hop_m: float
+    landmarks: tuple[Landmark, ...]
+
+
+class Correct(_Message, frozen=True):
+    """Correct the scale: break and re-establish the visual link to each anchor, one after the other.
+
+    `anchors` give the bearing at which each should about be.
+    """
+
+    cycle: int
+    anchors: tuple[Sighting, ...]
+
+
+# --- from a robot ---------------------------------------------------------------------------------------------------
+
+
+class Report(_Message, frozen=True):
+    """The answer to a survey. `sightings` None: nothing has changed. `touched` are bearings of walls touched."""
+
+    cycle: int
+    sightings: tuple[Sighting, ...] | None
+    touched: tuple[float, ...]
+
+
+class Emerged(_Message, frozen=True):
+    """A robot came out of the depot and sees this."""
+
+    sightings: tuple[Sighting, ...]
+
+
+class Cleared(_Message, frozen=True):
+    """The robot that deploys has gone far enough to be replaced."""
+
+    cycle: int
+
+
+class Arrived(_Message, frozen=True):
+    """The end of a drive.
+
+    `ok` False: the robot is back where it was. `loose`: bearings did not tell how far to go, odometry did. `leaned`: robots
+    that were driving themselves had to serve as landmarks. `touched` are bearings of walls touched, `driven_m` is how far it
+    came.
+    """
+
+    cycle: int
+    ok: bool
+    loose: bool
+    leaned: bool
+    driven_m: float
+    touched: tuple[float, ...]
+
+
+Order = Survey | Release | Deploy | Move | Correct
+Answer = Report | Emerged | Cleared | Arrived
+
+encode: Final[Callable[[Order | Answer], bytes]] = msgspec.msgpack.Encoder().encode
+decode_order: Final[Callable[[bytes], Order]] = msgspec.msgpack.Decoder(Order).decode
+decode_answer: Final[Callable[[bytes], Answer]] = msgspec.msgpack.Decoder(Answer).decode

@@ -1,0 +1,242 @@
+"""Flag complexes of a graph up to dimension 2, and their homology over Z2.
+
+A flag complex has every triangle whose three edges are there: the Vietoris-Rips complex of a swarm, from who sees whom
+alone (Ramaithitima et al. 2015, algorithm 2). Chains over Z2 are Python integers, one bit a simplex, so that adding two
+chains is one XOR. Nothing here knows where a vertex is, and nothing depends on the order of a set.
+
+Built to dimension 2, a complex keeps the boundary of every tetrahedron as a 2-cycle: H2 alone therefore says nothing.
+What says something is a relative cycle with a boundary on the fence, and `sparing` looks for that.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+Edge = tuple[int, int]
+Triangle = tuple[int, int, int]
+
+
+def edge(i: int, j: int) -> Edge:
+    """Return the edge between two vertices, the smaller id first."""
+    return (i, j) if i < j else (j, i)
+
+
+class FlagComplex:
+    """Vertices, edges and triangles, each ascending and with ascending ids; `neighbours` maps a vertex to its own."""
+
+    def __init__(self, neighbours: Mapping[int, Iterable[int]]) -> None:
+        """Take neighbour lists. An edge needs both ends to name each other: two robots that see each other."""
+        named = {vertex: frozenset(listed) for vertex, listed in sorted(neighbours.items())}
+        self.neighbours: dict[int, tuple[int, ...]] = {
+            i: tuple(j for j in sorted(listed) if j != i and j in named and i in named[j])
+            for i, listed in named.items()
+        }
+        self.vertices: tuple[int, ...] = tuple(self.neighbours)
+        self.edges: tuple[Edge, ...] = tuple((i, j) for i, each in self.neighbours.items() for j in each if i < j)
+        self._known = frozenset(self.edges)
+        self.triangles: tuple[Triangle, ...] = tuple(
+            (i, j, k) for i, j in self.edges for k in self.neighbours[j] if k > j and (i, k) in self._known
+        )
+
+    def __contains__(self, simplex: Edge) -> bool:
+        """Tell whether the ordered edge is there."""
+        return simplex in self._known
+
+    def common(self, i: int, j: int) -> tuple[int, ...]:
+        """Return the vertices that see both i and j, ascending."""
+        return tuple(k for k in self.neighbours[i] if edge(j, k) in self._known)
+
+    def without(self, vertices: Iterable[int]) -> "FlagComplex":
+        """Return the complex with some vertices gone, and all that they are part of."""
+        gone = frozenset(vertices)
+        return FlagComplex({v: each for v, each in self.neighbours.items() if v not in gone})
+
+    def components(self) -> list[tuple[int, ...]]:
+        """Return the vertices of every connected component, ascending."""
+        found: list[tuple[int, ...]] = []
+        seen: dict[int, None] = {}
+        for start in self.vertices:
+            if start in seen:
+                continue
+            seen[start] = None
+            reached = [start]
+            for vertex in reached:
+                for each in self.neighbours[vertex]:
+                    if each not in seen:
+                        seen[each] = None
+                        reached.append(each)
+            found.append(tuple(sorted(reached)))
+        return found
+
+
+# --- chains as bits -------------------------------------------------------------------------------------------------
+
+
+def boundaries(complex_: FlagComplex) -> list[int]:
+    """Return the boundary of every triangle, as bits over the edges."""
+    number = {each: 1 << n for n, each in enumerate(complex_.edges)}
+    return [number[i, j] | number[i, k] | number[j, k] for i, j, k in complex_.triangles]
+
+
+def bits(chain: int) -> Iterator[int]:
+    """Yield the positions of the set bits, ascending."""
+    while chain:
+        low = chain & -chain
+        yield low.bit_length() - 1
+        chain ^= low
+
+
+def reduce_chain(chain: int, pivots: Mapping[int, int]) -> int:
+    """Return `chain` reduced by columns that are keyed by their highest bit: 0 iff it is in their span."""
+    while chain:
+        column = pivots.get(chain.bit_length())
+        if column is None:
+            break
+        chain ^= column
+    return chain
+
+
+def rank(columns: Iterable[int]) -> int:
+    """Return the rank over Z2 of columns given as bits."""
+    pivots: dict[int, int] = {}
+    for column in columns:
+        left = reduce_chain(column, pivots)
+        if left:
+            pivots[left.bit_length()] = left
+    return len(pivots)
+
+
+def betti(complex_: FlagComplex) -> tuple[int, int]:
+    """Return the Betti numbers (b0, b1): the number of pieces, and the number of holes."""
+    pieces = len(complex_.components())
+    cycles = len(complex_.edges) - len(complex_.vertices) + pieces
+    return pieces, cycles - rank(boundaries(complex_))
+
+
+def relative_cycles(complex_: FlagComplex, fence: Iterable[Edge]) -> tuple[list[int], list[int]]:
+    """Return a basis of the relative 2-cycles of (complex, fence), and their boundaries.
+
+    The cycles are bits over the triangles, the boundaries bits over the edges; a boundary has fence edges only. Since
+    there are no 3-simplices this is a basis of the relative H2 of the 2-dimensional complex.
+    """
+    on_fence = frozenset(fence)
+    inner = sum(1 << n for n, each in enumerate(complex_.edges) if each not in on_fence)
+    columns: dict[int, tuple[int, int]] = {}  # highest inner bit: (inner part, combination of triangles)
+    whole = boundaries(complex_)
+    cycles: list[int] = []
+    for number, boundary in enumerate(whole):
+        chain, combination = boundary & inner, 1 << number
+        while chain:
+            known = columns.get(chain.bit_length())
+            if known is None:
+                columns[chain.bit_length()] = chain, combination
+                break
+            chain ^= known[0]
+            combination ^= known[1]
+        else:
+            cycles.append(combination)
+    return cycles, [_boundary(cycle, whole) for cycle in cycles]
+
+
+def _boundary(cycle: int, whole: list[int]) -> int:
+    chain = 0
+    for triangle in bits(cycle):
+        chain ^= whole[triangle]
+    return chain
+
+
+# --- who can be spared ----------------------------------------------------------------------------------------------
+
+
+def may_leave(vertex: int, neighbours: Mapping[int, Iterable[int]]) -> bool:
+    """Tell whether a vertex can leave without changing b0 or b1: the link criterion.
+
+    It can iff the flag complex of the graph that its neighbours induce is non-empty, connected and without holes.
+    """
+    around = tuple(neighbours[vertex])
+    if not around:
+        return False
+    seen = {each: frozenset(neighbours[each]) for each in around}
+    if any(all(other in seen[each] for other in around if other != each) for each in around):
+        return True  # one of them sees all the others: the link is a cone
+    return betti(FlagComplex({each: [other for other in around if other in seen[each]] for each in around})) == (1, 0)
+
+
+class Sparing(NamedTuple):
+    """A relative 2-cycle through the fence, and the vertices it does without."""
+
+    redundant: tuple[int, ...]
+    cycle: tuple[Triangle, ...]
+    boundary: tuple[Edge, ...]
+    missed: tuple[int, ...]  # fence vertices in a triangle that the cycle's boundary does not pass
+
+
+NOBODY = Sparing((), (), (), ())
+
+
+def sparing(
+    complex_: FlagComplex,
+    fence: Iterable[Edge],
+    keep: Iterable[int] = (),
+    missed_max: int = 0,
+    order: Callable[[int], int] | None = None,
+) -> Sparing:
+    """Return a relative 2-cycle with a boundary on the fence and as few vertices as greed can find.
+
+    Vertices of the fence, those in `keep` and those in no triangle always stay; the others are tried one after another,
+    the best connected first unless `order` says otherwise, by `may_leave`, which keeps the homotopy type and with it the
+    class of the cycle. Where no cycle passes all fence vertices that are part of a triangle, but for `missed_max`,
+    nobody is spared (de Silva and Ghrist 2006: then the cycle certifies nothing).
+    """
+    on_fence = tuple(sorted(set(fence)))
+    guarded = {vertex for each in on_fence for vertex in each} | set(keep)
+    left = {vertex: set(each) for vertex, each in complex_.neighbours.items()}
+    key = order or (lambda vertex: -len(complex_.neighbours[vertex]))
+    spared: list[int] = []
+    for vertex in sorted((v for v in complex_.vertices if v not in guarded), key=lambda v: (key(v), v)):
+        if may_leave(vertex, {each: sorted(left[each]) for each in (vertex, *sorted(left[vertex]))}):
+            for each in sorted(left.pop(vertex)):
+                left[each].discard(vertex)
+            spared.append(vertex)
+    reduced = FlagComplex(left)
+    cycles, edges = relative_cycles(reduced, on_fence)
+    cycle, boundary = _widest(cycles, edges, reduced)
+    passed = {vertex for n in bits(boundary) for vertex in reduced.edges[n]}
+    fenced = {vertex for each in on_fence for vertex in each}
+    solid = {vertex for each in reduced.triangles for vertex in each}
+    missed = tuple(sorted((fenced & solid) - passed))
+    if not boundary or len(missed) > missed_max:
+        return NOBODY._replace(missed=missed)
+    return Sparing(
+        tuple(sorted(spared)),
+        tuple(reduced.triangles[n] for n in bits(cycle)),
+        tuple(reduced.edges[n] for n in bits(boundary)),
+        missed,
+    )
+
+
+def _widest(cycles: list[int], edges: list[int], complex_: FlagComplex) -> tuple[int, int]:
+    """Return the sum of cycles whose boundary passes most vertices, by greed, and that boundary."""
+    incident = [(1 << i) | (1 << j) for i, j in complex_.edges]
+
+    def passed(boundary: int) -> int:
+        reached = 0
+        for n in bits(boundary):
+            reached |= incident[n]
+        return reached.bit_count()
+
+    pivots: dict[int, tuple[int, int]] = {}
+    for cycle, boundary in zip(cycles, edges, strict=True):
+        while boundary:
+            known = pivots.get(boundary.bit_length())
+            if known is None:
+                pivots[boundary.bit_length()] = boundary, cycle
+                break
+            boundary ^= known[0]
+            cycle ^= known[1]
+    best_boundary = best_cycle = 0
+    best = (0, 0)
+    for boundary, cycle in pivots.values():
+        found = passed(best_boundary ^ boundary), (best_boundary ^ boundary).bit_count()
+        if found > best:
+            best, best_boundary, best_cycle = found, best_boundary ^ boundary, best_cycle ^ cycle
+    return best_cycle, best_boundary
