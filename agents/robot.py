@@ -47,6 +47,9 @@ def main(
     """Live one robot's life and exit: 0 at its end, 1 controller failed, 2 could not join, 3 lost the world."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     die_with_parent()
+    parent = parent_process()
+    if parent is not None and not parent.is_alive():  # it died before the kernel was told
+        sys.exit(EXIT_LOST)
     set_threads(ONE_THREAD if is_local(endpoint) else TWO_THREADS)
     here = str(Path.cwd())
     if here not in sys.path:

@@ -26,8 +26,10 @@ from zwerm.link.session import Credential, Credentials
 # How many may be starting at once: more only get in each other's way.
 JOINING_MAX: Final = 16
 JOIN_DEADLINE_S: Final = 60.0
-LEAVE_DEADLINE_S: Final = 5.0
-TERMINATE_DEADLINE_S: Final = 2.0
+
+# How long nobody may have left before those who remain are ended with more force.
+LEAVE_PATIENCE_S: Final = 3.0
+TERMINATE_PATIENCE_S: Final = 2.0
 
 # Open files a robot costs this process: two pipes and the router's end of its connection.
 _FILES_PER_ROBOT: Final = 3
@@ -120,30 +122,29 @@ class LocalSupervisor:
         """Send a signal to one robot, such as SIGSTOP and SIGCONT."""
         os.kill(self.pids[node], number)
 
-    def wait(self, deadline_s: float | None = None) -> bool:
-        """Wait until all robots have ended, at most `deadline_s` seconds; tell whether they have."""
-        end_s = None if deadline_s is None else time.monotonic() + deadline_s
+    def wait(self, patience_s: float | None = None) -> bool:
+        """Wait until all robots have ended, or none has for `patience_s` seconds; tell whether all have."""
         alive: dict[Any, ForkServerProcess] = {process.sentinel: process for process in self._alive()}
         while alive:
-            ended = wait(list(alive), None if end_s is None else max(0.0, end_s - time.monotonic()))
+            ended = wait(list(alive), patience_s)
             if not ended:
                 return False
             for sentinel in ended:
                 alive.pop(sentinel).join()
         return True
 
-    def stop(self, leave_deadline_s: float = 0.0) -> None:
-        """End all robots: let them leave by themselves for so long, then SIGTERM, then SIGKILL; idempotent."""
+    def stop(self, patience_s: float = 0.0) -> None:
+        """End all robots: wait for them to leave, as `wait` does, then SIGTERM, then SIGKILL; idempotent."""
         with interrupts_held():
-            if self.wait(leave_deadline_s):
+            if self.wait(patience_s):
                 return
             for process in self._alive():
                 process.terminate()
-            if self.wait(TERMINATE_DEADLINE_S):
+            if self.wait(TERMINATE_PATIENCE_S):
                 return
             for process in self._alive():
                 process.kill()
-            self.wait(LEAVE_DEADLINE_S)
+            self.wait(LEAVE_PATIENCE_S)
 
     def _alive(self) -> list[ForkServerProcess]:
         return [process for process in self._processes.values() if process.exitcode is None]
@@ -155,7 +156,7 @@ class LocalSupervisor:
         reader, writer = self._context.Pipe(duplex=False)
         with reader, writer:
             while waiting or missing:
-                with interrupts_held(), _main_module_hidden():
+                with interrupts_held(), main_module_hidden():
                     while waiting and len(missing) < JOINING_MAX:
                         credential = waiting.popleft()
                         process = self._started(credential, deadline_s, writer)
@@ -203,7 +204,7 @@ def interrupts_held() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _main_module_hidden() -> Iterator[None]:
+def main_module_hidden() -> Iterator[None]:
     """Keep robot processes from importing the program that starts them, and all that it imports."""
     module = sys.modules["__main__"]
     names: dict[str, Any] = vars(module)

@@ -20,7 +20,7 @@ from zwerm.agents.contract import Setup
 from zwerm.deploy.identity import issue, renew, router_settings, save
 from zwerm.deploy.supervisor import (
     JOIN_DEADLINE_S,
-    LEAVE_DEADLINE_S,
+    LEAVE_PATIENCE_S,
     LocalSupervisor,
     Progress,
     interrupts_held,
@@ -139,7 +139,7 @@ class LocalSwarm(_Swarm):
         self._recast = recast
         self._ran = set(self._order)
         self._stopped: set[int] = set()
-        self._leave_deadline_s = 0.0  # nobody waits for those who have not joined
+        self._patience_s = 0.0  # nobody waits for those who have not joined
 
     def _open(self, directory: Path) -> None:
         prepare(len(self._members))
@@ -151,7 +151,7 @@ class LocalSwarm(_Swarm):
 
     def _gather(self) -> None:
         self.supervisor.start(self._progress, self._deadline_s)
-        self._leave_deadline_s = LEAVE_DEADLINE_S
+        self._patience_s = LEAVE_PATIENCE_S
 
     def kill(self, node: int) -> None:
         """Kill a node with SIGKILL; the link reports its end."""
@@ -188,7 +188,7 @@ class LocalSwarm(_Swarm):
         self._revive(node)
 
     def _revive(self, node: int) -> None:
-        self.link.wait_joined(lambda joined: node not in joined, LEAVE_DEADLINE_S)
+        self.link.wait_joined(lambda joined: node not in joined, LEAVE_PATIENCE_S)
         credential = renew(self._current[node])
         if self._recast is not None:
             self._members = {**self._members, node: self._recast(node, credential.incarnation)}
@@ -200,7 +200,7 @@ class LocalSwarm(_Swarm):
         for node in sorted(self._stopped):
             self.resume(node)
         self.link.dismiss("the run is over")
-        self.supervisor.stop(self._leave_deadline_s)
+        self.supervisor.stop(self._patience_s)
 
 
 class RemoteSwarm(_Swarm):
@@ -245,7 +245,9 @@ class RemoteSwarm(_Swarm):
 
     def _end(self) -> None:
         self.link.dismiss("the run is over")
-        self.link.wait_joined(lambda joined: not joined, LEAVE_DEADLINE_S)
+        count = len(self.link.joined)
+        while count and self.link.wait_joined(partial(_changed, count), LEAVE_PATIENCE_S):
+            count = len(self.link.joined)
 
 
 def _changed(count: int, joined: Collection[int]) -> bool:

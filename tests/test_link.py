@@ -175,6 +175,25 @@ def test_a_command_from_a_node_that_has_not_joined_is_counted_and_not_heard(net:
     session.close()  # type: ignore[no-untyped-call]
 
 
+def test_a_node_that_has_not_joined_cannot_hold_up_the_world(net: Network) -> None:
+    session = net.session(net.credentials.nodes[0])
+    over = threading.Event()
+
+    def flood() -> None:
+        while not over.is_set():
+            session.put(command_key(RUN, 0), b"let me in")
+
+    flooding = threading.Thread(target=flood)
+    flooding.start()
+    began_s = time.monotonic()
+    assert net.link.receive(0.2) is None
+    assert time.monotonic() - began_s < 5.0
+    over.set()
+    flooding.join()
+    assert net.link.refused["not-joined"] > 0
+    session.close()  # type: ignore[no-untyped-call]
+
+
 def test_what_is_sent_while_a_node_is_still_joining_is_not_lost(net: Network) -> None:
     node = net.node(0)
     node.join()

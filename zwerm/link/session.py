@@ -55,8 +55,7 @@ class Credential(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Credentials(Struct, frozen=True, forbid_unknown_fields=True):
-    """The credentials of some nodes of a run; `authority_pem` is who signed the world's certificate, for TLS and
-    QUIC."""
+    """The credentials of some nodes of a run. For TLS and QUIC, `authority_pem` signed the world's certificate."""
 
     run: str
     nodes: tuple[Credential, ...]

@@ -10,6 +10,7 @@ would compete with the world for the interpreter lock. As that channel has no wa
 through it.
 """
 
+import contextlib
 import threading
 import time
 from collections import Counter
@@ -111,10 +112,13 @@ class ZenohWorldLink:
                 if node is not None:
                     return Arrival(node, sample.payload.to_bytes())
                 if key != self._bell_key:
-                    self.refused["not-joined"] += 1
+                    with self._changed:
+                        self.refused["not-joined"] += 1
+                    if timeout_s > 0 and _is_over(deadline_s := deadline_s or time.monotonic() + timeout_s):
+                        return None  # whoever must not be heard must not hold us up either
                 elif note := sample.payload.to_bytes():
                     return self._lost(note)
-                elif deadline_s is not None and time.monotonic() >= deadline_s:
+                elif deadline_s is not None and _is_over(deadline_s):
                     return None
         except zenoh.ZError as error:
             raise LinkError(f"the world's link is closed: {error}") from None
@@ -154,18 +158,20 @@ class ZenohWorldLink:
             incarnation = self._joined.pop(node, None)
             self._changed.notify_all()
         if incarnation is not None and not self._dismissed:
-            self._ring(encode((node, incarnation)))
+            with contextlib.suppress(zenoh.ZError):  # closed meanwhile
+                self._ring(encode((node, incarnation)))
 
     def _on_hello(self, query: zenoh.Query) -> None:
         """A node asks to join, or says goodbye. Runs in a thread of its own."""
-        with query:
+        with query, contextlib.suppress(zenoh.ZError):  # closed meanwhile
             key = str(query.key_expr)
             try:
                 welcome = self._welcome(node_of(key), query.payload.to_bytes() if query.payload else b"")
             except ValueError:
                 welcome = Welcome(refused="identity")
             if welcome.refused:
-                self.refused[welcome.refused] += 1
+                with self._changed:
+                    self.refused[welcome.refused] += 1
             query.reply(key, encode(welcome))
 
     def _welcome(self, node: int, payload: bytes) -> Welcome:
@@ -190,6 +196,10 @@ class ZenohWorldLink:
             self._source_of[command_key(self._run, node)] = node
             self._changed.notify_all()
         return Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced)
+
+
+def _is_over(deadline_s: float) -> bool:
+    return time.monotonic() >= deadline_s
 
 
 class _Alarm:
