@@ -26,8 +26,8 @@ from zwerm.orders import (
     Report,
     Sighting,
     Survey,
-    decode_answer,
     encode,
+    open_answer,
 )
 from zwerm.protocol import Command, Observation, Transmission, Wake
 from zwerm.simplicial import Edge, FlagComplex
@@ -79,9 +79,10 @@ class SensorCoverage:
     def step(self, observation: Observation) -> Command:
         """Take the mail and go on."""
         self._now_s = observation.time_s
-        self._mail += [
-            (packet.sender, decode_answer(packet.payload)) for packet in observation.inbox if packet.sender is not None
-        ]
+        for packet in observation.inbox:
+            answer = open_answer(packet.payload)
+            if answer is not None and packet.sender is not None:
+                self._mail.append((packet.sender, answer))
         wake = next(self._story, Wake())
         outbox, self._outbox = tuple(self._outbox), []
         told, self._told = self._told, {}

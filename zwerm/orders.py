@@ -10,6 +10,8 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
+from zwerm.protocol import REFUSABLE
+
 
 def _tag(class_name: str) -> str:
     return class_name.lower()
@@ -128,5 +130,21 @@ Order = Survey | Release | Deploy | Move | Correct
 Answer = Report | Emerged | Cleared | Arrived
 
 encode: Final[Callable[[Order | Answer], bytes]] = msgspec.msgpack.Encoder().encode
-decode_order: Final[Callable[[bytes], Order]] = msgspec.msgpack.Decoder(Order).decode
-decode_answer: Final[Callable[[bytes], Answer]] = msgspec.msgpack.Decoder(Answer).decode
+_decode_order: Final[Callable[[bytes], Order]] = msgspec.msgpack.Decoder(Order).decode
+_decode_answer: Final[Callable[[bytes], Answer]] = msgspec.msgpack.Decoder(Answer).decode
+
+
+def open_order(payload: bytes) -> Order | None:
+    """Return the order in a packet, or None where there is none: a packet damaged on its way says nothing."""
+    try:
+        return _decode_order(payload)
+    except REFUSABLE:
+        return None
+
+
+def open_answer(payload: bytes) -> Answer | None:
+    """Return the answer in a packet, or None where there is none."""
+    try:
+        return _decode_answer(payload)
+    except REFUSABLE:
+        return None

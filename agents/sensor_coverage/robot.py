@@ -28,8 +28,8 @@ from zwerm.orders import (
     Release,
     Report,
     Survey,
-    decode_order,
     encode,
+    open_order,
 )
 from zwerm.protocol import BodyVelocity, Command, Observation, Transmission, Wake
 
@@ -93,7 +93,9 @@ class Robot(Controller):
         """Go on with the present drive, or start what an order asks for."""
         self.senses.take(observation)
         for packet in observation.inbox:
-            self._story = self._begin(decode_order(packet.payload))
+            order = open_order(packet.payload)
+            if order is not None:
+                self._story = self._begin(order)
         drive, wake = STOP, None
         if self._story is not None:
             try:
