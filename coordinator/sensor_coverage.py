@@ -27,7 +27,7 @@ from zwerm.orders import (
     Sighting,
     Survey,
     encode,
-    open_answer,
+    read_answer,
 )
 from zwerm.protocol import Command, Observation, Transmission, Wake
 from zwerm.simplicial import Edge, FlagComplex
@@ -80,7 +80,7 @@ class SensorCoverage:
         """Take the mail and go on."""
         self._now_s = observation.time_s
         for packet in observation.inbox:
-            answer = open_answer(packet.payload)
+            answer = read_answer(packet.payload)
             if answer is not None and packet.sender is not None:
                 self._mail.append((packet.sender, answer))
         wake = next(self._story, Wake())

@@ -13,7 +13,7 @@ from zwerm.agents.sensor_coverage.homing import offset, slid, unit
 from zwerm.assembly import assemble
 from zwerm.deploy.cast import cast
 from zwerm.link.memory import MemoryLink
-from zwerm.orders import Arrived, Correct, Deploy, Sighting, encode, open_answer
+from zwerm.orders import Arrived, Correct, Deploy, Sighting, encode, read_answer
 from zwerm.protocol import (
     Bearing,
     BodyVelocity,
@@ -110,7 +110,7 @@ class OneRobot:
         x = min(self.x + 0.1 * drive.forward_m_s, self.wall_x_m - 0.07)
         self.moved = (x - self.x, 0.1 * drive.left_m_s)
         self.x, self.y = x, self.y + self.moved[1]
-        self.said += [open_answer(each.payload) for each in command.outbox]
+        self.said += [read_answer(each.payload) for each in command.outbox]
         return command
 
     def until_arrived(self, order: bytes) -> Arrived:

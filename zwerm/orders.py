@@ -134,7 +134,7 @@ _decode_order: Final[Callable[[bytes], Order]] = msgspec.msgpack.Decoder(Order).
 _decode_answer: Final[Callable[[bytes], Answer]] = msgspec.msgpack.Decoder(Answer).decode
 
 
-def open_order(payload: bytes) -> Order | None:
+def read_order(payload: bytes) -> Order | None:
     """Return the order in a packet, or None where there is none: a packet damaged on its way says nothing."""
     try:
         return _decode_order(payload)
@@ -142,7 +142,7 @@ def open_order(payload: bytes) -> Order | None:
         return None
 
 
-def open_answer(payload: bytes) -> Answer | None:
+def read_answer(payload: bytes) -> Answer | None:
     """Return the answer in a packet, or None where there is none."""
     try:
         return _decode_answer(payload)

@@ -29,7 +29,7 @@ from zwerm.orders import (
     Report,
     Survey,
     encode,
-    open_order,
+    read_order,
 )
 from zwerm.protocol import BodyVelocity, Command, Observation, Transmission, Wake
 
@@ -93,7 +93,7 @@ class Robot(Controller):
         """Go on with the present drive, or start what an order asks for."""
         self.senses.take(observation)
         for packet in observation.inbox:
-            order = open_order(packet.payload)
+            order = read_order(packet.payload)
             if order is not None:
                 self._story = self._begin(order)
         drive, wake = STOP, None
