@@ -10,8 +10,8 @@ from typing import Any, Final, Protocol
 
 import msgspec
 
-from zwerm.coordinator.places import Places
-from zwerm.coordinator.planner import BASE, Parameters, Plan, Planner
+from zwerm.frontier.places import Places
+from zwerm.frontier.planner import BASE, Parameters, Plan, Planner
 from zwerm.orders import (
     Answer,
     Arrived,

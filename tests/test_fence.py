@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from zwerm.coordinator.fence import (
+from zwerm.frontier.fence import (
     Side,
     fence,
     is_exception,
@@ -15,7 +15,7 @@ from zwerm.coordinator.fence import (
     uncovered,
     wedges,
 )
-from zwerm.coordinator.paths import reach
+from zwerm.frontier.paths import reach
 from zwerm.simplicial import FlagComplex
 
 Views = dict[int, dict[int, float]]

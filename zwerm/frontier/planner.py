@@ -10,9 +10,9 @@ from typing import Final, NamedTuple
 
 from msgspec import Struct
 
-from zwerm.coordinator.fence import SIXTY_RAD, Fence, Side, Views, fence, wedges
-from zwerm.coordinator.paths import Reach, reach
-from zwerm.coordinator.places import Places
+from zwerm.frontier.fence import SIXTY_RAD, Fence, Side, Views, fence, wedges
+from zwerm.frontier.paths import Reach, reach
+from zwerm.frontier.places import Places
 from zwerm.simplicial import Edge, FlagComplex, edge, sparing
 
 BASE: Final = 0

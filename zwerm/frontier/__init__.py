@@ -1,0 +1,1 @@
+"""Where a swarm ends and where it may go on: the geometry of bearings that the coordinator and the robots share."""
