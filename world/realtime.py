@@ -39,7 +39,7 @@ class RealTime:
         self.deadman_stops = 0
         self.overruns = 0
         self.reason = ""
-        world.late_allowed = True
+        world.answers.late_allowed = True
 
     @property
     def lost(self) -> int:

@@ -7,15 +7,13 @@ when to advance: the lock-step driver when all have answered, the real-time driv
 The world is deterministic: its state after a tick is a function of the scenario, the seed and the accepted answers.
 """
 
-from collections import Counter
 from collections.abc import Sequence
 from itertools import repeat
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from zwerm.draws import Draws
-from zwerm.errors import ProtocolError
 from zwerm.protocol import (
     SENSOR_FIELDS,
     BodyVelocity,
@@ -25,10 +23,10 @@ from zwerm.protocol import (
     Transmission,
     WheelSpeeds,
     encode,
-    open_answer,
 )
 from zwerm.scenario import Scenario
 from zwerm.trace import Trace
+from zwerm.world.answers import Answers
 from zwerm.world.arena import Arena
 from zwerm.world.drives import Drives
 from zwerm.world.faults import ticks
@@ -49,8 +47,6 @@ from zwerm.world.wakes import SIGNATURES, Wakes
 if TYPE_CHECKING:
     from zwerm.world.recording import Recording
 
-NO_ANSWER: Final = b""
-
 
 class World:
     """One run's world. Every robot carries the `sensors`; `seed` keys all randomness. `meters` are for whoever drives it."""
@@ -66,11 +62,8 @@ class World:
         self.tick = 0
         self.count = count
         self.robot_ticks = 0
-        self.refused: Counter[str] = Counter()
         self.crashed: dict[int, str] = {}
         self.failures: dict[int, Failure] = {}
-        self.late_allowed = False
-        self.late_commands = 0
         self.exited: list[int] = []
         self.audience = Audience()
         self.trace = Trace()
@@ -95,14 +88,11 @@ class World:
         self._done: Bools = np.zeros(nodes, dtype=np.bool_)
         self._any_done = False
         self._fixed = ([self.coordinator] if self.coordinator is not None else []) + ([0] if scenario.base else [])
-        self._drive_types = (self._drives.kind, type(None))
+        self.answers = Answers(self._drives.kind, body.kind, self._fixed, self.medium)
+        self.refused = self.answers.refused
         self._present: Bools = np.zeros(count, dtype=np.bool_)
         self._nodes: list[int] = []
-        self._awaited: dict[int, None] = {}
         self._observations: list[bytes] = []
-        self._answers: dict[int, tuple[bytes, Command | Failure]] = {}
-        self._late: list[tuple[int, Command | Failure]] = []
-        self._last_answer: dict[int, int] = {}
         self._outboxes: list[tuple[int, tuple[Transmission, ...]]] = []
         self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
         self._depot = Depot(scenario.base, count, arena, body.radius_m, self.draws) if scenario.base else None
@@ -160,8 +150,7 @@ class World:
             inbox = inboxes[-1] if receivers else ()
             self._observations.append(encode(Observation(tick, scene.time_s, inbox)))
         self._nodes = nodes
-        self._awaited = dict.fromkeys(nodes)
-        self._answers.clear()
+        self.answers.ask(nodes, tick)
         self.robot_ticks += len(nodes)
         return nodes, self._observations
 
@@ -170,45 +159,18 @@ class World:
 
         Raises ProtocolError, and counts its reason, for what is malformed or unasked for; the node is still awaited then.
         """
-        try:
-            answer = open_answer(payload)
-            late = answer.tick != self.tick or node not in self._awaited or node in self._answers
-            if late:
-                self._check_late(node, answer.tick)
-            if type(answer) is Command and (
-                answer.outbox or type(answer.drive) not in self._drive_types or node in self._fixed
-            ):
-                self._check_content(node, answer)
-        except ProtocolError as error:
-            self.refused[error.reason] += 1
-            raise
+        answer = self.answers.hear(node, payload)
         if type(answer) is Failure:
             self.failures[node] = answer
             self.crash(node, answer.error)
-        if late:
-            self._late.append((node, answer))
-            self.late_commands += 1
-        else:
-            self._answers[node] = payload, answer
-        if self.late_allowed:
-            self._last_answer[node] = answer.tick
 
     def awaited(self) -> list[int]:
         """Return the nodes whose answer to this tick's observation has not come, ascending."""
-        return [node for node in self._nodes if node not in self._answers and node not in self.crashed]
+        return [node for node in self.answers.owing() if node not in self.crashed]
 
     def advance(self) -> None:
         """Apply what was accepted, in id order, and go on to the next tick."""
-        payloads: list[bytes] = []
-        commands: list[tuple[int, Command | Failure]] = list(self._late)
-        answers = self._answers
-        for node in self._nodes:
-            if node in answers:
-                payload, answer = answers[node]
-                payloads.append(payload)
-                commands.append((node, answer))
-            else:
-                payloads.append(NO_ANSWER)
+        payloads, commands = self.answers.close()
         self._apply(self.lives.finished(commands, self.tick))
         self.trace.extend(self.tick, self._nodes, self._observations, payloads)
         if self.recording is not None:
@@ -216,7 +178,6 @@ class World:
         if self._outboxes:
             self.medium.send(self.scene, self._outboxes)
             self._outboxes = []
-        self._late = []
         before = self.scene
         moving = self._physics.advance(*self._drives.velocities(self.tick))
         self.tick += 1
@@ -377,24 +338,3 @@ class World:
                 self._any_done = True
         if drives:
             self._drives.command(drives)
-
-    def _check_late(self, node: int, tick: int) -> None:
-        """Raise ProtocolError, unless late answers are allowed and this one comes in order."""
-        if self.late_allowed and self._last_answer.get(node, -1) < tick < self.tick:
-            return
-        if tick != self.tick:
-            raise ProtocolError("out-of-order", f"node {node} answers tick {tick} at tick {self.tick}")
-        if node not in self._awaited:
-            raise ProtocolError("unasked", f"node {node} was sent no observation at tick {tick}")
-        raise ProtocolError("duplicate", f"node {node} answers tick {tick} again")
-
-    def _check_content(self, node: int, command: Command) -> None:
-        """Raise ProtocolError for a command that this world cannot carry out."""
-        if command.drive is not None and type(command.drive) is not self._drives.kind:
-            raise ProtocolError("wrong-drive", f"a {self.scenario.robots.body.kind} body takes no {command.drive!r}")
-        if command.drive is not None and node in self._fixed:
-            raise ProtocolError("wrong-drive", f"node {node} has no drive")
-        for message in command.outbox:
-            refused = self.medium.refuses(node, message)
-            if refused:
-                raise ProtocolError("wrong-packet", refused)

@@ -215,7 +215,7 @@ def _result(
         metrics |= radio_metrics(world.medium, world.count, world.tick)
     metrics["refused_messages"] = float(world.refused.total())
     if isinstance(driver, RealTime):
-        metrics["late_commands"] = float(world.late_commands)
+        metrics["late_commands"] = float(world.answers.late_count)
         metrics["deadman_stops"] = float(driver.deadman_stops)
         metrics["tick_overruns"] = float(driver.overruns)
     counts = None
