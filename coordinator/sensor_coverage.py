@@ -1,17 +1,22 @@
 """The coordinator of sensor coverage: survey, fence, path, push, and again until nothing is left to expand.
 
-Algorithm 1 of Ramaithitima et al. 2015. It knows what robots told it over the uplink, and nothing else. The central pieces are
-functions beside it: the complex (`zwerm.simplicial`), the fence, the path, who can be spared; here is only the story.
+Algorithm 1 of Ramaithitima et al. 2015. It knows what robots told it over the uplink, and nothing else. What is to be decided
+stands behind one interface each (`zwerm.frontier.services`); here is only the story.
 """
 
 import math
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from typing import Any, Final, Protocol
 
 import msgspec
 
+from zwerm.frontier.assignment import CheapestFirst
+from zwerm.frontier.paths import Dijkstra, Reach
 from zwerm.frontier.places import Places
-from zwerm.frontier.planner import BASE, Parameters, Plan, Planner
+from zwerm.frontier.planner import Parameters, Planner
+from zwerm.frontier.redundancy import RelativeHomology
+from zwerm.frontier.services import Picture, Plan, Services
+from zwerm.frontier.termination import COVERED, Quiet
 from zwerm.orders import (
     Answer,
     Arrived,
@@ -32,8 +37,12 @@ from zwerm.orders import (
 from zwerm.protocol import Command, Observation, Transmission, Wake
 from zwerm.simplicial import Edge, FlagComplex
 
-# How a deployment ends.
-COVERED: Final = "covered"
+BASE: Final = 0
+
+# A robot that can be spared is taken before any from a base station.
+SPARED_COST: Final = -100.0
+
+# How a deployment ends that does not end with all covered.
 GIVEN_UP: Final = {
     "depot-dry": "the depot is empty",
     "source-blocked": "no robot gets away from the base",
@@ -64,7 +73,15 @@ class SensorCoverage:
         self.parameters: Parameters = msgspec.convert(setup.parameters, Parameters)
         self.dt_s = setup.dt_s
         self.places = Places()
-        self.planner = Planner(self.parameters, self.places)
+        self.services = Services(
+            Planner(self.parameters, self.places),
+            Dijkstra(self.parameters.obstacle_cost),
+            RelativeHomology(),
+            CheapestFirst(),
+            Quiet(),
+        )
+        self.picture = Picture({}, FlagComplex({}), (BASE,))
+        self.redundant: tuple[int, ...] = ()
         self.outcome = ""
         self.cycle = 0
         self.pushes = 0
@@ -91,14 +108,13 @@ class SensorCoverage:
     def _gave_up(self) -> str:
         """Return why the task cannot be completed, if so."""
         reason = GIVEN_UP.get(self.outcome, "")
-        return f"{self.outcome}: {reason}, {len(self.planner.frontier)} frontier edges left" if reason else ""
+        return f"{self.outcome}: {reason}, {len(self.services.frontier.frontier)} frontier edges left" if reason else ""
 
     # --- the story --------------------------------------------------------------------------------------------------
 
     def _tell(self) -> Story:
         self.places.found(BASE, 0.0)
         self.places.take(BASE, ())
-        quiet = 0
         moved: Sequence[int] = ()
         while self.cycle < self.parameters.cycles_max:
             self.cycle += 1
@@ -109,30 +125,42 @@ class SensorCoverage:
                 if self.outcome:
                     break
                 continue
-            plan = self.planner.plan(self.pushes)
+            plan = self._next()
             self._tell_complex(plan)
-            if plan is None:
-                quiet += 1
-                if quiet >= 2:
-                    self.outcome = COVERED if not self.planner.cut_off else "cut-off"
-                    break
-                continue
-            quiet = 0
-            moved = yield from self._push(plan)
+            self.outcome = self.services.termination.judge(plan is not None, bool(self.services.frontier.frontier))
+            if plan is not None:
+                moved = yield from self._push(plan)
             if self.outcome:
                 break
         self.outcome = self.outcome or "no-end"
-        self.planner.spare()
+        self._spare()
         self._tell_numbers()
         yield Wake()
+
+    def _next(self) -> Plan | None:
+        """Return the deployment to carry out next, if there is any."""
+        services, every = self.services, self.parameters.redundancy_every
+        if self.pushes and every and self.pushes % every == 0:
+            self._spare()
+        self.redundant = tuple(place for place in self.redundant if place in self.places.occupant)
+        sources = {BASE: 0.0, **dict.fromkeys(self.redundant, SPARED_COST)}
+
+        def ways(complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
+            return services.paths.ways(complex_, sources, services.frontier.obstacle)
+
+        found = services.assignment.assign(services.frontier.plans(), self.picture, sources, ways)
+        return found[0] if found else None
+
+    def _spare(self) -> None:
+        self.redundant = self.services.redundancy.redundant(self.picture, self.services.frontier.rim())
 
     def _tell_complex(self, best: Plan | None) -> None:
         """Tell who watches what the swarm looks like, by robots."""
         self._told["complex"] = {
             "cycle": self.cycle,
-            "edges": self._by_robot(self.complex.edges),
-            "frontier": self._by_robot(self.planner.frontier),
-            "obstacle": self._by_robot(self.planner.obstacle),
+            "edges": self._by_robot(self.picture.complex_.edges),
+            "frontier": self._by_robot(self.services.frontier.frontier),
+            "obstacle": self._by_robot(self.services.frontier.obstacle),
             "path": [] if best is None else [self.places.occupant[each] for each in best.path],
         }
 
@@ -145,7 +173,7 @@ class SensorCoverage:
             "deployment_cycles": self.cycle,
             "pushes": self.pushes,
             "robots_released": self.released,
-            "redundant_robots": len(self.planner.redundant),
+            "redundant_robots": len(self.redundant),
         }
 
     def _say(self, node: int, order: Order) -> None:
@@ -193,10 +221,10 @@ class SensorCoverage:
             place = place_of[robot]
             for bearing in report.touched:
                 self._remember(places.walls.setdefault(place, []), bearing + places.heading[robot])
-        self.views = places.views()
-        self.complex = FlagComplex(self.views)
-        places.learn_references(self.views)
-        self.planner.look(self.views, self.complex)
+        views = places.views()
+        places.learn_references(views)
+        self.picture = Picture(views, FlagComplex(views), (BASE,))
+        self.services.frontier.look(self.picture)
 
     @staticmethod
     def _remember(known: list[float], direction: float) -> None:
@@ -239,8 +267,8 @@ class SensorCoverage:
         places, cycle, path = self.places, self.cycle, plan.path
         robots = [places.occupant[place] for place in path]
         leader = robots[-1]
-        self.planner.note_attempt(plan)
-        if path[0] == BASE and self._waiting is None and not any(each not in path for each in self.views[BASE]):
+        self.services.frontier.note_attempt(plan)
+        if path[0] == BASE and self._waiting is None and not any(each not in path for each in self.picture.views[BASE]):
             # Whom the base sees is about to move: the next robot must look around before that.
             yield from self._let_out(path)
         bearing = plan.direction - places.heading[leader]
@@ -252,7 +280,7 @@ class SensorCoverage:
         )
         first = news[0][1] if news else None
         if first is None or (isinstance(first, Arrived) and not first.ok):
-            self.planner.note_failure(plan, math.inf if first is None else first.driven_m)
+            self.services.frontier.note_failure(plan, math.inf if first is None else first.driven_m)
             return (leader,)
         followers = robots[:-1]
         if path[0] == BASE:
@@ -291,12 +319,12 @@ class SensorCoverage:
 
     def _heading_at_base(self, born: int, path: Sequence[int]) -> float:
         """Return the heading of a robot that stands on the base and sees what the base sees."""
-        base = self.views[BASE]
+        base = self.picture.views[BASE]
         place_of = self.places.place_of()
         x = y = 0.0
         for node, bearing in self.places.view[born].items():
             place = place_of.get(node)
-            if place in base and (place not in path or len(base) == 1):
+            if place is not None and place in base and (place not in path or len(base) == 1):
                 x += math.cos(base[place] - bearing)
                 y += math.sin(base[place] - bearing)
         return math.atan2(y, x)

@@ -43,3 +43,14 @@ def reach(
                 step = obstacle_cost if edge(vertex, each) in obstacle else 1.0
                 heapq.heappush(heap, (spent + step, each, vertex))
     return Reach(cost, before)
+
+
+class Dijkstra:
+    """The path service of who knows the whole graph."""
+
+    def __init__(self, obstacle_cost: float) -> None:
+        self._obstacle_cost = obstacle_cost
+
+    def ways(self, complex_: FlagComplex, sources: Mapping[int, float], obstacle: Collection[Edge]) -> Reach:
+        """Return the cheapest ways from `sources` (place: cost to start there); obstacle edges are dear."""
+        return reach(complex_, sources, obstacle, self._obstacle_cost)

@@ -1,21 +1,19 @@
-"""Where to expand: which edges are frontier and which obstacle, who moves where, by which path, and who can be spared.
+"""Where to expand: which edges are frontier and which obstacle, and who could move where.
 
-The decisions of Ramaithitima et al. 2015, sections III-A, III-B and III-D, on what robots reported; what was tried and
-failed is remembered by place and side. A planner moves nobody.
+The decisions of Ramaithitima et al. 2015, section III-A, on what robots reported; what was tried and failed is remembered
+by place and side. A planner moves nobody.
 """
 
 import math
-from collections.abc import Iterable
-from typing import Final, NamedTuple
+from collections.abc import Iterable, Iterator
+from typing import Final
 
 from msgspec import Struct
 
-from zwerm.frontier.fence import SIXTY_RAD, Fence, Side, Views, fence, wedges
-from zwerm.frontier.paths import Reach, reach
+from zwerm.frontier.fence import SIXTY_RAD, Fence, Side, fence, wedges
 from zwerm.frontier.places import Places
-from zwerm.simplicial import Edge, FlagComplex, edge, sparing
-
-BASE: Final = 0
+from zwerm.frontier.services import Picture, Plan
+from zwerm.simplicial import Edge, FlagComplex, edge
 
 # Which ways a robot with a wide gap in what it sees may go, off the middle of the gap, and how far beside its neighbours.
 VERTEX_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 60, -60))
@@ -44,39 +42,40 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     cycles_max: int = 2000
 
 
-class Plan(NamedTuple):
-    """One deployment: the robot at `mover` goes along `direction`, and the robots on the path follow."""
-
-    key: tuple[int, ...]
-    mover: int
-    direction: float
-    hop_m: float
-    clear_m: float
-    anchors: tuple[int, ...]
-    path: tuple[int, ...] = ()
-
-
 class Planner:
-    """Plans over `places`. `frontier` and `obstacle` are edges between places, as of the last plan."""
+    """The frontier by the rules of the paper, over `places`."""
 
     def __init__(self, rules: Parameters, places: Places) -> None:
         self.fence = Fence((), ())
         self.frontier: tuple[Edge, ...] = ()
         self.obstacle: tuple[Edge, ...] = ()
-        self.redundant: list[int] = []
-        self.cut_off = False
         self._rules = rules
         self._places = places
-        self._views: Views = {}
-        self._complex = FlagComplex({})
+        self._views, self._complex, self._bases = Picture({}, FlagComplex({}), ())
+        self._plans: list[Plan] = []
         self._closed: dict[tuple[int, ...], None] = {}
         self._failed: dict[tuple[tuple[int, ...], int], None] = {}
         self._attempts: dict[tuple[int, ...], int] = {}
         self._blocked: dict[int, list[float]] = {}
 
-    def look(self, views: Views, complex_: FlagComplex) -> None:
-        """Take what the places see now."""
-        self._views, self._complex = views, complex_
+    def look(self, picture: Picture) -> None:
+        """Take what the places see now, and find the fence."""
+        self._views, self._complex, self._bases = picture
+        found = self.fence = fence(self._views, self._complex, self._rules.corner_margin_rad)
+        obstacle = dict.fromkeys(found.corners)
+        self._plans = []
+        for side in found.sides:
+            options = self._edge_plans(side)
+            if not options:
+                obstacle[side.edge] = None
+            self._plans += options
+        self.obstacle = tuple(sorted(obstacle))
+        self.frontier = tuple(sorted({edge(*each.key[:2]) for each in self._plans}))
+
+    def plans(self) -> Iterator[list[Plan]]:
+        """Yield the deployments there could be; edges first, since a robot between two others covers more."""
+        yield self._plans
+        yield list(self._vertex_plans())
 
     def note_attempt(self, plan: Plan) -> None:
         """Take note that a plan is being tried; the same side is not tried for ever."""
@@ -95,33 +94,12 @@ class Planner:
         self._failed[plan.key, plan.mover] = None
         self._blocked.setdefault(plan.mover, []).append(plan.direction)
 
-    def plan(self, pushes: int) -> Plan | None:
-        """Return the cheapest deployment there is; edges first, since a robot between two others covers more."""
-        found = self.fence = fence(self._views, self._complex, self._rules.corner_margin_rad)
-        obstacle = dict.fromkeys(found.corners)
-        plans: list[Plan] = []
-        for side in found.sides:
-            options = self._edge_plans(side)
-            if not options:
-                obstacle[side.edge] = None
-            plans += options
-        self.obstacle = tuple(sorted(obstacle))
-        self.frontier = tuple(sorted({edge(*each.key[:2]) for each in plans}))
-        if pushes and self._rules.redundancy_every and pushes % self._rules.redundancy_every == 0:
-            self.spare()
-        self.redundant = [place for place in self.redundant if place in self._places.occupant]
-        sources = dict.fromkeys(self.redundant, -100.0) if self.redundant else {}
-        ways = reach(self._complex, {BASE: 0.0, **sources}, obstacle, self._rules.obstacle_cost)
-        best = self._cheapest(plans, ways) or self._cheapest(self._vertex_plans(), ways)
-        self.cut_off = best is None and bool(plans)
-        return best
-
-    def _cheapest(self, plans: Iterable[Plan], ways: Reach) -> Plan | None:
-        open_plans = [(ways.cost[plan.mover], plan.mover, plan.key, plan) for plan in plans if plan.mover in ways.cost]
-        if not open_plans:
-            return None
-        plan = min(open_plans)[-1]
-        return plan._replace(path=ways.path(plan.mover))
+    def rim(self) -> tuple[Edge, ...]:
+        """Return the fence and the edges of all wedges: with those, it is closed."""
+        fenced: dict[Edge, None] = dict.fromkeys((*self.fence.corners, *(side.edge for side in self.fence.sides)))
+        for i, a, b, _ in wedges(self._views, self._complex):
+            fenced[edge(i, a)] = fenced[edge(i, b)] = None
+        return tuple(fenced)
 
     def _edge_plans(self, side: Side) -> list[Plan]:
         """Return the ways to expand one side of an edge; none if it is an obstacle edge. Section III-A, i to iv."""
@@ -134,7 +112,7 @@ class Planner:
             (side.i, side.j, side.sign, side.angle_i_rad, side.angle_j_rad),
             (side.j, side.i, -side.sign, side.angle_j_rad, side.angle_i_rad),
         ):
-            if mover == BASE:
+            if mover in self._bases:
                 continue
             towards = self._places.direction(mover, other)
             if towards is None:
@@ -156,7 +134,7 @@ class Planner:
         """Yield the ways on for robots with a wide gap in what they see: single files, and doors."""
         hop = self._rules.link_m - self._rules.margin_m
         for i, a, _, gap in wedges(self._views, self._complex):
-            if i == BASE:
+            if i in self._bases:
                 continue
             end = gap > END_RAD
             for turn in END_TURNS_RAD if end else VERTEX_TURNS_RAD:
@@ -174,14 +152,6 @@ class Planner:
 
     def _walled(self, place: int, direction: float) -> bool:
         return any(_apart(each, direction) < SIXTY_RAD for each in self._places.walls.get(place, ()))
-
-    def spare(self) -> None:
-        """Look for redundant robots; section III-D."""
-        fenced: dict[Edge, None] = dict.fromkeys((*self.fence.corners, *(side.edge for side in self.fence.sides)))
-        for i, a, b, _ in wedges(self._views, self._complex):
-            fenced[edge(i, a)] = fenced[edge(i, b)] = None
-        missed_max = 1 + len(self._complex.vertices) // 50
-        self.redundant = list(sparing(self._complex, fenced, (BASE,), missed_max).redundant)
 
 
 def _apart(a: float, b: float) -> float:
