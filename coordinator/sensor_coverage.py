@@ -65,7 +65,7 @@ class Setup(Protocol):
 
 
 class SensorCoverage:
-    """The coordinator."""
+    """Fills an unknown space with robots, from what they tell by radio (Ramaithitima et al. 2015, algorithm 1)."""
 
     Parameters = Parameters
 

@@ -6,6 +6,7 @@ import msgspec
 
 from zwerm.agents.contract import Body, Setup
 from zwerm.draws import Draws
+from zwerm.errors import ControllerError
 from zwerm.scenario import Scenario
 
 ROBOT: Final = "robot"
@@ -17,6 +18,17 @@ PARTS: Final = {
     (BASE, "sensor-coverage"): "zwerm.agents.sensor_coverage:Base",
     (COORDINATOR, "sensor-coverage"): "zwerm.coordinator.sensor_coverage:SensorCoverage",
 }
+
+
+def player(role: str, name: str) -> str:
+    """Return the controller that plays a role under the name that a scenario gives it.
+
+    Raises ControllerError where no coordinator has that name.
+    """
+    if role == COORDINATOR and (role, name) not in PARTS and ":" not in name:
+        known = ", ".join(each for part, each in PARTS if part == role)
+        raise ControllerError(f"expected a built-in coordinator ({known}) or module:Class, got {name!r}")
+    return PARTS.get((role, name), name)
 
 
 def recast(scenario: Scenario, seed: int, node: int, incarnation: int) -> tuple[str, Setup]:
@@ -49,7 +61,7 @@ def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
         placed = role != COORDINATOR
         key = draws.stream_key("controller", node)
         players[node] = (
-            PARTS.get((role, controller), controller),
+            player(role, controller),
             Setup(
                 node=node,
                 role=role,

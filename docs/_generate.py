@@ -23,6 +23,7 @@ from pydantic import BaseModel
 from zwerm import protocol, scenario
 from zwerm.agents import registry as controllers
 from zwerm.cli import app
+from zwerm.deploy.cast import PARTS
 from zwerm.running import run
 from zwerm.scenario import OpenTable, Scenario
 from zwerm.study.tables import StudyTable
@@ -214,15 +215,25 @@ def field_list() -> str:
 
 def controller_list() -> str:
     """Return every built-in controller and what it takes."""
-    parts = []
-    for name in controllers.BUILT_IN:
-        found = controllers.find(name)
-        parameters = controllers.parameters_of(found)
-        needs = ", ".join(f"`{each}`" for each in getattr(found, "sensors", ())) or "no sensor"
-        (schema,), components = msgspec.json.schema_components([parameters])
-        parts.append(f"### `{name}` {{ #controller-{name} }}\n\n{paragraphs(found.__doc__)}\n\nNeeds {needs}.")
-        parts.append(f"{paragraphs(parameters.__doc__)}\n\n{rows(components[schema['$ref'].rpartition('/')[2]])}")
-    return "\n\n".join(parts)
+    return "\n\n".join(_controller(f"`{name}`", f"controller-{name}", name) for name in controllers.BUILT_IN)
+
+
+def part_list() -> str:
+    """Return every built-in base station and coordinator and what it takes."""
+    return "\n\n".join(
+        _controller(f"`{name}`, {role}", f"{role}-{name}", where) for (role, name), where in PARTS.items()
+    )
+
+
+def _controller(title: str, anchor: str, name: str) -> str:
+    found = controllers.find(name)
+    parameters = controllers.parameters_of(found)
+    needs = ", ".join(f"`{each}`" for each in getattr(found, "sensors", ())) or "no sensor"
+    (schema,), components = msgspec.json.schema_components([parameters])
+    return (
+        f"### {title} {{ #{anchor} }}\n\n{paragraphs(found.__doc__)}\n\nNeeds {needs}.\n\n"
+        f"{paragraphs(parameters.__doc__)}\n\n{rows(components[schema['$ref'].rpartition('/')[2]])}"
+    )
 
 
 # --- the wire -------------------------------------------------------------------------------------------------------
@@ -304,6 +315,7 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
     "fields": field_list,
     "faults": fault_list,
     "messages": messages,
+    "parts": part_list,
     "radio-models": radio_models,
     "scenario-tables": scenario_tables,
     "sensors": sensor_list,

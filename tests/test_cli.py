@@ -48,7 +48,7 @@ def test_check_reports_every_mistake_of_every_stage_with_its_place_rule_and_valu
     assert any(line.startswith("zwerm: tables.toml: robots.colour: unknown key") for line in said)
     assert any(line.startswith("zwerm: parts.toml: arena: expected exactly one of") for line in said)
     assert "zwerm: parts.toml: robots.sensors: the controller computation-free needs the sensor 'line_of_sight'" in said
-    assert any("zwerm: parts.toml: robots.parameters: Expected float <= 1.0 - at $.left_0" in line for line in said)
+    assert "zwerm: parts.toml: robots.parameters.left_0: expected <= 1.0, got 3.0" in said
 
 
 @pytest.mark.parametrize(

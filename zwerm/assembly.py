@@ -1,13 +1,14 @@
 """From a scenario to a world ready to run, with every mistake that the typed tables could not see."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-import msgspec
 import numpy as np
 
 from zwerm.agents.registry import find, parameters_of
+from zwerm.deploy.cast import BASE, COORDINATOR, ROBOT, player
 from zwerm.errors import ControllerError, ScenarioError
+from zwerm.mistakes import struct_mistakes
 from zwerm.scenario import Scenario
 from zwerm.world.arena import Arena
 from zwerm.world.fields import Field, make_field
@@ -49,7 +50,7 @@ def prepare(scenario: Scenario) -> Prepared:
     field, table = None, scenario.field
     sensors, meters = None, None
     arena = _attempt(lambda: Arena.from_table(scenario.arena, scenario.folder), scenario, mistakes)
-    _attempt(lambda: check_controller(scenario), scenario, mistakes)
+    _attempt(lambda: check_controllers(scenario), scenario, mistakes)
     if arena is not None and table is not None:
         bounds = arena.bounds
         field = _attempt(lambda: make_field(table, bounds, scenario.folder, scenario.place), scenario, mistakes)
@@ -78,27 +79,34 @@ def _sensors(scenario: Scenario, arena: Arena, field: Field | None) -> Sequence[
     return make_sensors(scenario.robots.sensors, surroundings, "robots.sensors", scenario.place)
 
 
-def check_controller(scenario: Scenario) -> None:
-    """Find the robots' controller, and check what it is given against what it needs.
+def check_controllers(scenario: Scenario) -> None:
+    """Find the controllers of robots, base and coordinator, and check what each is given against what it needs.
 
     Raises ScenarioError with every mistake.
     """
-    robots = scenario.robots
-    try:
-        found = find(robots.controller)
-    except ControllerError as error:
-        raise ScenarioError([f"robots.controller: {error}"]) from None
+    robots, base, coordinator = scenario.robots, scenario.base, scenario.coordinator
     kinds = [table.kind for table in robots.sensors]
     # A controller may name what it needs by the sensor's kind or by the field of the observation that it fills.
-    given = {*kinds, *(BUILT_IN[kind].field for kind in kinds if kind in BUILT_IN)}
-    mistakes = [
-        f"robots.sensors: the controller {robots.controller} needs the sensor {sensor!r}"
-        for sensor in getattr(found, "sensors", ())
-        if sensor not in given
-    ]
-    try:
-        msgspec.convert(robots.parameters, parameters_of(found))
-    except msgspec.ValidationError as error:
-        mistakes.append(f"robots.parameters: {str(error).replace('`', '')}, got {robots.parameters!r}")
+    given = [*kinds, *(BUILT_IN[kind].field for kind in kinds if kind in BUILT_IN)]
+    mistakes = _controller_mistakes("robots", ROBOT, robots.controller, robots.parameters, given)
+    if base is not None:
+        mistakes += _controller_mistakes("base", BASE, base.controller, base.parameters, given)
+    if coordinator is not None:
+        mistakes += _controller_mistakes("coordinator", COORDINATOR, coordinator.controller, coordinator.parameters, [])
     if mistakes:
-        raise ScenarioError(mistakes)
+        raise ScenarioError(list(dict.fromkeys(mistakes)))
+
+
+def _controller_mistakes(
+    table: str, role: str, controller: str, parameters: dict[str, Any], sensors: Sequence[str]
+) -> list[str]:
+    try:
+        found = find(player(role, controller))
+    except ControllerError as error:
+        return [f"{table}.controller: {error}"]
+    mistakes = [
+        f"robots.sensors: the controller {controller} needs the sensor {sensor!r}"
+        for sensor in getattr(found, "sensors", ())
+        if sensor not in sensors
+    ]
+    return mistakes + struct_mistakes(parameters_of(found), parameters, f"{table}.parameters")

@@ -4,6 +4,8 @@ import json
 import re
 from typing import Any
 
+import msgspec
+from msgspec import Struct
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
@@ -57,6 +59,35 @@ def _mistake(each: ErrorDetails) -> tuple[tuple[int | str, ...], str, str | None
         rule = re.sub(r"^(Value error, |Input should be |Input )", "", each["msg"])
         rule = rule if rule.startswith("expected") else f"expected {rule}"
     return where, rule, None if isinstance(got, dict) else _shown(got)
+
+
+def struct_mistakes(kind: type[Struct], given: dict[str, Any], path: str) -> list[str]:
+    """Return one line for every mistake in what is given for a struct: `path.key: rule, got value`."""
+    fields = {each.encode_name: each for each in msgspec.structs.fields(kind)}
+    found = [f"{path}.{key}: unknown key; known are {', '.join(fields)}" for key in given if key not in fields]
+    for name, field in fields.items():
+        if name in given:
+            try:
+                msgspec.convert(given[name], field.type)
+            except msgspec.ValidationError as error:
+                rule, _, inner = str(error).replace("`", "").partition(" - at $")
+                found.append(f"{path}.{name}{inner}: {_as_ours(rule)}, got {_shown(given[name])}")
+        elif field.required:
+            found.append(f"{path}.{name}: required, and missing")
+    if not found:
+        try:
+            msgspec.convert(given, kind)
+        except msgspec.ValidationError as error:
+            found.append(f"{path}: {error}, got {_shown(given)}")
+    return found
+
+
+def _as_ours(rule: str) -> str:
+    """Return a rule of msgspec's in the words of the others: `expected a number`, `expected >= 1`."""
+    rule = re.sub(r"^Expected (float|int) (?=[<>])", "expected ", re.sub(r", got \w+$", "", rule))
+    for theirs, ours in (("float", "a number"), ("int", "an integer"), ("str", "a string"), ("bool", "true or false")):
+        rule = re.sub(rf"\b{theirs}\b", ours, rule)
+    return rule[0].lower() + rule[1:]
 
 
 def _shown(value: Any) -> str:

@@ -7,7 +7,7 @@ from zwerm.protocol import Command, Observation
 
 
 class Base(Robot):
-    """Robot 0. Its depot is its only actuator."""
+    """A robot that never moves; its depot is its only actuator."""
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)

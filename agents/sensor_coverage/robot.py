@@ -8,9 +8,9 @@ bearings, touch, its own odometry and its radio; it never turns on purpose, and 
 import math
 from collections.abc import Generator, Sequence
 from itertools import count
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from zwerm.agents.contract import Controller, Setup
 from zwerm.agents.sensor_coverage.homing import Offset, Vector, offset, slid, unit
@@ -43,19 +43,28 @@ NOISE_MIN_RAD = 1e-5
 AHEAD_RAD = math.pi / 3.0
 
 
+Length = Annotated[float, Meta(gt=0.0, le=1000.0)]
+Count = Annotated[int, Meta(ge=1)]
+
+
 class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     """What a scenario may set. `link_m` is r_v; neighbours shall be `margin_m` less apart."""
 
-    link_m: float = 1.0
-    margin_m: float = 0.05
-    samples: int = 16
-    first_samples: int = 10
-    tolerance_m: float = 0.005
-    creep_m: float = 0.02
-    fine_m: float = 0.005
-    stop_samples: int = 12
-    still_samples_max: int = 120
-    drive_ticks_max: int = 90
+    link_m: Length = 1.0
+    margin_m: Length = 0.05
+    samples: Count = 16
+    first_samples: Count = 10
+    tolerance_m: Length = 0.005
+    creep_m: Length = 0.02
+    fine_m: Length = 0.005
+    stop_samples: Count = 12
+    still_samples_max: Count = 120
+    drive_ticks_max: Count = 90
+
+    def __post_init__(self) -> None:
+        """Refuse a margin that leaves no link."""
+        if self.margin_m >= self.link_m:
+            raise ValueError("expected margin_m < link_m")
 
 
 class Way(NamedTuple):

@@ -6,9 +6,9 @@ by place and side. A planner moves nobody.
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Final
+from typing import Annotated, Final
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from zwerm.frontier.fence import SIXTY_RAD, Fence, Side, fence, wedges
 from zwerm.frontier.places import Places
@@ -25,21 +25,30 @@ VERTEX_BESIDE_RAD: Final = math.radians(75.0)
 BLOCKED_RAD: Final = math.radians(20.0)
 
 
+Length = Annotated[float, Meta(gt=0.0, le=1000.0)]
+Count = Annotated[int, Meta(ge=1)]
+
+
 class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     """What a scenario may set. `link_m` and `margin_m` are the robots'."""
 
-    link_m: float = 1.0
-    margin_m: float = 0.05
-    clear_m: float = 0.8
-    clear_vertex_m: float = 0.9
-    near_wall_m: float = 0.3
-    obstacle_cost: float = 3.0
-    corner_margin_rad: float = 0.15
-    redundancy_every: int = 10
-    attempts_max: int = 2
-    survey_ticks_max: int = 60
-    drive_ticks_max: int = 300
-    cycles_max: int = 2000
+    link_m: Length = 1.0
+    margin_m: Length = 0.05
+    clear_m: Length = 0.8
+    clear_vertex_m: Length = 0.9
+    near_wall_m: Length = 0.3
+    obstacle_cost: Annotated[float, Meta(ge=1.0, le=1000.0)] = 3.0
+    corner_margin_rad: Annotated[float, Meta(ge=-1.0, le=1.0)] = 0.15
+    redundancy_every: Annotated[int, Meta(ge=0)] = 10
+    attempts_max: Count = 2
+    survey_ticks_max: Count = 60
+    drive_ticks_max: Count = 300
+    cycles_max: Count = 2000
+
+    def __post_init__(self) -> None:
+        """Refuse a margin that leaves no link."""
+        if self.margin_m >= self.link_m:
+            raise ValueError("expected margin_m < link_m")
 
 
 class Planner:
