@@ -101,15 +101,15 @@ def nearest_on_side(views: Views, complex_: FlagComplex, i: int, j: int, sign: i
     return min(found)[1] if found else None
 
 
-def fence(views: Views, complex_: FlagComplex, corner_margin_rad: float) -> Fence:
-    """Return the fence. Algorithm 3 without the touch sensors.
+def fence(views: Views, complex_: FlagComplex, corner_margin_rad: float, edges: Iterable[Edge] | None = None) -> Fence:
+    """Return the fence, or what `edges` have of it. Algorithm 3 without the touch sensors.
 
     A corner narrower than 60 degrees and a margin is closed: its robots are so near to each other that they see all of it.
     The paper's margin is -2 beta, for a bearing error beta.
     """
     sides: list[Side] = []
     corners: dict[Edge, None] = {}
-    for i, j in complex_.edges:
+    for i, j in complex_.edges if edges is None else edges:
         open_signs = uncovered(views, complex_, i, j)
         if not open_signs or is_exception(views, complex_, i, j):
             continue

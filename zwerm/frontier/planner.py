@@ -13,6 +13,7 @@ from msgspec import Meta, Struct
 from zwerm.frontier.fence import SIXTY_RAD, Fence, Side, fence, wedges
 from zwerm.frontier.places import Places
 from zwerm.frontier.services import Picture, Plan
+from zwerm.frontier.tried import Tried
 from zwerm.simplicial import Edge, FlagComplex, edge
 
 # Which ways a robot with a wide gap in what it sees may go, off the middle of the gap, and how far beside its neighbours.
@@ -55,6 +56,7 @@ class Planner:
     """The frontier by the rules of the paper, over `places`."""
 
     def __init__(self, rules: Parameters, places: Places) -> None:
+        self.tried = Tried(rules.attempts_max, rules.near_wall_m)
         self.fence = Fence((), ())
         self.frontier: tuple[Edge, ...] = ()
         self.obstacle: tuple[Edge, ...] = ()
@@ -62,15 +64,11 @@ class Planner:
         self._places = places
         self._views, self._complex, self._bases = Picture({}, FlagComplex({}), ())
         self._plans: list[Plan] = []
-        self._closed: dict[tuple[int, ...], None] = {}
-        self._failed: dict[tuple[tuple[int, ...], int], None] = {}
-        self._attempts: dict[tuple[int, ...], int] = {}
-        self._blocked: dict[int, list[float]] = {}
 
-    def look(self, picture: Picture) -> None:
-        """Take what the places see now, and find the fence."""
+    def look(self, picture: Picture, edges: Iterable[Edge] | None = None) -> None:
+        """Take what the places see now, and find the fence, or what `edges` have of it."""
         self._views, self._complex, self._bases = picture
-        found = self.fence = fence(self._views, self._complex, self._rules.corner_margin_rad)
+        found = self.fence = fence(self._views, self._complex, self._rules.corner_margin_rad, edges)
         obstacle = dict.fromkeys(found.corners)
         self._plans = []
         for side in found.sides:
@@ -87,21 +85,12 @@ class Planner:
         yield list(self._vertex_plans())
 
     def note_attempt(self, plan: Plan) -> None:
-        """Take note that a plan is being tried; the same side is not tried for ever."""
-        self._attempts[plan.key] = self._attempts.get(plan.key, 0) + 1
-        if self._attempts[plan.key] >= self._rules.attempts_max:
-            self._closed[plan.key] = None
+        """Take note that a plan is being tried."""
+        self.tried.note_attempt(plan)
 
     def note_failure(self, plan: Plan, driven_m: float) -> None:
-        """Take note that a wall was in the way after so far.
-
-        One failure closes an edge's side, unless it was so near to one end that it says nothing about the other.
-        """
-        elsewhere = any((plan.key, end) in self._failed for end in plan.key[:2] if end != plan.mover)
-        if driven_m > self._rules.near_wall_m or plan.key[2] == 0 or elsewhere:
-            self._closed[plan.key] = None
-        self._failed[plan.key, plan.mover] = None
-        self._blocked.setdefault(plan.mover, []).append(plan.direction)
+        """Take note that a wall was in the way after so far."""
+        self.tried.note_failure(plan, driven_m)
 
     def rim(self) -> tuple[Edge, ...]:
         """Return the fence and the edges of all wedges: with those, it is closed."""
@@ -113,7 +102,7 @@ class Planner:
     def _edge_plans(self, side: Side) -> list[Plan]:
         """Return the ways to expand one side of an edge; none if it is an obstacle edge. Section III-A, i to iv."""
         key = (side.i, side.j, side.sign)
-        if key in self._closed:
+        if key in self.tried.closed:
             return []
         hop = self._rules.link_m - self._rules.margin_m
         plans = []
@@ -133,7 +122,7 @@ class Planner:
             elif near < SIXTY_RAD - 1e-9:
                 anchors = (mover,)
             direction = towards + sign * angle
-            if (key, mover) in self._failed or self._walled(mover, self._views[mover][other] + sign * near):
+            if (key, mover) in self.tried.failed or self._walled(mover, self._views[mover][other] + sign * near):
                 continue
             clear = min(self._rules.clear_m, 0.85 * length)
             plans.append(Plan(key, mover, direction, length, clear, anchors))
@@ -150,11 +139,11 @@ class Planner:
                 # The bisector first; aside only as far as the gap is wide.
                 direction = self._views[i][a] + gap / 2.0 + turn
                 key = (i, a, 0, round(math.degrees(turn)))
-                if gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD or key in self._closed or self._walled(i, direction):
+                if gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD or key in self.tried.closed or self._walled(i, direction):
                     continue
                 if any(
                     _apart(each, direction) < (BLOCKED_RAD if end else SIXTY_RAD / 2.0)
-                    for each in self._blocked.get(i, ())
+                    for each in self.tried.blocked.get(i, ())
                 ):
                     continue
                 yield Plan(key, i, direction, hop, self._rules.clear_vertex_m, (i,))
