@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zwerm.simplicial import FlagComplex, betti, bits, edge, may_leave, relative_cycles, sparing
+from zwerm.simplicial import FlagComplex, betti, bits, edge, hole_cycles, may_leave, relative_cycles, sparing
 
 Graph = dict[int, list[int]]
 
@@ -54,6 +54,18 @@ def gudhi_relative_b2(complex_: FlagComplex, fence: list[tuple[int, int]]) -> in
         tree.insert([i, j, apex])
     tree.compute_persistence(homology_coeff_field=2, persistence_dim_max=True)
     return [*tree.betti_numbers(), 0, 0, 0][2]
+
+
+def gudhi_b1_coned(complex_: FlagComplex, cycles: list[tuple[int, ...]]) -> int:
+    """The holes that are left when those that the cycles go around are filled."""
+    tree = gudhi.SimplexTree()
+    for simplex in (*((v,) for v in complex_.vertices), *complex_.edges, *complex_.triangles):
+        tree.insert(list(simplex))
+    for apex, cycle in enumerate(cycles, 1 + max(complex_.vertices, default=0)):
+        for i, j in zip(cycle, (*cycle[1:], cycle[0]), strict=True):
+            tree.insert([i, j, apex])
+    tree.compute_persistence(homology_coeff_field=2, persistence_dim_max=True)
+    return [*tree.betti_numbers(), 0, 0][1]
 
 
 @st.composite
@@ -125,7 +137,31 @@ def test_a_robot_in_no_triangle_is_never_spared_from_single_file() -> None:
     assert 1 not in sparing(FlagComplex(lists), [(2, 3), (3, 4), (2, 4)]).redundant
 
 
+def test_the_way_around_a_hole_is_the_shortest_there_is() -> None:
+    """A square within a hexagon, one hole: the square is the way. Beside it another, of five."""
+    outer, inner = ring(6), ring(4, 6)
+    spokes = [(0, 6), (1, 6), (1, 7), (2, 7), (3, 7), (3, 8), (4, 8), (4, 9), (5, 9), (0, 9)]
+    lists = graph(*outer, *inner, *spokes, *ring(5, 20), (20, 0))
+    assert hole_cycles(FlagComplex(lists)) == [(6, 7, 8, 9), (20, 21, 22, 23, 24)]
+
+
+def test_a_disc_has_no_way_around_a_hole() -> None:
+    assert hole_cycles(FlagComplex(wheel(6))) == []
+
+
 # --- against gudhi --------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(graphs())
+def test_ways_around_holes_are_as_many_as_there_are_and_none_can_be_filled(lists: Graph) -> None:
+    complex_ = FlagComplex(lists)
+    cycles = hole_cycles(complex_)
+    for cycle in cycles:
+        assert all(edge(*pair) in complex_ for pair in zip(cycle, (*cycle[1:], cycle[0]), strict=True))
+    # A cone over every one of them fills every hole, and each of them is needed.
+    for kept in range(len(cycles) + 1):
+        assert gudhi_b1_coned(complex_, cycles[:kept]) == len(cycles) - kept
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)

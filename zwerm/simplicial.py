@@ -112,6 +112,81 @@ def betti(complex_: FlagComplex) -> tuple[int, int]:
     return pieces, cycles - rank(boundaries(complex_))
 
 
+def hole_cycles(complex_: FlagComplex) -> list[tuple[int, ...]]:
+    """Return closed walks around the holes, one a hole: a basis of H1 out of the shortest cycles there are.
+
+    Erickson and Whittlesey 2005: every cycle of such a basis is, from one of its vertices, two shortest paths and an edge. Of
+    two cycles around the same hole, from the same vertex, one is enough.
+    """
+    labels, count = _edge_labels(complex_)
+    found: dict[tuple[int, ...], int] = {}
+    for root in complex_.vertices if count else ():
+        before, depth, label = {root: root}, {root: 0}, {root: 0}
+        reached = [root]
+        shortest: dict[int, tuple[int, Edge]] = {}  # hole: how long, and the edge opposite
+        for i in reached:
+            for j in complex_.neighbours[i]:
+                here = label[i] ^ labels[edge(i, j)]
+                if j not in before:
+                    before[j], depth[j], label[j] = i, depth[i] + 1, here
+                    reached.append(j)
+                elif around := here ^ label[j]:
+                    known, length = shortest.get(around), depth[i] + depth[j] + 1
+                    if known is None or (length, (i, j)) < known:
+                        shortest[around] = length, (i, j)
+        for around, (_, (i, j)) in sorted(shortest.items()):
+            there, back = _ancestors(i, before), _ancestors(j, before)
+            if not set(there[:-1]) & set(back[:-1]):
+                found.setdefault((*reversed(there), *back[:-1]), around)
+    pivots: dict[int, int] = {}
+    chosen: list[tuple[int, ...]] = []
+    for cycle, around in sorted(found.items(), key=lambda each: (len(each[0]), each)):
+        left = reduce_chain(around, pivots)
+        if left:
+            pivots[left.bit_length()] = left
+            chosen.append(cycle)
+    return chosen
+
+
+def _ancestors(vertex: int, before: Mapping[int, int]) -> list[int]:
+    """Return a vertex, the one before it, and so on to the root, which is before itself."""
+    found = [vertex]
+    while before[found[-1]] != found[-1]:
+        found.append(before[found[-1]])
+    return found
+
+
+def _edge_labels(complex_: FlagComplex) -> tuple[dict[Edge, int], int]:
+    """Return b1 bits for every edge, whose sums over a closed walk tell which holes it goes around, and b1."""
+    root = {vertex: vertex for vertex in complex_.vertices}
+
+    def root_of(vertex: int) -> int:
+        while root[vertex] != vertex:
+            root[vertex] = vertex = root[root[vertex]]
+        return vertex
+
+    off_tree: dict[Edge, int] = {}
+    for i, j in complex_.edges:
+        if root_of(i) == root_of(j):
+            off_tree[i, j] = 1 << len(off_tree)
+        else:
+            root[root_of(i)] = root_of(j)
+    pivots: dict[int, int] = {}
+    for i, j, k in complex_.triangles:
+        left = reduce_chain(off_tree.get((i, j), 0) ^ off_tree.get((i, k), 0) ^ off_tree.get((j, k), 0), pivots)
+        if left:
+            pivots[left.bit_length()] = left
+    free = [n for n in range(1, len(off_tree) + 1) if n not in pivots]
+    # An edge that leads a triangle's column is the sum of that column's others: those below it come first.
+    value = {n: 1 << at for at, n in enumerate(free)}
+    for n in sorted(pivots):
+        value[n] = 0
+        for other in bits(pivots[n] ^ (1 << (n - 1))):
+            value[n] ^= value[other + 1]
+    labels = {each: value[column.bit_length()] for each, column in off_tree.items()}
+    return {each: labels.get(each, 0) for each in complex_.edges}, len(free)
+
+
 def relative_cycles(complex_: FlagComplex, fence: Iterable[Edge]) -> tuple[list[int], list[int]]:
     """Return a basis of the relative 2-cycles of (complex, fence), and their boundaries.
 

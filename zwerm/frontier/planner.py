@@ -11,6 +11,7 @@ from typing import Annotated, Final
 from msgspec import Meta, Struct
 
 from zwerm.frontier.fence import SIXTY_RAD, Fence, Side, fence, wedges
+from zwerm.frontier.holes import holes, is_bare, sides
 from zwerm.frontier.places import Places
 from zwerm.frontier.services import Picture, Plan
 from zwerm.frontier.tried import Tried
@@ -72,7 +73,7 @@ class Planner:
         obstacle = dict.fromkeys(found.corners)
         self._plans = []
         for side in found.sides:
-            options = self._edge_plans(side)
+            options = self._edge_plans(side, (side.i, side.j, side.sign))
             if not options:
                 obstacle[side.edge] = None
             self._plans += options
@@ -83,6 +84,9 @@ class Planner:
         """Yield the deployments there could be; edges first, since a robot between two others covers more."""
         yield self._plans
         yield list(self._vertex_plans())
+        into_holes = list(self._hole_plans())
+        self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in into_holes}))
+        yield into_holes
 
     def note_attempt(self, plan: Plan) -> None:
         """Take note that a plan is being tried."""
@@ -99,9 +103,22 @@ class Planner:
             fenced[edge(i, a)] = fenced[edge(i, b)] = None
         return tuple(fenced)
 
-    def _edge_plans(self, side: Side) -> list[Plan]:
-        """Return the ways to expand one side of an edge; none if it is an obstacle edge. Section III-A, i to iv."""
-        key = (side.i, side.j, side.sign)
+    def _hole_plans(self) -> Iterator[Plan]:
+        """Yield the ways into holes in which nobody met anything: a corner is no wall, nor is an attempt without one."""
+        for hole in holes(self._views, self._complex):
+            if is_bare(hole, self._views, self._complex, self._met):
+                for side in sides(hole):
+                    yield from self._edge_plans(side, (side.i, side.j, side.sign, len(hole)), wary=False)
+
+    def _met(self, place: int) -> Iterator[float]:
+        yield from self._places.walls.get(place, ())
+        yield from self.tried.blocked.get(place, ())
+
+    def _edge_plans(self, side: Side, key: tuple[int, ...], wary: bool = True) -> list[Plan]:
+        """Return the ways to expand one side of an edge; none if it is an obstacle edge. Section III-A, i to iv.
+
+        `wary`: a wall beside the way will do to stay.
+        """
         if key in self.tried.closed:
             return []
         hop = self._rules.link_m - self._rules.margin_m
@@ -122,7 +139,9 @@ class Planner:
             elif near < SIXTY_RAD - 1e-9:
                 anchors = (mover,)
             direction = towards + sign * angle
-            if (key, mover) in self.tried.failed or self._walled(mover, self._views[mover][other] + sign * near):
+            if (key, mover) in self.tried.failed:
+                continue
+            if wary and self._walled(mover, self._views[mover][other] + sign * near):
                 continue
             clear = min(self._rules.clear_m, 0.85 * length)
             plans.append(Plan(key, mover, direction, length, clear, anchors))

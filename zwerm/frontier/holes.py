@@ -1,0 +1,72 @@
+"""The holes of a swarm's complex, by bearings: which way is in, and whether anything was ever met there.
+
+Homology finds a hole but does not tell a pillar from a gap that was left by chance. Robots can: whoever touched a wall, or was
+stopped by one, knows in which direction. A hole into which no such direction leads is no obstacle's.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+from zwerm.frontier.fence import SIXTY_RAD, Side, Views
+from zwerm.simplicial import FlagComplex, hole_cycles
+
+
+class Corner(NamedTuple):
+    """A place on the way around a hole, which is on the left: from the direction of the next place so far to the left."""
+
+    place: int
+    following: int
+    first_rad: float
+    width_rad: float
+
+    def faces(self, direction_rad: float) -> bool:
+        """Tell whether a direction from here leads into the hole."""
+        return (direction_rad - self.first_rad) % math.tau < self.width_rad
+
+
+Hole = tuple[Corner, ...]
+
+
+def holes(views: Views, complex_: FlagComplex) -> list[Hole]:
+    """Return the holes of the complex, each as the shortest way around it; `views` are directions in one frame."""
+    found = []
+    for cycle in hole_cycles(complex_):
+        for way in (cycle, cycle[::-1]):
+            corners = tuple(
+                Corner(i, after, views[i][after], (views[i][before] - views[i][after]) % math.tau)
+                for before, i, after in zip((way[-1], *way[:-1]), way, (*way[1:], way[0]), strict=True)
+            )
+            # The turns of the way around what is on the left come to one to the left.
+            if math.pi < sum(math.pi - each.width_rad for each in corners) < 3.0 * math.pi:
+                found.append(corners)
+    return found
+
+
+def is_bare(hole: Hole, views: Views, complex_: FlagComplex, met: Callable[[int], Iterable[float]]) -> bool:
+    """Tell whether nothing was ever met in a hole; `met` are the directions from a place in which something was.
+
+    A robot within the hole, whom at least two around it see there and none elsewhere, may have met it in any direction.
+    """
+    if any(corner.faces(each) for corner in hole for each in met(corner.place)):
+        return False
+    inside: dict[int, list[bool]] = {}
+    for corner in hole:
+        for each in complex_.neighbours[corner.place]:
+            inside.setdefault(each, []).append(corner.faces(views[corner.place][each]))
+    around = {corner.place for corner in hole}
+    return not any(
+        len(seen) > 1 and all(seen) and any(True for _ in met(place))
+        for place, seen in sorted(inside.items())
+        if place not in around
+    )
+
+
+def sides(hole: Hole) -> list[Side]:
+    """Return the sides of a hole's edges from which a robot could go into it, with the angles of algorithm 4."""
+    found = []
+    for one, other in zip(hole, (*hole[1:], hole[0]), strict=True):
+        near, far = min(SIXTY_RAD, one.width_rad / 2.0), min(SIXTY_RAD, other.width_rad / 2.0)
+        i, j = one.place, other.place
+        found.append(Side(i, j, 1, near, far) if i < j else Side(j, i, -1, far, near))
+    return found
