@@ -268,7 +268,7 @@ BUILT_IN = Path(__file__).parent / "scenarios"
 
 def built_in() -> dict[str, Path]:
     """Return the scenarios that ship with Zwerm, by name."""
-    return {path.stem: path for path in sorted(BUILT_IN.glob("*.toml"))}
+    return {path.stem: path for path in sorted(BUILT_IN.glob("*.toml"), key=lambda each: each.stem)}
 
 
 def locate(name: str) -> Path:

@@ -153,7 +153,7 @@ BUILT_IN = Path(__file__).parents[1] / "studies"
 
 def built_in() -> dict[str, Path]:
     """Return the studies that ship with Zwerm, by name."""
-    return {path.stem: path for path in sorted(BUILT_IN.glob("*.toml"))}
+    return {path.stem: path for path in sorted(BUILT_IN.glob("*.toml"), key=lambda each: each.stem)}
 
 
 def load_study(name: str) -> Study:
