@@ -1,7 +1,7 @@
 # Everything runs in .venv, which is made from the hashed locks. `make` alone lists the targets.
 
 PYTHON ?= python3
-SCENARIO ?= computation-free
+SCENARIO ?= sensor-coverage
 VENV := .venv
 BIN := $(VENV)/bin
 UV ?= uv
@@ -23,7 +23,7 @@ setup: $(RUN_READY)  ## make .venv with the zwerm command in it
 
 dev: $(DEV_READY)  ## add what tests, linters and documentation need
 
-run: setup  ## run a scenario (SCENARIO=name; default computation-free)
+run: setup  ## run a scenario (SCENARIO=name; default sensor-coverage)
 	$(BIN)/zwerm run $(SCENARIO)
 
 test: dev  ## run the tests

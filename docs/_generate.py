@@ -302,8 +302,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the picture of the index: a run of the first scenario, drawn as it is today; called by MkDocs."""
     folder = Path(tempfile.mkdtemp(prefix="zwerm-docs-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    name = "images/computation-free.png"
-    run("computation-free", seed=7, runner="inline").picture(folder / name)
+    name = "images/sensor-coverage.png"
+    run("sensor-coverage", runner="inline").picture(folder / name)
     files.append(File.generated(config, name, abs_src_path=str(folder / name)))
     return files
 

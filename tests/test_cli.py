@@ -122,3 +122,17 @@ def test_help_has_examples() -> None:
     for command in ("list", "check", "run", "world", "robot"):
         assert f"zwerm {command}" in zwerm(command, "--help").stdout
     assert zwerm("--version").stdout.startswith("zwerm ")
+
+
+def test_a_run_is_also_drawn_at_the_moments_asked_for_and_kept_where_it_has_none(tmp_path: Path) -> None:
+    hall = ["--set", "arena.size_m=[1.2,1.0]", "--set", "base.pose=[0.2,0.5,0.0]", "--set", "robots.count=8"]
+    moments = ["--picture-at", "2", "--picture-at", "1.5s", "--picture-at", "999"]
+    ran = zwerm("run", "sensor-coverage", "--inline", *hall, *moments, cwd=tmp_path)
+    assert ran.returncode == 2
+    assert "zwerm: cycle 999: expected one that the run told of, which are 2 to " in ran.stderr
+    assert "trace" in ran.stdout
+    drawn = sorted(path.name for path in (tmp_path / "runs").iterdir())
+    assert drawn == [f"sensor-coverage-seed1{each}.png" for each in ("-1.5s", "-cycle2", "")]
+    wrong = zwerm("run", "sensor-coverage", "--picture-at", "soon", cwd=tmp_path)
+    assert wrong.returncode == 2
+    assert wrong.stderr == "zwerm: --picture-at: expected a cycle such as 40 or a time such as 120s, got 'soon'\n"

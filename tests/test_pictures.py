@@ -1,5 +1,6 @@
 """Pictures: what is true of the run is at its place on the sheet, and whatever hinders them is one line."""
 
+import math
 import shutil
 import subprocess
 import sys
@@ -8,15 +9,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 from PIL import Image
 from shapely.geometry import LineString, Polygon, box
 
 from zwerm.errors import PictureError
 from zwerm.world.arena import Arena
-from zwerm.world.canvas import Sheet, Swarm, gone_at_the_end, outline, readable
+from zwerm.world.canvas import Sheet, Swarm, gone_at_the_end, outline, readable, round_down
+from zwerm.world.growth import growth
 from zwerm.world.history import History
-from zwerm.world.pictures import animate_run, draw_run
+from zwerm.world.pictures import RunView, animate_run, draw_run
+from zwerm.world.sight import Sight
+from zwerm.world.simplices import FRONTIER, OBSTACLE, PUSH, Simplices
+from zwerm.world.simplices import TRIANGLE as FILL
+from zwerm.world.stages import Stage, stages
+from zwerm.world.told import Told
 
 RADIUS_M = 0.1
 
@@ -45,6 +53,8 @@ HISTORY = history_of(
     ([(0.7, 0.5), (0.5, 1.5), (9.0, 9.0)], [True, True, False]),
     ([(1.0, 0.5), (0.5, 1.5), (9.0, 9.0)], [True, False, False]),
 )
+
+VIEW = RunView(ARENA, HISTORY, RADIUS_M, "trial")
 
 WHITE, BLUE, SKY, DARK, GREY = (255, 255, 255), (0, 114, 178), (86, 180, 233), (34, 34, 34), (228, 228, 228)
 
@@ -134,6 +144,125 @@ def test_a_frame_of_an_animation_is_the_same_as_a_sheet_drawn_whole() -> None:
     assert (earlier != frozen.frame()).any()
 
 
+def test_a_dead_robot_is_crossed_out_where_it_died() -> None:
+    history = History()
+    for dead in ((), (1, 7)):  # node 7 is no robot
+        history.append(MOMENT, dead)
+    sheet = Sheet(ARENA, "trial")
+    swarm = Swarm(sheet, ARENA, history.arrays(), RADIUS_M, plain=True)
+    swarm.show(1, 0)
+    look = Look(sheet)
+    assert look.at(1.0, 0.5) == BLUE
+    assert near(look.at(1.0, 1.5), DARK, 40)
+    assert look.at(1.07, 1.5) == WHITE
+    assert [each.get_label() for each in swarm.legend()] == ["1 robot at 0 s", "dead robots"]
+
+
+def test_what_is_in_sight_is_tinted_and_not_what_is_behind_a_wall() -> None:
+    sheet = Sheet(ARENA, "trial")
+    swarm = Swarm(sheet, ARENA, HISTORY.arrays(), RADIUS_M, sight=Sight(ARENA, 2.0))
+    swarm.show(2, 2)
+    look = Look(sheet)
+    assert look.at(1.5, 0.7) != WHITE
+    assert look.at(2.5, 0.5) == WHITE  # behind the wall without thickness
+    assert look.at(1.0, 1.9) != WHITE
+
+
+@pytest.mark.parametrize(("length_m", "bar_m"), [(1.0, 1.0), (1.99, 1.0), (2.04, 2.0), (0.7, 0.5), (30.0, 20.0)])
+def test_a_scale_bar_is_a_round_number_of_metres(length_m: float, bar_m: float) -> None:
+    assert round_down(length_m) == pytest.approx(bar_m)
+
+
+# --- a deployment ---------------------------------------------------------------------------------------------------
+
+# Three robots at the corners of a triangle; robot 0 is the base, and pushes robot 1, who goes ahead.
+TRIANGLE = np.array([(0.5, 0.5), (1.5, 0.5), (1.0, 1.3)])
+MOMENT = SimpleNamespace(
+    time_s=0.0, position=np.array([(1.0, 0.5), (1.0, 1.5)]), heading=np.zeros(2), present=np.ones(2, dtype=bool)
+)
+
+
+def deployment(cycles: int = 3) -> RunView:
+    """A run of `cycles` s; the complex is told of once a second, and turns from frontier to obstacle at the last."""
+    history = history_of(*[(TRIANGLE.tolist(), [True] * 3) for _ in range(cycles + 1)])
+    told = [
+        Told(
+            0, float(cycle), 3,
+            {"complex": {
+                "cycle": cycle, "edges": [[0, 1], [0, 2], [1, 2]], "path": [0, 1],
+                "frontier": [[1, 2]] if cycle < cycles else [], "obstacle": [] if cycle < cycles else [[1, 2]],
+            }},
+            TRIANGLE, np.ones(3, bool),
+        )
+        for cycle in range(1, cycles + 1)
+    ]  # fmt: skip
+    series = {"time_s": [0.0, 3.0], "coverage_fraction": [0.2, 0.8], "robots_deployed": [1.0, 3.0]}
+    return RunView(ARENA, history, RADIUS_M, "trial", sight_range_m=1.0, based=True, told=told, series=series)
+
+
+def shown(view: RunView, stage: Stage | None) -> Look:
+    sheet = Sheet(ARENA, "trial")
+    simplices = Simplices(sheet)
+    simplices.show(stage)
+    return Look(sheet)
+
+
+def test_the_complex_shows_triangles_frontier_obstacle_and_the_push() -> None:
+    view = deployment()
+    first, last = shown(view, view.stage(1)), shown(view, view.stage(3))
+    assert first.at(1.0, 0.8) == last.at(1.0, 0.8) == tuple(round(255 * each) for each in to_rgb(FILL["facecolor"]))
+    assert first.at(1.25, 0.9) == tuple(round(255 * each) for each in to_rgb(FRONTIER))
+    assert last.at(1.25, 0.9) == tuple(round(255 * each) for each in to_rgb(OBSTACLE))
+    assert first.at(1.0, 0.5) == tuple(round(255 * each) for each in to_rgb(PUSH))
+    assert shown(view, None).at(1.0, 0.8) == WHITE
+
+
+def test_several_paths_are_all_shown() -> None:
+    told = {"cycle": 1, "edges": [[0, 1], [0, 2]], "frontier": [], "obstacle": [], "paths": [[0, 1], [0, 2]]}
+    [stage] = stages([Told(0, 0.0, 3, {"complex": told}, TRIANGLE, np.ones(3, bool))])
+    assert stage.paths == ((0, 1), (0, 2))
+    assert len(stage.triangles) == 0
+    look = shown(deployment(), stage)
+    assert look.at(1.0, 0.5) == look.at(0.75, 0.9) == tuple(round(255 * each) for each in to_rgb(PUSH))
+
+
+def test_the_growth_is_by_cycle_where_there_are_cycles_and_else_by_time() -> None:
+    view = deployment()
+    assert view.growth is not None
+    assert view.growth.xlabel == "deployment cycle"
+    assert view.growth.x.tolist() == [0.0, 3.0]
+    assert view.growth.at(1.5) == (1.5, pytest.approx(0.5))
+    assert view.growth.ideal == pytest.approx((8.0 - 0.16) / (math.sqrt(3.0) / 2.0))
+    by_time = growth(view.series, [])
+    assert by_time is not None
+    assert by_time.xlabel == "time [s]"
+    assert growth({}, []) is None
+
+
+def test_a_deployment_is_drawn_at_its_end_at_a_cycle_and_at_a_time(tmp_path: Path) -> None:
+    view = deployment()
+    pictures = [
+        draw_run(tmp_path / "end.png", view, {"coverage_fraction": 0.8, "messages_per_robot_mean": 9.0}),
+        draw_run(tmp_path / "cycle.png", view, cycle=1),
+        draw_run(tmp_path / "time.png", view, at_s=0.5),
+    ]
+    assert len({path.read_bytes() for path in pictures}) == 3
+    with pytest.raises(PictureError, match="cycle 4: expected one that the run told of, which are 1 to 3"):
+        draw_run(tmp_path / "none.png", view, cycle=4)
+    with pytest.raises(PictureError, match="7 s: expected a time of the run, which lasted 3 s"):
+        draw_run(tmp_path / "none.png", view, at_s=7.0)
+    with pytest.raises(PictureError, match="cycle 1: expected one that the run told of, which are none"):
+        draw_run(tmp_path / "none.png", VIEW, cycle=1)
+
+
+def test_an_animation_of_a_deployment_keeps_the_colours_that_its_first_frame_does_not_have(tmp_path: Path) -> None:
+    path = animate_run(tmp_path / "run.gif", deployment(), fps=2, speed_up=1.0)
+    with Image.open(path) as animation:
+        animation.seek(4)
+        colours = {colour for _, colour in animation.convert("RGB").getcolors(1 << 20) or []}
+    assert {tuple(round(255 * each) for each in to_rgb(name)) for name in ("white", FRONTIER, PUSH)} <= colours
+
+
 def test_robots_that_have_left_are_told_from_those_that_never_came() -> None:
     assert gone_at_the_end(HISTORY.arrays()).tolist() == [1]
 
@@ -162,8 +291,7 @@ def test_a_metric_reads_as_words(name: str, words: str) -> None:
 
 def picture(path: Path, arena: Arena = ARENA, history: History = HISTORY) -> Path:
     metrics = {"area_coverage_fraction": 0.5, "robots_in_arena": 1.0}
-    times = np.arange(3.0)
-    return draw_run(path, arena, history, RADIUS_M, "trial, seed 1", metrics, 0.7, (4, 2), {"covered": (times, times)})
+    return draw_run(path, RunView(arena, history, RADIUS_M, "trial, seed 1", "3 s", 0.7, (4, 2)), metrics)
 
 
 @pytest.mark.parametrize("suffix", [".png", ".PNG", ".svg", ".pdf"])
@@ -191,7 +319,7 @@ def test_a_run_whose_robots_have_all_left_can_be_drawn(tmp_path: Path) -> None:
 def test_an_animation_shows_the_whole_run_and_tells_how_far_it_is(tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     path = animate_run(
-        tmp_path / "run.gif", ARENA, HISTORY, RADIUS_M, "trial", fps=10, speed_up=1.0,
+        tmp_path / "run.gif", VIEW, fps=10, speed_up=1.0,
         progress=lambda done, total: told.append((done, total)),
     )  # fmt: skip
     assert told == [(done, 21) for done in range(1, 22)]
@@ -209,7 +337,10 @@ def test_an_animation_lasts_some_ten_seconds_unless_told_otherwise(tmp_path: Pat
     history = history_of(*[([(0.5 + index / 100, 0.5)], [True]) for index in range(200)], every_s=5.0)
     told: list[int] = []
     animate_run(
-        tmp_path / "run.gif", ARENA, history, RADIUS_M, "trial", fps=2, progress=lambda done, total: told.append(total)
+        tmp_path / "run.gif",
+        RunView(ARENA, history, RADIUS_M, "trial"),
+        fps=2,
+        progress=lambda done, total: told.append(total),
     )
     assert told[-1] == 21
 
@@ -234,7 +365,7 @@ def test_a_picture_that_cannot_be_written_is_one_line(tmp_path: Path, name: str,
 def test_an_mp4_without_ffmpeg_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(PictureError) as caught:
-        animate_run(tmp_path / "run.mp4", ARENA, HISTORY, RADIUS_M, "trial")
+        animate_run(tmp_path / "run.mp4", VIEW)
     assert str(caught.value) == f"{tmp_path / 'run.mp4'}: an .mp4 needs ffmpeg, which is not installed; choose a .gif"
 
 
@@ -244,13 +375,13 @@ def test_an_ffmpeg_that_fails_is_one_line(tmp_path: Path, monkeypatch: pytest.Mo
     ffmpeg.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
     with pytest.raises(PictureError) as caught:
-        animate_run(tmp_path / "run.mp4", ARENA, HISTORY, RADIUS_M, "trial")
+        animate_run(tmp_path / "run.mp4", VIEW)
     assert str(caught.value) == f"{tmp_path / 'run.mp4'}: ffmpeg failed: no room"
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_an_mp4_is_written_where_there_is_ffmpeg(tmp_path: Path) -> None:
-    path = animate_run(tmp_path / "run.mp4", ARENA, HISTORY, RADIUS_M, "trial", fps=10, speed_up=1.0)
+    path = animate_run(tmp_path / "run.mp4", VIEW, fps=10, speed_up=1.0)
     assert b"ftyp" in path.read_bytes()[:16]
 
 

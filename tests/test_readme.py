@@ -48,6 +48,8 @@ def test_a_command_of_the_readme_does_what_it_says(command: str, desk: Path) -> 
     assert ran.returncode == (2 if mistaken else 0), ran.stderr
     if mistaken:
         assert "robots.count: expected >= 1, got -1" in ran.stderr
+    if "--picture-at 60" in command:
+        assert (desk / "runs/sensor-coverage-seed1-cycle60.png").stat().st_size > 10_000
     if "--animate" in command:
         assert (desk / "swarm.gif").read_bytes().startswith(b"GIF8")
 
@@ -62,13 +64,15 @@ def test_the_readme_has_its_two_commands_and_they_are_targets() -> None:
 @pytest.mark.skipif(
     not (ROOT / ".venv/.run-ready").exists(), reason="the environment of `make setup` is not what runs this"
 )
-def test_make_run_covers_the_arena_and_says_where_the_picture_is() -> None:
+def test_make_run_fills_the_hall_and_says_where_the_picture_is() -> None:
     ran = subprocess.run(["make", "run"], cwd=ROOT, capture_output=True, text=True, timeout=300)
     assert ran.returncode == 0, ran.stderr
     picture = re.search(r"runs/\S+\.png", ran.stdout)
     assert picture is not None
+    assert picture[0] == "runs/sensor-coverage-seed1.png"
     assert (ROOT / picture[0]).stat().st_size > 10_000
-    assert "cell_coverage_fraction" in ran.stdout
+    assert re.search(r"^coverage_fraction +(1|0\.99\d*) ", ran.stdout, re.MULTILINE)
+    assert "robots_deployed" in ran.stdout
 
 
 def test_the_python_of_the_readme_runs(

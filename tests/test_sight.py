@@ -5,11 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shapely.geometry import LineString
 
+from zwerm.result import RunResult
 from zwerm.running import run
 from zwerm.scenario import ArenaTable
 from zwerm.world.arena import Arena
 from zwerm.world.sight import hexagonal_packing_robots, holes, obstacles, sight_coverage_fraction
+from zwerm.world.stages import stages
 
 
 def arena(**table: object) -> Arena:
@@ -63,17 +66,77 @@ def test_holes_are_those_of_the_complex_and_obstacles_those_of_the_arena() -> No
 
 
 def test_the_complex_of_a_run_can_be_drawn_at_any_cycle(tmp_path: Path) -> None:
-    pictures = pytest.importorskip("zwerm.world.pictures_complex")
     settings = ["arena.size_m=[2.2,1.6]", "base.pose=[0.2,0.8,0.0]", "robots.count=14"]
     result = run("sensor-coverage", runner="inline", overrides=settings)
-    told = pictures.cycles(result.told)
-    assert [each.told["complex"]["cycle"] for each in told] == list(
-        range(2, int(result.metrics["deployment_cycles"]) + 1)
-    )
-    assert told[0].told["complex"]["frontier"]
-    assert not told[-1].told["complex"]["frontier"]
-    for path in (
-        result.picture_complex(tmp_path / "complex.png", cycle=1),
-        pictures.draw_coverage(tmp_path / "coverage.png", result.arena, result.told, 1.0),
-    ):
-        assert path.stat().st_size > 5_000
+    told = stages(result.told)
+    assert [each.cycle for each in told] == list(range(2, int(result.metrics["deployment_cycles"]) + 1))
+    assert len(told[0].frontier)
+    assert not len(told[-1].frontier)
+    assert result.picture(tmp_path / "complex.png", cycle=2).stat().st_size > 5_000
+
+
+# --- the metrics of a deployment, each by another way than the one it is computed by -------------------------------
+
+
+@pytest.fixture(scope="module")
+def deployed() -> RunResult:
+    pillar = "arena.obstacles=[[[1.5,1.0],[2.3,1.0],[2.3,1.8],[1.5,1.8]]]"
+    settings = ["arena.size_m=[3.4,2.8]", "base.pose=[0.2,1.4,0.0]", "robots.count=40", pillar, "metrics.every_s=1.0"]
+    result = run("sensor-coverage", runner="inline", overrides=settings)
+    assert result.outcome == "completed"
+    return result
+
+
+def test_robots_deployed_are_those_in_the_arena_and_the_ideal_is_area_over_hexagons(deployed: RunResult) -> None:
+    found = deployed.metrics
+    assert found["robots_deployed"] == deployed.history.arrays().present[-1].sum() == 1 + found["robots_released"]
+    assert found["hexagonal_packing_robots"] == pytest.approx((3.4 * 2.8 - 0.8 * 0.8) * 2.0 / math.sqrt(3.0))
+    assert found["robots_over_hexagonal"] == found["robots_deployed"] / found["hexagonal_packing_robots"]
+
+
+def test_holes_are_what_another_library_finds_in_the_true_complex(deployed: RunResult) -> None:
+    gudhi = pytest.importorskip("gudhi")
+    tracks = deployed.history.arrays()
+    here = tracks.position[-1][tracks.present[-1]]
+    pillar = LineString([(1.5, 1.0), (2.3, 1.0), (2.3, 1.8), (1.5, 1.8), (1.5, 1.0)])
+    tree = gudhi.SimplexTree()
+    for i in range(len(here)):
+        tree.insert([i])
+        for j in range(i):
+            if math.dist(here[i], here[j]) <= 1.0 and not LineString([here[i], here[j]]).crosses(pillar):
+                tree.insert([i, j])
+    tree.expansion(3)
+    tree.compute_persistence(homology_coeff_field=2, persistence_dim_max=True)
+    assert deployed.metrics["holes"] == tree.betti_numbers()[1] == deployed.metrics["obstacles"] == 1.0
+
+
+def test_cycles_are_those_told_of_and_ticks_and_messages_are_shared_out_among_them(deployed: RunResult) -> None:
+    found = deployed.metrics
+    assert found["deployment_cycles"] == stages(deployed.told)[-1].cycle
+    assert found["ticks_per_cycle_mean"] == deployed.ticks / found["deployment_cycles"]
+    sent = sum(sum(channel["messages"]) for channel in deployed.radio["channels"].values())
+    assert found["messages_per_cycle_mean"] == sent / found["deployment_cycles"]
+    assert 0.0 <= found["redundant_robots"] < found["robots_deployed"]
+
+
+def test_a_share_of_the_arena_is_in_sight_when_it_is_said_to_be(deployed: RunResult) -> None:
+    found, tracks = deployed.metrics, deployed.history.arrays()
+    times = [found[f"time_to_{percent}_percent_coverage_s"] for percent in (50, 90, 99)]
+    assert times == sorted(times)
+    for percent, time_s in zip((50, 90, 99), times, strict=True):
+        before, after = (
+            sight_coverage_fraction(tracks.position[k][tracks.present[k]], 1.0, deployed.arena)
+            for k in (np.searchsorted(tracks.time_s, time_s - 1.0) - 1, np.searchsorted(tracks.time_s, time_s + 1.0))
+        )
+        assert before < percent / 100.0 <= after
+    assert deployed.series["coverage_fraction"][-1] == found["coverage_fraction"]
+    assert deployed.series["robots_deployed"][-1] == found["robots_deployed"]
+
+
+def test_a_share_that_is_never_reached_has_no_time() -> None:
+    settings = ["arena.size_m=[2.2,1.6]", "base.pose=[0.2,0.8,0.0]", "robots.count=14", "time.duration_s=20.0"]
+    found = run("sensor-coverage", runner="inline", overrides=settings).metrics
+    assert found["time_to_50_percent_coverage_s"] < 20.0
+    assert math.isnan(found["time_to_99_percent_coverage_s"])
+    # The coordinator had no time to say how many; the complex that it told of last does.
+    assert found["deployment_cycles"] >= 1.0

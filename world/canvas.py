@@ -1,13 +1,13 @@
 """The sheet a run is drawn on, and the swarm drawn on it: layout and artists, for pictures and animations alike.
 
 A sheet is laid out in inches, so that nothing overlaps at any shape of arena: title, metrics, the arena in metres with
-its walls, optional curves below, the legend at the foot. Colours are Okabe and Ito's (2008), which do not depend on
-seeing red and green apart. Matplotlib's global state is neither used nor touched.
+its walls and a scale bar, room for curves below, the legend at the foot. Colours are Okabe and Ito's (2008), which do
+not depend on seeing red and green apart. Matplotlib's global state is neither used nor touched.
 """
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -27,15 +27,13 @@ from zwerm.world.arena import Arena
 from zwerm.world.history import Tracks
 from zwerm.world.metrics import cell_counts
 from zwerm.world.scene import Floats, Ints
-
-Series = Mapping[str, tuple[Floats, Floats]]  # name: (times [s], values), both (k,)
+from zwerm.world.sight import Sight
 
 BLUE: Final = "#0072B2"
 SKY: Final = "#56B4E9"
 ORANGE: Final = "#E69F00"
 VERMILLION: Final = "#D55E00"
 YELLOW: Final = "#F0E442"
-CURVES: Final = (BLUE, VERMILLION, "#009E73", "#CC79A7", ORANGE)
 WALL: Final = "#222222"
 OUTSIDE: Final = "#E4E4E4"
 QUIET: Final = "#555555"
@@ -48,7 +46,10 @@ TITLE_HEIGHT: Final = 0.26
 LINE_HEIGHT: Final = 0.2
 HEAD_GAP: Final = 0.06
 AXIS_HEIGHT: Final = 0.52
-SERIES_HEIGHT: Final = 1.4
+PLOT_HEIGHT: Final = 1.4
+# The scale bar is at most that much of the arena's width, and that far below the arena [inches].
+SCALE_FRACTION: Final = 0.2
+SCALE_DROP: Final = 0.3
 LEGEND_ROW: Final = 0.23
 LEGEND_COLUMN: Final = 2.5
 CHARACTER: Final = 0.078
@@ -82,7 +83,10 @@ def outline(area: shapely.Geometry) -> Outline:
 
 
 class Sheet:
-    """A figure with the arena on it, at most `arena_inches` (width, height) large; `note` is the last line of `text`."""
+    """A figure with the arena on it, at most `arena_inches` (width, height) large; `note` is the last line of `text`.
+
+    `plot` are axes for curves, where there is `with_plot`.
+    """
 
     def __init__(
         self,
@@ -90,7 +94,7 @@ class Sheet:
         title: str,
         text: str = "",
         legend_entries: int = 0,
-        series: Series | None = None,
+        with_plot: bool = False,
         arena_inches: tuple[float, float] = (8.0, 7.0),
         dpi: int = 150,
     ) -> None:
@@ -105,9 +109,10 @@ class Sheet:
         lines = textwrap.wrap(text, int(inner / CHARACTER)) or [""]
         columns = min(max(1, int(inner / LEGEND_COLUMN)), max(1, legend_entries))
         foot = MARGIN + LEGEND_ROW * math.ceil(legend_entries / columns)
-        below = foot + AXIS_HEIGHT + (SERIES_HEIGHT + AXIS_HEIGHT if series else 0.0)
+        below = foot + AXIS_HEIGHT + (PLOT_HEIGHT + AXIS_HEIGHT if with_plot else 0.0)
         head = TITLE_HEIGHT * len(heading) + LINE_HEIGHT * len(lines) + HEAD_GAP
-        total = (LEFT + inner + MARGIN, below + height + head + MARGIN)
+        right = LEFT if with_plot else MARGIN
+        total = (LEFT + inner + right, below + height + head + MARGIN)
 
         self.figure = Figure(figsize=total, dpi=dpi, facecolor="white")
         self.canvas = FigureCanvasAgg(self.figure)
@@ -126,8 +131,8 @@ class Sheet:
         for line in lines:
             self.note = self._write(top, line, fontsize=9.5, color=QUIET)
             top -= LINE_HEIGHT
-        if series:
-            self._draw_series(self._place(LEFT, foot + AXIS_HEIGHT, inner, SERIES_HEIGHT), series)
+        self._draw_scale(LEFT + (inner + width) / 2, below - SCALE_DROP, extent[0])
+        self.plot = self._place(LEFT, foot + AXIS_HEIGHT, inner, PLOT_HEIGHT) if with_plot else None
 
     def freeze(self, moving: Sequence[Artist]) -> None:
         """Draw everything but `moving` (and walls and note, which lie above it) once, for `frame`."""
@@ -186,14 +191,21 @@ class Sheet:
         )
         self.axes.add_collection(self.walls, autolim=False)
 
-    def _draw_series(self, axes: Axes, series: Series) -> None:
-        for (name, (times, values)), colour in zip(series.items(), CURVES * len(series), strict=False):
-            axes.plot(times, values, color=colour, linewidth=1.6, label=readable(name))
-        axes.set_xlabel("time [s]", color=QUIET)
-        axes.margins(x=0.0)
-        axes.grid(color=OUTSIDE, linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.legend(fontsize=8.5, frameon=False, labelcolor="linecolor", ncols=len(series), loc="lower right")
+    def _draw_scale(self, right: float, up: float, width_m: float) -> None:
+        """Draw a bar that is a round number of metres long, its right end there [inches]."""
+        length_m = round_down(SCALE_FRACTION * width_m)
+        left = right - length_m * self.inches_per_m
+        x = [each / self._total[0] for each in (left, left, left, right, right, right)]
+        y = [(up + each) / self._total[1] for each in (-0.03, 0.03, 0.0, 0.0, 0.03, -0.03)]
+        self.figure.add_artist(Line2D(x, y, color=WALL, linewidth=1.2, transform=self.figure.transFigure))
+        beside = (left - 0.06) / self._total[0]
+        self.figure.text(beside, up / self._total[1], f"{length_m:g} m", va="center", ha="right", fontsize=8.5)
+
+
+def round_down(length_m: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is not longer."""
+    power = 10.0 ** math.floor(math.log10(length_m) + 1e-9)
+    return float(power * max(each for each in (1, 2, 5) if each * power <= length_m * (1 + 1e-9)))
 
 
 def readable(name: str) -> str:
@@ -210,7 +222,11 @@ def gone_at_the_end(tracks: Tracks) -> Ints:
 
 
 class Swarm:
-    """The robots on a sheet: bodies, the paths they took, what they cover and the cells they occupy."""
+    """The robots on a sheet: bodies, the paths they took, what they cover and the cells they occupy.
+
+    What they cover is what they have in sight where `sight` is given, else what is near. The first robot is marked as the
+    base station where it is (`based`). A `plain` swarm has neither paths nor noses, for something else to be drawn below.
+    """
 
     def __init__(
         self,
@@ -220,14 +236,18 @@ class Swarm:
         radius_m: float,
         coverage_radius_m: float | None = None,
         cells: tuple[int, int] | None = None,
+        sight: Sight | None = None,
+        based: bool = False,
+        plain: bool = False,
     ) -> None:
         self._axes, self._arena, self._tracks = sheet.axes, arena, tracks
-        self._coverage_radius_m, self._cells = coverage_radius_m, cells
+        self._coverage_radius_m, self._cells, self._sight = coverage_radius_m, cells, sight
+        self._based, self._plain = based, plain
         self._way = np.where(tracks.present[:, :, None], tracks.position, np.nan)
         xmin, ymin, xmax, ymax = arena.bounds
         least = RADIUS_MIN_FRACTION * max(xmax - xmin, ymax - ymin)
         self._radius, self._enlarged = max(radius_m, least), radius_m < least
-        self._framed = coverage_radius_m is not None
+        self._framed = coverage_radius_m is not None or sight is not None
         self._cell_style = FRAME | {"linewidth": self._frame_width(sheet)} if self._framed else TINT
         path_width_m = PATH_POINTS / 72.0 / sheet.inches_per_m
         self._ink_per_m = path_width_m / arena.area_m2
@@ -235,7 +255,9 @@ class Swarm:
         self._bodies = self._discs(np.zeros((0, 2)), self._radius, facecolors=BLUE, edgecolors="white", zorder=4)
         nose_width = min(1.2, 0.35 * 72.0 * sheet.inches_per_m * self._radius)
         self._noses = LineCollection([], colors=WALL, linewidths=nose_width, capstyle="round", zorder=4.5)
-        for collection in (*self._paths, self._noses):
+        self._dead = LineCollection([], colors=WALL, linewidths=1.4, zorder=4.6)
+        self._base = self._discs(np.zeros((0, 2)), 2.0 * self._radius, facecolors=YELLOW, edgecolors=WALL, zorder=3.9)
+        for collection in (*self._paths, self._noses, self._dead):
             self._axes.add_collection(collection, autolim=False)
         self._covered = PathPatch(NOTHING, **COVERED, zorder=1)
         self._occupied = PathPatch(NOTHING, **self._cell_style, zorder=1.6)
@@ -248,17 +270,26 @@ class Swarm:
     @property
     def artists(self) -> list[Artist]:
         """What `show` changes."""
-        return [*self._paths, self._bodies, self._noses, self._covered, self._occupied]
+        drawn = [*self._paths, self._bodies, self._noses, self._dead, self._base, self._covered, self._occupied]
+        return list[Artist](drawn)
 
     def show(self, index: int, since: int) -> None:
         """Show the robots at sample `index`, and their paths from sample `since` to there."""
         present = self._tracks.present[index]
         position, heading = self._tracks.position[index][present], self._tracks.heading[index][present]
-        self._bodies.set_offsets(position)
-        nose = 1.7 * self._radius * np.stack([np.cos(heading), np.sin(heading)], axis=1)
-        self._noses.set_segments(list(np.stack([position, position + nose], axis=1)))
-        self._show_paths(index, since)
-        if self._coverage_radius_m is not None:
+        dead = self._tracks.dead[index][present]
+        self._bodies.set_offsets(position[~dead])
+        if not self._plain:
+            nose = 1.7 * self._radius * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+            self._noses.set_segments(list(np.stack([position, position + nose], axis=1)))
+            self._show_paths(index, since)
+        cross = 1.6 * self._radius * np.array([[[-1, -1], [1, 1]], [[-1, 1], [1, -1]]])
+        self._dead.set_segments(list((position[dead][:, None, None, :] + cross).reshape(-1, 2, 2)))
+        if self._based:
+            self._base.set_offsets(self._tracks.position[index][:1])
+        if self._sight is not None:
+            self._covered.set_path(outline(self._sight.area(position[~dead])))
+        elif self._coverage_radius_m is not None:
             discs = shapely.buffer(shapely.points(position), self._coverage_radius_m, quad_segs=16)
             self._covered.set_path(outline(shapely.intersection(shapely.union_all(discs), self._arena.free)))
         if self._cells is not None:
@@ -271,7 +302,7 @@ class Swarm:
     def show_ends(self) -> None:
         """Mark where robots started, and where those that have left were seen last."""
         position, present = self._tracks.position, self._tracks.present
-        robots = np.flatnonzero(present.any(axis=0))
+        robots = np.flatnonzero(present.any(axis=0)) if not self._plain else np.zeros(0, dtype=np.int64)
         first = present.argmax(axis=0)
         self._discs(
             position[first[robots], robots], 0.7 * self._radius, facecolors="none", edgecolors=VERMILLION, zorder=3
@@ -281,20 +312,31 @@ class Swarm:
         x, y = position[last[gone], gone].T
         self._axes.plot(x, y, linestyle="none", marker="x", color=VERMILLION, markersize=5, zorder=3.5)
 
-    def legend(self) -> list[Line2D | Patch]:
-        """Return the legend's entries for all that is shown."""
-        count, time_s = int(self._tracks.present[-1].sum()), self._tracks.time_s[-1]
-        robots = "robot" if count == 1 else "robots"
+    def legend(self, moving: bool = False) -> list[Line2D | Patch]:
+        """Return the legend's entries for all that is shown: at the last sample, or in an animation (`moving`)."""
+        count, time_s = int((self._tracks.present & ~self._tracks.dead)[-1].sum()), self._tracks.time_s[-1]
+        robots = "robots" if moving else f"{count} {'robot' if count == 1 else 'robots'} at {time_s:g} s"
         larger = ", drawn larger" if self._enlarged else ""
         entries: list[Line2D | Patch] = [
-            Line2D([], [], linestyle="none", marker="o", color=BLUE, label=f"{count} {robots} at {time_s:g} s{larger}"),
-            Line2D([], [], linestyle="none", marker="o", mec=VERMILLION, mfc="none", markersize=5, label="starts"),
-            Line2D([], [], color=WALL, alpha=0.5, linewidth=1.2, label="paths, fading with age"),
+            Line2D([], [], linestyle="none", marker="o", color=BLUE, label=f"{robots}{larger}")
         ]
-        if gone := len(gone_at_the_end(self._tracks)):
+        if self._based:
+            style: dict[str, Any] = {"mfc": YELLOW, "mec": WALL, "markersize": 9}
+            entries.append(Line2D([], [], linestyle="none", marker="o", label="base station, at the entrance", **style))
+        if not self._plain:
+            entries += [
+                Line2D([], [], linestyle="none", marker="o", mec=VERMILLION, mfc="none", markersize=5, label="starts"),
+                Line2D([], [], color=WALL, alpha=0.5, linewidth=1.2, label="paths, fading with age"),
+            ][moving:]
+        if self._tracks.dead.any():
+            entries.append(Line2D([], [], linestyle="none", marker="x", color=WALL, label="dead robots"))
+        if (gone := len(gone_at_the_end(self._tracks))) and not moving:
             label = f"{gone} {'robot has' if gone == 1 else 'robots have'} left"
             entries.append(Line2D([], [], linestyle="none", marker="x", color=VERMILLION, label=label))
-        if self._coverage_radius_m is not None:
+        if self._sight is not None:
+            label = f"in sight of a robot, {self._sight.range_m:.3g} m at most"
+            entries.append(Patch(**COVERED, label=label))
+        elif self._coverage_radius_m is not None:
             label = f"within {self._coverage_radius_m:.3g} m of a robot"
             entries.append(Patch(**COVERED, label=label))
         if self._cells is not None:

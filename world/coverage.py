@@ -6,7 +6,7 @@ of the true field. Source: Schwager, McLurkin, Rus 2006.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -106,6 +106,8 @@ class Rings:
 class CoverageMeter:
     """The metrics of the table `[metrics.voronoi]`, over the robots that are present and not `stationary`."""
 
+    every_s: Final = 0.1
+
     def __init__(self, table: VoronoiMetricsTable, arena: Arena, field: Field) -> None:
         self._table = table
         self._coverage = Coverage(arena, field)
@@ -114,7 +116,7 @@ class CoverageMeter:
         self._mean_error_m: list[float] = []
         self._last: tuple[Floats, Floats] | None = None
 
-    def look(self, scene: Scene) -> None:
+    def look(self, scene: Scene, dead: Sequence[int]) -> None:
         """Take note of the errors, and of which statistics are below the threshold for the first time."""
         position = scene.position[scene.present]
         if len(position) <= self._table.stationary:

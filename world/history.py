@@ -5,7 +5,8 @@ second one is taken, so what is held stays evenly spaced over the whole run. The
 there. A history is for pictures; nothing in a run depends on it.
 """
 
-from typing import Final, NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import Final, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,7 @@ class Sample(NamedTuple):
     position: Floats
     heading: Floats
     present: Bools
+    dead: Bools
 
 
 class Tracks(NamedTuple):
@@ -51,6 +53,18 @@ class Tracks(NamedTuple):
     position: Floats  # (k, n, 2) [m]
     heading: Floats  # (k, n) [rad]
     present: NDArray[np.bool_]  # (k, n)
+    dead: NDArray[np.bool_]  # (k, n) down for good; the body of one that is present stands where it died
+
+    def until(self, time_s: float) -> Self:
+        """Return the samples up to a time [s], copied."""
+        last = int(np.searchsorted(self.time_s, time_s + 1e-9, side="right"))
+        return type(self)(
+            self.time_s[:last].copy(),
+            self.position[:last].copy(),
+            self.heading[:last].copy(),
+            self.present[:last].copy(),
+            self.dead[:last].copy(),
+        )
 
 
 class History:
@@ -67,9 +81,11 @@ class History:
         """Return the number of samples that `arrays` gives."""
         return len(self._samples())
 
-    def append(self, moment: Moment) -> None:
-        """Take a copy of `moment`."""
-        sample = Sample(moment.time_s, moment.position.copy(), moment.heading.copy(), moment.present.copy())
+    def append(self, moment: Moment, dead: Sequence[int] = ()) -> None:
+        """Take a copy of `moment`, and of who is dead then; ids beyond the robots' are not theirs."""
+        down = np.zeros(len(moment.present), dtype=np.bool_)
+        down[[robot for robot in dead if robot < len(down)]] = True
+        sample = Sample(moment.time_s, moment.position.copy(), moment.heading.copy(), moment.present.copy(), down)
         if self._seen % self._stride == 0:
             self._held.append(sample)
         self._seen += 1
@@ -86,8 +102,8 @@ class History:
         samples = self._samples()
         if not samples:
             raise ValueError("the history is empty")
-        time_s, position, heading, present = zip(*samples, strict=True)
-        return Tracks(np.array(time_s), np.stack(position), np.stack(heading), np.stack(present))
+        time_s, *arrays = zip(*samples, strict=True)
+        return Tracks(np.array(time_s), *map(np.stack, arrays))
 
     def _samples(self) -> list[Sample]:
         if self._newest is None or self._held[-1] is self._newest:

@@ -13,16 +13,18 @@ from zwerm.world.arena import Arena
 from zwerm.world.coverage import CoverageMeter
 from zwerm.world.fields import Field
 from zwerm.world.scene import Scene
-
-# How often meters look where the scenario does not say [s].
-EVERY_S = 0.1
+from zwerm.world.sight_meter import SightMeter
 
 
 class Meter(Protocol):
     """One group of metrics, over one run."""
 
-    def look(self, scene: Scene) -> None:
-        """Take note of a scene."""
+    @property
+    def every_s(self) -> float:
+        """How often it looks where the scenario does not say [s]."""
+
+    def look(self, scene: Scene, dead: Sequence[int]) -> None:
+        """Take note of a scene, and of who is dead."""
 
     def metrics(self) -> dict[str, float]:
         """Return the metrics by name, after the last scene was looked at; nan is for what did not come to pass."""
@@ -32,26 +34,35 @@ class Meter(Protocol):
 
 
 class Meters:
-    """The meters of one run, and when they look: every `every_s` of virtual time, and at the end."""
+    """The meters of one run, and when they look: every `every_s` of virtual time, and at the end.
+
+    Where that is not given, all look as often as the one that needs to most.
+    """
 
     def __init__(self, meters: Sequence[Meter] = (), every_s: float | None = None, dt_s: float = 1.0) -> None:
         self._meters = tuple(meters)
-        self._stride = max(1, round((every_s or EVERY_S) / dt_s))
+        every_s = every_s or min((meter.every_s for meter in meters), default=1.0)
+        self._stride = max(1, round(every_s / dt_s))
         self._last_tick = -1
         self._time_s: list[float] = []
 
-    def look(self, scene: Scene, now: bool = False) -> None:
-        """Have the meters look, if it is time to or `now` is true, and they have not yet."""
+    def look(self, scene: Scene, dead: Sequence[int] = (), now: bool = False) -> bool:
+        """Have the meters look, if it is time to or `now` is true, and they have not yet; tell whether they have."""
         if not self._meters or scene.tick == self._last_tick or (scene.tick % self._stride and not now):
-            return
+            return False
         self._last_tick = scene.tick
         self._time_s.append(scene.time_s)
         for meter in self._meters:
-            meter.look(scene)
+            meter.look(scene, dead)
+        return True
 
     def metrics(self) -> dict[str, float]:
         """Return every meter's metrics."""
         return {name: value for meter in self._meters for name, value in meter.metrics().items()}
+
+    def newest(self) -> dict[str, float]:
+        """Return the newest value of every series."""
+        return {name: values[-1] for meter in self._meters for name, values in meter.series().items()}
 
     def series(self) -> dict[str, list[float]]:
         """Return every meter's series, and the times [s] they are of as `time_s`; nothing where there is no meter."""
@@ -71,4 +82,6 @@ def make_meters(table: MetricsTable, arena: Arena, field: Field | None, dt_s: fl
         if field is None:
             raise ScenarioError(["metrics.voronoi: needs a field, and the scenario has none"])
         meters.append(CoverageMeter(table.voronoi, arena, field))
+    if table.sight_range_m is not None:
+        meters.append(SightMeter(arena, table.sight_range_m))
     return Meters(meters, table.every_s, dt_s)

@@ -54,7 +54,15 @@ def measure(world: "World", table: MetricsTable) -> dict[str, float]:
         found["area_coverage_fraction"] = area_coverage_fraction(position, table.coverage_radius_m, world.arena)
     if table.sight_range_m is not None:
         found |= _sight(world, table.sight_range_m)
+    return found | _told(world)
+
+
+def _told(world: "World") -> dict[str, float]:
+    """Return the numbers that nodes told, the newest of each; and the cycle that the last complex told of is in."""
+    found: dict[str, float] = {}
     for each in world.audience.told:
+        if "complex" in each.told:
+            found["deployment_cycles"] = float(each.told["complex"]["cycle"])
         found |= {name: float(value) for name, value in each.told.items() if isinstance(value, int | float)}
     return found
 
@@ -62,7 +70,7 @@ def measure(world: "World", table: MetricsTable) -> dict[str, float]:
 def _sight(world: "World", range_m: float) -> dict[str, float]:
     """Return how well the living robots cover the arena by sight, and how that compares with the ideal packing."""
     scene = world.scene
-    robots = living(scene.present_ids(), sorted({*world.crashed, *world.schedule.gone()}))
+    robots = living(scene.present_ids(), world.dead)
     ideal = hexagonal_packing_robots(world.arena, range_m)
     return {
         "coverage_fraction": sight_coverage_fraction(scene.position[robots], range_m, world.arena),

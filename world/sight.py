@@ -26,12 +26,29 @@ def hexagonal_packing_robots(arena: Arena, range_m: float) -> float:
     return float(arena.area_m2 / (math.sqrt(3.0) / 2.0 * range_m**2))
 
 
+class Sight:
+    """What robots see of an arena. What is seen from a place is kept while a robot stands there."""
+
+    def __init__(self, arena: Arena, range_m: float) -> None:
+        self.arena, self.range_m = arena, range_m
+        self._from: dict[tuple[float, ...], shapely.Geometry] = {}
+
+    def area(self, position: Floats) -> shapely.Geometry:
+        """Return what is seen from any of position (n, 2)."""
+        self._from = {
+            tuple(each.tolist()): self._from.get(tuple(each.tolist())) or seen_from(each, self.range_m, self.arena)
+            for each in position
+        }
+        return shapely.intersection(shapely.union_all(list(self._from.values())), self.arena.free)
+
+    def fraction(self, position: Floats) -> float:
+        """Return the fraction of the arena that is seen from any of position (n, 2)."""
+        return min(1.0, float(self.area(position).area / self.arena.area_m2)) if len(position) else 0.0
+
+
 def sight_coverage_fraction(position: Floats, range_m: float, arena: Arena) -> float:
     """Return the fraction of the arena that is within `range_m` and in sight of a robot at one of position (n, 2)."""
-    if not len(position):
-        return 0.0
-    seen = shapely.union_all([seen_from(each, range_m, arena) for each in position])
-    return float(shapely.intersection(seen, arena.free).area / arena.area_m2)
+    return Sight(arena, range_m).fraction(position)
 
 
 def seen_from(place: Floats, range_m: float, arena: Arena) -> shapely.Geometry:

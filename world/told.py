@@ -6,7 +6,7 @@ Nobody in the run hears any of it.
 from typing import Any, NamedTuple
 
 from zwerm.protocol import Command
-from zwerm.world.scene import Floats, Scene
+from zwerm.world.scene import Bools, Floats, Scene
 
 
 class Told(NamedTuple):
@@ -17,6 +17,7 @@ class Told(NamedTuple):
     node: int
     told: dict[str, Any]
     position: Floats  # (n, 2) [m]
+    present: Bools  # (n,)
 
 
 class Audience:
@@ -29,6 +30,7 @@ class Audience:
     def hear(self, scene: Scene, node: int, command: Command, decides: bool) -> None:
         """Take note of what a command tells."""
         if command.told:
-            self.told.append(Told(scene.tick, scene.time_s, node, command.told, scene.position.copy()))
+            told = Told(scene.tick, scene.time_s, node, command.told, scene.position.copy(), scene.present)
+            self.told.append(told)
         if command.gave_up and decides:
             self.gave_up = f"node {node} gave up: {command.gave_up}"

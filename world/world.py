@@ -212,9 +212,14 @@ class World:
             return False
         over = self._done.copy()
         over[self.exited] = True
-        dead = sorted({*self.crashed, *self.schedule.gone()})
+        dead = self.dead
         over[dead] = True
         return bool(over.all()) and len(dead) < self.count
+
+    @property
+    def dead(self) -> list[int]:
+        """The nodes that are down and will never return, ascending."""
+        return sorted({*self.crashed, *self.schedule.gone()})
 
     @property
     def done_fraction(self) -> float:

@@ -5,6 +5,7 @@ one JSON object and nothing else. Exit status: 0 as it should be, 1 the run fail
 """
 
 import os
+import re
 import signal
 import sys
 from collections.abc import Iterator
@@ -19,7 +20,7 @@ from rich.console import Console
 
 from zwerm import __version__
 from zwerm.console import RunProgress, print_result, print_scenarios
-from zwerm.errors import ScenarioError, ZwermError
+from zwerm.errors import PictureError, ScenarioError, ZwermError
 from zwerm.result import RunResult
 from zwerm.scenario import built_in, load, locate
 
@@ -46,6 +47,14 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and no
 Picture = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--picture", metavar="FILE.png", help="Where to draw the run; runs/SCENARIO-seedN.png by default."),
+]
+PictureAt = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--picture-at",
+        metavar="CYCLE|TIMEs",
+        help="Also draw this moment, a deployment cycle such as 40 or a time such as 120s; may be given often.",
+    ),
 ]
 Animation = Annotated[
     Optional[Path],  # noqa: UP045
@@ -121,6 +130,7 @@ def check(
     "Examples:\n\n"
     "[bold]zwerm run computation-free[/bold]\n\n"
     "[bold]zwerm run computation-free --seed 7 --set robots.count=40 --animate swarm.gif[/bold]\n\n"
+    "[bold]zwerm run sensor-coverage --picture-at 40 --picture-at 300s --animate swarm.mp4[/bold]\n\n"
     "[bold]zwerm run computation-free --inline --json[/bold]\n\n"
     "[bold]zwerm run computation-free --set robots.controller=my_file:MyController[/bold]"
 )
@@ -134,6 +144,7 @@ def run(
     realtime: RealTime = None,
     record: Record = None,
     picture: Picture = None,
+    picture_at: PictureAt = None,
     animate: Animation = None,
     as_json: Json = False,
 ) -> None:
@@ -141,12 +152,13 @@ def run(
     from zwerm.running import run as run_scenario
 
     with _mistakes_in_one_line():
+        _check_moments(picture_at)
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
             result = run_scenario(
                 loaded, seed, "inline" if inline else "processes", realtime=realtime, watcher=progress, record=record
             )
-        _report(result, picture, animate, as_json)
+        _report(result, picture, picture_at or [], animate, as_json)
 
 
 @app.command(
@@ -163,6 +175,7 @@ def world(
     realtime: RealTime = None,
     record: Record = None,
     picture: Picture = None,
+    picture_at: PictureAt = None,
     animate: Animation = None,
     as_json: Json = False,
 ) -> None:
@@ -170,10 +183,11 @@ def world(
     from zwerm.running import serve
 
     with _mistakes_in_one_line():
+        _check_moments(picture_at)
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
             result = serve(loaded, seed, listen, credentials, realtime=realtime, watcher=progress, record=record)
-        _report(result, picture, animate, as_json)
+        _report(result, picture, picture_at or [], animate, as_json)
 
 
 @app.command(
@@ -283,13 +297,21 @@ def study(
     raise typer.Exit(EXIT_FAILED if result.failed else 0)
 
 
-def _report(result: RunResult, picture: Path | None, animate: Path | None, as_json: bool) -> NoReturn:
+def _report(
+    result: RunResult, picture: Path | None, moments: list[str], animate: Path | None, as_json: bool
+) -> NoReturn:
     """Draw, print, and exit with the status that belongs to the outcome."""
     drawn: list[Path] = []
-    if not as_json and picture is None:
-        picture = Path("runs") / f"{result.scenario.name}-seed{result.seed}.png"
-    if picture is not None:
-        drawn.append(result.picture(picture))
+    mistakes: list[str] = []
+    usual = Path("runs") / f"{result.scenario.name}-seed{result.seed}.png"
+    if picture is not None or not as_json:
+        drawn.append(result.picture(picture or usual))
+    for moment in moments:
+        # A run is not thrown away for a moment that it does not have.
+        try:
+            drawn.append(_draw_moment(result, picture or usual, moment))
+        except PictureError as error:
+            mistakes.append(str(error))
     if result.scenario.random_faults is not None and not as_json:
         from zwerm.toml import write_toml
 
@@ -306,11 +328,36 @@ def _report(result: RunResult, picture: Path | None, animate: Path | None, as_js
         sys.stdout.flush()
     else:
         print_result(out, result, drawn)
+    if mistakes:
+        raise PictureError("\n".join(mistakes))
     if result.reason:
         err.print(f"zwerm: {result.reason}", style="red", markup=False, highlight=False, soft_wrap=True)
     if result.outcome == "interrupted":
         raise typer.Exit(EXIT_INTERRUPTED)
     raise typer.Exit(0 if result.ok else EXIT_FAILED)
+
+
+_MOMENT = re.compile(r"(?P<cycle>\d+)|(?P<at_s>\d+(\.\d+)?)s")
+
+
+def _check_moments(moments: list[str] | None) -> None:
+    """Raise ScenarioError for what is neither a cycle nor a time."""
+    mistakes = [
+        f"--picture-at: expected a cycle such as 40 or a time such as 120s, got {each!r}"
+        for each in moments or []
+        if not _MOMENT.fullmatch(each)
+    ]
+    if mistakes:
+        raise ScenarioError(mistakes)
+
+
+def _draw_moment(result: RunResult, beside: Path, moment: str) -> Path:
+    """Draw a run at a moment, in a file named after the one of its end, and return the path."""
+    found = _MOMENT.fullmatch(moment)
+    assert found is not None
+    if found["cycle"] is not None:
+        return result.picture(beside.with_stem(f"{beside.stem}-cycle{moment}"), cycle=int(moment))
+    return result.picture(beside.with_stem(f"{beside.stem}-{moment}"), at_s=float(found["at_s"]))
 
 
 def _interrupt(signum: int, frame: FrameType | None) -> None:

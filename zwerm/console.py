@@ -46,11 +46,15 @@ class RunProgress:
         """Show that `tick` of `ticks` are done."""
         self._show(self._name, "ticks", tick, ticks)
 
+    def covered(self, fraction: float, robots: int) -> None:
+        """Show how much of the arena is in sight, and of how many robots."""
+        self._show(f"{self._name}: in sight", f"% of the arena, of {robots} robots", round(100.0 * fraction, 1), 100)
+
     def shrunk(self, tried: int, faults: int) -> None:
         """Show how many runs were tried, and how many faults the smallest failing schedule has."""
         self._show(f"{self._name}: shrinking", f"runs, {faults} faults still fail", tried, None)
 
-    def _show(self, title: str, unit: str, done: int, total: int | None) -> None:
+    def _show(self, title: str, unit: str, done: float, total: int | None) -> None:
         task = self._tasks.get(title)
         if task is None:
             task = self._tasks[title] = self._progress.add_task(title, total=total, unit=unit)

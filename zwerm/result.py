@@ -3,13 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from zwerm.scenario import Scenario
 from zwerm.world.arena import Arena
 from zwerm.world.history import History
 from zwerm.world.scene import Ints
 from zwerm.world.told import Told
+
+if TYPE_CHECKING:  # pictures need matplotlib
+    from zwerm.world.pictures import RunView
 
 
 @dataclass(slots=True)
@@ -67,43 +70,52 @@ class RunResult:
             "faults": self.faults,
         }
 
-    def picture(self, path: str | Path) -> Path:
-        """Draw arena, trails, final robots and coverage as a PNG at `path`, and return the path."""
+    def picture(self, path: str | Path, cycle: int | None = None, at_s: float | None = None) -> Path:
+        """Draw the run at its end, at a deployment cycle or at a time [s] as a PNG at `path`, and return the path.
+
+        Raises PictureError where the file cannot be written, or the moment is not of the run.
+        """
         from zwerm.world.pictures import draw_run
 
-        return draw_run(
-            Path(path),
-            self.arena,
-            self.history,
-            self.scenario.robots.body.radius_m,
-            self.title,
-            self.metrics,
-            coverage_radius_m=self.scenario.metrics.coverage_radius_m,
-            cells=self.scenario.metrics.cells,
-        )
-
-    def picture_complex(self, path: str | Path, cycle: int = -1) -> Path:
-        """Draw the simplicial complex at a cycle (from 0; -1 is the last) at `path`, and return the path."""
-        from zwerm.world.pictures_complex import cycles, draw_complex
-
-        return draw_complex(Path(path), self.arena, cycles(self.told)[cycle])
+        return draw_run(Path(path), self._view(), self.metrics, cycle, at_s)
 
     def animate(self, path: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
         """Draw the run as an animation at `path`, .gif or .mp4, and return the path."""
         from zwerm.world.pictures import animate_run
 
-        return animate_run(
-            Path(path),
+        return animate_run(Path(path), self._view(), progress=progress)
+
+    def _view(self) -> "RunView":
+        from zwerm.world.pictures import RunView
+
+        table = self.scenario.metrics
+        return RunView(
             self.arena,
             self.history,
             self.scenario.robots.body.radius_m,
-            self.title,
-            coverage_radius_m=self.scenario.metrics.coverage_radius_m,
-            cells=self.scenario.metrics.cells,
-            progress=progress,
+            self.name,
+            self.ending,
+            table.coverage_radius_m,
+            table.cells,
+            table.sight_range_m,
+            self.scenario.base is not None,
+            self.told,
+            self.series,
         )
 
     @property
+    def name(self) -> str:
+        """The scenario and the seed."""
+        return f"{self.scenario.name}, seed {self.seed}"
+
+    @property
+    def ending(self) -> str:
+        """How many robots there were in the end, and how long the run was."""
+        there = int(self.metrics.get("robots_deployed", self.metrics.get("robots_in_arena", self.robots)))
+        robots = f"{self.robots} robots" if there == self.robots else f"{there} of {self.robots} robots"
+        return f"{robots}, {self.sim_s:g} s"
+
+    @property
     def title(self) -> str:
-        """One line that names the run."""
-        return f"{self.scenario.name}, seed {self.seed}: {self.robots} robots, {self.sim_s:g} s"
+        """One line that names the run, and says how it ended."""
+        return f"{self.name}: {self.ending}"

@@ -19,14 +19,15 @@ from zwerm.scenario import Scenario, load
 from zwerm.world.history import History
 from zwerm.world.lockstep import FAILED, INTERRUPTED, LockStep
 from zwerm.world.metrics import cell_counts, measure
-from zwerm.world.radio.report import radio_metrics, radio_report
+from zwerm.world.radio.report import messages, radio_metrics, radio_report
 from zwerm.world.realtime import RealTime
 from zwerm.world.world import World
 
 Runner = Literal["processes", "inline"]
 
-# How many samples of a run its history starts with, for pictures and animations.
-HISTORY_SAMPLES = 1_000
+# How many samples of a run its history takes, for pictures and animations, and how often a watcher is told of ticks.
+HISTORY_SAMPLES = 4_000
+TOLD_TIMES = 1_000
 
 
 class Watcher(Protocol):
@@ -38,6 +39,9 @@ class Watcher(Protocol):
     def ticked(self, tick: int, ticks: int) -> None:
         """`tick` of `ticks` are done."""
 
+    def covered(self, fraction: float, robots: int) -> None:
+        """This fraction of the arena is in sight of so many robots."""
+
 
 class Nobody:
     """A watcher that does not look."""
@@ -46,6 +50,9 @@ class Nobody:
         """Ignore it."""
 
     def ticked(self, tick: int, ticks: int) -> None:
+        """Ignore it."""
+
+    def covered(self, fraction: float, robots: int) -> None:
         """Ignore it."""
 
 
@@ -167,15 +174,19 @@ def _drive(
 ) -> RunResult:
     table = world.scenario.time
     ticks = round(table.duration_s / table.dt_s)
-    stride = max(1, ticks // HISTORY_SAMPLES)
+    stride, telling = max(1, ticks // HISTORY_SAMPLES), max(1, ticks // TOLD_TIMES)
     history = History()
-    history.append(world.scene)
-    world.meters.look(world.scene)
+    history.append(world.scene, world.dead)
+    world.meters.look(world.scene, world.dead)
 
     def on_tick(world: World) -> None:
-        world.meters.look(world.scene)
+        if world.meters.look(world.scene, world.dead):
+            newest = world.meters.newest()
+            if "coverage_fraction" in newest:
+                watcher.covered(newest["coverage_fraction"], int(newest["robots_deployed"]))
         if world.tick % stride == 0:
-            history.append(world.scene)
+            history.append(world.scene, world.dead)
+        if world.tick % telling == 0:
             watcher.ticked(world.tick, ticks)
 
     driver = (
@@ -192,7 +203,7 @@ def _drive(
         outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
     wall_s = time.monotonic() - start
     if world.tick % stride:
-        history.append(world.scene)
+        history.append(world.scene, world.dead)
     return _result(world, seed, runner, outcome, reason, wall_s, driver, history, link)
 
 
@@ -208,11 +219,14 @@ def _result(
     link: WorldLink,
 ) -> RunResult:
     scenario = world.scenario
-    world.meters.look(world.scene, now=True)
+    world.meters.look(world.scene, world.dead, now=True)
     metrics = measure(world, scenario.metrics) | world.meters.metrics()
     if scenario.radio is not None or scenario.coordinator is not None:
         metrics["robots_done_fraction"] = world.done_fraction
         metrics |= radio_metrics(world.medium, world.count, world.tick)
+    if cycles := metrics.get("deployment_cycles"):
+        metrics["ticks_per_cycle_mean"] = world.tick / cycles
+        metrics["messages_per_cycle_mean"] = messages(world.medium) / cycles
     metrics["refused_messages"] = float(world.refused.total())
     if isinstance(driver, RealTime):
         metrics["late_commands"] = float(world.answers.late_count)

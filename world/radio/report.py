@@ -35,6 +35,11 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
     }
 
 
+def messages(medium: Medium) -> int:
+    """Return how many transmissions there were, of all nodes over all channels; a broadcast is one."""
+    return sum(int(channel.accounts.node_messages.sum()) for channel in medium.channels.values())
+
+
 def radio_metrics(medium: Medium, robots: int, tick: int) -> dict[str, float]:
     """Return what may be measured of a radio, over all channels; nothing where nobody sent anything."""
     books = [channel.accounts for channel in medium.channels.values()]

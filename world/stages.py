@@ -1,0 +1,49 @@
+"""The stages of a deployment: a swarm's simplicial complex as it was told, cycle by cycle, for pictures.
+
+What is told is for those who watch (see `Command.told`): `complex` is a table with the `cycle`, and by ids of robots the
+`edges`, those among them that are `frontier` or `obstacle`, and the `path` to push along or several `paths`.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from zwerm.simplicial import FlagComplex
+from zwerm.world.scene import Bools, Floats, Ints
+from zwerm.world.told import Told
+
+
+class Stage(NamedTuple):
+    """The complex at one cycle, and where the robots stood then."""
+
+    cycle: int
+    time_s: float
+    position: Floats  # (n, 2) [m]
+    present: Bools  # (n,)
+    edges: Ints  # (k, 2) robots; likewise the next two
+    frontier: Ints
+    obstacle: Ints
+    paths: tuple[tuple[int, ...], ...]  # each from its source to the robot that goes ahead
+
+    @property
+    def triangles(self) -> Ints:
+        """(k, 3) the robots of the 2-simplices."""
+        lists: dict[int, list[int]] = {robot: [] for robot in np.unique(self.edges).tolist()}
+        for i, j in self.edges.tolist():
+            lists[i].append(j)
+            lists[j].append(i)
+        return np.array(FlagComplex(lists).triangles, dtype=np.int64).reshape(-1, 3)
+
+
+def stages(told: Sequence[Told]) -> list[Stage]:
+    """Return the stages that were told of, in order."""
+    return [_stage(each, each.told["complex"]) for each in told if "complex" in each.told]
+
+
+def _stage(moment: Told, told: dict[str, Any]) -> Stage:
+    edges, frontier, obstacle = (
+        np.array(told[name], dtype=np.int64).reshape(-1, 2) for name in ("edges", "frontier", "obstacle")
+    )
+    paths = tuple(tuple(path) for path in told.get("paths", [told.get("path", ())]) if path)
+    return Stage(told["cycle"], moment.time_s, moment.position, moment.present, edges, frontier, obstacle, paths)
