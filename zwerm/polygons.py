@@ -17,7 +17,7 @@ Polygon = Sequence[Point]
 _CUTS_BEFORE_REACH: Final = 6
 
 # Below this, a quotient of two sums of denormal numbers means nothing.
-_MASS_MIN: Final = 1e-290
+MASS_MIN: Final = 1e-290
 
 # The area of a thinner polygon may be rounding, and its centroid is held to its bounding box [m2].
 _THIN_M2: Final = 1e-12
@@ -123,7 +123,7 @@ def linear_centroid(polygon: Polygon, value: float, gx: float, gy: float) -> tup
     i00, i10, i01, i20, i11, i02 = moments(polygon, ox, oy)
     c1 = value + gx * ox + gy * oy  # the density at the corner about which the moments are taken
     mass = c1 * i00 + gx * i10 + gy * i01  # eq. 18
-    if not mass > _MASS_MIN:
+    if not mass > MASS_MIN:
         return 0.0, ox, oy
     x = ox + (c1 * i10 + gx * i20 + gy * i11) / mass  # eq. 17
     y = oy + (c1 * i01 + gx * i11 + gy * i02) / mass
