@@ -30,7 +30,7 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Setup(Struct, frozen=True, forbid_unknown_fields=True):
-    """All that a node knows before its first observation."""
+    """All that a node knows before its first observation. The `bases`, ids of base stations, only a coordinator knows."""
 
     node: int
     role: str
@@ -40,6 +40,7 @@ class Setup(Struct, frozen=True, forbid_unknown_fields=True):
     body: Body | None = None
     channels: tuple[str, ...] = ()
     parameters: dict[str, Any] = {}
+    bases: tuple[int, ...] = ()
 
 
 class Stepper(Protocol):

@@ -71,13 +71,15 @@ def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
                 body=body if placed else None,
                 channels=channels if placed else ("uplink",),
                 parameters=parameters,
+                bases=() if placed or scenario.base is None else tuple(range(scenario.base.stations)),
             ),
         )
 
     for node in range(robots.count):
         add(node, ROBOT, robots.controller, robots.parameters)
     if scenario.base is not None:
-        add(0, BASE, scenario.base.controller, scenario.base.parameters)
+        for node in range(scenario.base.stations):
+            add(node, BASE, scenario.base.controller, scenario.base.parameters)
     if scenario.coordinator is not None:
         add(robots.count, COORDINATOR, scenario.coordinator.controller, scenario.coordinator.parameters)
     return players

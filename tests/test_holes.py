@@ -87,7 +87,7 @@ def test_a_robot_that_goes_in_halves_the_narrow_corners() -> None:
 def planner(places: Positions, wall_at: int | None = None) -> Planner:
     known = Places()
     for node in sorted(places):
-        assert known.found(node, 0.0) == node
+        assert known.found(node) == node
     views, complex_ = seen(places)
     for node, view in views.items():
         known.take(node, [Sighting(other, bearing) for other, bearing in view.items()])

@@ -189,7 +189,7 @@ def deployment(cycles: int = 3) -> RunView:
         Told(
             0, float(cycle), 3,
             {"complex": {
-                "cycle": cycle, "edges": [[0, 1], [0, 2], [1, 2]], "path": [0, 1],
+                "cycle": cycle, "edges": [[0, 1], [0, 2], [1, 2]], "paths": [[0, 1]],
                 "frontier": [[1, 2]] if cycle < cycles else [], "obstacle": [] if cycle < cycles else [[1, 2]],
             }},
             TRIANGLE, np.ones(3, bool),

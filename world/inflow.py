@@ -5,12 +5,15 @@ there is none, the next robot waits at the door; the interval counts from the la
 enter when it releases them, where it stands.
 """
 
+from collections import deque
+
 import numpy as np
 
 from zwerm.draws import Draws
+from zwerm.errors import ScenarioError
 from zwerm.scenario import BaseTable, InflowTable, PlacementTable
 from zwerm.world.arena import Arena
-from zwerm.world.placement import free_spot, place
+from zwerm.world.placement import free_spot, place, placed
 from zwerm.world.scene import Floats, Ints, Scene
 
 
@@ -48,35 +51,42 @@ class Inflow:
         return np.flatnonzero(inside & scene.present)
 
 
-class Depot:
-    """The robots, ids from 1 to `count` - 1, that wait at a base station, which is robot 0."""
+class Depots:
+    """The base stations, robots 0 to n - 1, and the others, who wait in their depots: dealt out in turn, each in id order."""
 
     def __init__(self, table: BaseTable, count: int, arena: Arena, radius_m: float, draws: Draws) -> None:
+        """Take the place of every base station. Raises ScenarioError where one cannot be, or no robot is left to wait."""
+        stations = table.stations
+        if stations >= count:
+            raise ScenarioError([f"robots.count: expected more than the {stations} base stations, got {count}"])
         if table.pose is not None:
-            x, y, heading = table.pose
-            self.base: tuple[int, Floats, float] = (0, np.array([x, y]), heading)
+            self.position, self.heading = placed([table.pose], ["base.pose"], arena, radius_m)
+        elif table.poses is not None:
+            keys = [f"base.poses.{station}" for station in range(stations)]
+            self.position, self.heading = placed(table.poses, keys, arena, radius_m)
         else:
-            positions, headings = place(PlacementTable(), arena, 1, radius_m, draws)
-            self.base = (0, positions[0], float(headings[0]))
-        self._count = count
-        self._next_robot = 1
-        self._ordered = 0
+            self.position, self.heading = place(PlacementTable(), arena, stations, radius_m, draws)
+        self.stations = stations
+        self._waiting = [deque(range(stations + station, count, stations)) for station in range(stations)]
+        self._entering: deque[tuple[int, int]] = deque()
         self.refused_releases = 0
 
-    def release(self) -> None:
-        """Let the next robot out; a release from an empty depot is refused and counted."""
-        if self._next_robot + self._ordered < self._count:
-            self._ordered += 1
+    def release(self, station: int) -> None:
+        """Let a station's next robot out; a release from an empty depot is refused and counted."""
+        if self._waiting[station]:
+            self._entering.append((station, self._waiting[station].popleft()))
         else:
             self.refused_releases += 1
 
     def entering(self, scene: Scene) -> tuple[int, Floats, float] | None:
-        """Return (robot, position (2,) [m], heading [rad]) of a robot that enters now, at the base, or None."""
-        if not self._ordered:
+        """Return (robot, position (2,) [m], heading [rad]) of a robot that enters now, at its base, or None.
+
+        One robot enters a tick; of those released at once the others follow.
+        """
+        if not self._entering:
             return None
-        self._ordered -= 1
-        robot, self._next_robot = self._next_robot, self._next_robot + 1
-        return robot, self.base[1].copy(), self.base[2]
+        station, robot = self._entering.popleft()
+        return robot, self.position[station].copy(), float(self.heading[station])
 
     def leaving(self, scene: Scene) -> Ints:
         """Return nobody: what a base station released stays out."""

@@ -6,7 +6,7 @@ space, in the largest part that a disc of their radius can move about in, and no
 for them. (Given poses may be anywhere free; walls without thickness are taken for intended, and close off nothing.)
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import shapely
@@ -221,11 +221,21 @@ def _poses(table: PlacementTable, arena: Arena, count: int, radius_m: float) -> 
         raise ScenarioError(
             [f"robots.placement.poses: expected one for each of {count} robots, got {len(table.poses)}"]
         )
-    poses = np.array(table.poses)
+    return placed(table.poses, [f"robots.placement.poses.{robot}" for robot in range(count)], arena, radius_m)
+
+
+def placed(
+    given: Sequence[tuple[float, float, float]], keys: Sequence[str], arena: Arena, radius_m: float
+) -> tuple[Floats, Floats]:
+    """Return positions (n, 2) [m] and headings (n,) [rad] of n given poses.
+
+    Raises ScenarioError, by the poses' keys, for those in a wall or in each other's way.
+    """
+    poses = np.array(given)
     position = poses[:, :2]
     mistakes = []
     for robot, inside in enumerate(arena.contains(position, radius_m)):
-        key, (x, y) = f"robots.placement.poses.{robot}", position[robot]
+        key, (x, y) = keys[robot], position[robot]
         if not inside:
             mistakes.append(f"{key}: expected free space {radius_m:g} m around, got ({x:g}, {y:g})")
         gap = np.hypot(*(position[:robot] - position[robot]).T)

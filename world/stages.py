@@ -45,5 +45,5 @@ def _stage(moment: Told, told: dict[str, Any]) -> Stage:
     edges, frontier, obstacle = (
         np.array(told[name], dtype=np.int64).reshape(-1, 2) for name in ("edges", "frontier", "obstacle")
     )
-    paths = tuple(tuple(path) for path in told.get("paths", [told.get("path", ())]) if path)
+    paths = tuple(tuple(path) for path in told["paths"] if path)
     return Stage(told["cycle"], moment.time_s, moment.position, moment.present, edges, frontier, obstacle, paths)

@@ -33,7 +33,7 @@ from zwerm.world.faults import ticks
 from zwerm.world.faults.generator import scheduled
 from zwerm.world.faults.schedule import Schedule, unite
 from zwerm.world.faults.sensing import SensingFault, read
-from zwerm.world.inflow import Depot, Inflow
+from zwerm.world.inflow import Depots, Inflow
 from zwerm.world.lives import Lives, Order
 from zwerm.world.meters import Meters
 from zwerm.world.physics import Physics
@@ -87,7 +87,8 @@ class World:
         self._columns = SENSOR_FIELDS[: last + 1]
         self._done: Bools = np.zeros(nodes, dtype=np.bool_)
         self._any_done = False
-        self._fixed = ([self.coordinator] if self.coordinator is not None else []) + ([0] if scenario.base else [])
+        stations = range(scenario.base.stations if scenario.base is not None else 0)
+        self._fixed = [*([self.coordinator] if self.coordinator is not None else []), *stations]
         self.answers = Answers(self._drives.kind, body.kind, self._fixed, self.medium)
         self.refused = self.answers.refused
         self._present: Bools = np.zeros(count, dtype=np.bool_)
@@ -95,14 +96,14 @@ class World:
         self._observations: list[bytes] = []
         self._outboxes: list[tuple[int, tuple[Transmission, ...]]] = []
         self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
-        self._depot = Depot(scenario.base, count, arena, body.radius_m, self.draws) if scenario.base else None
+        self._depots = Depots(scenario.base, count, arena, body.radius_m, self.draws) if scenario.base else None
         if self.coordinator is not None:
             self._admit(self.coordinator)
-        if self._depot is not None:
-            base, position, heading = self._depot.base
-            self._physics.fix(base, position, heading)
-            self._set_present(base, True)
-            self._admit(base)
+        if self._depots is not None:
+            for base in stations:
+                self._physics.fix(base, self._depots.position[base], float(self._depots.heading[base]))
+                self._set_present(base, True)
+                self._admit(base)
         elif self._inflow is None:
             positions, headings = place(scenario.robots.placement, arena, count, body.radius_m, self.draws)
             for robot in range(count):
@@ -249,7 +250,7 @@ class World:
 
     def _let_in_and_out(self) -> None:
         """Let robots enter and leave at the start of a tick, and look again if any did."""
-        door = self._inflow or self._depot
+        door = self._inflow or self._depots
         if door is None:
             return
         leaving = door.leaving(self.scene).tolist()
@@ -336,8 +337,8 @@ class World:
                 self._wakes.sleep(node, answer.wake, self.tick)
             if answer.told or answer.gave_up:
                 self.audience.hear(self.scene, node, answer, node in self._fixed)
-            if answer.release and node == 0 and self._depot is not None:
-                self._depot.release()
+            if answer.release and self._depots is not None and node < self._depots.stations:
+                self._depots.release(node)
             if answer.done or self._any_done:
                 done[node] = answer.done
                 self._any_done = True

@@ -8,9 +8,9 @@ to type; the tables here carry them as they are.
 import re
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from zwerm.errors import ScenarioError
 from zwerm.mistakes import mistakes as mistakes  # for those who type tables of their own
@@ -149,12 +149,27 @@ class RobotsTable(Table):
 class BaseTable(Table):
     """A base station: robot 0, which never moves. The others wait in its depot until it releases them, one at a time.
 
-    Without a `pose` it stands at a random free place.
+    It stands at its `pose`, else at a random free place. With several `poses`, or `count` at random places, there are as many
+    base stations, robots 0, 1, ..., each with a depot of its own: the other robots are dealt out to them in turn.
     """
 
     controller: str
     parameters: dict[str, Any] = {}
     pose: Pose | None = None
+    poses: Annotated[list[Pose], Field(min_length=1)] | None = None
+    count: Count | None = None
+
+    @property
+    def stations(self) -> int:
+        """How many base stations there are."""
+        return len(self.poses) if self.poses is not None else self.count or 1
+
+    @model_validator(mode="after")
+    def _one_way_to_say_where(self) -> Self:
+        given = [name for name in ("pose", "poses", "count") if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise ValueError(f"expected at most one of pose, poses and count, got {' and '.join(given)}")
+        return self
 
 
 class CoordinatorTable(Table):

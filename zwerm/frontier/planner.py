@@ -43,6 +43,7 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     corner_margin_rad: Annotated[float, Meta(ge=-1.0, le=1.0)] = 0.15
     redundancy_every: Annotated[int, Meta(ge=0)] = 10
     attempts_max: Count = 2
+    pushes_max: Count = 100
     survey_ticks_max: Count = 60
     drive_ticks_max: Count = 300
     cycles_max: Count = 2000
@@ -57,7 +58,7 @@ class Planner:
     """The frontier by the rules of the paper, over `places`."""
 
     def __init__(self, rules: Parameters, places: Places) -> None:
-        self.tried = Tried(rules.attempts_max, rules.near_wall_m)
+        self.tried = Tried(rules.attempts_max, rules.near_wall_m, places.blocked)
         self.fence = Fence((), ())
         self.frontier: tuple[Edge, ...] = ()
         self.obstacle: tuple[Edge, ...] = ()

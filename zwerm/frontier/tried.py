@@ -11,11 +11,11 @@ class Tried:
     `blocked` has the directions in which a wall stopped a drive, by the place that it began at.
     """
 
-    def __init__(self, attempts_max: int, near_wall_m: float) -> None:
+    def __init__(self, attempts_max: int, near_wall_m: float, blocked: dict[int, list[float]] | None = None) -> None:
         self.closed: dict[Key, None] = {}
         self.failed: dict[tuple[Key, int], None] = {}
         self.attempts: dict[Key, int] = {}
-        self.blocked: dict[int, list[float]] = {}
+        self.blocked: dict[int, list[float]] = {} if blocked is None else blocked
         self._attempts_max = attempts_max
         self._near_wall_m = near_wall_m
 

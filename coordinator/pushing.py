@@ -1,0 +1,165 @@
+"""One push, from the robot that goes into the unknown to the scale correction. Ramaithitima et al. 2015, algorithm 1.
+
+Several pushes may be told at once, if none has a place in its path that is anybody's landmark in another.
+"""
+
+import math
+from collections.abc import Sequence
+
+from zwerm.coordinator.post import Post, Story
+from zwerm.coordinator.sources import Sources
+from zwerm.frontier.places import Places
+from zwerm.frontier.planner import Parameters
+from zwerm.frontier.services import FrontierService, Picture, Plan
+from zwerm.orders import Arrived, Cleared, Correct, Deploy, Landmark, Move, Sighting
+from zwerm.simplicial import FlagComplex
+
+# Which ways the first robot tries, in its own frame.
+FIRST_WAYS_RAD = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
+
+Moved = Sequence[int]
+
+
+class Pushing:
+    """The pushes of one cycle. `pushes` counts those that led into a new place."""
+
+    def __init__(
+        self, rules: Parameters, places: Places, post: Post, sources: Sources, frontier: FrontierService
+    ) -> None:
+        self.pushes = 0
+        self.cycle = 0
+        self.picture = Picture({}, FlagComplex({}), ())
+        self._rules = rules
+        self._places = places
+        self._post = post
+        self._sources = sources
+        self._frontier = frontier
+        self._hop_m = rules.link_m - rules.margin_m
+
+    def first(self, base: int) -> Story[Moved]:
+        """Deploy a station's first robot, open loop. Algorithm 1, line 1."""
+        robot = yield from self._sources.release(base, self.cycle)
+        if robot is None:
+            return ()
+        for bearing in FIRST_WAYS_RAD:
+            self._post.say(robot, Deploy(self.cycle, bearing, self._hop_m, self._rules.clear_m))
+            arrived = yield from self._arrivals([robot])
+            if robot in arrived and arrived[robot].ok:
+                del self._sources.waiting[base]
+                self._places.found(robot)
+                yield from self._correct(robot, [(self._places.occupant[base], bearing + math.pi)])
+                return (robot,)
+        self._sources.blocked[base] = None
+        return ()
+
+    def push(self, plan: Plan) -> Story[Moved]:
+        """Push along the plan's path; section III-B. Return the robots that moved."""
+        places, cycle, path = self._places, self.cycle, plan.path
+        base = path[0] if path[0] in self.picture.bases else None
+        leader = places.occupant[path[-1]]
+        self._frontier.note_attempt(plan)
+        if base is not None and not any(each not in path for each in self.picture.views[base]):
+            # Whom the base sees is about to move: the next robot must look around before that.
+            yield from self._sources.let_out(base, cycle, self.picture.views[base], path)
+        bearing = plan.direction - places.heading[leader]
+        self._post.say(leader, Deploy(cycle, _wrapped(bearing), plan.hop_m, plan.clear_m))
+        news = yield from self._post.wait(
+            lambda node, answer: node == leader and isinstance(answer, Cleared | Arrived),
+            1,
+            self._rules.drive_ticks_max,
+        )
+        first = news[0][1] if news else None
+        if first is None:  # dead on its way: that says nothing of walls
+            return (leader,)
+        if isinstance(first, Arrived) and not first.ok:
+            self._frontier.note_failure(plan, first.driven_m)
+            return (leader,)
+        followers = [places.occupant[place] for place in path[:-1]]
+        if base is not None:
+            yield from self._sources.let_out(base, cycle, self.picture.views[base], path)
+            born = self._sources.waiting.pop(base, None)
+            if born is None:  # nobody comes: back
+                yield from self._arrivals([leader])
+                self._move([leader], [plan.mover], [plan.mover], {})
+                yield from self._arrivals([leader])
+                return (leader,)
+            followers[0] = born
+        going = path[1:]
+        self._move(followers, path[:-1], going, dict(zip(going, followers, strict=True)))
+        arrived = yield from self._arrivals([*followers, leader])
+        self.pushes += 1
+        if base is None:
+            places.drop(path[0])
+        for place, robot in zip(going, followers, strict=True):
+            places.occupant[place] = robot
+        places.found(leader)
+        yield from self._straighten(followers, path, arrived)
+        yield from self._settle(followers, going, arrived)
+        if leader in arrived:
+            back = plan.direction + math.pi - places.heading[leader]
+            yield from self._correct(leader, [(places.occupant[each], back) for each in plan.anchors])
+        return (*followers, leader)
+
+    def _move(
+        self, robots: Sequence[int], origins: Sequence[int], goals: Sequence[int], future: dict[int, int]
+    ) -> None:
+        """Tell robots to take the places ahead of them; `future` is who will be where among the places that change."""
+        places, bases = self._places, self.picture.bases
+        vacated = [place for place in origins if place not in future and place not in bases]
+        for robot, origin, goal in zip(robots, origins, goals, strict=True):
+            heading = places.heading[robot]
+            direction = places.direction(origin, goal)
+            length = self._hop_m
+            if direction is None:
+                direction, length = 0.0, 0.0
+            landmarks = []
+            for place, there in places.known_from(goal):
+                node = future.get(place, places.occupant[place])
+                if node == robot or (place in vacated and place not in future and future):
+                    continue
+                still = place not in future
+                landmarks.append(Landmark(node, _wrapped(there - heading), still))
+            if origin in bases and sum(each.still for each in landmarks) > 2:
+                landmarks = [each for each in landmarks if each.node != places.occupant[origin]]
+            self._post.say(robot, Move(self.cycle, _wrapped(direction - heading), length, tuple(landmarks)))
+
+    def _settle(self, robots: Sequence[int], goals: Sequence[int], arrived: dict[int, Arrived]) -> Story[None]:
+        """Who leaned on moving robots finds its place again now that they stand: one by one, rear to front."""
+        leaning = {place: robot for place, robot in zip(goals, robots, strict=True) if _leaned(arrived, robot)}
+        for _ in range(2):
+            again: dict[int, int] = {}
+            for place, robot in list(leaning.items()):
+                del leaning[place]
+                self._move([robot], [place], [place], leaning)
+                arrived = yield from self._arrivals([robot])
+                if _leaned(arrived, robot):
+                    again[place] = robot
+            leaning = again
+
+    def _straighten(self, followers: Sequence[int], path: Sequence[int], arrived: dict[int, Arrived]) -> Story[None]:
+        """In single file, rear to front: bearings did not tell how far to go, the range of sight does."""
+        rear = self._places.occupant.get(path[0])
+        for robot in followers:
+            if robot in arrived and arrived[robot].loose and rear is not None:
+                yield from self._correct(robot, [(rear, 0.0)])
+            rear = robot
+
+    def _correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Story[None]:
+        self._post.say(robot, Correct(self.cycle, tuple(Sighting(node, _wrapped(there)) for node, there in anchors)))
+        yield from self._arrivals([robot])
+
+    def _arrivals(self, robots: Sequence[int]) -> Story[dict[int, Arrived]]:
+        answers = yield from self._post.wait(
+            lambda node, answer: node in robots and isinstance(answer, Arrived),
+            len(robots),
+            self._rules.drive_ticks_max,
+        )
+        return {node: answer for node, answer in answers if isinstance(answer, Arrived)}
+
+
+def _leaned(arrived: dict[int, Arrived], robot: int) -> bool:
+    return robot in arrived and arrived[robot].leaned
+
+
+def _wrapped(angle: float) -> float:
+    return math.remainder(angle, math.tau)
