@@ -77,8 +77,7 @@ def test_a_forger_is_not_heard_as_another_node(net: Network, victim: ZenohNodeLi
     intruder.put(command_key(RUN, VICTIM), b"forged command")
     intruder.put(observation_key(RUN, VICTIM), b"forged observation")
     intruder.put(f"zwerm/{RUN}/node/*/cmd", b"forged for all")
-    intruder.put(command_key(RUN, "bell"), b"")
-    intruder.put(command_key(RUN, "bell"), b"\x92\x00\x01")  # what the world tells itself when node 0 is lost
+    intruder.put(command_key(RUN, "nobody"), b"forged for nobody")
     intruder.delete(command_key(RUN, INTRUDER))
     after_all_before(net, intruder)
     assert victim.receive(0.0) is None

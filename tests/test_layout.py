@@ -31,7 +31,6 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
         "global_randomness",
     ): "names the random streams that the conformance kit watches; it draws from none",
     ("zwerm/link/zenoh_node.py", "wall_clock"): "joining has a deadline; observations and commands do not look at it",
-    ("zwerm/link/zenoh_world.py", "wall_clock"): "receiving has a timeout; what is received does not depend on it",
 }
 LONG_FILES: dict[str, str] = {}
 

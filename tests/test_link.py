@@ -119,6 +119,39 @@ def test_receive_waits_as_long_as_it_is_told_even_after_a_longer_wait(net: Netwo
     node.close()
 
 
+def test_gathering_ends_when_enough_has_arrived_and_when_a_node_is_lost(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    for number in range(3):
+        threading.Timer(0.02 * number, node.send, [bytes([number])]).start()
+    net.link.gather(3, 60.0)
+    assert [net.link.receive(0.0) for _ in range(4)] == [*(Arrival(0, bytes([number])) for number in range(3)), None]
+    began_s = time.monotonic()
+    net.link.gather(1, 0.1)
+    assert 0.1 <= time.monotonic() - began_s < 2.0
+    node.send(b"last words")
+    threading.Timer(0.1, node.close).start()
+    net.link.gather(3, 60.0)
+    assert time.monotonic() - began_s < 30.0
+    assert [net.link.receive(0.0) for _ in range(3)] == [Arrival(0, b"last words"), Arrival(0, None), None]
+
+
+def test_a_node_that_sends_more_than_anybody_takes_is_held_back(
+    private_tmp: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("zwerm.link.zenoh_world.CAPACITY", 10)
+    sent = [str(number).encode() for number in range(100)]
+    with network(private_tmp) as net:
+        node = net.node(0)
+        node.join()
+        for payload in sent:
+            node.send(payload)
+        until(lambda: len(net.link._arrivals) == 10, "full")
+        assert [net.link.receive(20.0) for _ in sent] == [Arrival(0, payload) for payload in sent]
+        assert net.link.receive(0.0) is None
+        node.close()
+
+
 def test_a_closed_link_says_so(net: Network) -> None:
     net.link.close()
     with pytest.raises(LinkError, match=r"^the world's link is closed"):
@@ -204,6 +237,23 @@ def test_what_is_sent_while_a_node_is_still_joining_is_not_lost(net: Network) ->
     node.listen(lambda payload: (heard.append(payload), done.set() if len(heard) == 100 else None))
     assert done.wait(20.0)
     assert heard == [bytes([number]) for number in range(100)]
+    node.close()
+
+
+def test_zenoh_s_thread_keeps_what_python_knows_of_it_from_one_message_to_the_next(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    own, counts = threading.local(), []
+
+    def count(payload: bytes) -> None:
+        own.count = getattr(own, "count", 0) + 1
+        counts.append(own.count)
+
+    node.listen(count)
+    for _ in range(3):
+        net.link.send(0, b"x")
+    until(lambda: len(counts) == 3, "three messages")
+    assert counts == [1, 2, 3]
     node.close()
 
 

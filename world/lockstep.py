@@ -12,6 +12,9 @@ from zwerm.link import Arrival, Programs, WorldLink
 from zwerm.world.programs import Undertaker
 from zwerm.world.world import World
 
+# A part of this many of the answers is waited for after the rest.
+_LAST: Final = 8
+
 OnTick = Callable[[World], None]
 
 # What a run may end with; "interrupted" is the caller's to say.
@@ -67,21 +70,26 @@ class LockStep:
 
     def _collect(self, missing: int) -> None:
         """Receive until nobody is awaited; `missing` bounds the answers that can come in order."""
-        world, receive = self._world, self._link.receive
+        world, link = self._world, self._link
         straggler_s = world.scenario.time.straggler_s
         deadline: float | None = None
         while missing:
-            arrival = receive(straggler_s if deadline is None else max(0.0, deadline - time.monotonic()))
+            patience_s = straggler_s if deadline is None else max(0.0, deadline - time.monotonic())
+            # All but a few, which still come while the others are read.
+            link.gather(missing - missing // _LAST, patience_s)
+            arrival = link.receive(0.0)
             if arrival is None:
                 self.lost += len(world.awaited())
                 raise StragglerError(world.awaited(), world.tick, straggler_s)
-            if self._take(arrival):
-                missing -= 1
-            elif arrival.payload is None:
-                missing = len(world.awaited())
-            else:
-                # Time that a babbling node uses up is not given back to it.
-                deadline = deadline or time.monotonic() + straggler_s
+            while arrival is not None:
+                if self._take(arrival):
+                    missing -= 1
+                elif arrival.payload is None:
+                    missing = len(world.awaited())
+                else:
+                    # Time that a babbling node uses up is not given back to it.
+                    deadline = deadline or time.monotonic() + straggler_s
+                arrival = link.receive(0.0) if missing else None
 
     def _take(self, arrival: Arrival) -> bool:
         """Tell the world what has come; return whether it was an answer to this tick's observation."""

@@ -30,6 +30,9 @@ class MemoryLink:
         """Return the next answer, or None at once: nothing can come later than it was asked for."""
         return self._arrivals.popleft() if self._arrivals else None
 
+    def gather(self, count: int, timeout_s: float) -> None:
+        """Return at once: all that will come is there."""
+
     def close(self) -> None:
         """Forget what has not been received."""
         self._arrivals.clear()

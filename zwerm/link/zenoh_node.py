@@ -17,7 +17,7 @@ from zenoh.handlers import Callback, FifoChannel
 
 from zwerm.errors import LinkError
 from zwerm.keys import alive_key, command_key, hello_key, observation_key
-from zwerm.link.session import Credential, open_session, transport_settings, trust_settings
+from zwerm.link.session import Credential, keep_thread, open_session, transport_settings, trust_settings
 from zwerm.protocol import REFUSABLE, Goodbye, Hello, Welcome, decode_welcome, encode, refusal
 
 RETRY_S: Final = 0.05
@@ -139,6 +139,7 @@ class ZenohNodeLink:
         return welcome
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
+        keep_thread()
         with self._delivering:
             self._deliver(sample.payload.to_bytes())
 

@@ -5,33 +5,30 @@ messages arrive in the order sent, and the end of its process after the last of 
 in `refused`. Who may connect, and speak on which key, is not decided here but by the access control in the router's
 settings.
 
-Messages wait in a channel on Zenoh's side and are taken out in the caller's own thread: a callback in Python for each
-would compete with the world for the interpreter lock. As that channel has no wait with a timeout, an alarm rings
-through it.
+Messages are taken in by Zenoh's own thread, which wakes the world only when there are as many as it waits for: a switch from
+one thread to the other for each message would cost more than all that is done with it.
 """
 
 import contextlib
 import threading
-import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, Final
 
 import msgspec
 import zenoh
 from msgspec import Struct
+from zenoh.handlers import Callback
 
 from zwerm.errors import LinkError
 from zwerm.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
 from zwerm.link import Arrival
-from zwerm.link.session import TWO_THREADS, open_session, set_threads
+from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threads
 from zwerm.protocol import REFUSABLE, Goodbye, Welcome, decode_hello, encode, refusal
 
-# More than can wait at once when every node answers each message with one; past it Zenoh holds the senders back.
-CHANNEL_CAPACITY: Final = 16_384
-
-# Stands in the place of a node id where the world writes to itself; access control leaves that key to nobody else.
-BELL: Final = "bell"
+# More than can wait at once when every node answers each message with one; past it Zenoh's thread waits, and so in the end
+# do the senders.
+CAPACITY: Final = 16_384
 
 
 class Member(Struct, frozen=True):
@@ -55,16 +52,15 @@ class ZenohWorldLink:
         self._source_of: dict[str, int] = {}
         self._changed = threading.Condition()
         self._dismissed = False
+        self._arrivals: deque[Arrival] = deque()
+        self._wanted = CAPACITY  # so many arrivals are worth waking somebody for
+        self._losses = 0  # among them
+        self._closed = False
         set_threads(TWO_THREADS)
         self._session = open_session({"mode": "router", **settings}, "the world cannot listen")
         try:
             self._put = {node: self._publisher(observation_key(run, node)).put for node in self._members}
-            self._bell_key = command_key(run, BELL)
-            self._ring = self._publisher(self._bell_key, zenoh.Locality.SESSION_LOCAL).put
-            self._messages = self._session.declare_subscriber(
-                command_key(run, EVERY), zenoh.handlers.FifoChannel(CHANNEL_CAPACITY)
-            )
-            self._alarm = _Alarm(lambda: self._ring(b""))
+            self._session.declare_subscriber(command_key(run, EVERY), Callback(self._on_command, indirect=False))
             self._session.liveliness().declare_subscriber(alive_key(run, EVERY), self._on_life)
             self._session.declare_queryable(hello_key(run, EVERY), self._on_hello)
         except BaseException:
@@ -96,32 +92,29 @@ class ZenohWorldLink:
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """Return the next arrival, or None after `timeout_s` seconds without one. Raises LinkError once closed."""
-        deadline_s: float | None = None
-        try:
-            while True:
-                sample = self._messages.try_recv()
-                if sample is None:
-                    if timeout_s <= 0:
-                        return None
-                    if deadline_s is None:
-                        deadline_s = time.monotonic() + timeout_s
-                    self._alarm.set(deadline_s)
-                    sample = self._messages.recv()
-                key = str(sample.key_expr)
-                node = self._source_of.get(key)
-                if node is not None:
-                    return Arrival(node, sample.payload.to_bytes())
-                if key != self._bell_key:
-                    with self._changed:
-                        self.refused["not-joined"] += 1
-                    if timeout_s > 0 and _is_over(deadline_s := deadline_s or time.monotonic() + timeout_s):
-                        return None  # whoever must not be heard must not hold us up either
-                elif note := sample.payload.to_bytes():
-                    return self._lost(note)
-                elif deadline_s is not None and _is_over(deadline_s):
-                    return None
-        except zenoh.ZError as error:
-            raise LinkError(f"the world's link is closed: {error}") from None
+        if self._closed:
+            raise LinkError("the world's link is closed")
+        if not self._arrivals:
+            self.gather(1, timeout_s)
+        if not self._arrivals:
+            return None
+        arrival = self._arrivals.popleft()
+        if arrival.payload is None or len(self._arrivals) == CAPACITY - 1:
+            with self._changed:
+                self._losses -= arrival.payload is None
+                self._changed.notify_all()
+        return arrival
+
+    def gather(self, count: int, timeout_s: float) -> None:
+        """Wait until `count` arrivals can be received at once, or one that is a loss, or `timeout_s` seconds have passed."""
+        if timeout_s <= 0:
+            return
+        with self._changed:
+            self._wanted = min(count, CAPACITY)
+            self._changed.wait_for(
+                lambda: len(self._arrivals) >= self._wanted or self._losses or self._closed, timeout_s
+            )
+            self._wanted = CAPACITY
 
     def dismiss(self, reason: str) -> None:
         """Tell every joined node that its life is over; their leaving is no loss and is not reported."""
@@ -135,31 +128,44 @@ class ZenohWorldLink:
     def close(self) -> None:
         """Release all that the link holds; idempotent."""
         self._dismissed = True
-        self._alarm.close()
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
         self._session.close()  # type: ignore[no-untyped-call]
 
-    def _publisher(self, key: str, destination: zenoh.Locality = zenoh.Locality.REMOTE) -> zenoh.Publisher:
+    def _publisher(self, key: str) -> zenoh.Publisher:
         return self._session.declare_publisher(
-            key, express=True, congestion_control=zenoh.CongestionControl.BLOCK, allowed_destination=destination
+            key,
+            express=True,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            allowed_destination=zenoh.Locality.REMOTE,
         )
 
-    def _lost(self, note: bytes) -> Arrival:
-        node, incarnation = msgspec.msgpack.decode(note, type=tuple[int, int])
-        if self._joined.get(node, incarnation) == incarnation:
-            self._source_of.pop(command_key(self._run, node), None)
-        return Arrival(node, None)
+    def _on_command(self, sample: zenoh.Sample) -> None:
+        """A message came from whoever may write to that key. Runs in Zenoh's thread."""
+        keep_thread()
+        node = self._source_of.get(str(sample.key_expr))
+        if node is None:
+            with self._changed:
+                self.refused["not-joined"] += 1
+            return
+        self._arrivals.append(Arrival(node, sample.payload.to_bytes()))
+        if len(self._arrivals) >= self._wanted:
+            with self._changed:
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: len(self._arrivals) < CAPACITY or self._closed)
 
     def _on_life(self, sample: zenoh.Sample) -> None:
-        """A liveliness token came or vanished. Runs in a thread of its own."""
+        """A liveliness token came or vanished: after all that the node said. Runs in a thread of its own."""
         if sample.kind == zenoh.SampleKind.PUT:
             return
         node = node_of(str(sample.key_expr))
         with self._changed:
-            incarnation = self._joined.pop(node, None)
+            self._source_of.pop(command_key(self._run, node), None)
+            if self._joined.pop(node, None) is not None and not self._dismissed:
+                self._arrivals.append(Arrival(node, None))
+                self._losses += 1
             self._changed.notify_all()
-        if incarnation is not None and not self._dismissed:
-            with contextlib.suppress(zenoh.ZError):  # closed meanwhile
-                self._ring(encode((node, incarnation)))
 
     def _on_hello(self, query: zenoh.Query) -> None:
         """A node asks to join, or says goodbye. Runs in a thread of its own."""
@@ -196,44 +202,3 @@ class ZenohWorldLink:
             self._source_of[command_key(self._run, node)] = node
             self._changed.notify_all()
         return Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced)
-
-
-def _is_over(deadline_s: float) -> bool:
-    return time.monotonic() >= deadline_s
-
-
-class _Alarm:
-    """Calls `ring` once the time set last has come; also, harmlessly, at times when nobody waits for it any more."""
-
-    def __init__(self, ring: Callable[[], None]) -> None:
-        self._ring = ring
-        self._changed = threading.Condition()
-        self._due_s: float | None = None
-        self._wakes_s = float("inf")
-        self._open = True
-        self._thread = threading.Thread(target=self._watch, name="zwerm-alarm", daemon=True)
-        self._thread.start()
-
-    def set(self, due_s: float) -> None:
-        """Ring at `due_s` of the monotonic clock. A time later than the last one wakes nobody up: it costs little."""
-        with self._changed:
-            self._due_s = due_s
-            if due_s < self._wakes_s:
-                self._changed.notify()
-
-    def close(self) -> None:
-        """End the thread; idempotent."""
-        with self._changed:
-            self._open = False
-            self._changed.notify()
-        self._thread.join()
-
-    def _watch(self) -> None:
-        with self._changed:
-            while self._open:
-                now_s = time.monotonic()
-                if self._due_s is not None and self._due_s <= now_s:
-                    self._due_s = None
-                    self._ring()
-                self._wakes_s = float("inf") if self._due_s is None else self._due_s
-                self._changed.wait(None if self._due_s is None else self._due_s - now_s)
