@@ -27,6 +27,7 @@ class Pushing:
         self, rules: Parameters, places: Places, post: Post, sources: Sources, frontier: FrontierService
     ) -> None:
         self.pushes = 0
+        self.lost: dict[int, None] = {}  # robots that could not get to their places
         self.cycle = 0
         self.picture = Picture({}, FlagComplex({}), ())
         self._rules = rules
@@ -84,7 +85,7 @@ class Pushing:
                 yield from self._arrivals([leader])
                 return (leader,)
             followers[0] = born
-        going = path[1:]
+        going = list(path[1:])
         self._move(followers, path[:-1], going, dict(zip(going, followers, strict=True)))
         arrived = yield from self._arrivals([*followers, leader])
         self.pushes += 1
@@ -93,11 +94,13 @@ class Pushing:
         for place, robot in zip(going, followers, strict=True):
             places.occupant[place] = robot
         places.found(leader)
-        yield from self._straighten(followers, path, arrived)
+        followers, going = self._without_lost(followers, going, arrived)
+        yield from self._straighten(followers, places.occupant.get(path[0]), arrived)
         yield from self._settle(followers, going, arrived)
-        if leader in arrived:
+        anchors = [places.occupant[each] for each in plan.anchors if each in places.occupant]
+        if leader in arrived and anchors:
             back = plan.direction + math.pi - places.heading[leader]
-            yield from self._correct(leader, [(places.occupant[each], back) for each in plan.anchors])
+            yield from self._correct(leader, [(each, back) for each in anchors])
         return (*followers, leader)
 
     def _move(
@@ -136,9 +139,19 @@ class Pushing:
                     again[place] = robot
             leaning = again
 
-    def _straighten(self, followers: Sequence[int], path: Sequence[int], arrived: dict[int, Arrived]) -> Story[None]:
+    def _without_lost(
+        self, followers: Sequence[int], going: Sequence[int], arrived: dict[int, Arrived]
+    ) -> tuple[list[int], list[int]]:
+        """Return who arrived, and where. Who says that it did not is of no use where it is: its place is empty."""
+        self.lost |= {robot: None for robot in followers if robot in arrived and not arrived[robot].ok}
+        for place, robot in zip(going, followers, strict=True):
+            if robot in self.lost:
+                self._places.drop(place)
+        left = [(robot, place) for robot, place in zip(followers, going, strict=True) if robot not in self.lost]
+        return [robot for robot, _ in left], [place for _, place in left]
+
+    def _straighten(self, followers: Sequence[int], rear: int | None, arrived: dict[int, Arrived]) -> Story[None]:
         """In single file, rear to front: bearings did not tell how far to go, the range of sight does."""
-        rear = self._places.occupant.get(path[0])
         for robot in followers:
             if robot in arrived and arrived[robot].loose and rear is not None:
                 yield from self._correct(robot, [(rear, 0.0)])

@@ -78,6 +78,7 @@ class SensorCoverage:
         self.outcome = ""
         self.cycle = 0
         self._spared_at = 0
+        self._silent: dict[int, None] = {}
         self._told: dict[str, Any] = {}
         self._story = self._tell()
 
@@ -97,7 +98,9 @@ class SensorCoverage:
     def _gave_up(self) -> str:
         """Return why the task cannot be completed, if so."""
         reason = GIVEN_UP.get(self.outcome, "")
-        return f"{self.outcome}: {reason}, {len(self.services.frontier.frontier)} frontier edges left" if reason else ""
+        return (
+            f"{self.outcome}: {reason}; frontier edges left: {len(self.services.frontier.frontier)}" if reason else ""
+        )
 
     # --- the story --------------------------------------------------------------------------------------------------
 
@@ -116,16 +119,24 @@ class SensorCoverage:
         yield Wake()
 
     def _judge(self, busy: bool) -> str:
-        """Return the outcome, or nothing while it goes on."""
+        """Return the outcome, or nothing while it goes on.
+
+        An empty frontier says that all is covered where nobody is cut off from all stations, and somebody got anywhere.
+        """
         outcome = self.services.termination.judge(busy, bool(self.services.frontier.frontier))
-        sources, alone = self.sources, len(self.places.occupant) == len(self.sources.alive())
-        if not outcome or (outcome == COVERED and not alone):
+        sources, pieces = self.sources, self.picture.complex_.components()
+        stations = sources.alive()
+        alone = all(place in stations for piece in pieces for place in piece)
+        whole = [len(piece) > 1 for piece in pieces] == [True] or all(
+            any(place in stations for place in piece) for piece in pieces
+        )
+        if not outcome or (outcome == COVERED and whole and not alone):
             return outcome
-        if not sources.alive():
+        if not stations:
             return "source-lost"
         if sources.dry:
             return "depot-dry"
-        return "source-blocked" if alone else outcome
+        return "source-blocked" if alone else "cut-off"
 
     # --- what to do next --------------------------------------------------------------------------------------------
 
@@ -162,27 +173,26 @@ class SensorCoverage:
 
     def _survey(self, moved: Moved) -> Story[None]:
         """Ask everyone what they see; who does not answer is dead, until it says something."""
-        places, cycle = self.places, self.cycle
+        places = self.places
         self._welcome()
         asked = sorted(places.occupant.values())
-        for robot in asked:
-            self.post.say(robot, Survey(cycle, tuple(sorted(moved))))
-        answers = yield from self.post.wait(
-            lambda _, answer: isinstance(answer, Report) and answer.cycle == cycle,
-            len(asked),
-            self.parameters.survey_ticks_max,
-        )
+        reports = yield from self._ask(asked, moved)
         place_of = places.place_of()
-        reports = {node: answer for node, answer in answers if isinstance(answer, Report)}
         for robot in asked:
             if robot not in reports:
                 places.drop(place_of[robot])
+        while strangers := self._strangers(reports):
+            answers = yield from self._ask(strangers, ())
+            for robot in answers:
+                places.found(robot)
+            reports |= answers
         fresh = []
         for robot, report in sorted(reports.items()):
             if report.sightings is not None:
                 places.take(robot, report.sightings)
                 fresh.append(robot)
         places.learn_headings(fresh)
+        place_of = places.place_of()
         for robot, report in sorted(reports.items()):
             place = place_of[robot]
             for bearing in report.touched:
@@ -190,17 +200,40 @@ class SensorCoverage:
         views = places.views()
         places.learn_references(views)
         self.picture = self.pushing.picture = Picture(views, FlagComplex(views), tuple(self.sources.alive()))
-        self.pushing.cycle = cycle
+        self.pushing.cycle = self.cycle
         self.services.frontier.look(self.picture)
+
+    def _ask(self, robots: Sequence[int], moved: Moved) -> Story[dict[int, Report]]:
+        """Return what robots report, by robot; who does not answer in time is not asked again.
+
+        Of whom nothing is known, its own reading is asked for as if it had moved: "as before" would tell nothing.
+        """
+        cycle, known = self.cycle, self.places.view
+        for robot in robots:
+            self.post.say(robot, Survey(cycle, tuple(sorted(moved if robot in known else {*moved, robot}))))
+        answers = yield from self.post.wait(
+            lambda _, answer: isinstance(answer, Report) and answer.cycle == cycle,
+            len(robots),
+            self.parameters.survey_ticks_max,
+        )
+        reports = {node: answer for node, answer in answers if isinstance(answer, Report)}
+        self._silent |= dict.fromkeys(robot for robot in robots if robot not in reports)
+        return reports
+
+    def _strangers(self, reports: Mapping[int, Report]) -> list[int]:
+        """Return robots that are seen and have no place: a coordinator that begins anew finds the swarm as it is."""
+        known = {*self.places.occupant.values(), *self.sources.waiting.values(), *self._silent, *self.pushing.lost}
+        seen = {each.node for report in reports.values() for each in report.sightings or ()}
+        return sorted(seen - known)
 
     def _welcome(self) -> None:
         """Give a place to those who were given up for dead, and speak; who begins anew has a frame of its own."""
-        known = {*self.places.occupant.values(), *self.sources.waiting.values()}
+        placed = self.places.place_of()
         for robot, answer in self.post.rest():
             if isinstance(answer, Emerged) and robot in self.places.heading:
                 self.places.orient(robot, robot, 0.0)
-            if robot not in known:
-                known.add(robot)
+            if robot in self._silent and robot not in placed:
+                del self._silent[robot]
                 station = self.sources.place_of(robot)
                 if station is None:
                     self.places.found(robot)

@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping
 
 from zwerm.coordinator.post import Post, Story
 from zwerm.frontier.places import Places
-from zwerm.orders import Emerged, Release
+from zwerm.orders import Answer, Emerged, Release
 
 
 class Sources:
@@ -50,7 +50,7 @@ class Sources:
             yield from self._post.pause()
         self._busy = True
         self._post.say(self.stations[base], Release(cycle))
-        answers = yield from self._post.wait(lambda _, answer: isinstance(answer, Emerged), 1, self._ticks_max)
+        answers = yield from self._post.wait(self._is_new, 1, self._ticks_max)
         self._busy = False
         for robot, answer in answers:
             if isinstance(answer, Emerged):
@@ -60,6 +60,9 @@ class Sources:
                 return robot
         self.dry[base] = None
         return None
+
+    def _is_new(self, node: int, answer: Answer) -> bool:
+        return isinstance(answer, Emerged) and self.place_of(node) is None and node not in self._places.heading
 
     def let_out(self, base: int, cycle: int, view: Mapping[int, float], moving: Collection[int]) -> Story[None]:
         """Have a robot wait at a station that has this view, its heading known, unless one does; some places may be moving."""

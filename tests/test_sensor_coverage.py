@@ -1,18 +1,14 @@
 """Sensor coverage, run for real in small halls: coverage, noise, failures, frames, outcomes, processes."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+from halls import HALL, NOISE, OBSTACLE, Link, drive
 
 from zwerm.agents.contract import Body, Setup
-from zwerm.agents.node import Node
 from zwerm.agents.sensor_coverage import Robot
 from zwerm.agents.sensor_coverage.homing import offset, slid, unit
-from zwerm.assembly import assemble
-from zwerm.deploy.cast import cast
-from zwerm.link.memory import MemoryLink
 from zwerm.orders import Arrived, Correct, Deploy, Sighting, encode, read_answer
 from zwerm.protocol import (
     Bearing,
@@ -27,32 +23,9 @@ from zwerm.protocol import (
 )
 from zwerm.protocol import encode as to_wire
 from zwerm.running import run
-from zwerm.scenario import Scenario, load
-from zwerm.world.lockstep import LockStep
+from zwerm.scenario import load
 from zwerm.world.metrics import measure
 from zwerm.world.world import World
-
-HALL = ("arena.size_m=[3.4,2.8]", "base.pose=[0.2,1.4,0.0]", "robots.count=40")
-NOISE = "robots.sensors.0.sd_rad=0.0436332"
-OBSTACLE = "arena.obstacles=[[[1.5,1.0],[2.3,1.0],[2.3,1.8],[1.5,1.8]]]"
-
-Link = Callable[[bytes], bytes]
-
-
-def drive(
-    scenario: Scenario,
-    on_tick: Callable[[World], None] | None = None,
-    around: Callable[[int, Link], Link] | None = None,
-) -> tuple[str, World]:
-    """Run inline; `on_tick` may meddle with the world, `around` with what a node hears and says."""
-    world = assemble(scenario, 1)
-    answers: dict[int, Link] = {n: Node(*each).answer for n, each in cast(scenario, 1).items()}
-    if around is not None:
-        answers = {n: around(n, each) for n, each in answers.items()}
-    driver = LockStep(world, MemoryLink(answers), on_tick)
-    outcome = driver.run()
-    return outcome, world
-
 
 # --- the mathematics of one robot -----------------------------------------------------------------------------------
 
@@ -224,20 +197,6 @@ def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
     assert len(killed) == 2
     assert found["coverage_fraction"] >= 0.99
     assert found["holes"] == 0.0
-
-
-@pytest.mark.parametrize(
-    ("settings", "reason"),
-    [
-        (("robots.count=6",), "depot-dry: the depot is empty"),
-        (("arena.size_m=[0.5,0.5]", "base.pose=[0.2,0.2,0.0]"), "source-blocked: no robot gets away from the base"),
-    ],
-)
-def test_a_deployment_that_cannot_go_on_says_why(settings: tuple[str, ...], reason: str) -> None:
-    result = run("sensor-coverage", runner="inline", overrides=[*HALL, *settings])
-    assert result.outcome == "failed"
-    assert reason in result.reason
-    assert not result.crashed
 
 
 def test_robots_in_processes_leave_the_same_trace() -> None:

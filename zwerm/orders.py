@@ -113,9 +113,9 @@ class Cleared(_Message, frozen=True):
 class Arrived(_Message, frozen=True):
     """The end of a drive.
 
-    `ok` False: the robot is back where it was. `loose`: bearings did not tell how far to go, odometry did. `leaned`: robots
-    that were driving themselves had to serve as landmarks. `touched` are bearings of walls touched, `driven_m` is how far it
-    came.
+    `ok` False: the robot is back where it was, or never got to its place. `loose`: bearings did not tell how far to go,
+    odometry did. `leaned`: robots that were driving themselves had to serve as landmarks. `touched` are bearings of walls
+    touched, `driven_m` is how far it came.
     """
 
     cycle: int

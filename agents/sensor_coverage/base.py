@@ -11,7 +11,6 @@ class Base(Robot):
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
-        self._story = None
         self._releasing = False
 
     def step(self, observation: Observation) -> Command:

@@ -39,6 +39,9 @@ Story = Generator[BodyVelocity, None, None]
 # Bearings that err less than this do not err.
 NOISE_MIN_RAD = 1e-5
 
+# Who was pushed aside needs not that long to go back; who cannot must still answer a survey in time.
+RETURN_TICKS_MAX = 30
+
 # A contact within this of the heading is ahead.
 AHEAD_RAD = math.pi / 3.0
 
@@ -156,7 +159,7 @@ class Robot(Controller):
 
     def _survey(self, order: Survey) -> Story:
         if self._rest is not None:  # who was pushed aside goes back
-            yield from self._back(self._rest)
+            yield from self._back(self._rest, ticks_max=RETURN_TICKS_MAX)
         self.senses.forget(order.moved)
         if self.setup.node in order.moved:
             self.senses.forget()
@@ -205,10 +208,10 @@ class Robot(Controller):
             self._outbox.append(Cleared(order.cycle))
         self._arrive(order.cycle, True, driven_m=done, touched=touched)
 
-    def _back(self, to: Vector, near_m: float | None = None) -> Story:
+    def _back(self, to: Vector, near_m: float | None = None, ticks_max: int | None = None) -> Story:
         """Drive to where odometry says that `to` is."""
         near_m = self.parameters.tolerance_m if near_m is None else near_m
-        for _ in range(self.parameters.drive_ticks_max):
+        for _ in range(ticks_max or self.parameters.drive_ticks_max):
             dx, dy = to[0] - self.senses.x_m, to[1] - self.senses.y_m
             if math.hypot(dx, dy) < near_m:
                 return
@@ -243,6 +246,10 @@ class Robot(Controller):
             if math.hypot(x, y) < p.tolerance_m:
                 break  # a wall is in the way
             yield self._velocity(x, y)
+        else:
+            if math.hypot(way.x, way.y) > 0.5 * order.hop_m > 0.0:
+                self._arrive(order.cycle, False, way.loose, way.leaned)
+                return
         if noisy and not way.leaned:
             way = yield from self._settle(order, goal)
         self._arrive(order.cycle, True, way.loose, way.leaned)

@@ -44,7 +44,7 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     redundancy_every: Annotated[int, Meta(ge=0)] = 10
     attempts_max: Count = 2
     pushes_max: Count = 100
-    survey_ticks_max: Count = 60
+    survey_ticks_max: Count = 80
     drive_ticks_max: Count = 300
     cycles_max: Count = 2000
 
