@@ -11,6 +11,7 @@ from scipy.integrate import cubature, dblquad
 from scipy.spatial import Voronoi
 
 from zwerm.polygons import estimated_centroid, linear_centroid, moments, nearest_point, voronoi_cell
+from zwerm.world import tessellation
 from zwerm.world.arena import Arena
 from zwerm.world.coverage import Coverage
 from zwerm.world.fields import Constant, Gaussians, Linear
@@ -87,17 +88,22 @@ def test_voronoi_neighbours_alone_give_the_same_cell_as_everyone(position):
         assert shapely.Polygon(cell).hausdorff_distance(shapely.Polygon(everyone)) < 1e-9
 
 
-def test_a_triangulation_that_is_kept_is_the_one_made_anew():
+def test_a_triangulation_that_is_kept_or_mended_is_the_one_made_anew(monkeypatch):
+    made = []
+    triangulate = tessellation._triangulate
+    monkeypatch.setattr(tessellation, "_triangulate", lambda position: made.append(1) or triangulate(position))
     random = np.random.default_rng(5)
     position = random.random((80, 2))
     kept = Tessellation()
-    changes = 0
+    changes = mended = 0
     for _ in range(300):
-        before = kept.pairs(position)
+        before, earlier = kept.pairs(position), len(made)
         position = np.clip(position + random.normal(scale=0.0007, size=position.shape), 0.0, 1.0)
-        np.testing.assert_array_equal(kept.pairs(position), Tessellation().pairs(position))
-        changes += kept.pairs(position) is not before
-    assert 10 < changes < 290  # both the kept and the new have been compared
+        found = kept.pairs(position)
+        mended += found is not before and len(made) == earlier
+        np.testing.assert_array_equal(found, Tessellation().pairs(position))
+        changes += found is not before
+    assert 20 < mended < changes < 290  # the kept, the mended and the new have been compared
 
 
 @pytest.mark.parametrize(

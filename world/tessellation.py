@@ -2,24 +2,34 @@
 
 While robots move little their triangulation seldom changes. So the last one is tried first: if its triangles still turn
 counter-clockwise, its rim is still convex and no edge should be flipped, it is the Delaunay triangulation of the new
-positions too (Delaunay's lemma), and that is far quicker to see than to triangulate anew. Robots that share one place, and
-swarms on one line, are dealt with as stated; nothing here knows of ranges, walls or noise.
+positions too (Delaunay's lemma), and that is far quicker to see than to triangulate anew. Where a few edges should be, they
+are (Lawson 1977). Robots that share one place, and swarms on one line, are dealt with as stated; nothing here knows of
+ranges, walls or noise.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
-from zwerm.world.scene import Bools, Floats, Ints
+from zwerm.world.scene import Floats, Ints
+
+# Where more edges are to be flipped at once, or more often than that, it is quicker to triangulate anew.
+_FLIPS_AT_ONCE: Final = 12
+_ROUNDS: Final = 4
+
+# The rows of a mesh's edges.
+_A, _B, _C, _D, _LEFT, _RIGHT = range(6)
 
 
 class _Mesh(NamedTuple):
-    """A triangulation: counter-clockwise triangles, its inner edges with the corners across, and its rim."""
+    """A triangulation: its inner edges, and the corners of what must turn left."""
 
-    triangles: Ints  # (t, 3)
-    edges: Ints  # (e, 4) left corner a, b of an inner edge, the corner c left of a -> b, and d right of it
-    rim: Ints  # (h, 3) consecutive corners of the convex hull, counter-clockwise
+    # (6, e) for every inner edge a -> b: a, b, the corner c left of it, d right of it, and the triangles on either side.
+    edges: Ints
+    # (3, t + h) the counter-clockwise triangles, then the rim: the hull's corners with the one before and the one after.
+    turns: Ints
+    triangles: int
 
 
 class Tessellation:
@@ -27,6 +37,9 @@ class Tessellation:
 
     def __init__(self) -> None:
         self._mesh: _Mesh | None = None
+        self._rows: dict[
+            tuple[int, int], int
+        ] = {}  # the mesh's edges, by their ends in order; empty until it is needed
         self._position: Floats = np.empty((0, 2))
         self._pairs: Ints = np.empty((0, 2), dtype=np.int64)
 
@@ -36,14 +49,64 @@ class Tessellation:
         Of points at one place, one has the neighbours, and the others are neighbours of it, of its neighbours and of one
         another. Points on one line, and fewer than four, are all neighbours: too many do no harm to who clips a cell.
         """
-        if position.shape == self._position.shape and (
-            (position == self._position).all() or (self._mesh is not None and _holds(self._mesh, position))
-        ):
+        if position.shape == self._position.shape and ((position == self._position).all() or self._mended(position)):
             return self._pairs
         self._position = position.copy()
         self._mesh, self._pairs = _triangulate(position)
+        self._rows = {}
         self._pairs.flags.writeable = False
         return self._pairs
+
+    def _mended(self, position: Floats) -> bool:
+        """Make the mesh the Delaunay triangulation of these positions by flipping edges, and tell whether it is."""
+        if self._mesh is None:
+            return False
+        for flips in range(_ROUNDS):
+            wrong = _wrong_edges(self._mesh, position)
+            if wrong is None or len(wrong) > _FLIPS_AT_ONCE:
+                return False
+            if not len(wrong):
+                if flips:
+                    self._pairs = _pairs_of(self._mesh, len(position))
+                    self._pairs.flags.writeable = False
+                return True
+            self._flip(wrong)
+        return False
+
+    def _flip(self, wrong: Ints) -> None:
+        """Flip these edges, but for those that another flip has changed."""
+        assert self._mesh is not None
+        edges, turns, _ = self._mesh
+        if not self._rows:
+            low, high = np.minimum(edges[_A], edges[_B]).tolist(), np.maximum(edges[_A], edges[_B]).tolist()
+            self._rows = {ends: row for row, ends in enumerate(zip(low, high, strict=True))}
+        touched: list[int] = []
+        for row in wrong.tolist():
+            a, b, c, d, left, right = edges[:, row].tolist()
+            if left in touched or right in touched:
+                continue
+            touched += [left, right]
+            del self._rows[_ends(a, b)]
+            self._rows[_ends(c, d)] = row
+            edges[:, row] = d, c, a, b, left, right
+            turns[:, left] = a, d, c
+            turns[:, right] = d, b, c
+            # The four edges around it have another corner across, two of them in the other triangle.
+            for p, q, was, old, now, new in (
+                (b, c, a, left, d, right),
+                (c, a, b, left, d, left),
+                (a, d, b, right, c, left),
+                (d, b, a, right, c, right),
+            ):
+                around = self._rows.get(_ends(p, q))
+                if around is not None:  # it is none of the rim
+                    side = 0 if edges[_C, around] == was and edges[_LEFT, around] == old else 1
+                    edges[_C + side, around] = now
+                    edges[_LEFT + side, around] = new
+
+
+def _ends(p: int, q: int) -> tuple[int, int]:
+    return (p, q) if p < q else (q, p)
 
 
 def _everyone(count: int) -> Ints:
@@ -65,21 +128,23 @@ def _triangulate(position: Floats) -> tuple[_Mesh | None, Ints]:
     triangles[clockwise] = triangles[clockwise][:, ::-1]
     across[clockwise] = across[clockwise][:, ::-1]
     starts, ends = triangles[:, [1, 2, 0]], triangles[:, [2, 0, 1]]  # the side opposite each corner
-    keys = np.sort(np.minimum(starts, ends) * count + np.maximum(starts, ends), axis=None)
-    keys = np.unique(keys)
-    pairs = np.column_stack([keys // count, keys % count])
+    rim = _rim(starts, ends, across)
+    mesh = _Mesh(
+        _inner_edges(triangles, starts, ends, across), np.concatenate([triangles, rim]).T.copy(), len(triangles)
+    )
+    pairs = _pairs_of(mesh, count)
     if len(found.coplanar):
         return None, _with_coincident(pairs, found.coplanar[:, [0, 2]].astype(np.int64), count)
-    return _Mesh(triangles, _inner_edges(triangles, starts, ends, across), _rim(starts, ends, across)), pairs
+    return mesh, pairs
 
 
 def _inner_edges(triangles: Ints, starts: Ints, ends: Ints, across: Ints) -> Ints:
-    """Return (e, 4) every inner edge once."""
+    """Return (6, e) every inner edge once."""
     row, corner = np.nonzero(across > np.arange(len(triangles))[:, None])
     other = across[row, corner]
     a, b, c = starts[row, corner], ends[row, corner], triangles[row, corner]
     d = triangles[other].sum(axis=1) - a - b
-    return np.column_stack([a, b, c, d])
+    return np.array([a, b, c, d, row, other])
 
 
 def _rim(starts: Ints, ends: Ints, across: Ints) -> Ints:
@@ -89,6 +154,13 @@ def _rim(starts: Ints, ends: Ints, across: Ints) -> Ints:
     order = np.argsort(start)
     after = end[order][np.searchsorted(start[order], end)]
     return np.column_stack([start, end, after])
+
+
+def _pairs_of(mesh: _Mesh, count: int) -> Ints:
+    """Return (k, 2) the ends of every edge, in order, ascending."""
+    p, q = np.concatenate([mesh.edges[:2], mesh.turns[:2, mesh.triangles :]], axis=1)
+    keys = np.sort(np.minimum(p, q) * count + np.maximum(p, q))
+    return np.column_stack([keys // count, keys % count])
 
 
 def _with_coincident(pairs: Ints, twins: Ints, count: int) -> Ints:
@@ -110,20 +182,16 @@ def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
     return turn
 
 
-def _holds(mesh: _Mesh, position: Floats) -> bool:
-    """Tell whether the triangulation is Delaunay for these positions."""
-    x, y = position[:, 0], position[:, 1]
-    a, b, c, d = mesh.edges.T
-    xd, yd = x[d], y[d]
-    ax, ay, bx, by, cx, cy = x[a] - xd, y[a] - yd, x[b] - xd, y[b] - yd, x[c] - xd, y[c] - yd
+def _wrong_edges(mesh: _Mesh, position: Floats) -> Ints | None:
+    """Return the edges that are to be flipped; None where the triangles do not cover the hull, each place once."""
+    x, y = np.ascontiguousarray(position.T)
+    (px, qx, rx), (py, qy, ry) = x.take(mesh.turns), y.take(mesh.turns)
+    turn = (qx - px) * (ry - py) - (qy - py) * (rx - px)
+    if not (turn[: mesh.triangles].min() > 0.0 and turn[mesh.triangles :].min() >= 0.0):
+        return None
+    # The corner d, the origin here, lies within the circle through a, b and c.
+    abc, d = mesh.edges[: _C + 1], mesh.edges[_D]
+    (ax, bx, cx), (ay, by, cy) = x.take(abc) - x.take(d), y.take(abc) - y.take(d)
     ab, bc, ca = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
     inside = (ax * ax + ay * ay) * bc + (bx * bx + by * by) * ca + (cx * cx + cy * cy) * ab
-    if (inside > 0.0).any():
-        return False
-    p, q, r = mesh.triangles.T
-    turn: Bools = (x[q] - x[p]) * (y[r] - y[p]) - (y[q] - y[p]) * (x[r] - x[p]) > 0.0
-    if not turn.all():
-        return False
-    p, q, r = mesh.rim.T
-    convex: Bools = (x[q] - x[p]) * (y[r] - y[p]) - (y[q] - y[p]) * (x[r] - x[p]) >= 0.0
-    return bool(convex.all())
+    return np.flatnonzero(inside > 0.0)

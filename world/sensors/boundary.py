@@ -44,4 +44,5 @@ class Boundary:
             corner = np.arange(len(self._corners))
             x += self._sd_m * scene.draws.normal("sensor.boundary.x", scene.tick, robots[:, None], corner)
             y += self._sd_m * scene.draws.normal("sensor.boundary.y", scene.tick, robots[:, None], corner)
-        return [tuple(zip(*corners, strict=True)) for corners in zip(x.tolist(), y.tolist(), strict=True)]
+        corners = [zip(*each, strict=True) for each in zip(x.T.tolist(), y.T.tolist(), strict=True)]
+        return list(zip(*corners, strict=True))

@@ -47,8 +47,9 @@ class Neighbours:
     def read(self, scene: Scene, robots: Ints) -> list[tuple[Neighbour, ...]]:
         """Return where each of `robots` has the robots it sees."""
         observer, seen, ends = self._sightings(scene, robots)
-        dx, dy = (scene.position[seen] - scene.position[observer]).T
-        cos, sin = np.cos(scene.heading)[observer], np.sin(scene.heading)[observer]
+        here = np.ascontiguousarray(scene.position.T)
+        dx, dy = here.take(seen, axis=1) - here.take(observer, axis=1)
+        cos, sin = np.cos(scene.heading).take(observer), np.sin(scene.heading).take(observer)
         x, y = cos * dx + sin * dy, cos * dy - sin * dx
         if self._sd_m > 0.0:
             x += self._sd_m * scene.draws.normal("sensor.neighbours.x", scene.tick, observer, seen)
