@@ -14,7 +14,9 @@ COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generat
 	--no-emit-index-url --no-annotate --no-header --no-config pyproject.toml --extra record --extra study --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev run test lint format docs bench lock clean
+APT_TOOLS := iproute2 nftables
+
+.PHONY: help setup dev tools run test lint format docs bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -22,6 +24,14 @@ help:  ## list the targets
 setup: $(RUN_READY)  ## make .venv with the zwerm command in it
 
 dev: $(DEV_READY)  ## add what tests, linters and documentation need
+
+tools:  ## install what the twin on a real network needs (as root, where there is apt-get; else say so)
+	@if command -v ip >/dev/null && command -v tc >/dev/null && command -v nft >/dev/null; then echo "tools: all there"; \
+	elif [ "$$(id -u)" != 0 ]; then echo "tools: skipped, because installing $(APT_TOOLS) needs root"; \
+	elif ! command -v apt-get >/dev/null; then echo "tools: skipped, because there is no apt-get: install $(APT_TOOLS)"; \
+	elif { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(APT_TOOLS); } \
+	  >/dev/null 2>&1; then echo "tools: installed $(APT_TOOLS)"; \
+	else echo "tools: skipped, because apt-get could not install $(APT_TOOLS)"; fi
 
 run: setup  ## run a scenario (SCENARIO=name; default sensor-coverage)
 	$(BIN)/zwerm run $(SCENARIO)

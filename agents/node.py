@@ -4,11 +4,15 @@ The same object runs behind the memory link and inside a robot process, so both 
 """
 
 import traceback
+from collections.abc import Callable
 from typing import Final
+
+import msgspec
 
 from zwerm.agents.contract import Setup, Stepper
 from zwerm.agents.registry import make
-from zwerm.protocol import MESSAGE_BYTES_MAX, Failure, decode_observation, encode
+from zwerm.link.station import Radio
+from zwerm.protocol import MESSAGE_BYTES_MAX, Command, Failure, Observation, decode_observation, encode
 
 # So that a failure fits into a message, whatever its characters.
 ERROR_CHARS_MAX: Final = 2_000
@@ -22,7 +26,21 @@ class Node:
         self.id = setup.node
         self.failed = False
         self._controller: Stepper = make(controller, setup)
-        self._step = self._controller.step
+        self._step: Callable[[Observation], Command] = self._controller.step
+
+    def go_on_air(self, radio: Radio) -> None:
+        """From now on hear what `radio` hears, and nothing else, and send by it what the controller sends."""
+        step, began = self._step, radio.begin
+
+        def step_on_air(observation: Observation) -> Command:
+            began()
+            tick = observation.tick
+            command = step(msgspec.structs.replace(observation, inbox=radio.take(tick)))
+            for message in command.outbox:
+                radio.send(tick, message)
+            return command
+
+        self._step = step_on_air
 
     def answer(self, payload: bytes) -> bytes:
         """Return the encoded command for one encoded observation, or the encoded Failure if the controller raises."""

@@ -28,6 +28,7 @@ from zwerm.agents.contract import Setup
 from zwerm.agents.node import Node
 from zwerm.errors import ControllerError, ZwermError
 from zwerm.link.session import ONE_THREAD, TWO_THREADS, Credential, is_local, set_threads
+from zwerm.link.station import Radio, Station, enter_namespace
 from zwerm.link.zenoh_node import ZenohNodeLink
 from zwerm.protocol import REFUSABLE, Failure, Goodbye, Welcome, decode_to_node, encode
 
@@ -42,24 +43,38 @@ _PR_SET_PDEATHSIG: Final = 1
 
 
 def main(
-    run: str, credential: Credential, endpoint: str, authority_pem: str, deadline_s: float, joined: Connection
+    run: str,
+    credential: Credential,
+    endpoint: str,
+    authority_pem: str,
+    deadline_s: float,
+    joined: Connection,
+    station: Station | None = None,
 ) -> None:
-    """Live one robot's life and exit: 0 at its end, 1 controller failed, 2 could not join, 3 lost the world."""
+    """Live one robot's life and exit: 0 at its end, 1 controller failed, 2 could not join, 3 lost the world.
+
+    With a `station` its radio is that of a real network, which this process moves into.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     die_with_parent()
     parent = parent_process()
     if parent is not None and not parent.is_alive():  # it died before the kernel was told
         sys.exit(EXIT_LOST)
-    set_threads(ONE_THREAD if is_local(endpoint) else TWO_THREADS)
+    set_threads(ONE_THREAD if is_local(endpoint) and station is None else TWO_THREADS)
     here = str(Path.cwd())
     if here not in sys.path:
         sys.path.append(here)  # where a user's own controllers are
     try:
+        if station is not None:
+            enter_namespace(station.namespace)
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            code = runner.run(live(run, credential, endpoint, authority_pem, deadline_s, joined))
+            code = runner.run(live(run, credential, endpoint, authority_pem, deadline_s, joined, station))
     except ZwermError as error:
         sys.stderr.write(f"zwerm: {error}\n")
         code = EXIT_REFUSED
+    if station is not None:
+        sys.stderr.flush()
+        os._exit(code)  # the radio's session would wait for goodbyes that the network loses
     sys.exit(code)
 
 
@@ -70,6 +85,7 @@ async def live(
     authority_pem: str = "",
     deadline_s: float = 30.0,
     joined: Connection | None = None,
+    station: Station | None = None,
 ) -> int:
     """Join the run, answer until the end, and return the exit code.
 
@@ -110,10 +126,12 @@ async def live(
         deadline_s=deadline_s,
         on_lost=lambda: finish_from_outside(EXIT_LOST),
     )
+    radio = None
     try:
         send = link.send
+        radio = None if station is None else Radio(run, station)
         welcome = link.join()
-        node = _node(link, welcome)
+        node = _node(link, welcome, radio)
         answer = node.answer
         loop.add_signal_handler(signal.SIGTERM, finish, 0)
         parent: Any = parent_process()
@@ -131,17 +149,22 @@ async def live(
         return code
     finally:
         link.close()
+        if radio is not None:
+            radio.close()
 
 
-def _node(link: ZenohNodeLink, welcome: Welcome) -> Node:
+def _node(link: ZenohNodeLink, welcome: Welcome, radio: Radio | None) -> Node:
     """Make the node that the world describes; where that fails the world hears why."""
     setup = msgspec.msgpack.decode(welcome.setup, type=Setup)
     try:
-        return Node(welcome.controller, setup)
+        node = Node(welcome.controller, setup)
     except ControllerError as error:
         link.send(encode(Failure(0, str(error), "")))
         link.take_leave("it has no controller", LEAVE_TIMEOUT_S)
         raise
+    if radio is not None:
+        node.go_on_air(radio)
+    return node
 
 
 def _is_goodbye(payload: bytes) -> bool:

@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
@@ -22,6 +22,7 @@ from typing import Any, Final
 from zwerm.agents.robot import main
 from zwerm.errors import LinkError
 from zwerm.link.session import Credential, Credentials
+from zwerm.link.station import Station
 
 # How many may be starting at once: more only get in each other's way.
 JOINING_MAX: Final = 16
@@ -68,15 +69,26 @@ def _raise_file_limit(needed: int) -> None:
 
 
 class LocalSupervisor:
-    """One process for each of `credentials`, connected to `endpoint`; `order` is the order of starting."""
+    """One process for each of `credentials`, connected to `endpoint`; `order` is the order of starting.
 
-    def __init__(self, endpoint: str, credentials: Credentials, *, order: Sequence[int] | None = None) -> None:
+    Those with a place in `stations` have a radio of their own there, on a real network.
+    """
+
+    def __init__(
+        self,
+        endpoint: str,
+        credentials: Credentials,
+        *,
+        order: Sequence[int] | None = None,
+        stations: Mapping[int, Station] | None = None,
+    ) -> None:
         self._endpoint = endpoint
         self._run = credentials.run
         self._authority_pem = credentials.authority_pem
         self._credentials = {credential.node: credential for credential in credentials.nodes}
         self._order = list(self._credentials) if order is None else list(order)
         self._context = multiprocessing.get_context("forkserver")
+        self._stations = stations or {}
         self._processes: dict[int, ForkServerProcess] = {}
 
     def __enter__(self) -> "LocalSupervisor":
@@ -178,7 +190,10 @@ class LocalSupervisor:
     def _started(self, credential: Credential, deadline_s: float, joined: Connection) -> ForkServerProcess:
         process = self._context.Process(
             target=main,
-            args=(self._run, credential, self._endpoint, self._authority_pem, deadline_s, joined),
+            args=(
+                *(self._run, credential, self._endpoint, self._authority_pem, deadline_s, joined),
+                self._stations.get(credential.node),
+            ),
             name=f"node {credential.node}",
             daemon=True,
         )

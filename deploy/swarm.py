@@ -28,6 +28,7 @@ from zwerm.deploy.supervisor import (
 )
 from zwerm.errors import LinkError
 from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials
+from zwerm.link.station import Station
 from zwerm.link.zenoh_world import Member, ZenohWorldLink
 from zwerm.protocol import encode
 
@@ -128,15 +129,17 @@ class LocalSwarm(_Swarm):
         paced: bool = False,
         unborn: Collection[int] = (),
         recast: Recast | None = None,
+        stations: Mapping[int, Station] | None = None,
     ) -> None:
         """`order` is the order of starting; `deadline_s` is given to each process to join; `paced` is real time.
 
         The nodes in `unborn` are not started before `start` is called; `recast` says who plays a node's next incarnation,
-        the same as before if it is not given.
+        the same as before if it is not given. Nodes with a place in `stations` have their radio there.
         """
         super().__init__(run, members, progress, deadline_s, paced)
         self._order = [node for node in (members if order is None else order) if node not in unborn]
         self._recast = recast
+        self._stations = stations
         self._ran = set(self._order)
         self._stopped: set[int] = set()
         self._patience_s = 0.0  # nobody waits for those who have not joined
@@ -146,7 +149,7 @@ class LocalSwarm(_Swarm):
         endpoint = f"{UNIX_PROTOCOL}/{directory}/router"
         self._listen(directory, [endpoint])
         self._current = {credential.node: credential for credential in self.credentials.nodes}
-        self.supervisor = LocalSupervisor(endpoint, self.credentials, order=self._order)
+        self.supervisor = LocalSupervisor(endpoint, self.credentials, order=self._order, stations=self._stations)
         self._stack.callback(self._end)
 
     def _gather(self) -> None:

@@ -26,12 +26,15 @@ class RealTime:
         factor: float,
         on_tick: OnTick | None = None,
         programs: Programs | None = None,
+        on_sense: OnTick | None = None,
     ) -> None:
+        """`on_sense` is called between sensing and sending, `on_tick` when a tick is over."""
         self._world = world
         self._undertaker = Undertaker(world, link, programs, self._take)
         self._link = link
         self._dt_s = world.scenario.time.dt_s / factor
         self._on_tick = on_tick
+        self._on_sense = on_sense
         self._last_tick = round(world.scenario.time.duration_s / world.scenario.time.dt_s)
         self._unanswered_since_s: dict[int, float] = {}
         self._outstanding: dict[int, int] = {}
@@ -55,6 +58,8 @@ class RealTime:
             deadline = start + (world.tick + 1) * self._dt_s
             self._bring_about(world.begin())
             nodes, observations = world.observe()
+            if self._on_sense is not None:
+                self._on_sense(world)
             for node, observation in zip(nodes, observations, strict=True):
                 self._link.send(node, observation)
                 self._outstanding[node] = self._outstanding.get(node, 0) + 1

@@ -1,4 +1,4 @@
-"""The command line: `zwerm list`, `check`, `run`, `world`, `robot` and `study`.
+"""The command line: `zwerm list`, `check`, `run`, `world`, `robot`, `twin`, `shrink` and `study`.
 
 What a command prints for people goes to standard error, but for tables that are its result; with --json standard output is
 one JSON object and nothing else. Exit status: 0 as it should be, 1 the run failed, 2 a mistake of the user's, 130 Ctrl-C.
@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, NoReturn, Optional
+from typing import Annotated, Literal, NoReturn, Optional
 
 import msgspec
 import typer
@@ -21,6 +21,7 @@ from rich.console import Console
 from zwerm import __version__
 from zwerm.console import RunProgress, print_result, print_scenarios
 from zwerm.errors import PictureError, ScenarioError, ZwermError
+from zwerm.options import Animation, Json, Picture, PictureAt, RealTime, Record, ScenarioName, Seed, Sets
 from zwerm.result import RunResult
 from zwerm.scenario import built_in, load, locate
 
@@ -36,40 +37,6 @@ app = typer.Typer(
 )
 err = Console(stderr=True)
 out = Console()
-
-ScenarioName = Annotated[str, typer.Argument(help="A built-in scenario (see `zwerm list`) or a TOML file.")]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Keys all randomness of the run.")]
-Sets = Annotated[
-    Optional[list[str]],  # noqa: UP045 - typer reads it
-    typer.Option("--set", metavar="PATH=VALUE", help="Override a setting of the scenario; may be given often."),
-]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Picture = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--picture", metavar="FILE.png", help="Where to draw the run; runs/SCENARIO-seedN.png by default."),
-]
-PictureAt = Annotated[
-    Optional[list[str]],  # noqa: UP045
-    typer.Option(
-        "--picture-at",
-        metavar="CYCLE|TIMEs",
-        help="Also draw this moment, a deployment cycle such as 40 or a time such as 120s; may be given often.",
-    ),
-]
-Animation = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--animate", metavar="FILE", help="Also draw an animation: .gif, or .mp4 where ffmpeg is installed."),
-]
-Record = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option(
-        "--record", metavar="FILE.mcap", help="Record every message and the truth, for Foxglove and the like."
-    ),
-]
-RealTime = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--realtime", metavar="FACTOR", help="Pace the run at FACTOR times the wall clock."),
-]
 
 
 @contextmanager
@@ -241,6 +208,41 @@ def shrink(
         f"{len(faults)} faults are enough, found in {shrinker.tried} runs: {path}", highlight=False, soft_wrap=True
     )
     out.print(write_toml({"faults": list(faults)}), markup=False, highlight=False, end="")
+
+
+@app.command(
+    help="Run a scenario on a real network, in real time: every robot in a network namespace of its own, and every packet over "
+    "Zenoh through nftables and tc, which lose and delay what the scenario's models say. The models judge the same packets; "
+    "what became of them is set side by side. Needs Linux and root; leaves nothing behind.\n\n"
+    "Examples:\n\n"
+    "[bold]zwerm twin beacon-twin[/bold]\n\n"
+    "[bold]zwerm twin gossip-max --transport tcp --set robots.count=8 --set time.duration_s=10 --json[/bold]"
+)
+def twin(
+    scenario: ScenarioName,
+    seed: Seed = 1,
+    sets: Sets = None,
+    transport: Annotated[
+        Literal["udp", "tcp", "both"],
+        typer.Option("--transport", help="What Zenoh runs over; both are two runs, one after the other."),
+    ] = "both",
+    as_json: Json = False,
+) -> None:
+    """Run a scenario's twin, and print where the models and the network agree."""
+    from zwerm.twin.command import Transports, run_and_tell
+
+    with _mistakes_in_one_line():
+        loaded = load(scenario, tuple(sets or ()))
+        outcomes = run_and_tell(
+            loaded,
+            seed,
+            Transports(transport).chosen(),
+            as_json,
+            out,
+            err,
+            lambda name: RunProgress(err, name, quiet=as_json),
+        )
+    raise typer.Exit(EXIT_INTERRUPTED if "interrupted" in outcomes else EXIT_FAILED if "failed" in outcomes else 0)
 
 
 @app.command(

@@ -31,6 +31,16 @@ def alive_key(run: str, node: Node) -> str:
     return f"{ROOT}/{run}/alive/{node}"
 
 
+def air_key(run: str, channel: str, sender: Node, to: Node | None = None) -> str:
+    """Where a node's radio on a real network sends: to everybody on a channel, or to one."""
+    return f"{ROOT}/{run}/air/{channel}/{sender}/{'all' if to is None else to}"
+
+
+def hail_key(run: str, node: Node) -> str:
+    """Where a node's radio says hello to the others."""
+    return f"{ROOT}/{run}/hail/{node}"
+
+
 def truth_key(run: str, topic: str) -> str:
     """Where the world publishes what only viewers may see."""
     return f"{ROOT}/{run}/truth/{topic}"

@@ -21,6 +21,7 @@ class Accounts:
         self.copies = 0
         self.damaged = 0
         self.bytes = 0
+        self.delay_ticks = 0  # from sending to handing over, of all that were delivered
         self.node_messages: Ints = np.zeros(nodes, dtype=np.int64)  # transmissions, by sender
         self.node_bytes: Ints = np.zeros(nodes, dtype=np.int64)
         self._links = links
@@ -50,6 +51,7 @@ class Accounts:
     def deliver(self, link: Ints, sent_tick: Ints, tick: int) -> None:
         """Take note of packets received at `tick` on `link` (k,) that were sent at `sent_tick` (k,)."""
         np.add.at(self._delivered.values, link, 1)
+        self.delay_ticks += tick * len(link) - int(sent_tick.sum())
         newest = self._newest.values
         before = newest[link]
         np.maximum.at(newest, link, sent_tick)

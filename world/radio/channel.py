@@ -46,7 +46,7 @@ class Channel:
         self.mail = Mail(nodes)
         self._members = members
         self._center = center
-        self._dt_s = dt_s
+        self.dt_s = dt_s
         self._anonymous = anonymous
         self._audiences: dict[int, Ints] = {}
 
@@ -55,6 +55,25 @@ class Channel:
         if to == sender or to not in self._members:
             return False
         return self._center is None or self._center in (sender, to)
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Return every (sender, receiver) between whom a broadcast passes, sorted."""
+        return [(node, int(other)) for node in self._members for other in self.links.receiver[self._audience(node)]]
+
+    def stopped(self, scene: Scene, models: Sequence[LinkModel]) -> list[tuple[int, int]]:
+        """Return the pairs between whom one of `models` would now let nothing pass, sorted; for models without chance."""
+        nodes = np.array(self._members)
+        links = [self._audience(node) for node in nodes.tolist()]
+        transmission = np.repeat(np.arange(len(nodes)), [len(each) for each in links])
+        air = Air(scene, self.dt_s, nodes, np.zeros(len(nodes), dtype=np.int64), [b""] * len(nodes))
+        key = np.zeros(len(transmission), dtype=np.uint64)
+        packets = Packets(self.links, np.concatenate(links), transmission, transmission, key)
+        stopped = np.zeros(len(packets), dtype=np.bool_)
+        for model in models:
+            drop = model.judge(air, packets).drop
+            if drop is not None:
+                stopped |= drop
+        return sorted(zip(packets.sender[stopped].tolist(), packets.receiver[stopped].tolist(), strict=True))
 
     def send(self, scene: Scene, outboxes: Outboxes, before: Sequence[LinkModel] = ()) -> None:
         """Take what the nodes sent on this channel at this tick, (node, its outbox) in id order, and judge every packet."""
@@ -79,7 +98,7 @@ class Channel:
         if not senders:
             return
         audience = np.fromiter(map(len, links), np.int64, len(links))
-        air = Air(scene, self._dt_s, np.array(senders), np.array(ranks), payloads)
+        air = Air(scene, self.dt_s, np.array(senders), np.array(ranks), payloads)
         link = np.concatenate(links)
         transmission = np.repeat(np.arange(len(senders)), audience)
         key = key_part(_stamp(air))[transmission]
@@ -150,7 +169,7 @@ class Channel:
         arrival_s = np.full(len(packets), now_s)
         if delay_s is not None:
             arrival_s = now_s + delay_s
-            due = tick + np.maximum(1, np.ceil(delay_s / self._dt_s - 1e-9)).astype(np.int64)
+            due = tick + np.maximum(1, np.ceil(delay_s / self.dt_s - 1e-9)).astype(np.int64)
         parcel = Parcel(
             sender,
             packets.receiver,

@@ -111,6 +111,12 @@ class Medium:
         for name, channel in self.channels.items():
             channel.send(scene, outboxes, (*self._before, *self.faults[name]))
 
+    def stopped(self, name: str, scene: Scene, numbers: Sequence[int]) -> list[tuple[int, int]]:
+        """Return the pairs of a channel between whom nothing passes now, by faults or by its models with these `numbers`."""
+        channel = self.channels[name]
+        chosen = [channel.models[number] for number in numbers]
+        return channel.stopped(scene, [*self._before, *self.faults[name], *chosen])
+
     def switch_off(self, node: int, cause: str) -> None:
         """Let a node hear nothing more, and drop for `cause` what waits for it and what comes due."""
         self._off.deaf[node] = True

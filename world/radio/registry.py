@@ -106,7 +106,7 @@ def make_models(
         path = "radio" if name == ROBOTS else "uplink"
         models: list[LinkModel] = []
         counts: Counter[str] = Counter()
-        for where, model in [] if table is None else [*_shorthands(table, path), *_tables(table, path)]:
+        for where, model in [] if table is None else tables_of(table, path):
             counts[model.kind] += 1
             place = Place(links[name], draws, f"radio/{name}/{model.kind}", _nodes(scenario), scenario.time.dt_s, arena)
             try:
@@ -191,7 +191,8 @@ def _nodes(scenario: Scenario) -> int:
     return scenario.robots.count + (scenario.coordinator is not None)
 
 
-def _shorthands(table: ChannelTable, path: str) -> list[tuple[str, OpenTable]]:
+def tables_of(table: ChannelTable, path: str) -> list[tuple[str, OpenTable]]:
+    """Return the models of a channel in order, shorthands first, each as (path, table)."""
     found = []
     range_m, line_of_sight = getattr(table, "range_m", None), getattr(table, "line_of_sight", False)
     if range_m is not None:
@@ -200,8 +201,4 @@ def _shorthands(table: ChannelTable, path: str) -> list[tuple[str, OpenTable]]:
         found.append((f"{path}.line_of_sight", OpenTable.model_validate({"kind": "line_of_sight"})))
     if table.loss:
         found.append((f"{path}.loss", OpenTable.model_validate({"kind": "loss", "fraction": table.loss})))
-    return found
-
-
-def _tables(table: ChannelTable, path: str) -> list[tuple[str, OpenTable]]:
-    return [(f"{path}.models.{index}", model) for index, model in enumerate(table.models)]
+    return [*found, *((f"{path}.models.{index}", model) for index, model in enumerate(table.models))]

@@ -22,13 +22,15 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
     links = None
     if channel.links.count <= LINKS_IN_JSON_MAX:
         links = books.by_link()
+    delivered = int(books.delivered().sum())
     return {
         "sent": int(books.sent().sum()),
-        "delivered": int(books.delivered().sum()),
+        "delivered": delivered,
         "dropped": {cause: int(column.sum()) for cause, column in books.dropped().items() if column.any()},
         "in_flight": int(books.in_flight().sum()),
         "messages": books.node_messages.tolist(),
         "message_bytes": books.node_bytes.tolist(),
+        "delay_mean_s": books.delay_ticks / delivered * channel.dt_s if delivered else None,
         "age_mean_s": None if age is None else age[0],
         "age_max_s": None if age is None else age[1],
         "links": links,

@@ -1,0 +1,40 @@
+"""Options that several commands of the command line share, each with its help."""
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+ScenarioName = Annotated[str, typer.Argument(help="A built-in scenario (see `zwerm list`) or a TOML file.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Keys all randomness of the run.")]
+Sets = Annotated[
+    Optional[list[str]],  # noqa: UP045 - typer reads it
+    typer.Option("--set", metavar="PATH=VALUE", help="Override a setting of the scenario; may be given often."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Picture = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--picture", metavar="FILE.png", help="Where to draw the run; runs/SCENARIO-seedN.png by default."),
+]
+PictureAt = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--picture-at",
+        metavar="CYCLE|TIMEs",
+        help="Also draw this moment, a deployment cycle such as 40 or a time such as 120s; may be given often.",
+    ),
+]
+Animation = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--animate", metavar="FILE", help="Also draw an animation: .gif, or .mp4 where ffmpeg is installed."),
+]
+Record = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--record", metavar="FILE.mcap", help="Record every message and the truth, for Foxglove and the like."
+    ),
+]
+RealTime = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--realtime", metavar="FACTOR", help="Pace the run at FACTOR times the wall clock."),
+]
