@@ -94,6 +94,13 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
     sys.modules.pop("study_robots", None)
 
 
+COVERING = """
+name = "covering"
+scenario = "voronoi-coverage-table1"
+set = ["time.duration_s=1.0"]
+seeds = 2
+metrics = ["density_ring_01"]
+"""
 TINY = """
 scenario = "tiny-scenario.toml"
 seeds = 3
@@ -487,8 +494,11 @@ def test_a_metric_that_nothing_measures_is_told(write: Callable[..., Study], tmp
         + "[[paper.points]]\nvalues = { cell_coverage_fraction = 0.4 }",
         TINY + "picture = 'heatmap'",
         TINY + "series = ['robots_in_arena']",
+        TINY + "picture = 'tracks'",
+        COVERING + "picture = 'tracks'",
+        COVERING + "picture = 'density'",
     ],
-    ids=["line", "bars", "heatmap", "series"],
+    ids=["line", "bars", "heatmap", "series", "tracks", "tracks with cells", "density"],
 )
 def test_a_study_is_drawn(write: Callable[..., Study], tmp_path: Path, text: str) -> None:
     result = run_here(write(text), tmp_path / "out.parquet")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zwerm.agents.voronoi_coverage.kept_cell import KeptCell
+from zwerm.kept_cell import KeptCell
 from zwerm.polygons import estimated_centroid, nearest_point, voronoi_cell
 from zwerm.protocol import Neighbour
 from zwerm.world.tessellation import Tessellation

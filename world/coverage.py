@@ -12,7 +12,9 @@ from typing import Final
 import numpy as np
 import shapely
 
-from zwerm.polygons import Polygon, estimated_centroid, nearest_point, voronoi_cell
+from zwerm.kept_cell import KeptCell
+from zwerm.polygons import Point, Polygon, voronoi_cell
+from zwerm.protocol import Neighbour
 from zwerm.scenario import VoronoiMetricsTable
 from zwerm.world.arena import Arena
 from zwerm.world.fields import Field
@@ -43,30 +45,40 @@ class Coverage:
     def __init__(self, arena: Arena, field: Field) -> None:
         self._outline, self._field = outline_of(arena), field
         self._tessellation = Tessellation()
+        self._kept: list[KeptCell] = []
 
     def cells(self, position: Floats) -> list[Polygon]:
         """Return for each of position (n, 2) its cell's corners relative to it [m]; empty for one that has none."""
-        pairs = self._tessellation.pairs(position)
-        observer, seen = np.concatenate([pairs, pairs[:, ::-1]]).T
-        order = np.argsort(observer, kind="stable")
-        apart = position[seen[order]] - position[observer[order]]
-        ends = np.searchsorted(observer[order], np.arange(len(position)), side="right").tolist()
-        others = list(map(tuple, apart.tolist()))
-        outlines = (self._outline - position[:, None, :]).tolist()
-        starts = [0, *ends]
         return [
-            voronoi_cell(list(map(tuple, outline)), others[start:end])
-            for outline, start, end in zip(outlines, starts, ends, strict=False)
+            voronoi_cell(outline, [(other.x_m, other.y_m) for other in others])
+            for outline, others in zip(*self._seen(position), strict=True)
         ]
 
     def targets(self, position: Floats) -> Floats:
         """Return (n, 2) the way of each of position (n, 2) to where an undisturbed robot there would go [m]."""
+        if len(self._kept) != len(position):
+            self._kept = [KeptCell() for _ in position]
         value, gradient = self._field.value(position).tolist(), self._field.gradient(position).tolist()
-        targets = []
-        for cell, here, phi, (gx, gy) in zip(self.cells(position), position, value, gradient, strict=True):
-            target = estimated_centroid(cell, phi, gx, gy)
-            targets.append(target or nearest_point(list(map(tuple, (self._outline - here).tolist()))))
-        return np.array(targets)
+        return np.array(
+            [
+                cell.target(outline, others, phi, gx, gy)
+                for cell, outline, others, phi, (gx, gy) in zip(
+                    self._kept, *self._seen(position), value, gradient, strict=True
+                )
+            ]
+        )
+
+    def _seen(self, position: Floats) -> tuple[list[list[Point]], list[tuple[Neighbour, ...]]]:
+        """Return what is around each of position (n, 2), relative to it: the outline, and the Voronoi neighbours."""
+        pairs = self._tessellation.pairs(position)
+        observer, seen = np.concatenate([pairs, pairs[:, ::-1]]).T
+        order = np.argsort(observer, kind="stable")
+        observer, seen = observer[order], seen[order]
+        x, y = (position[seen] - position[observer]).T.tolist()
+        ends = np.searchsorted(observer, np.arange(len(position)), side="right").tolist()
+        others = list(map(Neighbour, seen.tolist(), x, y))
+        outlines = [list(map(tuple, outline)) for outline in (self._outline - position[:, None, :]).tolist()]
+        return outlines, [tuple(others[start:end]) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
 
     def errors(self, position: Floats) -> Floats:
         """Return (n,) the distance of each of position (n, 2) to the estimated centroid of its cell [m]."""
@@ -88,15 +100,15 @@ class Rings:
 
     def __init__(self, arena: Arena, peak_m: tuple[float, float], count: int) -> None:
         self._peak = np.array(peak_m)
-        self._edges = np.linspace(0.0, np.hypot(*(outline_of(arena) - self._peak).T).max(), count + 1)
-        discs = shapely.buffer(shapely.Point(peak_m), self._edges[1:], quad_segs=64)
+        self.edges_m: Floats = np.linspace(0.0, np.hypot(*(outline_of(arena) - self._peak).T).max(), count + 1)
+        discs = shapely.buffer(shapely.Point(peak_m), self.edges_m[1:], quad_segs=64)
         inner = shapely.area(shapely.intersection(discs, arena.free))
         self._share = np.diff(inner, prepend=0.0) / arena.area_m2
 
     def density(self, position: Floats) -> dict[str, float]:
         """Return the density of robots in each ring over that of the whole arena: 1 is uniform. Figures 4 and 7."""
         distance = np.hypot(*(position - self._peak).T)
-        counts: Ints = np.histogram(distance, self._edges)[0]
+        counts: Ints = np.histogram(distance, self.edges_m)[0]
         found = {"mean_peak_distance_m": float(distance.mean())}
         for ring, (count, share) in enumerate(zip(counts.tolist(), self._share.tolist(), strict=True), 1):
             found[f"density_ring_{ring:02d}"] = count / len(position) / share if share > 0.0 else math.nan

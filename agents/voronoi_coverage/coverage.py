@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar
 from msgspec import Meta, Struct
 
 from zwerm.agents.contract import Controller, Setup
-from zwerm.agents.voronoi_coverage.kept_cell import KeptCell
+from zwerm.kept_cell import KeptCell
 from zwerm.protocol import BodyVelocity, Command, Observation
 
 

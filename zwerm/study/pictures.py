@@ -1,4 +1,6 @@
-"""A study as one PNG: lines over an axis of the grid, bars of the variants, heat maps of the cells, or robots over time.
+"""A study as one PNG: lines over an axis of the grid, bars of the variants, heat maps of the cells, or what changes over time.
+
+What shows the swarm itself is in `pictures_swarm`.
 
 Bands and error bars are the 95 % interval of the mean, the paler band one standard deviation; diamonds are the paper's
 values, and triangles point upward from bounds that it claims.
@@ -12,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from zwerm.study.pictures_swarm import draw_density, draw_tracks
 from zwerm.study.plan import label
 from zwerm.study.summary import Line, Results
 
@@ -37,7 +40,7 @@ def draw_study(path: Path, results: Results) -> Path:
         )
         kind = "series" if table.series else "line" if numeric else "bars"
     figure = Figure(dpi=_DPI, layout="constrained")
-    {"line": _lines, "bars": _bars, "heatmap": _heat_maps, "series": _series}[kind](figure, results)
+    _DRAW[kind](figure, results)
     figure.suptitle("\n".join(textwrap.wrap(table.summary or table.name, 60)))
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
@@ -160,3 +163,13 @@ def _show_range(panel: "Axes", metric: str) -> None:
     panel.set(ylabel=metric)
     if metric.endswith("_fraction"):
         panel.set_ylim(0.0, 1.02)
+
+
+_DRAW: Final = {
+    "line": _lines,
+    "bars": _bars,
+    "heatmap": _heat_maps,
+    "series": _series,
+    "tracks": draw_tracks,
+    "density": draw_density,
+}

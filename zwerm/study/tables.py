@@ -115,7 +115,7 @@ class StudyTable(Table):
     grid: dict[str, Axis] = Field(default_factory=dict)
     variants: list[VariantTable] = Field(default_factory=list)
     paper: PaperTable = Field(default_factory=PaperTable)
-    picture: Literal["line", "bars", "heatmap", "series"] | None = None
+    picture: Literal["line", "bars", "heatmap", "series", "tracks", "density"] | None = None
 
 
 @dataclass(frozen=True)
