@@ -45,7 +45,10 @@ class Pushing:
         for bearing in FIRST_WAYS_RAD:
             self._post.say(robot, Deploy(self.cycle, bearing, self._hop_m, self._rules.clear_m))
             arrived = yield from self._arrivals([robot])
-            if robot in arrived and arrived[robot].ok:
+            if robot not in arrived:  # dead: the next one tries
+                del self._sources.waiting[base]
+                return ()
+            if arrived[robot].ok:
                 del self._sources.waiting[base]
                 self._places.found(robot)
                 yield from self._correct(robot, [(self._places.occupant[base], bearing + math.pi)])

@@ -6,10 +6,14 @@ stands where its station stands and sees what that sees: this tells its heading.
 
 import math
 from collections.abc import Collection, Mapping
+from typing import Final
 
-from zwerm.coordinator.post import Post, Story
+from zwerm.coordinator.post import Letter, Post, Story
 from zwerm.frontier.places import Places
 from zwerm.orders import Answer, Emerged, Release
+
+# A depot is not empty because nobody came out: whoever did may have died at the door.
+RELEASES_MAX: Final = 3
 
 
 class Sources:
@@ -49,8 +53,12 @@ class Sources:
         while self._busy:
             yield from self._post.pause()
         self._busy = True
-        self._post.say(self.stations[base], Release(cycle))
-        answers = yield from self._post.wait(self._is_new, 1, self._ticks_max)
+        answers: list[Letter] = []
+        for _ in range(RELEASES_MAX):
+            self._post.say(self.stations[base], Release(cycle))
+            answers = yield from self._post.wait(self._is_new, 1, self._ticks_max)
+            if answers:
+                break
         self._busy = False
         for robot, answer in answers:
             if isinstance(answer, Emerged):

@@ -9,7 +9,7 @@ from halls import HALL, NOISE, OBSTACLE, Link, drive
 from zwerm.agents.contract import Body, Setup
 from zwerm.agents.sensor_coverage import Robot
 from zwerm.agents.sensor_coverage.homing import offset, slid, unit
-from zwerm.orders import Arrived, Correct, Deploy, Sighting, encode, read_answer
+from zwerm.orders import Arrived, Correct, Deploy, Report, Sighting, Survey, encode, read_answer
 from zwerm.protocol import (
     Bearing,
     BodyVelocity,
@@ -122,6 +122,22 @@ def test_the_ruler_sets_the_distance_whatever_it_was(start: float) -> None:
     assert math.dist((alone.x, alone.y), alone.neighbour) == pytest.approx(0.95, abs=0.011)
 
 
+def test_a_robot_that_a_wall_keeps_off_its_place_answers_a_survey_at_once_and_rests_where_it_is() -> None:
+    """It arrived pressed against the wall, which then pushed it out by more than it tolerates."""
+    alone = OneRobot((-0.9, 0.0), 0.86)
+    assert alone.until_arrived(encode(Deploy(1, 0.0, 0.95, 0.7))).ok
+    arrived_m = alone.x
+    alone.x, alone.wall_x_m = arrived_m - 0.008, alone.wall_x_m - 0.008
+    alone.moved = (-0.008, 0.0)
+    for cycle in (2, 3):
+        alone.said.clear()
+        alone.tick(encode(Survey(cycle, (1,))))
+        for _ in range(40):
+            alone.tick()
+        assert [type(each) for each in alone.said] == [Report]
+        assert alone.x == pytest.approx(arrived_m - 0.008, abs=1e-6)
+
+
 # --- the whole swarm ------------------------------------------------------------------------------------------------
 
 
@@ -197,6 +213,20 @@ def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
     assert len(killed) == 2
     assert found["coverage_fraction"] >= 0.99
     assert found["holes"] == 0.0
+
+
+@pytest.mark.parametrize("unlucky", [1, 2, 9])
+def test_a_robot_that_dies_at_the_door_is_followed_by_another(unlucky: int) -> None:
+    scenario = load("sensor-coverage", (*HALL, "robots.on_crash=continue"))
+
+    def kill(world: World) -> None:
+        if world.scene.present[unlucky] and unlucky not in world.crashed:
+            world.crash(unlucky, "struck by lightning")
+
+    outcome, world = drive(scenario, kill)
+    assert outcome == "completed"
+    assert unlucky in world.crashed
+    assert measure(world, scenario.metrics)["coverage_fraction"] >= 0.99
 
 
 def test_robots_in_processes_leave_the_same_trace() -> None:

@@ -40,7 +40,7 @@ Story = Generator[BodyVelocity, None, None]
 NOISE_MIN_RAD = 1e-5
 
 # Who was pushed aside needs not that long to go back; who cannot must still answer a survey in time.
-RETURN_TICKS_MAX = 30
+RETURN_TICKS_MAX = 20
 
 # A contact within this of the heading is ahead.
 AHEAD_RAD = math.pi / 3.0
@@ -158,8 +158,8 @@ class Robot(Controller):
         return int(self.parameters.samples) if self._noise_rad > NOISE_MIN_RAD else 1
 
     def _survey(self, order: Survey) -> Story:
-        if self._rest is not None:  # who was pushed aside goes back
-            yield from self._back(self._rest, ticks_max=RETURN_TICKS_MAX)
+        if self._rest is not None:
+            self._rest = yield from self._return(self._rest)
         self.senses.forget(order.moved)
         if self.setup.node in order.moved:
             self.senses.forget()
@@ -168,6 +168,19 @@ class Robot(Controller):
             yield from self._sample()
         sightings = self.senses.sightings() if fresh else None
         self._outbox.append(Report(order.cycle, sightings, self.senses.touched))
+
+    def _return(self, rest: Vector) -> Generator[BodyVelocity, None, Vector]:
+        """Go back to where the robot rests, if it was pushed aside, and return where it rests now: some cannot."""
+        p, senses = self.parameters, self.senses
+        for _ in range(RETURN_TICKS_MAX):
+            dx, dy = rest[0] - senses.x_m, rest[1] - senses.y_m
+            if math.hypot(dx, dy) < p.tolerance_m:
+                return rest
+            dx, dy = slid(dx, dy, senses.touched)
+            if math.hypot(dx, dy) < p.tolerance_m:
+                break
+            yield self._velocity(dx, dy)
+        return senses.x_m, senses.y_m
 
     # --- into the unknown -------------------------------------------------------------------------------------------
 
@@ -208,10 +221,10 @@ class Robot(Controller):
             self._outbox.append(Cleared(order.cycle))
         self._arrive(order.cycle, True, driven_m=done, touched=touched)
 
-    def _back(self, to: Vector, near_m: float | None = None, ticks_max: int | None = None) -> Story:
+    def _back(self, to: Vector, near_m: float | None = None) -> Story:
         """Drive to where odometry says that `to` is."""
         near_m = self.parameters.tolerance_m if near_m is None else near_m
-        for _ in range(ticks_max or self.parameters.drive_ticks_max):
+        for _ in range(self.parameters.drive_ticks_max):
             dx, dy = to[0] - self.senses.x_m, to[1] - self.senses.y_m
             if math.hypot(dx, dy) < near_m:
                 return
