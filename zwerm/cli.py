@@ -1,4 +1,4 @@
-"""The command line: `zwerm list`, `check`, `run`, `world`, `robot`, `twin`, `shrink` and `study`.
+"""The command line: `zwerm list`, `check`, `run`, `world`, `robot`, `twin`, `shrink`, `study` and `compare`.
 
 What a command prints for people goes to standard error, but for tables that are its result; with --json standard output is
 one JSON object and nothing else. Exit status: 0 as it should be, 1 the run failed, 2 a mistake of the user's, 130 Ctrl-C.
@@ -8,24 +8,27 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, Literal, NoReturn, Optional
 
-import msgspec
 import typer
-from rich.console import Console
 
 from zwerm import __version__
 from zwerm.console import RunProgress, print_result, print_scenarios
-from zwerm.errors import PictureError, ScenarioError, ZwermError
+from zwerm.errors import PictureError, ScenarioError
 from zwerm.options import Animation, Json, Picture, PictureAt, RealTime, Record, ScenarioName, Seed, Sets
 from zwerm.result import RunResult
 from zwerm.scenario import built_in, load, locate
-
-EXIT_FAILED, EXIT_MISTAKE, EXIT_INTERRUPTED = 1, 2, 130
+from zwerm.studying import COMPARE_HELP, STUDY_HELP, compare, study
+from zwerm.terminal import (
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    err,
+    mistakes_in_one_line,
+    out,
+    print_json,
+)
 
 app = typer.Typer(
     name="zwerm",
@@ -35,19 +38,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Emulate robot swarms as what they are: many processes that pass messages, with bit-identical runs.",
 )
-err = Console(stderr=True)
-out = Console()
-
-
-@contextmanager
-def _mistakes_in_one_line() -> Iterator[None]:
-    """Print a user's mistakes as they are, one line each, and exit with status 2."""
-    try:
-        yield
-    except ZwermError as error:
-        for line in str(error).splitlines():
-            err.print(f"zwerm: {line}", style="red", markup=False, highlight=False, soft_wrap=True)
-        raise typer.Exit(EXIT_MISTAKE) from None
 
 
 @app.callback(invoke_without_command=True)
@@ -64,7 +54,7 @@ def list_scenarios() -> None:
     from zwerm.study.tables import built_in as built_in_studies
     from zwerm.study.tables import load_study
 
-    with _mistakes_in_one_line():
+    with mistakes_in_one_line():
         print_scenarios(out, [load(name) for name in built_in()])
         out.print()
         print_studies(out, [load_study(name) for name in built_in_studies()])
@@ -88,7 +78,7 @@ def check(
         except ScenarioError as error:
             mistakes += error.mistakes
     if mistakes:
-        with _mistakes_in_one_line():
+        with mistakes_in_one_line():
             raise ScenarioError(mistakes)
 
 
@@ -118,7 +108,7 @@ def run(
     """Run a scenario and report on it."""
     from zwerm.running import run as run_scenario
 
-    with _mistakes_in_one_line():
+    with mistakes_in_one_line():
         _check_moments(picture_at)
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
@@ -149,7 +139,7 @@ def world(
     """Run a world whose robots are started elsewhere."""
     from zwerm.running import serve
 
-    with _mistakes_in_one_line():
+    with mistakes_in_one_line():
         _check_moments(picture_at)
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
@@ -169,7 +159,7 @@ def robot(
     """Start a slice of a swarm's robots on this machine, each in a process of its own."""
     from zwerm.deploy.remote import run_robots
 
-    with _mistakes_in_one_line():
+    with mistakes_in_one_line():
         with RunProgress(err, "swarm") as progress:
             codes = run_robots(connect, credentials, ids, progress.joined)
         failed = {node: code for node, code in codes.items() if code}
@@ -196,7 +186,7 @@ def shrink(
     from zwerm.shrink import Shrinker, parse_failing, tables_of, with_faults
     from zwerm.toml import write_toml
 
-    with _mistakes_in_one_line():
+    with mistakes_in_one_line():
         loaded = load(scenario, tuple(sets or ()))
         path = output or Path("runs") / f"{loaded.name}-shrunk.toml"
         with RunProgress(err, loaded.name) as progress:
@@ -231,7 +221,7 @@ def twin(
     """Run a scenario's twin, and print where the models and the network agree."""
     from zwerm.twin.command import Transports, run_and_tell
 
-    with _mistakes_in_one_line():
+    with mistakes_in_one_line():
         loaded = load(scenario, tuple(sets or ()))
         outcomes = run_and_tell(
             loaded,
@@ -245,58 +235,8 @@ def twin(
     raise typer.Exit(EXIT_INTERRUPTED if "interrupted" in outcomes else EXIT_FAILED if "failed" in outcomes else 0)
 
 
-@app.command(
-    help="Run a study: scenarios over a grid of settings and many seeds, set beside a paper's numbers.\n\n"
-    "Trials run inline, many at a time, and every row is kept as soon as it is there: after Ctrl-C the same command goes "
-    "on where it was. Makes a Parquet file, one row a trial, and a picture of the same name.\n\n"
-    "Examples:\n\n"
-    "[bold]zwerm study computation-free-comparison --seeds 20[/bold]\n\n"
-    "[bold]zwerm study my-study.toml --seeds 501-1000 --out second-half.parquet[/bold]"
-)
-def study(
-    study: Annotated[str, typer.Argument(metavar="STUDY", help="A built-in study (see `zwerm list`) or a TOML file.")],
-    seeds: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--seeds", metavar="N|FIRST-LAST", help="Seeds 1 to N, or FIRST to LAST, instead of the study's."),
-    ] = None,
-    jobs: Annotated[
-        Optional[int],  # noqa: UP045
-        typer.Option("--jobs", min=1, help="How many trials to run at a time; one a core by default."),
-    ] = None,
-    output: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--out", metavar="FILE.parquet", help="Where the rows go; runs/STUDY.parquet by default."),
-    ] = None,
-    sets: Sets = None,
-    retry: Annotated[bool, typer.Option("--retry", help="Run trials again that failed.")] = False,
-) -> None:
-    """Run what is missing of a study, print its table and draw it."""
-    with _mistakes_in_one_line():
-        try:
-            from zwerm.study.pictures import draw_study
-            from zwerm.study.report import StudyProgress, print_results
-            from zwerm.study.running import run_study
-            from zwerm.study.tables import load_study, parse_seeds
-        except ModuleNotFoundError as error:
-            raise ZwermError(f"study: needs {error.name}; install it with: pip install 'zwerm[study]'") from None
-        loaded = load_study(study)
-        chosen = None if seeds is None else parse_seeds(seeds)
-        path = output or Path("runs") / f"{loaded.name}.parquet"
-        with StudyProgress(err, loaded.name) as progress:
-            result = run_study(
-                loaded, path, seeds=chosen, jobs=jobs, sets=tuple(sets or ()), retry=retry, watcher=progress
-            )
-        if result.done:
-            drawn = draw_study(path.with_suffix(".png"), result.results)
-            print_results(out, result.results)
-            err.print(
-                f"{result.done} of {result.planned} trials, {result.ran} of them run now: {path}", highlight=False
-            )
-            err.print(f"picture: {drawn}", highlight=False, soft_wrap=True)
-    if result.interrupted:
-        err.print("zwerm: interrupted; the same command goes on from here", style="red")
-        raise typer.Exit(EXIT_INTERRUPTED)
-    raise typer.Exit(EXIT_FAILED if result.failed else 0)
+app.command(help=STUDY_HELP)(study)
+app.command(help=COMPARE_HELP)(compare)
 
 
 def _report(
@@ -326,8 +266,7 @@ def _report(
     for node, traceback in sorted(result.tracebacks.items()):
         err.print(f"node {node} raised:\n{traceback}", markup=False, highlight=False, soft_wrap=True)
     if as_json:
-        sys.stdout.write(msgspec.json.encode(result.as_json()).decode() + "\n")
-        sys.stdout.flush()
+        print_json(result.as_json())
     else:
         print_result(out, result, drawn)
     if mistakes:

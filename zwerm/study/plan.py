@@ -16,6 +16,7 @@ from typing import Any
 from zwerm import __version__
 from zwerm.assembly import prepare
 from zwerm.errors import ScenarioError
+from zwerm.running import Runner
 from zwerm.scenario import Scenario, load
 from zwerm.scenario import built_in as built_in_scenarios
 from zwerm.study.tables import Setting, Study, VariantTable
@@ -48,6 +49,7 @@ class Trial:
     point: Point
     seed: int
     series: tuple[str, ...] = ()
+    runner: Runner = "inline"
 
     @property
     def key(self) -> tuple[str, str, int]:
@@ -81,10 +83,10 @@ def make_points(study: Study, sets: Sequence[str] = ()) -> list[Point]:
     return points
 
 
-def make_trials(study: Study, points: Sequence[Point], seeds: Sequence[int]) -> list[Trial]:
+def make_trials(study: Study, points: Sequence[Point], seeds: Sequence[int], runner: Runner = "inline") -> list[Trial]:
     """Return the trials by seed and then by point, so that whatever part of them is done says something of every point."""
     series = tuple(study.table.series)
-    return [Trial(study.name, point, seed, series) for seed in seeds for point in points]
+    return [Trial(study.name, point, seed, series, runner) for seed in seeds for point in points]
 
 
 def _make_point(study: Study, variant: VariantTable, settings: dict[str, Setting], sets: Sequence[str]) -> Point:
@@ -92,10 +94,17 @@ def _make_point(study: Study, variant: VariantTable, settings: dict[str, Setting
     beside = study.path.parent / name
     if name not in built_in_scenarios() and beside.is_file():
         name = str(beside)
-    axes = [f"{variant.axes.get(axis, axis)}={json.dumps(value)}" for axis, value in settings.items()]
+    axes = [each for axis, value in settings.items() for each in _assignments(study, variant, axis, value)]
     scenario = load(name, (*study.table.set, *variant.set, *sets, *axes))
     arena = prepare(scenario).arena
     return Point(variant.name, settings, scenario, _fingerprint(scenario, arena.segments.tobytes()))
+
+
+def _assignments(study: Study, variant: VariantTable, axis: str, value: Setting) -> list[str]:
+    """Return what a value of an axis sets in a variant."""
+    if axis in study.table.levels:
+        return study.table.levels[axis][str(value)]
+    return [f"{path}={json.dumps(value)}" for path in variant.axes.get(axis, axis).split("+")]
 
 
 def _fingerprint(scenario: Scenario, walls: bytes) -> str:

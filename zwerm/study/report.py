@@ -18,9 +18,9 @@ _REASONS_SHOWN = 5
 
 
 class StudyProgress:
-    """A study's progress on `console`: trials done, failed and to come."""
+    """A study's progress on `console`: trials done, failed and to come. A quiet one shows nothing."""
 
-    def __init__(self, console: Console, name: str) -> None:
+    def __init__(self, console: Console, name: str, quiet: bool = False) -> None:
         self._progress = Progress(
             TextColumn("[bold]{task.description}"),
             BarColumn(bar_width=None),
@@ -31,6 +31,7 @@ class StudyProgress:
             TimeRemainingColumn(),
             console=console,
             speed_estimate_period=_ESTIMATE_S,
+            disable=quiet,
         )
         self._name = name
         self._failed = 0

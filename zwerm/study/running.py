@@ -13,6 +13,7 @@ from typing import Protocol
 from joblib import cpu_count
 
 from zwerm.errors import ScenarioError
+from zwerm.running import Runner
 from zwerm.study.plan import Trial, make_points, make_trials
 from zwerm.study.pool import run_trials
 from zwerm.study.rows import Key, Rows
@@ -57,24 +58,27 @@ def run_study(
     jobs: int | None = None,
     sets: Sequence[str] = (),
     retry: bool = False,
+    runner: Runner = "inline",
     watcher: Watcher | None = None,
 ) -> StudyResult:
     """Run what `out` does not hold yet of `study`, `jobs` trials at a time, and return what is known then.
 
     `seeds` replaces the study's own, `sets` overrides its scenarios, `retry` runs trials again that failed. Ctrl-C keeps
-    every row that is done, and is told by the result. Raises ScenarioError for mistakes, before anything is run.
+    every row that is done, and is told by the result. In `processes`, a trial has the machine for itself. Raises
+    ScenarioError for mistakes, before anything is run.
     """
     if jobs is not None and jobs < 1:
         raise ScenarioError([f"jobs: expected >= 1, got {jobs}"])
     points = make_points(study, sets)
-    trials = make_trials(study, points, study.table.seeds if seeds is None else seeds)
+    trials = make_trials(study, points, study.table.seeds if seeds is None else seeds, runner)
     with Rows(out) as rows:
         todo = [trial for trial in trials if _wanted(rows.held.get(trial.key), retry)]
         ran, interrupted = 0, False
         if watcher is not None:
             watcher.begin(len(todo))
         try:
-            with closing(run_trials(todo, min(jobs or cpu_count(), max(1, len(todo))))) as ending:
+            workers = 1 if runner == "processes" else min(jobs or cpu_count(), max(1, len(todo)))
+            with closing(run_trials(todo, workers)) as ending:
                 for row in ending:
                     rows.add(row)
                     ran += 1

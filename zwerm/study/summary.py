@@ -77,10 +77,13 @@ class Results:
         self.failures = Counter(row["reason"] for row in rows if row["outcome"] == FAILED)
         self.known_metrics = sorted({name for row in rows for name in row if isinstance(row[name], float)})
 
+    def every_row(self, point: Point) -> list[Row]:
+        """Return the rows of a point's trials, by seed."""
+        return sorted(self._rows[point.variant, point.fingerprint], key=lambda row: int(row["seed"]))
+
     def rows(self, point: Point) -> list[Row]:
         """Return the rows of a point's trials that did not fail, by seed."""
-        rows = self._rows[point.variant, point.fingerprint]
-        return sorted((row for row in rows if row["outcome"] != FAILED), key=lambda row: int(row["seed"]))
+        return [row for row in self.every_row(point) if row["outcome"] != FAILED]
 
     def sample(self, point: Point, metric: str) -> Sample:
         """Return a metric of a point, condensed."""

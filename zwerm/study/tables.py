@@ -22,6 +22,8 @@ RESERVED = (
     *("study", "variant", "seed", "outcome", "reason", "trace", "fingerprint", "ticks", "sim_s", "wall_s"),
     *("cell_counts", "series_time_s"),
 )
+# Of them, what a study may report as it does a metric.
+MEASURED_ANYWAY = ("ticks", "sim_s", "wall_s")
 
 
 def _one_kind(values: list[Any]) -> list[Setting]:
@@ -102,7 +104,10 @@ class VariantTable(Table):
 
 
 class StudyTable(Table):
-    """One study. Every variant is run at every point of the grid with every seed."""
+    """One study. Every variant is run at every point of the grid with every seed.
+
+    An axis of the grid sets the path that it names, or several, `PATH+PATH`; one with `levels` names sets of settings.
+    """
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*$")]
     summary: str = ""
@@ -113,6 +118,7 @@ class StudyTable(Table):
     metrics: Annotated[list[str], Field(min_length=1)]
     series: list[Literal["robots_in_arena", "robots_entered", "mean_error_m"]] = Field(default_factory=list)
     grid: dict[str, Axis] = Field(default_factory=dict)
+    levels: dict[str, dict[str, list[str]]] = Field(default_factory=dict)
     variants: list[VariantTable] = Field(default_factory=list)
     paper: PaperTable = Field(default_factory=PaperTable)
     picture: Literal["line", "bars", "heatmap", "series", "tracks", "density"] | None = None
@@ -167,6 +173,14 @@ def load_study(name: str) -> Study:
         raise ScenarioError([f"{name}: expected a study's file or the name of a built-in one{hint}"])
     tables = read(path)
     tables.setdefault("name", path.stem)
+    return check_study(tables, path)
+
+
+def check_study(tables: dict[str, Any], path: Path) -> Study:
+    """Return the study of `tables`, which are `path`'s.
+
+    Raises ScenarioError with every mistake.
+    """
     try:
         study = Study(StudyTable.model_validate(tables), path)
     except ValidationError as error:
@@ -204,11 +218,17 @@ def _contradictions(table: StudyTable) -> Iterator[str]:
         for axis in variant.axes:
             if axis not in table.grid:
                 yield f"variants.{index}.axes.{axis}: the grid has no such axis"
+    for axis, levels in table.levels.items():
+        if axis not in table.grid:
+            yield f"levels.{axis}: the grid has no such axis"
+        for value in table.grid.get(axis, ()):
+            if value not in levels:
+                yield f"levels.{axis}: expected what {value!r} of the grid sets"
     for axis in table.grid:
         if axis in RESERVED or axis in table.metrics:
             yield f"grid.{axis}: the results have a column of that name"
     for metric, count in Counter(table.metrics).items():
-        if count > 1 or metric in RESERVED:
+        if count > 1 or (metric in RESERVED and metric not in MEASURED_ANYWAY):
             yield f"metrics: expected different names of metrics, got {metric!r}"
     for index, point in enumerate(table.paper.points):
         yield from (f"paper.points.{index}.{line}" for line in _point_contradictions(point, table))

@@ -26,7 +26,7 @@ def run_trial(trial: Trial) -> Row:
     Raises KeyboardInterrupt where it is interrupted.
     """
     try:
-        result = run(trial.point.scenario, trial.seed, "inline")
+        result = run(trial.point.scenario, trial.seed, trial.runner)
     except ZwermError as error:
         return failed_row(trial, str(error).replace("\n", "; "))
     except Exception as error:
