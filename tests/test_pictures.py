@@ -197,7 +197,7 @@ def deployment(cycles: int = 3) -> RunView:
         for cycle in range(1, cycles + 1)
     ]  # fmt: skip
     series = {"time_s": [0.0, 3.0], "coverage_fraction": [0.2, 0.8], "robots_deployed": [1.0, 3.0]}
-    return RunView(ARENA, history, RADIUS_M, "trial", sight_range_m=1.0, based=True, told=told, series=series)
+    return RunView(ARENA, history, RADIUS_M, "trial", sight_range_m=1.0, bases=1, told=told, series=series)
 
 
 def shown(view: RunView, stage: Stage | None) -> Look:

@@ -224,8 +224,8 @@ def gone_at_the_end(tracks: Tracks) -> Ints:
 class Swarm:
     """The robots on a sheet: bodies, the paths they took, what they cover and the cells they occupy.
 
-    What they cover is what they have in sight where `sight` is given, else what is near. The first robot is marked as the
-    base station where it is (`based`). A `plain` swarm has neither paths nor noses, for something else to be drawn below.
+    What they cover is what they have in sight where `sight` is given, else what is near. The first `bases` robots are
+    marked as base stations. A `plain` swarm has neither paths nor noses, for something else to be drawn below.
     """
 
     def __init__(
@@ -237,12 +237,12 @@ class Swarm:
         coverage_radius_m: float | None = None,
         cells: tuple[int, int] | None = None,
         sight: Sight | None = None,
-        based: bool = False,
+        bases: int = 0,
         plain: bool = False,
     ) -> None:
         self._axes, self._arena, self._tracks = sheet.axes, arena, tracks
         self._coverage_radius_m, self._cells, self._sight = coverage_radius_m, cells, sight
-        self._based, self._plain = based, plain
+        self._bases, self._plain = bases, plain
         self._way = np.where(tracks.present[:, :, None], tracks.position, np.nan)
         xmin, ymin, xmax, ymax = arena.bounds
         least = RADIUS_MIN_FRACTION * max(xmax - xmin, ymax - ymin)
@@ -285,8 +285,7 @@ class Swarm:
             self._show_paths(index, since)
         cross = 1.6 * self._radius * np.array([[[-1, -1], [1, 1]], [[-1, 1], [1, -1]]])
         self._dead.set_segments(list((position[dead][:, None, None, :] + cross).reshape(-1, 2, 2)))
-        if self._based:
-            self._base.set_offsets(self._tracks.position[index][:1])
+        self._base.set_offsets(self._tracks.position[index][: self._bases])
         if self._sight is not None:
             self._covered.set_path(outline(self._sight.area(position[~dead])))
         elif self._coverage_radius_m is not None:
@@ -320,9 +319,10 @@ class Swarm:
         entries: list[Line2D | Patch] = [
             Line2D([], [], linestyle="none", marker="o", color=BLUE, label=f"{robots}{larger}")
         ]
-        if self._based:
+        if self._bases:
+            label = "base station, at the entrance" if self._bases == 1 else "base stations, at the entrances"
             style: dict[str, Any] = {"mfc": YELLOW, "mec": WALL, "markersize": 9}
-            entries.append(Line2D([], [], linestyle="none", marker="o", label="base station, at the entrance", **style))
+            entries.append(Line2D([], [], linestyle="none", marker="o", label=label, **style))
         if not self._plain:
             entries += [
                 Line2D([], [], linestyle="none", marker="o", mec=VERMILLION, mfc="none", markersize=5, label="starts"),

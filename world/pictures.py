@@ -68,7 +68,7 @@ class RunView:
     coverage_radius_m: float | None = None
     cells: tuple[int, int] | None = None
     sight_range_m: float | None = None
-    based: bool = False
+    bases: int = 0
     told: Sequence[Told] = ()
     series: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
@@ -201,7 +201,7 @@ def _compose(sheet: Sheet, view: RunView, tracks: Tracks, names: bool = False) -
         view.coverage_radius_m,
         view.cells,
         sight,
-        view.based,
+        view.bases,
         bool(view.stages),
     )
     return swarm, simplices

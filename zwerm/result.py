@@ -98,7 +98,7 @@ class RunResult:
             table.coverage_radius_m,
             table.cells,
             table.sight_range_m,
-            self.scenario.base is not None,
+            0 if self.scenario.base is None else self.scenario.base.stations,
             self.told,
             self.series,
         )

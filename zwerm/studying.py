@@ -35,7 +35,7 @@ COMPARE_HELP: Final = (
     "its 95 % interval, a Parquet file with one row a trial, and a figure. After Ctrl-C the same command goes on where it "
     "was.\n\n"
     "Examples:\n\n"
-    "[bold]zwerm compare gossip-max --variant often --variant seldom:robots.parameters.every_s=1.0 "
+    "[bold]zwerm compare gossip-max --variant often --variant seldom:robots.parameters.every_ticks=5 "
     "--sweep radio.loss=0,0.1,...,0.9 --seeds 20[/bold]\n\n"
     "[bold]zwerm compare my.toml --variants variants.toml --sweep "
     "'faults=none:\\[],crash:\\[{kind=\"crash\", nodes=\\[3], at_s=10.0}]'[/bold]"
