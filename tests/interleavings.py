@@ -1,0 +1,303 @@
+"""Every interleaving of the redundancy protocol on a small graph, by explicit exploration of its states.
+
+The network is the set of all messages ever sent: any of them can be delivered at any time and as often as one likes, or
+never, which is loss, delay, reordering and duplication at once. Robots ask, give up, leave, look around, lose their memory,
+come and are moved by others whenever they can; time is a few ticks. A robot's state is interned, and what an event does to
+it is computed once.
+
+What cannot matter is left out: a denial does what giving up does, which robots do anyway; a grant only ever allows more, so it
+arrives at once (a robot need not use it); and a message that its receiver will ignore for ever is forgotten.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+from zwerm.agents.sensor_coverage.redundancy import Ask, Deny, Grant, Message, Neighbours, Over, Redundancy, Sent
+from zwerm.simplicial import FlagComplex, betti, bits
+
+LEASE_TICKS = 2
+
+Graph = Mapping[int, tuple[int, ...]]
+
+
+class Budget(NamedTuple):
+    """How often what may happen does, in one life of the swarm."""
+
+    asks: tuple[int, ...]  # one each of these robots
+    ticks: int = 0
+    amnesias: int = 0
+    moving: tuple[int, tuple[int, ...]] | None = None  # this robot is moved to where it has these neighbours
+    comes: bool = False  # and is not there at first
+
+
+class State(NamedTuple):
+    """A swarm: ids of the robots' states, a bit for every message ever sent, and a bit for everyone who stands or is seen."""
+
+    now: int
+    robots: tuple[int, ...]
+    sent: int
+    standing: int
+    seen: int
+    asks: tuple[int, ...]
+    amnesias: int
+    moving: int  # 2 before the move, 1 on the way, 0 after it
+
+
+BEFORE, UNDER_WAY, AFTER = 2, 1, 0
+
+
+class Violation(Exception):
+    """A state in which what is promised does not hold."""
+
+
+class Explorer:
+    """The states that a swarm can reach."""
+
+    def __init__(self, graph: Graph, budget: Budget, kind: type[Redundancy] = Redundancy) -> None:
+        self.graph = graph
+        self.later = _moved(graph, *budget.moving) if budget.moving is not None else graph
+        self.mover = budget.moving[0] if budget.moving is not None else -1
+        self.budget = budget
+        self.kind = kind
+        self._objects: list[Redundancy] = []
+        self._numbers: dict[Any, int] = {}
+        self._letters: list[tuple[int, int, Message]] = []
+        self._letter_numbers: dict[Any, int] = {}
+        self._done: dict[Any, tuple[int, tuple[Any, ...]]] = {}
+        self._useless: dict[tuple[int, int], bool] = {}
+        self._bare: dict[int, int] = {}
+        self.departures = 0
+
+    def explore(self) -> int:
+        """Visit every state, and return how many there are. Raises Violation."""
+        first = self._first()
+        known = {first}
+        stack = [first]
+        while stack:
+            state = stack.pop()
+            self._check_exclusion(state)
+            for after in map(self._forgotten, self._events(state)):
+                if after not in known and self._anybody_may_leave(after):
+                    known.add(after)
+                    stack.append(after)
+        return len(known)
+
+    # --- what is promised -------------------------------------------------------------------------------------------
+
+    def _check_exclusion(self, state: State) -> None:
+        able = [node for node in self.graph if self._about_to_leave(state, node)]
+        for node in able:
+            if any(other in able for other in self._graph(state)[node]):
+                raise Violation(f"adjacent robots {able} may leave at once")
+
+    def _about_to_leave(self, state: State, node: int) -> bool:
+        robot = self._objects[state.robots[node]]
+        return robot.wants and not self._objects[self._try(state, node, "leave")[0]]._stands
+
+    def _anybody_may_leave(self, state: State) -> bool:
+        return bool(state.asks) or any(self._objects[number].wants for number in state.robots)
+
+    def _check_removal(self, state: State, node: int) -> None:
+        graph = tuple(sorted(self._graph(state).items()))
+        before, after = _holes(graph, state.standing), _holes(graph, state.standing & ~(1 << node))
+        if before != after:
+            raise Violation(f"robot {node} left {state.standing:b}: b0 and b1 were {before}, are {after}")
+
+    # --- what can happen --------------------------------------------------------------------------------------------
+
+    def _events(self, state: State) -> Iterator[State]:
+        for number in bits(state.sent):
+            sender, receiver, message = self._letters[number]
+            if not self._only_forbids(state, sender, receiver, message):
+                yield self._after(state, receiver, "hear", sender, message)
+        for node in self.graph:
+            bit = 1 << node
+            if any(asker in state.asks for asker in (node, *self._graph(state)[node])):
+                yield self._after(state, node, "look")
+            if state.standing & bit:
+                yield from self._acts(state, node)
+            elif state.seen & bit and node != self.mover:
+                yield state._replace(seen=state.seen & ~bit)
+        if state.moving == UNDER_WAY:
+            bit = 1 << self.mover
+            there = state._replace(standing=state.standing | bit, seen=state.seen | bit, moving=AFTER)
+            yield self._after(there, self.mover, "settle")
+        if state.now < self.budget.ticks:
+            yield state._replace(now=state.now + 1)
+
+    def _acts(self, state: State, node: int) -> Iterator[State]:
+        """Yield what a robot that stands may do."""
+        gone = state.standing & ~(1 << node)
+        robot = self._objects[state.robots[node]]
+        if robot.wants:
+            yield self._after(state, node, "give_up")
+            if self._about_to_leave(state, node):
+                self._check_removal(state, node)
+                self.departures += 1
+                yield self._after(state, node, "leave")._replace(standing=gone)
+        elif node in state.asks:
+            after = self._after(state, node, "ask")
+            if self._objects[after.robots[node]].wants:
+                yield after._replace(asks=_less(state.asks, node))
+        if node == self.mover and state.moving == BEFORE and not robot.locked(state.now):
+            yield self._after(state, node, "depart")._replace(standing=gone, moving=UNDER_WAY)
+        if state.amnesias:
+            yield self._after(state, node, "forget")._replace(amnesias=state.amnesias - 1)
+
+    def _graph(self, state: State) -> Graph:
+        return self.graph if state.moving else self.later
+
+    def _only_forbids(self, state: State, sender: int, receiver: int, message: Message) -> bool:
+        """Tell whether all that a message would do is to make its receiver refuse others, which might as well be lost."""
+        lock = self._objects[state.robots[receiver]]._lock
+        return isinstance(message, Over) and (lock is None or lock.holder != sender or lock.number > message.number)
+
+    def _in_sight(self, state: State, node: int) -> tuple[int, ...]:
+        return tuple(other for other in self._graph(state)[node] if state.seen >> other & 1)
+
+    # --- robots, interned -------------------------------------------------------------------------------------------
+
+    def _first(self) -> State:
+        """Everyone stands, and knows all lists."""
+        standing = sum(1 << node for node in self.graph if not (self.budget.comes and node == self.mover))
+        robots = {node: self.kind(node, LEASE_TICKS, -LEASE_TICKS) for node in self.graph}
+        for node, robot in robots.items():
+            robot.see((other for other in self.graph[node] if standing >> other & 1), 0)
+            if not standing >> node & 1:
+                robot.depart()
+        for node, robot in robots.items():
+            for other in self.graph[node]:
+                robot.hear(other, robots[other].tell(), 0)
+        numbers = tuple(self._number(robots[node]) for node in sorted(robots))
+        moving = AFTER if self.mover < 0 else UNDER_WAY if self.budget.comes else BEFORE
+        return State(0, numbers, 0, standing, standing, self.budget.asks, self.budget.amnesias, moving)
+
+    def _number(self, robot: Redundancy) -> int:
+        key = tuple(tuple(sorted(each.items())) if isinstance(each, dict) else each for each in vars(robot).values())
+        if key not in self._numbers:
+            self._numbers[key] = len(self._objects)
+            self._objects.append(robot)
+        return self._numbers[key]
+
+    def _after(self, state: State, node: int, event: str, *what: Any) -> State:
+        number, sent = self._try(state, node, event, *what)
+        robots = [*state.robots[:node], number, *state.robots[node + 1 :]]
+        letters = state.sent
+        for to, message in sent:
+            for receiver in self._graph(state)[node] if to is None else (to,):
+                if isinstance(message, Grant):
+                    robots[receiver], _ = self._step(robots[receiver], state.now, None, "hear", node, message)
+                elif not isinstance(message, Deny):
+                    letters |= 1 << self._letter(node, receiver, message)
+        return state._replace(robots=tuple(robots), sent=letters)
+
+    def _forgotten(self, state: State) -> State:
+        """Return the state without messages that cannot matter any more."""
+        if state.amnesias:
+            return state
+        robots = tuple(
+            number if node in state.asks else self._without_lists(number) for node, number in enumerate(state.robots)
+        )
+        left = 0
+        for number in bits(state.sent):
+            sender, receiver, message = self._letters[number]
+            if self._still_matters(state, sender, receiver, message):
+                key = number, robots[receiver]
+                if key not in self._useless:
+                    self._useless[key] = self._ignores(self._objects[key[1]], sender, message)
+                if not self._useless[key]:
+                    left |= 1 << number
+        return state._replace(robots=robots, sent=left)
+
+    def _still_matters(self, state: State, sender: int, receiver: int, message: Message) -> bool:
+        """Tell whether a message can allow anything to those who have asked or will."""
+        match message:
+            case Neighbours():
+                return receiver in state.asks
+            case Ask():
+                return sender in state.asks or self._objects[state.robots[sender]].wants
+        return True
+
+    def _without_lists(self, number: int) -> int:
+        """Return the robot's state less what only matters to who will ask."""
+        if number not in self._bare:
+            robot = _copy(self._objects[number])
+            robot._lists = {}
+            self._bare[number] = self._number(robot)
+        return self._bare[number]
+
+    def _ignores(self, robot: Redundancy, sender: int, message: Message) -> bool:
+        if self.mover in (robot._me, sender):
+            return False
+        if sender not in robot._listed or (not robot._stands and not isinstance(message, Ask)):
+            return True
+        match message:
+            case Ask() if not robot._stands:
+                return not any(isinstance(each.message, Grant) for each in _copy(robot).hear(sender, message, 0))
+            case Ask() | Over():
+                return message.number <= robot._over.get(sender, -1)
+            case Neighbours():
+                known = robot._lists.get(sender)
+                return known is not None and message.version <= known.version
+        return False
+
+    def _letter(self, *letter: Any) -> int:
+        if letter not in self._letter_numbers:
+            self._letter_numbers[letter] = len(self._letters)
+            self._letters.append(letter)
+        return self._letter_numbers[letter]
+
+    def _try(self, state: State, node: int, event: str, *what: Any) -> tuple[int, tuple[Any, ...]]:
+        return self._step(state.robots[node], state.now, self._in_sight(state, node), event, *what)
+
+    def _step(
+        self, number: int, now: int, seen: tuple[int, ...] | None, event: str, *what: Any
+    ) -> tuple[int, tuple[Any, ...]]:
+        """Let a robot see whom it sees now, and then something happen; return its new state and what it sends."""
+        key = (number, now, seen, event, *what)
+        if key not in self._done:
+            robot = _copy(self._objects[number])
+            if event == "forget":
+                vars(robot).update(vars(self.kind(robot._me, LEASE_TICKS, now)))
+            before = robot.tell()
+            if seen is not None:
+                robot.see(seen, now)
+            told = [] if robot.tell() == before else [Sent(None, robot.tell())]
+            match event:
+                case "hear":
+                    told += robot.hear(*what, now)
+                case "ask" | "leave":
+                    told += getattr(robot, event)(now)
+                case "give_up" | "depart":
+                    told += getattr(robot, event)()
+                case "settle":
+                    robot.settle()
+            self._done[key] = self._number(robot), tuple(told)
+        return self._done[key]
+
+
+def _moved(graph: Graph, mover: int, neighbours: tuple[int, ...]) -> Graph:
+    """Return the graph with other neighbours of one robot."""
+    return {
+        node: neighbours
+        if node == mover
+        else tuple(sorted({*(each for each in listed if each != mover), *([mover] if node in neighbours else [])}))
+        for node, listed in graph.items()
+    }
+
+
+def _less(asks: tuple[int, ...], node: int) -> tuple[int, ...]:
+    at = asks.index(node)
+    return asks[:at] + asks[at + 1 :]
+
+
+def _copy(robot: Redundancy) -> Redundancy:
+    twin = object.__new__(type(robot))
+    vars(twin).update({name: dict(each) if isinstance(each, dict) else each for name, each in vars(robot).items()})
+    return twin
+
+
+@cache
+def _holes(graph: tuple[tuple[int, tuple[int, ...]], ...], standing: int) -> tuple[int, int]:
+    return betti(FlagComplex({node: each for node, each in graph if standing >> node & 1}))
