@@ -1,6 +1,7 @@
 """Sensor coverage, run for real in small halls: coverage, noise, failures, frames, outcomes, processes."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -155,11 +156,11 @@ def test_a_small_hall_is_covered_with_no_hole_but_the_obstacle(settings: tuple[s
     assert result.robot_ticks < 0.35 * result.ticks * result.metrics["robots_deployed"], "parked robots cost"
 
 
-def test_the_frame_of_a_robot_changes_nothing() -> None:
-    """Frames turned by whole switches of the touch ring: the same places. Robot 1 is straight: it says where forward is."""
+def scrambled(multiple: int, straight: tuple[int, ...]) -> Callable[[int, Link], Link]:
+    """Turn the frame of every robot, each by some switches of the touch ring, but for the `straight`."""
 
-    def turned(node: int, answer: Link) -> Link:
-        angle = 0.0 if node in (0, 1, 40) else math.radians(30.0) * ((node * 5) % 12)
+    def around(node: int, answer: Link) -> Link:
+        angle = 0.0 if node in straight else math.radians(30.0) * ((node * multiple + 1) % 12)
         cos, sin = math.cos(angle), math.sin(angle)
 
         def through(payload: bytes) -> bytes:
@@ -189,12 +190,31 @@ def test_the_frame_of_a_robot_changes_nothing() -> None:
 
         return through if angle else answer
 
-    scenario = load("sensor-coverage", (*HALL, "robots.sensors.2.distance_sd_fraction=0.0"))
-    straight, crooked = drive(scenario)[1].scene, drive(scenario, around=turned)[1].scene
-    here, there = (np.round(each.position[each.present], 3) for each in (straight, crooked))
-    assert len(here) == len(there) > 8
-    for place in here:
-        assert np.hypot(*(there - place).T).min() < 0.01
+    return around
+
+
+@pytest.mark.parametrize(
+    ("scenario", "settings", "straight"),
+    [
+        # The first robot of a station goes ahead: it says where forward is. The last id is the coordinator's.
+        ("sensor-coverage", HALL, (1, 40)),
+        (
+            "sensor-coverage-multi-source",
+            ("arena.size_m=[4.2,2.6]", "robots.count=40", "base.poses=[[0.2,1.3,0.0],[4.0,1.3,3.0]]"),
+            (2, 3, 40),
+        ),
+    ],
+)
+def test_scrambling_the_frames_of_robots_and_stations_gives_the_same_places(
+    scenario: str, settings: tuple[str, ...], straight: tuple[int, ...]
+) -> None:
+    loaded = load(scenario, (*settings, "robots.sensors.2.distance_sd_fraction=0.0"))
+    worlds = [drive(loaded, around=scrambled(multiple, straight) if multiple else None)[1] for multiple in (0, 5, 7)]
+    unturned, *turned = [world.scene.position[world.scene.present] for world in worlds]
+    for there in turned:
+        assert len(there) == len(unturned) > 8
+        for place in unturned:
+            assert np.hypot(*(there - place).T).min() < 0.01
 
 
 def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
