@@ -8,16 +8,16 @@ Promises: entering returns when every node has joined; leaving, in whatever way,
 
 import contextlib
 import signal
-import tempfile
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Final, NamedTuple, Self
+from typing import NamedTuple, Self
 
 from zwerm.agents.contract import Setup
 from zwerm.deploy.identity import issue, renew, router_settings, save
+from zwerm.deploy.private import private_directory
 from zwerm.deploy.supervisor import (
     JOIN_DEADLINE_S,
     LEAVE_PATIENCE_S,
@@ -36,9 +36,6 @@ Members = Mapping[int, tuple[str, Setup]]
 
 # Of a node's id and incarnation: who plays it.
 Recast = Callable[[int, int], tuple[str, Setup]]
-
-# The path of a Unix socket has at most 107 bytes, on macOS 103.
-_SOCKET_PATH_BYTES_MAX: Final = 100
 
 
 class Certificate(NamedTuple):
@@ -67,10 +64,7 @@ class _Swarm(ABC):
         """Start everything, and return when every node has joined. Raises LinkError where one does not."""
         try:
             with interrupts_held():
-                temporary = tempfile.TemporaryDirectory(
-                    prefix="zwerm-", dir=_short_directory(), ignore_cleanup_errors=True
-                )
-                self._open(Path(self._stack.enter_context(temporary)))
+                self._open(self._stack.enter_context(private_directory()))
             self._gather()
         except BaseException:
             self.close()
@@ -255,9 +249,3 @@ class RemoteSwarm(_Swarm):
 
 def _changed(count: int, joined: Collection[int]) -> bool:
     return len(joined) != count
-
-
-def _short_directory() -> str:
-    """Return the directory for temporary files, or /tmp where a socket below it would have too long a path."""
-    chosen = tempfile.gettempdir()
-    return chosen if len(chosen) < _SOCKET_PATH_BYTES_MAX - len("/zwerm-12345678/router") else "/tmp"

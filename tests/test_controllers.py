@@ -156,6 +156,15 @@ def test_the_gaussian_end_of_stable_has_twice_the_variance_of_its_scale() -> Non
     assert np.var(lengths) == pytest.approx(2.0 * 0.5**2, rel=0.03)
 
 
+def test_an_exact_zero_among_the_draws_gives_a_finite_length() -> None:
+    class Zeros:
+        def random(self) -> float:
+            return 0.0
+
+    for alpha in (0.5, 1.0, 1.67, 2.0):
+        assert math.isfinite(symmetric_stable(Zeros(), alpha, 0.156))  # type: ignore[arg-type]
+
+
 def walk(steps: int, key: bytes = KEY, **parameters: float) -> list[tuple[float, float]]:
     controller = make("random-walk", setup(dict(parameters), key=key))
     return [wheels(controller.step(Observation(tick, tick * DT_S))) for tick in range(steps)]

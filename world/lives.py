@@ -34,6 +34,7 @@ class Lives:
         self.down[list(unborn)] = True
         self.paused: Bools = np.zeros(nodes, dtype=np.bool_)
         self.every: Ints = np.ones(nodes, dtype=np.int64)  # ticks that a node takes over an answer
+        self.withheld: Bools = np.zeros(nodes, dtype=np.bool_)  # whom the driver does not want observed now
         self.ever: dict[str, list[int]] = {}  # who was ever crashed, restarted, paused, slow or late, in order
         self._busy_until: Ints = np.zeros(nodes, dtype=np.int64)
         self._held: dict[int, list[Held]] = {}
@@ -72,9 +73,10 @@ class Lives:
 
     def able(self, nodes: Ints, tick: int) -> Ints:
         """Return those of `nodes` that can take an observation at `tick`; the slow among them are busy from now on."""
-        if not self._hindered:
+        if not self._hindered and not self.withheld.any():
             return nodes
-        nodes = nodes[~(self.down[nodes] | self.paused[nodes]) & (self._busy_until[nodes] <= tick)]
+        kept_away = self.down[nodes] | self.paused[nodes] | self.withheld[nodes]
+        nodes = nodes[~kept_away & (self._busy_until[nodes] <= tick)]
         self._busy_until[nodes] = tick + self.every[nodes]
         return nodes
 

@@ -1,9 +1,13 @@
-"""Carrying out what faults demand of nodes' programs, for every driver alike.
+"""Carrying out what faults demand of nodes' programs.
 
-When an order has been carried out, the node it is about is dead and buried, or has joined: whatever a dead program had still
-said is refused as stale, and its end has been reported, so that nothing of it can be mistaken for its successor's.
+In lock-step the undertaker does, and time stands still meanwhile. When an order has been carried out, the node it is about is
+dead and buried, or has joined: whatever a dead program had still said is refused as stale, and its end has been reported, so
+that nothing of it can be mistaken for its successor's. In real time nobody may wait for a program to die or to start: a
+runner of errands does what is ordered in a thread of its own.
 """
 
+import queue
+import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import Final
@@ -14,6 +18,57 @@ from zwerm.world.lives import Order
 from zwerm.world.world import World
 
 BURIAL_DEADLINE_S: Final = 10.0
+
+
+def do(order: Order, programs: Programs | None) -> None:
+    """Do to a program what is ordered. Raises LinkError where nobody can, or it does not join."""
+    deed, node = order
+    if programs is None:
+        raise LinkError(f"node {node}: a fault would {deed} its program, which runs elsewhere")
+    {"kill": programs.kill, "start": programs.start, "pause": programs.pause, "resume": programs.resume}[deed](node)
+
+
+class Errands:
+    """Carries out orders one after the other, in a thread of its own. `close` ends it after the order it is about."""
+
+    def __init__(self, programs: Programs | None) -> None:
+        self._programs = programs
+        self._asked: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
+        self._done: queue.SimpleQueue[Order | Exception] = queue.SimpleQueue()
+        self._closing = False
+        self._thread: threading.Thread | None = None
+
+    def ask(self, order: Order) -> None:
+        """Have an order carried out after those before it."""
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name="zwerm-errands", daemon=True)
+            self._thread.start()
+        self._asked.put(order)
+
+    def done(self) -> list[Order]:
+        """Return the orders that have been carried out since the last call. Raises LinkError where one could not be."""
+        found: list[Order] = []
+        while not self._done.empty():
+            order = self._done.get()
+            if isinstance(order, Exception):
+                raise order
+            found.append(order)
+        return found
+
+    def close(self) -> None:
+        """Drop what is not begun, and return when what is has ended; idempotent."""
+        self._closing = True
+        if self._thread is not None:
+            self._asked.put(None)
+            self._thread.join()
+
+    def _run(self) -> None:
+        while (order := self._asked.get()) is not None and not self._closing:
+            try:
+                do(order, self._programs)
+                self._done.put(order)
+            except Exception as error:  # raised where somebody can do something about it
+                self._done.put(error)
 
 
 class Undertaker:
@@ -30,19 +85,12 @@ class Undertaker:
 
     def carry_out(self, orders: Sequence[Order]) -> None:
         """Do as told. Raises LinkError where a program does not die, or does not join."""
-        for deed, node in orders:
-            if self._programs is None:
-                raise LinkError(f"node {node}: a fault would {deed} its program, which runs elsewhere")
-            if deed == "kill":
-                self._programs.kill(node)
-                self._bury(node)
-            elif deed == "start":
-                self._programs.start(node)
-                self._forget_the_former(node)
-            elif deed == "pause":
-                self._programs.pause(node)
-            else:
-                self._programs.resume(node)
+        for order in orders:
+            do(order, self._programs)
+            if order.deed == "kill":
+                self._bury(order.node)
+            elif order.deed == "start":
+                self._forget_the_former(order.node)
 
     def _forget_the_former(self, node: int) -> None:
         """Take in what its former incarnation left: the new one has been sent nothing, and cannot have spoken."""

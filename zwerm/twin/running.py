@@ -5,7 +5,6 @@ crosses the network, and they hear what came through and nothing else. The world
 its models judge it: so every packet has two fates, a modelled and a real one, at the same tick and between the same places.
 """
 
-import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from zwerm.assembly import assemble
 from zwerm.deploy.cast import cast
 from zwerm.deploy.impairments import Impairments, Network, translate
 from zwerm.deploy.namespaces import Namespaces, address_of, missing
+from zwerm.deploy.private import private_directory
 from zwerm.deploy.swarm import LocalSwarm, Members
 from zwerm.errors import LinkError
 from zwerm.link.station import MET, Line, Station, Transport, read_log
@@ -71,9 +71,9 @@ def run_twin(scenario: Scenario, seed: int, transport: Transport, watcher: Watch
     members = cast(scenario, seed)
     with (
         Namespaces(sorted(members)) as namespaces,
-        tempfile.TemporaryDirectory(prefix="zwerm-") as directory,
+        private_directory() as directory,
     ):
-        stations = _stations(scenario, members, namespaces, transport, Path(directory))
+        stations = _stations(scenario, members, namespaces, transport, directory)
         logs = {node: Path(station.log) for node, station in stations.items()}
         with LocalSwarm(new_run_id(), members, progress=watcher.joined, paced=True, stations=stations) as swarm:
             _wait_until_met(logs)
