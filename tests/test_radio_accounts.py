@@ -1,5 +1,6 @@
 """Every packet is accounted for: under any two models, any traffic, sleepers and crashes, on every link at every tick."""
 
+import io
 from collections import Counter
 from itertools import product
 from typing import Any
@@ -9,8 +10,12 @@ import pytest
 from air import DT_S, Radio, ring
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rich.console import Console
+from support import scenario
 
 from zwerm.protocol import Transmission
+from zwerm.radio_table import print_books
+from zwerm.running import run
 from zwerm.world.radio.links import Links
 from zwerm.world.radio.registry import BUILT_IN
 
@@ -113,6 +118,28 @@ def test_the_books_by_link_are_sorted_and_add_up_to_the_summary() -> None:
     heard = Counter((packet.sender, node) for node, got in radio.received.items() for _, packet in got)
     pairs = zip(books["sender"], books["receiver"], strict=True)
     assert books["delivered"] == [heard[pair] for pair in pairs]
+
+
+def test_the_books_are_a_table_of_every_cause_with_the_links_that_lost_most() -> None:
+    one_way = {"kind": "loss", "fraction": 1.0, "senders": [0], "receivers": [1]}
+    walled = scenario(
+        robots={"count": 3, "controller": "beacon", "sensors": []},
+        radio={"models": [one_way]},
+        faults=[{"kind": "cut", "senders": [2], "receivers": [0], "at_s": 1.0}],
+    )
+    books = run(walled, 1, "inline").radio
+    links = books["channels"]["robots"]["links"]
+    ages = dict(zip(zip(links["sender"], links["receiver"], strict=True), links["age_mean_s"], strict=True))
+    assert ages[0, 1] is None, "nothing was ever delivered"
+    assert ages[1, 0] == pytest.approx(0.1)
+    assert ages[2, 0] > 0.3
+    console = Console(record=True, width=120, file=io.StringIO())
+    print_books(console, books, 2)
+    text = [" ".join(line.split()) for line in console.export_text().splitlines()]
+    assert text[1] == "from to sent delivered loss cut in flight delivered % age mean s age max s"
+    assert text[2].startswith(f"all all 120 {120 - 20 - 10 - 4} 20 10 4 ")
+    assert [line[:14] for line in text[3:5]] == ["0 1 20 0 20 0 ", "2 0 20 10 0 10"]
+    assert text[5:] == ["messages a node: mean 20.0, most 20", "bytes a node: mean 320.0, most 320"]
 
 
 def test_messages_and_bytes_are_counted_once_for_each_sender() -> None:

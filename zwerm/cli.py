@@ -17,7 +17,8 @@ import typer
 from zwerm import __version__
 from zwerm.console import RunProgress, print_result, print_scenarios
 from zwerm.errors import PictureError, ScenarioError
-from zwerm.options import Animation, Json, Picture, PictureAt, RealTime, Record, ScenarioName, Seed, Sets
+from zwerm.options import Animation, Json, Picture, PictureAt, RadioTable, RealTime, Record, ScenarioName, Seed, Sets
+from zwerm.radio_table import print_books
 from zwerm.result import RunResult
 from zwerm.scenario import built_in, load, locate
 from zwerm.studying import COMPARE_HELP, STUDY_HELP, compare, study
@@ -103,6 +104,7 @@ def run(
     picture: Picture = None,
     picture_at: PictureAt = None,
     animate: Animation = None,
+    radio_table: RadioTable = None,
     as_json: Json = False,
 ) -> None:
     """Run a scenario and report on it."""
@@ -115,7 +117,7 @@ def run(
             result = run_scenario(
                 loaded, seed, "inline" if inline else "processes", realtime=realtime, watcher=progress, record=record
             )
-        _report(result, picture, picture_at or [], animate, as_json)
+        _report(result, picture, picture_at or [], animate, radio_table, as_json)
 
 
 @app.command(
@@ -134,6 +136,7 @@ def world(
     picture: Picture = None,
     picture_at: PictureAt = None,
     animate: Animation = None,
+    radio_table: RadioTable = None,
     as_json: Json = False,
 ) -> None:
     """Run a world whose robots are started elsewhere."""
@@ -144,7 +147,7 @@ def world(
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
             result = serve(loaded, seed, listen, credentials, realtime=realtime, watcher=progress, record=record)
-        _report(result, picture, picture_at or [], animate, as_json)
+        _report(result, picture, picture_at or [], animate, radio_table, as_json)
 
 
 @app.command(
@@ -240,7 +243,12 @@ app.command(help=COMPARE_HELP)(compare)
 
 
 def _report(
-    result: RunResult, picture: Path | None, moments: list[str], animate: Path | None, as_json: bool
+    result: RunResult,
+    picture: Path | None,
+    moments: list[str],
+    animate: Path | None,
+    radio_table: int | None,
+    as_json: bool,
 ) -> NoReturn:
     """Draw, print, and exit with the status that belongs to the outcome."""
     drawn: list[Path] = []
@@ -269,6 +277,8 @@ def _report(
         print_json(result.as_json())
     else:
         print_result(out, result, drawn)
+        if radio_table is not None:
+            print_books(out, result.radio, radio_table)
     if mistakes:
         raise PictureError("\n".join(mistakes))
     if result.reason:

@@ -38,3 +38,12 @@ RealTime = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option("--realtime", metavar="FACTOR", help="Pace the run at FACTOR times the wall clock."),
 ]
+RadioTable = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option(
+        "--radio-table",
+        min=0,
+        metavar="LINKS",
+        help="Also print the radio's books: of the LINKS that lost most, and of nodes.",
+    ),
+]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwerm.world.radio.links import Column, Links
-from zwerm.world.scene import Ints
+from zwerm.world.scene import Floats, Ints
 
 
 class Accounts:
@@ -102,21 +102,30 @@ class Accounts:
 
         None where nothing was ever delivered.
         """
+        mean_s, peak_s = self.link_ages_s(tick)
+        counted = ~np.isnan(mean_s)
+        return (float(mean_s[counted].mean()), float(peak_s[counted].max())) if counted.any() else None
+
+    def link_ages_s(self, tick: int) -> tuple[Floats, Floats]:
+        """Return by link the mean and the largest age of information up to `tick` [s]; nan where nothing was delivered."""
         newest, since = self._of(self._newest), self._of(self._since)
         heard = newest >= 0
         left = np.where(heard, tick - since, 0)
         ticks = self._of(self._age_ticks) + left
         total = self._of(self._age_sum) + left * (0.5 * (since + tick - 1) - newest)
         counted = heard & (ticks > 0)
-        if not counted.any():
-            return None
-        peak = np.maximum(self._of(self._age_peak)[counted], (tick - newest)[counted])
-        return float((total[counted] / ticks[counted]).mean()) * self._dt_s, float(peak.max()) * self._dt_s
+        peak = np.maximum(self._of(self._age_peak), tick - newest)
+        mean = np.divide(total, ticks, out=np.full(len(ticks), np.nan), where=counted)
+        return mean * self._dt_s, np.where(counted, peak, np.nan) * self._dt_s
+
+    def order(self) -> Ints:
+        """Return the rows of the links in the order of sender and receiver."""
+        return np.lexsort((self._of_links(self._links.receiver), self._of_links(self._links.sender)))
 
     def by_link(self) -> dict[str, Any]:
         """Return the books as columns, sorted by sender and receiver, ready for a JSON encoder."""
-        sender, receiver = self._links.sender[: self._links.count], self._links.receiver[: self._links.count]
-        order = np.lexsort((receiver, sender))
+        sender, receiver = self._of_links(self._links.sender), self._of_links(self._links.receiver)
+        order = self.order()
         return {
             "sender": sender[order].tolist(),
             "receiver": receiver[order].tolist(),
@@ -127,4 +136,7 @@ class Accounts:
         }
 
     def _of(self, column: Column) -> NDArray[Any]:
-        return column.values[: self._links.count]
+        return self._of_links(column.values)
+
+    def _of_links(self, values: NDArray[Any]) -> NDArray[Any]:
+        return values[: self._links.count]

@@ -5,6 +5,7 @@ from typing import Any, Final
 import numpy as np
 
 from zwerm.world.radio.medium import Medium
+from zwerm.world.scene import Floats
 
 # The books of more links than this are not in the JSON object: it would be all that is in it.
 LINKS_IN_JSON_MAX: Final = 10_000
@@ -21,7 +22,8 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
     age = books.ages_s(tick)
     links = None
     if channel.links.count <= LINKS_IN_JSON_MAX:
-        links = books.by_link()
+        mean_s, peak_s = (_numbers(ages[books.order()]) for ages in books.link_ages_s(tick))
+        links = books.by_link() | {"age_mean_s": mean_s, "age_max_s": peak_s}
     delivered = int(books.delivered().sum())
     return {
         "sent": int(books.sent().sum()),
@@ -35,6 +37,11 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
         "age_max_s": None if age is None else age[1],
         "links": links,
     }
+
+
+def _numbers(values: Floats) -> list[float | None]:
+    """Return numbers as JSON has them: None in the place of nan."""
+    return [None if value != value else value for value in values.tolist()]
 
 
 def messages(medium: Medium) -> int:
