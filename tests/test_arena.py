@@ -49,12 +49,16 @@ def walls_of(arena: Arena) -> shapely.Geometry:
 
 @contextmanager
 def answered(by: str) -> Iterator[None]:
-    pairs = {"comparing all with all": 10**9, "the index": -1}[by]
-    with mock.patch.multiple(module, _DENSE_LINES=pairs, _DENSE_POINTS=pairs):
+    settings = {
+        "comparing all with all": {"_DENSE_LINES": 10**9, "_DENSE_POINTS": 10**9},
+        "blocks": {"_DENSE_LINES": 64, "_DENSE_POINTS": -1},
+        "the index": {"_DENSE_LINES": -1, "_DENSE_POINTS": -1, "_FEW_SEGMENTS": -1},
+    }[by]
+    with mock.patch.multiple(module, **settings):
         yield
 
 
-WAYS = ("comparing all with all", "the index")
+WAYS = ("comparing all with all", "blocks", "the index")
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -170,8 +174,8 @@ def test_in_a_large_arena_the_index_answers_bit_for_bit_as_comparing_all_with_al
             answers.append(
                 (arena.blocked(start, end), arena.ray_length(start, direction, 25.0), arena.clearance(start))
             )
-    for one, other in zip(*answers, strict=True):
-        assert one.tolist() == other.tolist()
+    for all_with_all, *others in zip(*answers, strict=True):
+        assert all(other.tolist() == all_with_all.tolist() for other in others)
     assert 0 < answers[0][0].sum() < 300
 
 

@@ -25,6 +25,8 @@ Bools = NDArray[np.bool_]
 
 # Up to this many pairs, comparing all with all is quicker than asking an index (measured).
 _DENSE_LINES = 5_000
+# Up to so many walls, every line is compared with every wall in blocks of that size: the index is slower.
+_FEW_SEGMENTS = 64
 _DENSE_POINTS = 20_000
 _ON_WALL_M = 1e-9  # a ray that begins this near a wall, on either side, begins on it
 
@@ -83,6 +85,10 @@ class Arena:
             hit = _crosses(a[0], a[1], b[0], b[1], self._px, self._py, self._qx, self._qy)
             dense: Bools = np.logical_or.reduce(hit, axis=1)
             return dense
+        if len(self.segments) <= _FEW_SEGMENTS:
+            step = _DENSE_LINES // len(self.segments)
+            parts = [self.blocked(start[at : at + step], end[at : at + step]) for at in range(0, count, step)]
+            return np.concatenate(parts)
         blocked = np.zeros(count, dtype=np.bool_)
         line, wall = self._index.candidates(start, end)
         a, b = start[line].T, end[line].T

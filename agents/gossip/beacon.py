@@ -11,16 +11,17 @@ from msgspec import Meta, Struct
 from zwerm.agents.contract import Controller, Setup
 from zwerm.agents.gossip.frame import HEAD_BYTES, seal, unseal
 from zwerm.errors import ProtocolError
-from zwerm.protocol import Command, Observation, Transmission
+from zwerm.protocol import BodyVelocity, Command, Observation, Transmission, WheelSpeeds
 
 _LAYOUT: Final = Layout(">II")
 
 
 class BeaconTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """A beacon every `every_ticks`, each of `payload_bytes` in all."""
+    """A beacon every `every_ticks`, each of `payload_bytes` in all; the robot drives straight on at `speed_m_s`."""
 
     every_ticks: Annotated[int, Meta(ge=1)] = 1
     payload_bytes: Annotated[int, Meta(ge=HEAD_BYTES + _LAYOUT.size, le=1_024)] = 16
+    speed_m_s: Annotated[float, Meta(ge=0.0)] = 0.0
 
 
 class Beacon(Controller):
@@ -35,6 +36,7 @@ class Beacon(Controller):
         self.refused = 0
         self._next: dict[int, int] = {}
         self._number = 0
+        self._drive = _straight_on(setup, self.parameters)
 
     def step(self, observation: Observation) -> Command:
         """Count what was heard, and send the next beacon if it is time."""
@@ -51,8 +53,18 @@ class Beacon(Controller):
                 self._next[sender] = number + 1
         table: Any = self.parameters
         if observation.tick % table.every_ticks:
-            return Command()
+            return Command(drive=self._drive)
         numbered = _LAYOUT.pack(self.setup.node, self._number)
         self._number += 1
         frame = seal(numbered.ljust(table.payload_bytes - HEAD_BYTES, b"\0"))
-        return Command(outbox=tuple([Transmission(channel, frame) for channel in self.setup.channels]))
+        return Command(
+            drive=self._drive, outbox=tuple([Transmission(channel, frame) for channel in self.setup.channels])
+        )
+
+
+def _straight_on(setup: Setup, table: Any) -> BodyVelocity | WheelSpeeds | None:
+    """Return the drive, or None where the node stands."""
+    speed: float = table.speed_m_s
+    if setup.body is None or not speed:
+        return None
+    return BodyVelocity(speed) if setup.body.kind == "holonomic" else WheelSpeeds(speed, speed)

@@ -80,6 +80,10 @@ class Links:
             row = self._find(key)
         return row
 
+    def find(self, sender: Ints, receiver: Ints) -> Ints:
+        """Return (k,) the row of each link, -1 where there is none yet."""
+        return self._find(sender * self._nodes + receiver)
+
     def _find(self, key: Ints) -> Ints:
         if self._dense is not None:
             return self._dense[key]
