@@ -16,7 +16,7 @@ COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generat
 .DEFAULT_GOAL := help
 APT_TOOLS := iproute2 nftables
 
-.PHONY: help setup dev tools run test lint format docs bench lock clean
+.PHONY: help setup dev tools run test lint format docs bench fidelity lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -55,6 +55,9 @@ docs: dev  ## build the documentation into site/
 bench: dev  ## run the benchmarks
 	@for each in benchmarks/bench_*.py; do \
 	  test -e "$$each" || continue; echo "== $$each"; $(BIN)/python "$$each" || exit 1; done
+
+fidelity: dev  ## hold every model of the radio against its 99 % confidence interval, a million packets each
+	$(BIN)/python benchmarks/bench_fidelity.py
 
 lock:  ## resolve the dependencies anew (needs uv)
 	$(COMPILE) --upgrade --output-file requirements.txt

@@ -1,0 +1,33 @@
+"""The benchmark of the radio's fidelity, on few packets: every model is as true as it says, and a wrong one is found out."""
+
+import importlib.util
+from types import ModuleType
+
+import pytest
+from air import Radio, ring
+from support import ROOT
+
+from zwerm.world.radio.registry import BUILT_IN
+
+
+@pytest.fixture(scope="module")
+def fidelity() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("bench_fidelity", ROOT / "benchmarks" / "bench_fidelity.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_model_keeps_its_promise_over_thirty_thousand_packets(fidelity: ModuleType) -> None:
+    rows = list(fidelity.measure(30_000, seed=1))
+    assert [row for row in rows if not fidelity.is_inside(row)] == []
+    assert {row[0] for row in rows} == set(BUILT_IN)
+
+
+def test_a_model_that_is_off_by_a_tenth_is_found_out(fidelity: ModuleType) -> None:
+    found = Radio(ring(40), [{"kind": "loss", "fraction": 0.33}], check=False).all_broadcast(20)
+    assert not fidelity.is_inside(
+        fidelity.row("loss", "", 0.3, found["dropped"]["loss"] / found["sent"], 0.46, found["sent"])
+    )
