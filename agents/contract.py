@@ -30,7 +30,10 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Setup(Struct, frozen=True, forbid_unknown_fields=True):
-    """All that a node knows before its first observation. The `bases`, ids of base stations, only a coordinator knows."""
+    """All that a node knows before its first observation.
+
+    The `bases`, ids of base stations, only a coordinator knows. `services` tells who provides which service.
+    """
 
     node: int
     role: str
@@ -41,6 +44,7 @@ class Setup(Struct, frozen=True, forbid_unknown_fields=True):
     channels: tuple[str, ...] = ()
     parameters: dict[str, Any] = {}
     bases: tuple[int, ...] = ()
+    services: dict[str, str] = {}
 
 
 class Stepper(Protocol):

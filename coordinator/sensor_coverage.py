@@ -52,6 +52,10 @@ class Setup(Protocol):
     def bases(self) -> tuple[int, ...]:
         """The ids of the base stations."""
 
+    @property
+    def services(self) -> dict[str, str]:
+        """Who provides which service."""
+
 
 class SensorCoverage:
     """Fills an unknown space with robots, from what they tell by radio (Ramaithitima et al. 2015, algorithm 1)."""
@@ -77,6 +81,7 @@ class SensorCoverage:
         self.redundant: tuple[int, ...] = ()
         self.outcome = ""
         self.cycle = 0
+        self._spares = setup.services.get("redundancy", "coordinator") == "coordinator"
         self._spared_at = 0
         self._silent: dict[int, None] = {}
         self._told: dict[str, Any] = {}
@@ -166,6 +171,8 @@ class SensorCoverage:
         return services.assignment.assign(services.frontier.plans(), self.picture, sources, ways)
 
     def _spare(self) -> None:
+        if not self._spares:
+            return
         self._spared_at = self.pushing.pushes
         self.redundant = self.services.redundancy.redundant(self.picture, self.services.frontier.rim())
 

@@ -7,7 +7,7 @@ import msgspec
 from zwerm.agents.contract import Body, Setup
 from zwerm.draws import Draws
 from zwerm.errors import ControllerError
-from zwerm.scenario import Scenario
+from zwerm.scenario import Scenario, ServicesTable
 
 ROBOT: Final = "robot"
 BASE: Final = "base"
@@ -19,15 +19,23 @@ PARTS: Final = {
     (COORDINATOR, "sensor-coverage"): "zwerm.coordinator.sensor_coverage:SensorCoverage",
 }
 
+# The same where robots find the path among themselves.
+ALONE: Final = {
+    (ROBOT, "sensor-coverage"): "zwerm.agents.sensor_coverage.local:LocalRobot",
+    (BASE, "sensor-coverage"): "zwerm.agents.sensor_coverage.local_base:LocalBase",
+}
 
-def player(role: str, name: str) -> str:
-    """Return the controller that plays a role under the name that a scenario gives it.
+
+def player(role: str, name: str, services: ServicesTable | None = None) -> str:
+    """Return the controller that plays a role under the name that a scenario gives it, with these services.
 
     Raises ControllerError where no coordinator has that name.
     """
     if role == COORDINATOR and (role, name) not in PARTS and ":" not in name:
         known = ", ".join(each for part, each in PARTS if part == role)
         raise ControllerError(f"expected a built-in coordinator ({known}) or module:Class, got {name!r}")
+    if services is not None and services.path == "gradient" and (role, name) in ALONE:
+        return ALONE[role, name]
     return PARTS.get((role, name), name)
 
 
@@ -55,13 +63,15 @@ def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
     )
     sensors = tuple(table.kind for table in robots.sensors)
     channels = (("robots",) if scenario.radio is not None else ()) + (("uplink",) if scenario.coordinator else ())
+    chosen = scenario.services or ServicesTable()
+    services = {"path": chosen.path, "redundancy": chosen.spares}
     players: dict[int, tuple[str, Setup]] = {}
 
     def add(node: int, role: str, controller: str, parameters: dict[str, Any]) -> None:
         placed = role != COORDINATOR
         key = draws.stream_key("controller", node)
         players[node] = (
-            player(role, controller),
+            player(role, controller, scenario.services),
             Setup(
                 node=node,
                 role=role,
@@ -71,6 +81,7 @@ def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
                 body=body if placed else None,
                 channels=channels if placed else ("uplink",),
                 parameters=parameters,
+                services=services,
                 bases=() if placed or scenario.base is None else tuple(range(scenario.base.stations)),
             ),
         )

@@ -88,20 +88,22 @@ def check_controllers(scenario: Scenario) -> None:
     kinds = [table.kind for table in robots.sensors]
     # A controller may name what it needs by the sensor's kind or by the field of the observation that it fills.
     given = [*kinds, *(BUILT_IN[kind].field for kind in kinds if kind in BUILT_IN)]
-    mistakes = _controller_mistakes("robots", ROBOT, robots.controller, robots.parameters, given)
+    mistakes = _controller_mistakes(scenario, "robots", ROBOT, robots.controller, robots.parameters, given)
     if base is not None:
-        mistakes += _controller_mistakes("base", BASE, base.controller, base.parameters, given)
+        mistakes += _controller_mistakes(scenario, "base", BASE, base.controller, base.parameters, given)
     if coordinator is not None:
-        mistakes += _controller_mistakes("coordinator", COORDINATOR, coordinator.controller, coordinator.parameters, [])
+        mistakes += _controller_mistakes(
+            scenario, "coordinator", COORDINATOR, coordinator.controller, coordinator.parameters, []
+        )
     if mistakes:
         raise ScenarioError(list(dict.fromkeys(mistakes)))
 
 
 def _controller_mistakes(
-    table: str, role: str, controller: str, parameters: dict[str, Any], sensors: Sequence[str]
+    scenario: Scenario, table: str, role: str, controller: str, parameters: dict[str, Any], sensors: Sequence[str]
 ) -> list[str]:
     try:
-        found = find(player(role, controller))
+        found = find(player(role, controller, scenario.services))
     except ControllerError as error:
         return [f"{table}.controller: {error}"]
     mistakes = [

@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, 
 
 from zwerm.errors import ScenarioError
 from zwerm.mistakes import mistakes as mistakes  # for those who type tables of their own
+from zwerm.overrides import override as override
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -179,6 +180,27 @@ class CoordinatorTable(Table):
     parameters: dict[str, Any] = {}
 
 
+class ServicesTable(Table):
+    """Who provides what a deployment needs to have decided: the `coordinator`, or the robots among themselves.
+
+    With `path` `gradient` robots find the frontier, the way to it and the end by themselves. `redundancy` is who finds the
+    robots that can be spared: the coordinator, by relative homology; or nobody, with `none`.
+    """
+
+    path: Literal["coordinator", "gradient"] = "coordinator"
+    redundancy: Literal["coordinator", "none"] | None = None
+
+    @property
+    def spares(self) -> str:
+        """Who finds redundant robots: whoever finds the path where nothing else is said, and no robot does so far."""
+        return self.redundancy or ("coordinator" if self.path == "coordinator" else "none")
+
+    @property
+    def centre(self) -> bool:
+        """Whether anything is the coordinator's."""
+        return "coordinator" in (self.path, self.spares)
+
+
 class ChannelTable(Table):
     """What happens to packets on a channel: `loss` is independent loss, `models` judge in order. `check` audits every tick.
 
@@ -257,6 +279,7 @@ class Scenario(Table):
     robots: RobotsTable
     base: BaseTable | None = None
     coordinator: CoordinatorTable | None = None
+    services: ServicesTable | None = None
     field: OpenTable | None = None
     landmarks: list[Point] = []
     radio: RadioTable | None = None
@@ -266,6 +289,22 @@ class Scenario(Table):
     metrics: MetricsTable = MetricsTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")
+
+    @model_validator(mode="after")
+    def _someone_provides_the_services(self) -> Self:
+        services = self.services
+        if services is None:
+            return self
+        if services.centre and self.coordinator is None:
+            raise ValueError("services: what the coordinator provides needs the table [coordinator]")
+        if services.path == "gradient":
+            if self.radio is None:
+                raise ValueError("services.path: robots that find the path need the table [radio]")
+            if self.base is None or self.base.stations > 1:
+                raise ValueError("services.path: robots find the path from one base station")
+            if services.spares == "coordinator":
+                raise ValueError("services.redundancy: with path 'gradient' expected 'none', got 'coordinator'")
+        return self
 
     @property
     def folder(self) -> Path:
@@ -313,44 +352,6 @@ def read(path: Path) -> dict[str, Any]:
         raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
 
 
-def override(tables: dict[str, Any], assignment: str) -> None:
-    """Apply one `path=value` in place; value is TOML, or else a bare string. A number in the path indexes a list.
-
-    Raises ScenarioError where the path leads nowhere.
-    """
-    path, equals, text = assignment.partition("=")
-    if not equals or not path.strip():
-        raise ScenarioError([f"--set {assignment}: expected path=value"])
-    try:
-        value = tomllib.loads(f"value = {text}")["value"] if "\n" not in text else text
-    except tomllib.TOMLDecodeError:
-        value = text
-    *parents, last = path.strip().split(".")
-    place: Any = tables
-    for depth, part in enumerate(parents):
-        place = _enter(place, part, ".".join(parents[: depth + 1]), assignment)
-    if isinstance(place, list):
-        place[_index(place, last, path, assignment)] = value
-    elif isinstance(place, dict):
-        place[last] = value
-    else:
-        raise ScenarioError([f"--set {assignment}: {'.'.join(parents)} is no table"])
-
-
-def _enter(place: Any, part: str, path: str, assignment: str) -> Any:
-    if isinstance(place, list):
-        return place[_index(place, part, path, assignment)]
-    if isinstance(place, dict):
-        return place.setdefault(part, {})
-    raise ScenarioError([f"--set {assignment}: {path} is in no table"])
-
-
-def _index(place: list[Any], part: str, path: str, assignment: str) -> int:
-    if not part.isdigit() or int(part) >= len(place):
-        raise ScenarioError([f"--set {assignment}: {path}: expected an index below {len(place)}, got {part}"])
-    return int(part)
-
-
 def load(name: str, overrides: tuple[str, ...] = ()) -> Scenario:
     """Return the scenario `name` (built in, or a path) with each `path=value` of `overrides` applied.
 
@@ -373,5 +374,20 @@ def validate(tables: dict[str, Any], place: str, folder: Path) -> Scenario:
         scenario = Scenario.model_validate(tables)
     except ValidationError as error:
         raise ScenarioError(mistakes(error, place)) from None
+    if scenario.services is not None and not scenario.services.centre:
+        scenario = _without_coordinator(scenario)
     scenario._folder, scenario._place = folder, place
     return scenario
+
+
+def _without_coordinator(scenario: Scenario) -> Scenario:
+    """Return a scenario in which the coordinator has nothing to do without it, its uplink, and the faults of both."""
+    faults = []
+    for each in scenario.faults:
+        nodes = each.parameters.get("nodes")
+        if each.parameters.get("channel") == "uplink" or nodes == ["coordinator"]:
+            continue
+        if isinstance(nodes, list) and "coordinator" in nodes:
+            each = OpenTable(kind=each.kind, **each.parameters | {"nodes": [n for n in nodes if n != "coordinator"]})
+        faults.append(each)
+    return scenario.model_copy(update={"coordinator": None, "uplink": None, "faults": faults})

@@ -64,6 +64,10 @@ class Senses:
         """Tell whether everyone in sight was averaged over `samples`, and nobody else is on record."""
         return self._sums.keys() == self.seen.keys() and all(n >= samples for _, n in self._sums.values())
 
+    def count(self, node: int) -> int:
+        """Return how many readings the average of a robot's bearing has."""
+        return self._sums[node][1] if node in self._sums else 0
+
     def spread(self) -> float | None:
         """Return how much one bearing errs [rad], by the averages with at least 4 readings, or None if there are none.
 

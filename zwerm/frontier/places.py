@@ -136,6 +136,11 @@ class Places:
         known = self._reference.get((a, b))
         return None if known is None else cmath.phase(known[0])
 
+    def remember(self, a: int, b: int, direction: float) -> None:
+        """Take the direction from one place to another from who remembers it."""
+        mean = cmath.rect(1.0, direction)
+        self._reference[a, b], self._reference[b, a] = (mean, 1), (-mean, 1)
+
     def learn_references(self, views: Mapping[int, Mapping[int, float]]) -> None:
         """Let the remembered directions follow what is seen, slowly: else errors would walk at random."""
         for a, seen in views.items():

@@ -1,0 +1,343 @@
+"""The robot of sensor coverage without a centre: it plans for the edges at itself, and takes part in pushes.
+
+It hears its neighbours' states, tells its own when that changes, and sleeps in between. What it does when it drives is the
+same as under a coordinator (`zwerm.agents.sensor_coverage.robot`); who tells it to is its neighbour or itself.
+"""
+
+import math
+from typing import Any, Final
+
+import msgspec
+
+from zwerm.agents.contract import Setup
+from zwerm.agents.sensor_coverage.homing import Vector
+from zwerm.agents.sensor_coverage.post import Post
+from zwerm.agents.sensor_coverage.push import Drive, Push
+from zwerm.agents.sensor_coverage.robot import STOP, Parameters, Robot, Story
+from zwerm.agents.sensor_coverage.vicinity import Vicinity
+from zwerm.agents.sensor_coverage.words import (
+    CHANNEL,
+    NOWHERE,
+    Abort,
+    Ask,
+    Body,
+    Gone,
+    Letter,
+    Receipt,
+    State,
+    Take,
+    Token,
+    Word,
+    read,
+    write,
+)
+from zwerm.frontier.planner import Parameters as Rules
+from zwerm.orders import Arrived, Cleared
+from zwerm.protocol import Command, Observation, Transmission, Wake
+
+# When a new state is told again, and after how long a silence [ticks].
+AGAIN_TICKS: Final = (6,)
+ROUTE_TICKS: Final = 4
+HEARTBEAT_TICKS: Final = 100
+# When to ask those whose word is missing, and how often before they are taken for dead.
+ASK_FIRST_TICKS: Final = 8
+ASK_TICKS: Final = 5
+ASKS_MAX: Final = 60
+SILENT_TICKS: Final = 260
+# How often the news that a leader is gone is told, and told on.
+GONE_HOPS: Final = 2
+GONE_TICKS: Final = 4
+
+
+class LocalRobot(Robot):
+    """A robot of the swarm."""
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        p: Parameters = self.parameters
+        self.rules = Rules(link_m=p.link_m, margin_m=p.margin_m)
+        self.tick = 0
+        self.post = Post()
+        self.vicinity = Vicinity(setup.node, self.rules)
+        self.push: Push | None = None
+        self._over: dict[int, None] = {}
+        self._letters: list[Transmission] = []
+        self._state: State | None = None
+        self._number = 0
+        self._told_at = -ROUTE_TICKS
+        self._again: list[int] = []
+        self._heartbeat = 0
+        self._told_on: dict[int, int] = {}
+        self._gone: tuple[int, int] | None = None  # the push whose leader this was, and when to say so again
+        self._asked: dict[int, int] = {}
+        self._dead: dict[int, None] = {}
+        self._ask_at: int | None = None
+        self._rest = 0.0, 0.0
+        self._story = self._look_around()
+
+    # --- one tick ---------------------------------------------------------------------------------------------------
+
+    def step(self, observation: Observation) -> Command:
+        """Hear, go on with the present drive, and say what is new."""
+        self.tick = observation.tick
+        self.senses.take(observation)
+        for packet in observation.inbox:
+            word = read(packet.payload) if packet.channel == CHANNEL and packet.sender is not None else None
+            if word is not None and packet.sender is not None:
+                self._hear(packet.sender, word)
+        drive = self._go_on()
+        self._take_part()
+        if not self.vicinity.moving:
+            self._keep_watch()
+        self._say()
+        outbox, self._letters = tuple(self._letters), []
+        return Command(drive=drive, outbox=outbox, wake=self._wake())
+
+    def _go_on(self) -> Any:
+        drive = STOP
+        if self._story is not None:
+            try:
+                drive = next(self._story)
+            except StopIteration:
+                self._story = None
+        events, self._outbox = self._outbox, []
+        for event in events:
+            if self.push is not None and isinstance(event, Cleared):
+                self.push.cleared()
+            elif isinstance(event, Arrived):
+                self._arrived(event)
+        return drive
+
+    def _arrived(self, arrived: Arrived) -> None:
+        if self.push is not None:
+            self.push.arrived(arrived)
+        else:
+            self.rest()
+
+    def _take_part(self) -> None:
+        """Go on with the push that this robot is part of."""
+        for letters, lost in ((self.post.sent, False), (self.post.lost, True)):
+            for to, body in letters:
+                if lost:
+                    self.vicinity.forget(to)
+                if self.push is not None and body.push == self.push.id:
+                    self.push.acknowledged(body, lost)
+            letters.clear()
+        if self.push is not None:
+            self.push.turn()
+        if self.push is not None and self.push.over:
+            self._over[self.push.id] = None
+            self.push = None
+
+    def _wake(self) -> Wake | None:
+        if self._story is not None:
+            return None
+        push = self.push.next_tick() if self.push is not None else None
+        times = [self._heartbeat, *self._again[:1]]
+        times += [each for each in (self.post.next_tick(), push, self._ask_at) if each is not None]
+        if self._gone is not None:
+            times.append(self._gone[1])
+        return Wake(at_s=max(self.tick + 1, min(times)) * self.setup.dt_s, on_packet=True)
+
+    # --- what it hears ----------------------------------------------------------------------------------------------
+
+    def _hear(self, sender: int, word: Word) -> None:
+        match word:
+            case State():
+                self._dead.pop(sender, None)
+                self._asked.pop(sender, None)
+                if self.vicinity.hear(sender, word, self.tick):
+                    self.senses.forget((sender,))
+            case Ask():
+                if not word.nodes or self.setup.node in word.nodes:
+                    self._again = [self.tick]
+            case Gone():
+                self._hear_gone(word)
+            case Letter():
+                receipt, body = self.post.take(sender, word)
+                self._send(receipt, sender)
+                if body is not None:
+                    self._read(sender, body)
+            case Receipt():
+                self.post.acknowledge(sender, word)
+
+    def _hear_gone(self, word: Gone) -> None:
+        if self.push is not None and self.push.id == word.push:
+            self.push.hear_gone()
+        if word.hops and self.tick >= self._told_on.get(word.push, 0):
+            self._told_on[word.push] = self.tick + 2 * GONE_TICKS
+            self._send(Gone(word.push, word.hops - 1))
+
+    def _read(self, sender: int, body: Body) -> None:
+        if isinstance(body, Token):
+            self._take_token(sender, body)
+        elif self.push is not None and body.push == self.push.id:
+            self.push.take(body)
+        elif isinstance(body, Take) and self._free and any(node == self.setup.node for _, node in body.chain):
+            self.push = Push(self, body.push, NOWHERE, body.chain, None)
+            self.push.take(body)
+
+    @property
+    def _free(self) -> bool:
+        return self.push is None and not self.vicinity.moving and self.vicinity.heading is not None
+
+    def _take_token(self, sender: int, token: Token) -> None:
+        """Pass a token on along the gradient, or lead the push if it ends here."""
+        vicinity = self.vicinity
+        here = vicinity.place if vicinity.place != NOWHERE else 0
+        if not self._free or token.push in self._over or any(node == self.setup.node for _, node in token.chain):
+            self.post.write(sender, Abort(token.push, False))
+            return
+        chain = (*token.chain, (here, self.setup.node))
+        first = not token.chain and token.via == NOWHERE
+        self.push = Push(self, token.push, token.fresh, chain, sender, first)
+        route = vicinity.route
+        onward = vicinity.onward() if token.chain else token.via
+        if first or (route is not None and len(route.places) == 1):
+            self.push.lead()
+        elif onward is None or onward not in self.senses.seen or any(node == onward for _, node in chain):
+            self.push.take(Abort(token.push, False))
+        else:
+            self.post.write(onward, Token(token.push, token.fresh, chain, NOWHERE))
+
+    # --- what it says -----------------------------------------------------------------------------------------------
+
+    def _send(self, word: Word, to: int | None = None) -> None:
+        self._letters.append(Transmission(CHANNEL, write(word), to))
+
+    def _say(self) -> None:
+        state = self.vicinity.state(0, self._waiting)
+        if state != self._state:
+            # A way is often found by and by: it is told no more often than that.
+            same = self._state is not None and state == msgspec.structs.replace(self._state, route=state.route)
+            at = max(self.tick, self._told_at + ROUTE_TICKS) if same else self.tick
+            self._state = state
+            self._number += 1
+            self._again = [at, *(at + each for each in AGAIN_TICKS)]
+        if (self._again and self.tick >= self._again[0]) or self.tick >= self._heartbeat:
+            while self._again and self.tick >= self._again[0]:
+                del self._again[0]
+            self._heartbeat = self.tick + HEARTBEAT_TICKS + self.setup.node % 10
+            self._told_at = self.tick
+            self._send(msgspec.structs.replace(state, number=self._number))
+        if self._gone is not None and self.tick >= self._gone[1]:
+            self._gone = (self._gone[0], self.tick + GONE_TICKS)
+            self._send(Gone(self._gone[0], GONE_HOPS))
+            if self.push is None or self.push.id != self._gone[0] or self.push.phase not in ("deploying", "out"):
+                self._gone = None
+        for to, letter in self.post.due(self.tick):
+            self._send(letter, to)
+
+    @property
+    def _waiting(self) -> bool:
+        return self.vicinity.place == NOWHERE and self._free
+
+    # --- standing still ---------------------------------------------------------------------------------------------
+
+    def _keep_watch(self) -> None:
+        """Look around when somebody has come or gone, ask for words that are missing, and find out where to expand."""
+        vicinity = self.vicinity
+        if self._story is None:
+            away = 0.0
+            if self._rest is not None:
+                away = math.hypot(self.senses.x_m - self._rest[0], self.senses.y_m - self._rest[1])
+            if self._rest is not None and away > 2.0 * self.parameters.tolerance_m:
+                self._story = self._recover(self._rest)  # it was pushed aside
+            elif self._unsure():
+                self._story = self._look_around()
+        vicinity.learn_references()
+        # Places outlive who stands there: while they change hands the frontier and the way to it stay as they were.
+        if not vicinity.changing(self.bearings, self.tick):
+            vicinity.plan()
+            vicinity.find_route()
+        self._ask()
+
+    def _recover(self, rest: Vector) -> Story:
+        self._rest = yield from self._return(rest)
+
+    def _standing(self) -> list[int]:
+        """Return whom it sees, but for robots that are on their way."""
+        states = self.vicinity.states
+        return [node for node in self.senses.seen if node not in states or not states[node].moving]
+
+    def _unsure(self) -> bool:
+        """Tell whether somebody in sight was not averaged, or somebody out of sight was."""
+        wanted = 1 if self._noise_rad is None else self._samples
+        standing = self._standing()
+        gone = any(node not in self.senses.seen for node in self.vicinity.seen)
+        return gone or not self.vicinity.samples or any(self.senses.count(node) < wanted for node in standing)
+
+    def _look_around(self) -> Story:
+        """Stand still until everyone in sight that stands has been averaged."""
+        for _ in range(2 * self._samples):
+            self.senses.average()
+            if all(self.senses.count(node) >= self._samples for node in self._standing()):
+                break
+            yield STOP
+        if self._noise_rad is None:
+            self._noise_rad = self.senses.spread()
+        standing = frozenset(self._standing())
+        self.vicinity.look({s.node: s.bearing_rad for s in self.senses.sightings() if s.node in standing})
+        self.vicinity.touch(self.senses.touched)
+
+    def _ask(self) -> None:
+        """Ask those whose word is missing or old; who does not answer for long is dead."""
+        vicinity, tick = self.vicinity, self.tick
+        wanted = [node for node in dict.fromkeys(vicinity.stale(self.senses.seen)) if node not in self._dead]
+        wanted += [n for n in self.senses.seen if n not in wanted and tick - vicinity.heard.get(n, tick) > SILENT_TICKS]
+        wanted = [
+            node
+            for node in wanted
+            if node not in vicinity.states
+            or not vicinity.states[node].moving
+            or tick - vicinity.heard[node] > SILENT_TICKS
+        ]
+        if not wanted:
+            self._asked.clear()
+            self._ask_at = None
+        elif self._ask_at is None:
+            self._ask_at = tick + ASK_FIRST_TICKS + self._samples
+        elif tick >= self._ask_at:
+            self._ask_at = tick + ASK_TICKS
+            self._send(Ask(tuple(wanted)))
+            self._asked = {node: self._asked.get(node, 0) + 1 for node in wanted}
+            for node, times in self._asked.items():
+                if times > ASKS_MAX and tick - vicinity.heard.get(node, -SILENT_TICKS) > SILENT_TICKS:
+                    vicinity.forget(node)
+                    self._dead[node] = None
+
+    # --- what pushes need -------------------------------------------------------------------------------------------
+
+    @property
+    def node(self) -> int:
+        """The robot's id."""
+        return self.setup.node
+
+    @property
+    def busy(self) -> bool:
+        """Whether it drives, or looks around."""
+        return self._story is not None or self._unsure()
+
+    @property
+    def bearings(self) -> dict[int, float]:
+        """Whom it sees now, but for the dead."""
+        return {node: bearing for node, bearing in self.senses.seen.items() if node not in self._dead}
+
+    @property
+    def clear(self) -> bool:
+        """Whether it stands, has looked around, and nobody about it is on the way."""
+        return not self.busy and not self.vicinity.changing(self.bearings, self.tick)
+
+    def drive(self, order: Drive) -> None:
+        """Begin a drive."""
+        self.vicinity.go()
+        self._story = self._begin(order)
+
+    def rest(self) -> None:
+        """Stand again, for neighbours to look at."""
+        self.vicinity.moving = False
+        self.senses.forget()
+
+    def tell_gone(self, push: int) -> None:
+        """Broadcast that this leader is gone, until the push goes on."""
+        self._gone = push, self.tick

@@ -1,0 +1,145 @@
+"""The base station without a centre: it lets robots out while the gradient leads to a frontier, and tells when none is left."""
+
+from typing import Any, Final
+
+from zwerm.agents.contract import Setup
+from zwerm.agents.sensor_coverage.local import LocalRobot
+from zwerm.agents.sensor_coverage.words import NOWHERE, Abort, Body, Done, State, Take, Token, Word
+from zwerm.protocol import Command, Observation, Wake
+
+# How long to wait for a robot to come out, for a push to end, and without a frontier before all is covered [ticks].
+BIRTH_TICKS: Final = 60
+PUSH_TICKS: Final = 3000
+QUIET_TICKS: Final = 60
+PUSHES_MAX: Final = 2**40
+
+
+class LocalBase(LocalRobot):
+    """A robot that never moves; its depot is its only actuator."""
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        self.vicinity.place = 0
+        self.vicinity.heading = 0.0
+        self.cycles = 0
+        self.pushes = 0
+        self.released = 0
+        self.outcome = ""
+        self._release = False
+        self._released_at: int | None = None
+        self._born = -1
+        self._known: dict[int, None] = {}
+        self._active: int | None = None
+        self._first = False
+        self._since = 0
+        self._quiet_since: int | None = None
+        self._tokens = 0
+        self._told: dict[str, Any] = {}
+
+    def step(self, observation: Observation) -> Command:
+        """Hear, and decide whether another robot is wanted."""
+        for each in observation.bearings or ():
+            if each.node not in self._known:  # it came out just now
+                self._known[each.node] = None
+                self.released += 1
+        command = super().step(observation)
+        command.drive = None
+        command.release, self._release = self._release, False
+        command.told, self._told = self._told, {}
+        command.done = self.outcome == "covered"
+        command.gave_up = "" if self.outcome in ("", "covered") else self.outcome
+        return command
+
+    def _take_part(self) -> None:
+        for to, body in self.post.lost:
+            self.vicinity.forget(to)
+            if isinstance(body, Token) and body.push == self._active:
+                self._end(False)
+        self.post.sent.clear()
+        self.post.lost.clear()
+        self._decide()
+
+    def _decide(self) -> None:
+        """Start the next push, or wait for what there is to wait for."""
+        if self.outcome:
+            return
+        if self._active is not None:
+            if self.tick - self._since > PUSH_TICKS:
+                self._end(False)
+            return
+        alone = not any(s.place not in (0, NOWHERE) for s in self.vicinity.states.values())
+        if not alone and self.vicinity.route is None:
+            self._watch_quiet()
+            return
+        self._quiet_since = None
+        waiting = [n for n, s in sorted(self.vicinity.states.items()) if s.waiting and n in self.senses.seen]
+        if not waiting:
+            self._let_out()
+            return
+        born = waiting[0]
+        via = NOWHERE if alone else self.vicinity.onward()
+        if via is None:
+            return
+        self._released_at = None
+        self._tokens += 1
+        self._active, self._since, self._first = self._tokens, self.tick, alone
+        self.post.write(born, Token(self._active, born, (), via))
+
+    def _let_out(self) -> None:
+        if self._released_at is None:
+            self._release = True
+            self._released_at = self.tick
+            self._born = self.released
+        elif self.released == self._born and self.tick - self._released_at > BIRTH_TICKS:
+            self.outcome = "depot-dry: the depot is empty"
+            self._tell_numbers()
+
+    def _watch_quiet(self) -> None:
+        if not self.clear:
+            self._quiet_since = None
+            return
+        if self._quiet_since is None:
+            self._quiet_since = self.tick
+        if self.tick - self._quiet_since > QUIET_TICKS + 4 * self._samples:
+            self.outcome = "covered"
+            self._tell_numbers()
+
+    def _tell_numbers(self) -> None:
+        self._told |= {
+            "deployment_cycles": self.cycles,
+            "pushes": self.pushes,
+            "robots_released": self.released,
+        }
+
+    def _end(self, tried: bool, done: bool = False) -> None:
+        self._active = None
+        self.cycles += tried or done
+        self.pushes += done
+        if self._first and tried and not done:
+            self.outcome = "source-blocked: no robot gets away from the base"
+            self._tell_numbers()
+
+    def _read(self, sender: int, body: Body) -> None:
+        if isinstance(body, Token):
+            self.post.write(sender, Abort(body.push, False))
+        elif body.push == self._active:
+            if isinstance(body, Abort):
+                self._end(body.tried)
+            elif isinstance(body, Done):
+                self._end(True, True)
+        elif isinstance(body, Take):
+            pass
+
+    def _hear(self, sender: int, word: Word) -> None:
+        new = isinstance(word, State) and sender not in self.vicinity.states
+        super()._hear(sender, word)
+        if new and isinstance(word, State) and word.place == NOWHERE:
+            self._again = [self.tick]  # it wants to know what the base sees
+
+    def _wake(self) -> Wake | None:
+        wake = super()._wake()
+        if wake is None or self.outcome:
+            return wake
+        soon = self._active is None
+        at_s = (self.tick + 1) * self.setup.dt_s if soon else wake.at_s
+        return Wake(at_s=at_s, on_packet=True, on_visible=True)

@@ -1,0 +1,200 @@
+"""What robots say to each other when nobody is in charge: all of it crosses the robots' radio, under a checksum.
+
+`State` is broadcast when it changes, and now and then; letters go to one neighbour and are acknowledged. Directions are
+told in one frame, which every robot knows by its heading; no message tells a position.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+import msgspec
+from msgspec import Struct
+
+from zwerm.agents.gossip.frame import seal, unseal
+from zwerm.errors import ProtocolError
+from zwerm.protocol import REFUSABLE
+
+CHANNEL: Final = "robots"
+NOWHERE: Final = -1
+
+
+class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A part of a message that comes in numbers."""
+
+
+class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A whole message, led by its tag."""
+
+
+# --- to all who hear it ---------------------------------------------------------------------------------------------
+
+
+class Seen(_Part, frozen=True):
+    """A robot seen since it last moved, for the `epoch`-th time, the place that it holds, and its direction."""
+
+    node: int
+    epoch: int
+    place: int
+    direction_rad: float
+
+
+class Try(_Part, frozen=True):
+    """What the sender tried at one side of the edge between its place and another."""
+
+    other: int
+    sign: int
+    attempts: int
+    failed: bool
+    closed: bool
+
+
+class Route(_Part, frozen=True):
+    """The way to the nearest robot at the frontier: what it costs, and the places on it, the sender's first."""
+
+    cost: float
+    places: tuple[int, ...]
+
+
+class State(_Message, frozen=True, tag="s"):
+    """All that neighbours need to know of a robot.
+
+    `number` counts its states, `epoch` its drives, `samples` how often it has looked around. `could` are the sides, as
+    (other place, sign), that it could expand. `waiting`: it stands at the base, ready to go.
+    """
+
+    number: int
+    place: int
+    epoch: int
+    moving: bool
+    waiting: bool
+    samples: int
+    seen: tuple[Seen, ...]
+    tries: tuple[Try, ...]
+    could: tuple[tuple[int, int], ...]
+    route: Route | None
+
+
+class Ask(_Message, frozen=True, tag="a"):
+    """These robots shall tell their state again."""
+
+    nodes: tuple[int, ...]
+
+
+class Gone(_Message, frozen=True, tag="g"):
+    """The leader of a push has left its place for good. Told on `hops` times."""
+
+    push: int
+    hops: int
+
+
+# --- letters --------------------------------------------------------------------------------------------------------
+
+
+class Reference(_Part, frozen=True):
+    """The direction in which another place is remembered, from how many looks, and who is there."""
+
+    place: int
+    node: int
+    direction_rad: float
+    count: int
+
+
+class Memory(_Part, frozen=True):
+    """What is remembered of a place, whoever stands there."""
+
+    place: int
+    references: tuple[Reference, ...]
+    walls: tuple[float, ...]
+    closed: tuple[tuple[int, ...], ...]
+    failed: tuple[tuple[int, ...], ...]
+    attempts: tuple[tuple[tuple[int, ...], int], ...]
+    blocked: tuple[float, ...]
+
+
+# The robots of a push, rear to front, each with the place it stands at before.
+Chain = tuple[tuple[int, int], ...]
+
+
+class Token(_Message, frozen=True, tag="T"):
+    """A push looks for its leader: go on along the gradient, `via` somebody first. `fresh` is the new place."""
+
+    push: int
+    fresh: int
+    chain: Chain
+    via: int
+
+
+class Ready(_Message, frozen=True, tag="R"):
+    """The leader to who follows it: this will be your place, once I am gone."""
+
+    push: int
+    chain: Chain
+    memory: Memory
+
+
+class Take(_Message, frozen=True, tag="K"):
+    """Take my place: I go now."""
+
+    push: int
+    chain: Chain
+    memory: Memory
+
+
+class Abort(_Message, frozen=True, tag="A"):
+    """The push is over and nobody has moved. `tried`: its leader did try."""
+
+    push: int
+    tried: bool
+
+
+class Stand(_Message, frozen=True, tag="S"):
+    """All ahead of you stand."""
+
+    push: int
+
+
+class Settled(_Message, frozen=True, tag="P"):
+    """All behind you have found their places."""
+
+    push: int
+
+
+class Done(_Message, frozen=True, tag="D"):
+    """The push is over, and has brought a robot out."""
+
+    push: int
+
+
+Body = Token | Ready | Take | Abort | Stand | Settled | Done
+
+
+class Letter(_Message, frozen=True, tag="l"):
+    """The `number`-th letter from its sender to its receiver."""
+
+    number: int
+    body: Body
+
+
+class Receipt(_Message, frozen=True, tag="r"):
+    """The letter of this number has come."""
+
+    number: int
+
+
+Word = State | Ask | Gone | Letter | Receipt
+
+_encode: Final[Callable[[Word], bytes]] = msgspec.msgpack.Encoder().encode
+_decode: Final[Callable[[bytes], Word]] = msgspec.msgpack.Decoder(Word).decode
+
+
+def write(word: Word) -> bytes:
+    """Return the payload of a packet that says this."""
+    return seal(_encode(word))
+
+
+def read(payload: bytes) -> Word | None:
+    """Return what a packet says, or None where that is nothing: it was damaged on its way, or is somebody else's."""
+    try:
+        return _decode(unseal(payload))
+    except (ProtocolError, *REFUSABLE):
+        return None

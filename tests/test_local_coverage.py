@@ -1,0 +1,142 @@
+"""Sensor coverage without a coordinator, run for real in a small hall: how it ends, who decides, and that nobody is lost."""
+
+from collections.abc import Callable
+
+import pytest
+
+from zwerm.agents.node import Node
+from zwerm.agents.sensor_coverage.local import LocalRobot
+from zwerm.agents.sensor_coverage.post import TRIES_MAX, Post
+from zwerm.agents.sensor_coverage.words import Done, Letter, State, Token, read, write
+from zwerm.assembly import assemble
+from zwerm.deploy.cast import cast
+from zwerm.errors import ScenarioError
+from zwerm.link.memory import MemoryLink
+from zwerm.running import run
+from zwerm.scenario import Scenario, load
+from zwerm.world.lockstep import LockStep
+from zwerm.world.world import World
+
+HALL = ("arena.size_m=[2.6,2.0]", "base.pose=[0.2,1.0,0.0]", "robots.count=24")
+ALONE = (*HALL, "services.path=gradient")
+NOISE = "robots.sensors.0.sd_rad=0.0436332"
+
+
+def drive(scenario: Scenario, on_tick: Callable[[World], None] | None = None) -> tuple[str, World, list[LocalRobot]]:
+    """Run inline, and return how it ended, the world, and the robots that are out."""
+    world = assemble(scenario, 1)
+    nodes = {node: Node(*each) for node, each in cast(scenario, 1).items()}
+    driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), on_tick)
+    outcome = driver.run()
+    out = [nodes[robot]._controller for robot in world.scene.present_ids().tolist() if robot]
+    return outcome, world, [each for each in out if isinstance(each, LocalRobot)]
+
+
+# --- words and letters ----------------------------------------------------------------------------------------------
+
+
+def test_a_damaged_word_says_nothing() -> None:
+    payload = write(Letter(1, Done(7)))
+    assert read(payload) == Letter(1, Done(7))
+    for place in range(len(payload)):
+        damaged = bytearray(payload)
+        damaged[place] ^= 4
+        assert read(bytes(damaged)) is None
+    assert read(payload[:-1]) is None
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.5, 0.9])
+def test_letters_arrive_once_and_in_order_whatever_is_lost(lost: float) -> None:
+    import random
+
+    luck = random.Random(3)
+    here, there = Post(), Post()
+    for number in range(20):
+        here.write(2, Token(number, 0, (), 0))
+    told: list[int] = []
+    for tick in range(12_000):
+        for _, word in here.due(tick):
+            assert isinstance(word, Letter)
+            if luck.random() >= lost:
+                receipt, body = there.take(1, word)
+                told += [] if body is None else [body.push]
+                if luck.random() >= lost:
+                    here.acknowledge(2, receipt)
+    assert told == sorted(set(told))
+    assert {body.push for _, body in here.sent} <= set(told)
+    assert len(here.sent) + len(here.lost) == 20
+    assert lost > 0.5 or told == list(range(20))
+
+
+def test_a_letter_that_nobody_acknowledges_is_given_up() -> None:
+    post = Post()
+    post.write(2, Done(1))
+    tries = sum(len(post.due(tick)) for tick in range(10 * TRIES_MAX))
+    assert tries == TRIES_MAX
+    assert post.lost == [(2, Done(1))]
+
+
+# --- the whole swarm ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("noise", [(), (NOISE,)])
+def test_robots_alone_cover_a_small_hall_about_as_well_as_with_a_coordinator(noise: tuple[str, ...]) -> None:
+    central = run("sensor-coverage", runner="inline", overrides=[*HALL, *noise])
+    alone = run("sensor-coverage", runner="inline", overrides=[*ALONE, *noise])
+    assert alone.outcome == central.outcome == "completed"
+    assert alone.metrics["coverage_fraction"] >= 0.99
+    assert alone.metrics["robots_deployed"] <= central.metrics["robots_deployed"] + 2
+    assert alone.metrics["deployment_cycles"] <= 1.3 * central.metrics["deployment_cycles"]
+    assert "uplink" not in alone.radio["channels"], "there is no coordinator"
+
+
+def test_every_robot_that_came_out_holds_a_place_of_its_own() -> None:
+    outcome, world, robots = drive(load("sensor-coverage", ALONE))
+    assert outcome == "completed"
+    places = [robot.vicinity.place for robot in robots if not robot._waiting]
+    assert len(places) == len(set(places)) >= len(robots) - 1
+    assert world.medium.summary()["sent"] > 0
+
+
+def test_a_coordinator_that_is_killed_changes_nothing_where_there_is_none() -> None:
+    kill = 'faults=[{kind="crash", at_s=10.0, nodes=["coordinator"]}]'
+    settings = [*ALONE, "time.duration_s=30.0"]
+    alone, killed = (run("sensor-coverage", runner="inline", overrides=[*settings, *each]) for each in ((), (kill,)))
+    other = run("sensor-coverage", seed=2, runner="inline", overrides=[*settings, NOISE])
+    assert alone.trace == killed.trace != other.trace
+    assert alone.metrics["robots_deployed"] > 2
+
+
+def test_robots_alone_leave_the_same_trace_in_processes() -> None:
+    settings = ["arena.size_m=[2.0,1.4]", "base.pose=[0.2,0.7,0.0]", "robots.count=10", "services.path=gradient"]
+    inline, processes = (run("sensor-coverage", runner=each, overrides=settings) for each in ("inline", "processes"))
+    assert inline.outcome == processes.outcome == "completed"
+    assert inline.trace == processes.trace
+
+
+def test_an_empty_depot_is_noticed_by_the_base() -> None:
+    result = run("sensor-coverage", runner="inline", overrides=[*ALONE, "robots.count=4"])
+    assert result.outcome == "failed"
+    assert "depot-dry: the depot is empty" in result.reason
+
+
+# --- who provides what ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("settings", "line"),
+    [
+        (("services.path=mesh",), 'services.path: expected "coordinator" or "gradient", got "mesh"'),
+        (("services.pathh=gradient",), "services.pathh"),
+        (("services.path=gradient",), "services.path: robots find the path from one base station"),
+    ],
+)
+def test_a_mistake_in_the_services_is_one_clear_line(settings: tuple[str, ...], line: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load("sensor-coverage-multi-source" if settings == ("services.path=gradient",) else "sensor-coverage", settings)
+    assert len(caught.value.mistakes) == 1
+    assert line in caught.value.mistakes[0]
+
+
+def test_a_state_tells_no_position() -> None:
+    assert not any(name.endswith("_m") for name in State.__struct_fields__)

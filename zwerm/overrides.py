@@ -1,0 +1,44 @@
+"""Settings of a scenario from the command line: `path=value`, applied to its tables before anything is checked."""
+
+import tomllib
+from typing import Any
+
+from zwerm.errors import ScenarioError
+
+
+def override(tables: dict[str, Any], assignment: str) -> None:
+    """Apply one `path=value` in place; value is TOML, or else a bare string. A number in the path indexes a list.
+
+    Raises ScenarioError where the path leads nowhere.
+    """
+    path, equals, text = assignment.partition("=")
+    if not equals or not path.strip():
+        raise ScenarioError([f"--set {assignment}: expected path=value"])
+    try:
+        value = tomllib.loads(f"value = {text}")["value"] if "\n" not in text else text
+    except tomllib.TOMLDecodeError:
+        value = text
+    *parents, last = path.strip().split(".")
+    place: Any = tables
+    for depth, part in enumerate(parents):
+        place = _enter(place, part, ".".join(parents[: depth + 1]), assignment)
+    if isinstance(place, list):
+        place[_index(place, last, path, assignment)] = value
+    elif isinstance(place, dict):
+        place[last] = value
+    else:
+        raise ScenarioError([f"--set {assignment}: {'.'.join(parents)} is no table"])
+
+
+def _enter(place: Any, part: str, path: str, assignment: str) -> Any:
+    if isinstance(place, list):
+        return place[_index(place, part, path, assignment)]
+    if isinstance(place, dict):
+        return place.setdefault(part, {})
+    raise ScenarioError([f"--set {assignment}: {path} is in no table"])
+
+
+def _index(place: list[Any], part: str, path: str, assignment: str) -> int:
+    if not part.isdigit() or int(part) >= len(place):
+        raise ScenarioError([f"--set {assignment}: {path}: expected an index below {len(place)}, got {part}"])
+    return int(part)
