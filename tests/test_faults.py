@@ -355,6 +355,7 @@ def test_random_faults_that_cannot_be_are_mistakes() -> None:
         ({"kind": "crash", "nodes": ["coordinator"], "at_s": 0}, "faults.0.nodes.0: the scenario has no coordinator"),
         ({"kind": "crash", "nodes": [], "at_s": 0}, "faults.0.nodes: expected 1 items at least, got []"),
         ({"kind": "crash", "nodes": [1], "at_s": 99}, "faults.0.at_s: the run ends after 2 s, got 99"),
+        ({"kind": "crash", "nodes": [1], "at_s": 2}, "faults.0.at_s: the run ends after 2 s, got 2"),
         ({"kind": "crash", "nodes": [1], "at_s": 1, "until_s": 5}, "faults.0.until_s: the run ends after 2 s, got 5"),
         ({"kind": "crash", "nodes": [1], "at_s": 1, "until_s": 0.5},
          "faults.0.until_s: expected later than it begins, got 0.5"),

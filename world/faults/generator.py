@@ -53,7 +53,7 @@ def draw(scenario: Scenario, seed: int, arena: Arena) -> list[OpenTable]:
             continue
         stream = draws.generator(f"random-faults/{kind}")
         at_s = 0.0
-        while (at_s := at_s + stream.exponential(SECONDS_PER_H / per_h)) < scenario.time.duration_s:
+        while round(at_s := at_s + stream.exponential(SECONDS_PER_H / per_h), 3) < scenario.time.duration_s:
             for_s = max(scenario.time.dt_s, stream.exponential(table.mean_s))
             what = _one(kind, stream, scenario, arena)
             found.append({"kind": kind, "at_s": round(at_s, 3), "for_s": round(for_s, 3), **what})

@@ -256,10 +256,10 @@ def _wrong_times(table: FaultTable, scenario: Scenario) -> list[str]:
         found.append(": expected for_s or until_s, not both")
     if not table.lasts and (table.for_s is not None or table.until_s is not None):
         found.append(": happens at once: no for_s and no until_s")
-    for key in ("at_s", "until_s"):
-        value: Any = getattr(table, key)
-        if value is not None and value > duration_s:
-            found.append(f".{key}: the run ends after {duration_s:g} s, got {value:g}")
+    if table.at_s is not None and table.at_s >= duration_s:
+        found.append(f".at_s: the run ends after {duration_s:g} s, got {table.at_s:g}")
+    if table.until_s is not None and table.until_s > duration_s:
+        found.append(f".until_s: the run ends after {duration_s:g} s, got {table.until_s:g}")
     if table.until_s is not None and table.until_s <= (table.at_s or 0.0):
         found.append(f".until_s: expected later than it begins, got {table.until_s:g}")
     if table.when is not None:
