@@ -377,3 +377,11 @@ def test_a_mistake_in_a_model_is_one_line(model: dict[str, Any], line: str) -> N
     with pytest.raises(ScenarioError) as caught:
         Radio(ring(2), [model])
     assert caught.value.mistakes == [line]
+
+
+def test_the_pairs_of_a_channel_are_all_there_and_those_that_are_stopped_are_told() -> None:
+    radio = Radio([(50.0 + node, 50.0) for node in range(20)], [{"kind": "range", "range_m": 17.5}])
+    pairs = radio.medium.channels["robots"].pairs()
+    assert sorted(pairs) == [(a, b) for a in range(20) for b in range(20) if a != b]
+    assert radio.medium.stopped("robots", radio.scene(), [0]) == [(0, 18), (0, 19), (1, 19), (18, 0), (19, 0), (19, 1)]
+    assert radio.medium.stopped("robots", radio.scene(), []) == []

@@ -58,7 +58,10 @@ class Channel:
 
     def pairs(self) -> list[tuple[int, int]]:
         """Return every (sender, receiver) between whom a broadcast passes, sorted."""
-        return [(node, int(other)) for node in self._members for other in self.links.receiver[self._audience(node)]]
+        audiences = [
+            (node, self._audience(node)) for node in self._members
+        ]  # all of them, before receivers are looked up
+        return [(node, other) for node, links in audiences for other in self.links.receiver[links].tolist()]
 
     def stopped(self, scene: Scene, models: Sequence[LinkModel]) -> list[tuple[int, int]]:
         """Return the pairs between whom one of `models` would now let nothing pass, sorted; for models without chance."""
