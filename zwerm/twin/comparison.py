@@ -2,13 +2,17 @@
 
 Compared is the fraction that got through: the models' over all packets that were sent, less those dropped; the network's over
 all that were sent, those that arrived before the end. The half width is that of a 99 % confidence interval for the difference
-of the two, both being random: `z sqrt(p (1 - p) g (1/n + 1/m))`, where g > 1 says that packets in bursts are not independent.
+of the two, both being random: a link of n modelled and m real packets adds `p (1 - p) g (n/N^2 + m/M^2)` to the variance, where
+N and M are those of all links, and g > 1 says that packets in bursts are not independent. The two agree where that difference
+is within the interval, and so is that of every single link, with an interval for all links together.
 """
 
 import itertools
 import math
 from collections import Counter, defaultdict
-from typing import Any, Final
+from collections.abc import Sequence
+from statistics import NormalDist
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -30,7 +34,8 @@ def compare(run: TwinRun) -> dict[str, Any]:
     runs = [length for link, numbers in sent.items() for length in lost_runs(numbers, arrived[link])]
     real = real_arrived / real_sent if real_sent else math.nan
     model = model_passed / model_sent if model_sent else math.nan
-    half = half_width(run, (model_passed + real_arrived) / max(1, model_sent + real_sent), model_sent, real_sent)
+    counts = _counts(run, modelled, sent, arrived)
+    half, links = half_width(counts), agreeing(counts)
     channels = run.world.medium.channels.values()
     delivered = sum(int(each.accounts.delivered().sum()) for each in channels)
     model_delay_s = sum(each.accounts.delay_ticks for each in channels) * dt_s / delivered if delivered else None
@@ -60,7 +65,8 @@ def compare(run: TwinRun) -> dict[str, Any]:
         },
         "difference": _json(real - model),
         "half_width": _json(half),
-        "agrees": bool(abs(real - model) <= half),
+        "links_that_agree": links,
+        "agrees": bool(abs(real - model) <= half) and links == len(counts),
         "links": _by_link(modelled, sent, arrived),
     }
 
@@ -109,16 +115,57 @@ def lost_runs(sent: list[int], arrived: set[int]) -> list[int]:
     return [len(list(run)) for passed, run in fates if not passed]
 
 
-def half_width(run: TwinRun, passed: float, modelled: int, real: int) -> float:
-    """Return the half width of the 99 % interval for the difference of two fractions near `passed`."""
-    grown = 1.0
+class Counts(NamedTuple):
+    """A link's packets: modelled, of them passed; real, of them passed; and how much bursts widen its variance."""
+
+    modelled: int
+    passed: int
+    real: int
+    came: int
+    grown: float
+
+    @property
+    def variance(self) -> float:
+        """Of one packet's fate, as both sides together have it."""
+        p = (self.passed + self.came) / (self.modelled + self.real)
+        return p * (1.0 - p) * self.grown
+
+
+def _counts(
+    run: TwinRun, modelled: dict[Link, tuple[int, int]], sent: dict[Link, list[int]], arrived: dict[Link, set[int]]
+) -> list[Counts]:
+    """Return the counts of every link."""
+    grown: dict[tuple[int, int], float] = {}
     for rule in run.impairments.rules:
         if rule.bursts:
             again = 1.0 - rule.leave - rule.enter
-            grown = max(grown, (1.0 + again) / (1.0 - again))
-    if not modelled or not real:
+            grown |= dict.fromkeys(rule.pairs, (1.0 + again) / (1.0 - again))
+    return [
+        Counts(*modelled.get(link, (0, 0)), len(sent[link]), len(arrived[link]), grown.get(link[1:], 1.0))
+        for link in {**modelled, **sent}
+    ]
+
+
+def half_width(counts: Sequence[Counts]) -> float:
+    """Return the half width of the 99 % interval for the difference of the two fractions over all links."""
+    here, there = sum(each.modelled for each in counts), sum(each.real for each in counts)
+    if not here or not there:
         return math.nan
-    return Z99 * math.sqrt(passed * (1.0 - passed) * grown * (1.0 / modelled + 1.0 / real))
+    variance = sum(each.variance * (each.modelled / here**2 + each.real / there**2) for each in counts)
+    return Z99 * math.sqrt(variance)
+
+
+def agreeing(counts: Sequence[Counts]) -> int:
+    """Return how many links agree. All do in 99 % of runs where both sides have the same chances (Bonferroni)."""
+    z = NormalDist().inv_cdf(1.0 - 0.005 / max(1, len(counts)))
+
+    def agrees(each: Counts) -> bool:
+        if not each.modelled or not each.real:
+            return False
+        half = z * math.sqrt(each.variance * (1.0 / each.modelled + 1.0 / each.real))
+        return abs(each.passed / each.modelled - each.came / each.real) <= half
+
+    return sum(map(agrees, counts))
 
 
 def _spread(delay_ns: list[int]) -> dict[str, float] | None:

@@ -28,6 +28,7 @@ def print_twin(console: Console, title: str, found: Mapping[str, Found], skipped
     row("fraction", "modelled.passed_fraction", "real.passed_fraction")
     row("difference", "", "difference")
     row("99 % within +-", "", "half_width")
+    row("links that agree", "", "links_that_agree")
     row("agrees", "", "agrees")
     row("mean run of lost packets", "", "real.lost_run_mean_packets")
     row("heard after, mean (s)", "modelled.heard_after_mean_s", "real.heard_after_mean_s")
