@@ -97,6 +97,26 @@ def test_what_the_world_alone_can_judge_is_blocked_tick_by_tick(nothing_left: No
 
 
 @on_a_real_network
+def test_the_uplink_is_a_network_of_its_own_between_robots_and_coordinator(nothing_left: None) -> None:
+    robots = {"count": 2, "controller": "radioed:Counts", "sensors": [], "body": {"kind": "holonomic"}}
+    deaf = {"kind": "loss", "fraction": 1.0, "senders": [0], "receivers": ["coordinator"]}
+    chosen = scenario(
+        time={"duration_s": 1.0},
+        robots=robots,
+        radio={"loss": 1.0},
+        uplink={"models": [deaf]},
+        coordinator={"controller": "radioed:Counts"},
+    )
+    found = compare(run_twin(chosen, 1, "udp"))
+    links = found["links"]
+    passed = dict(
+        zip(zip(links["channel"], links["sender"], links["receiver"], strict=True), links["passed"], strict=True)
+    )
+    nothing = {("robots", 0, 1): 0, ("robots", 1, 0): 0, ("uplink", 0, 2): 0}
+    assert passed == nothing | {("uplink", 1, 2): 10, ("uplink", 2, 0): 10, ("uplink", 2, 1): 10}
+
+
+@on_a_real_network
 def test_over_tcp_loss_becomes_delay_and_retransmission(nothing_left: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(running.DRAIN_S, "tcp", 2.0)
     chosen = beacons(0.02, 2.0, radio={"loss": 0.1})
