@@ -12,7 +12,7 @@ Everything else is refused. Rules stand in the order of the models, and a packet
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -36,6 +36,7 @@ _WIRE_BYTES: Final = {"udp": 14 + 20 + 8, "tcp": 14 + 20 + 32}
 _ZENOH_BYTES: Final = 16
 
 _BY_PLACE: Final = ("range", "line_of_sight", "walls")
+_OF_A_CABLE: Final = ("delay", "rate_limit")
 _CANNOT: Final = {
     "path_loss": "its chance changes with every distance; say range and loss",
     "walls": "without margin_db nothing is dropped",
@@ -74,6 +75,7 @@ def possible(scenario: Scenario) -> tuple[Scenario, list[str]]:
     """
     wrong: list[str] = []
     skipped: list[str] = []
+    cables: list[str] = []
     reason = ""
     changed: dict[str, Any] = {}
     nodes = scenario.robots.count + (scenario.coordinator is not None)
@@ -85,6 +87,12 @@ def possible(scenario: Scenario) -> tuple[Scenario, list[str]]:
         kept: list[OpenTable] = []
         for path, model in [] if table is None else tables_of(table, name):
             complaint = _complaint(model)
+            if not complaint and model.kind in _OF_A_CABLE:
+                if scenario.radio is not None and scenario.coordinator is not None:
+                    complaint = "both channels share a node's cable"
+                elif model.kind in cables:
+                    complaint = "one such model at most"
+                cables.append(model.kind)
             if complaint:
                 wrong.append(f"{path}.kind: not in the twin: {complaint}, got {model.kind!r}")
             elif model.kind == "delay" and (reason := reason or lacks_netem()):
@@ -217,6 +225,11 @@ class Network:
     def impair(self, draws: Draws) -> None:
         """Begin to lose, to delay and to limit. Raises LinkError where a tool refuses."""
         self._namespaces.run(["nft", "-f", "-"], ruleset(self._impairments.rules, draws))
+        for node, command in self.cables():
+            self._namespaces.run(["tc", "qdisc", "add", "dev", *command], node=node)
+
+    def cables(self) -> Iterator[tuple[int | None, list[str]]]:
+        """Yield what tc is told, of which device in the namespace of which node (None: at the bridge)."""
         # What is counted is payload: the table of sizes takes away what stands before it, and has an entry for each size.
         before = _WIRE_BYTES[self._transport] + _ZENOH_BYTES + HEAD_BYTES
         sizes = ["stab", "overhead", str(-before - 1), "mtu", "2047", "tsize", "2048"]
@@ -225,10 +238,10 @@ class Network:
         for sender, (rate_bytes_s, queue_bytes, receivers) in self._impairments.rates.items():
             burst, limit = max(queue_bytes, longest), max(receivers * queue_bytes, longest)
             bucket = ["rate", f"{8 * rate_bytes_s:.0f}bit", "burst", f"{burst:.0f}", "limit", f"{limit:.0f}"]
-            self._namespaces.run(["tc", "qdisc", "add", "dev", "eth0", "root", *sizes, "tbf", *bucket], node=sender)
+            yield sender, ["eth0", "root", *sizes, "tbf", *bucket]
         for receiver, (mean_s, around_s) in self._impairments.delays.items():
             delay = ["delay", f"{mean_s * 1e6:.0f}us", f"{around_s * 1e6:.0f}us"]
-            self._namespaces.run(["tc", "qdisc", "add", "dev", port_of(receiver), "root", "netem", *delay])
+            yield None, [port_of(receiver), "root", "netem", *delay]
 
     def block(self, pairs: Pairs) -> None:
         """Let nothing pass between `pairs` from now on, and all others pass again."""

@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 from rich.console import Console
 
+from zwerm.assembly import assemble
 from zwerm.deploy.impairments import possible
 from zwerm.link.station import Transport
 from zwerm.running import Watcher
@@ -46,6 +47,7 @@ def run_and_tell(
     Raises LinkError where this machine cannot have a network of a run's own, ScenarioError for what no network could do.
     """
     usable()
+    assemble(scenario, seed)  # for the mistakes in what may be left out
     chosen, skipped = possible(scenario)
     found: dict[str, dict[str, Any]] = {}
     for transport in transports:
