@@ -30,13 +30,14 @@ def test_the_world_goes_on_while_a_program_starts_and_observes_it_once_it_has() 
         {node: Node(*played).answer for node, played in cast(chosen, 1).items()},
         lambda node, life: Node(*recast(chosen, 1, node, life)).answer,
     )
-    tick_15, observed = threading.Event(), Counter[int]()
+    tick_15, started, observed = threading.Event(), threading.Event(), Counter[int]()
     start, send = link.start, link.send
     waited: list[bool] = []
 
     def start_when_the_world_has_gone_on(node: int) -> None:
         waited.append(tick_15.wait(SOON_S))
         start(node)
+        started.set()
 
     def counted(node: int, payload: bytes) -> None:
         observed[node] += 1
@@ -46,6 +47,8 @@ def test_the_world_goes_on_while_a_program_starts_and_observes_it_once_it_has() 
         if world.tick == 15:
             assert observed[1] == 5, "a program that does not run yet is not observed"
             tick_15.set()
+        elif world.tick == 20:
+            assert started.wait(SOON_S)
 
     link.start, link.send = start_when_the_world_has_gone_on, counted  # type: ignore[method-assign]
     assert RealTime(world, link, 20.0, on_tick, link).run() == "time-limit"
