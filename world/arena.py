@@ -28,6 +28,7 @@ _DENSE_LINES = 5_000
 # Up to so many walls, every line is compared with every wall in blocks of that size: the index is slower.
 _FEW_SEGMENTS = 64
 _DENSE_POINTS = 20_000
+_DENSE_WALLS = 8  # so many in all, however many points are asked about
 _ON_WALL_M = 1e-9  # a ray that begins this near a wall, on either side, begins on it
 
 
@@ -137,6 +138,12 @@ class Arena:
 
     def walls_within(self, points: Floats, distance_m: float) -> WallContacts:
         """Return every pair of a point of points (k, 2) and a wall segment at most distance_m from it."""
+        if len(self.segments) <= _DENSE_WALLS:
+            x, y = points.T[:, :, None]
+            nx, ny = self._nearest(x, y, np.s_[:])
+            apart = np.hypot(nx - x, ny - y)
+            point, wall = (apart <= distance_m).nonzero()
+            return WallContacts(point, wall, np.column_stack([nx[point, wall], ny[point, wall]]), apart[point, wall])
         point, wall = self._near(points, distance_m)
         nearest = np.column_stack(self._nearest(points[point, 0], points[point, 1], wall))
         distance = _norm(nearest - points[point])

@@ -62,6 +62,41 @@ class WallVerdicts:
         self._keys, self._blocked = keys[order], blocked[order]
 
 
+class NearPairs:
+    """The pairs of robots within a range, for any range and one scene, which is searched once if the ranges are known.
+
+    `known_m` is the longest range that was asked about in an earlier scene: it is searched first, whatever is asked first.
+    """
+
+    def __init__(self, known_m: float = 0.0) -> None:
+        self.asked_m = 0.0
+        self._known_m = known_m
+        self._reach_m = -1.0
+        self._pairs: Ints = np.empty((0, 2), dtype=np.int64)
+        self._apart2: Floats = np.empty(0)
+
+    def within(self, scene: Scene, range_m: float | None) -> Ints:
+        """Return (k, 2) ids i < j of present robots at most range_m apart, ascending."""
+        if range_m is None:
+            ids = scene.present_ids()
+            everyone: Ints = ids[np.column_stack(np.triu_indices(len(ids), 1))]
+            return everyone
+        self.asked_m = max(self.asked_m, range_m)
+        if range_m > self._reach_m:
+            self._search(scene, max(range_m, self._known_m))
+        found: Ints = self._pairs[self._apart2 <= range_m**2]
+        return found
+
+    def _search(self, scene: Scene, reach_m: float) -> None:
+        ids = scene.present_ids()
+        position = scene.position[ids]
+        # A little too far, so that one rule, the one above, decides at the very edge.
+        pairs = cKDTree(position).query_pairs(reach_m * (1.0 + 1e-9), output_type="ndarray")
+        pairs = pairs[np.argsort(pairs[:, 0] * len(ids) + pairs[:, 1])]
+        dx, dy = position[pairs[:, 1]].T - position[pairs[:, 0]].T
+        self._reach_m, self._pairs, self._apart2 = reach_m, ids[pairs], dx**2 + dy**2
+
+
 class Visibility:
     """The visible pairs of one run, remembered from scene to scene."""
 
@@ -69,6 +104,7 @@ class Visibility:
         self._position: Floats = np.empty((0, 2))
         self._present: Bools = np.empty(0, dtype=np.bool_)
         self._verdicts = WallVerdicts()
+        self._near = NearPairs()
         self._pairs: dict[tuple[float | None, bool, bool], Ints] = {}
         self._sightings: dict[tuple[float | None, bool, bool], tuple[Ints, Ints]] = {}
 
@@ -127,6 +163,7 @@ class Visibility:
             changed |= scene.present != self._present
         if not changed.any():
             return
+        self._near = NearPairs(self._near.asked_m)
         self._pairs.clear()
         self._sightings.clear()
         keys, count = self._verdicts.keys, len(changed)
@@ -135,31 +172,15 @@ class Visibility:
         self._position, self._present = scene.position.copy(), scene.present.copy()
 
     def _settle(self, scene: Scene, range_m: float | None, through_walls: bool, robots_occlude: bool) -> Ints:
-        pairs = _pairs_within(scene, range_m)
+        pairs = self._near.within(scene, range_m)
         if not through_walls:
             start, end = scene.position[pairs[:, 0]], scene.position[pairs[:, 1]]
             keys = pairs[:, 0] * len(scene.present) + pairs[:, 1]
             pairs = pairs[~self._verdicts.blocked(scene.arena, keys, start, end)]
         if robots_occlude:
             reach_m = None if range_m is None else range_m + scene.radius_m
-            pairs = pairs[~_hidden(scene, pairs, _pairs_within(scene, reach_m))]
+            pairs = pairs[~_hidden(scene, pairs, self._near.within(scene, reach_m))]
         return pairs
-
-
-def _pairs_within(scene: Scene, range_m: float | None) -> Ints:
-    """Return (k, 2) ids i < j of present robots at most range_m apart, ascending."""
-    ids = scene.present_ids()
-    position = scene.position[ids]
-    if range_m is None:
-        everyone: Ints = ids[np.column_stack(np.triu_indices(len(ids), 1))]
-        return everyone
-    # A little too far, so that one rule, the one below, decides at the very edge.
-    pairs = cKDTree(position).query_pairs(range_m * (1.0 + 1e-9), output_type="ndarray")
-    pairs = pairs[np.argsort(pairs[:, 0] * len(ids) + pairs[:, 1])]
-    apart = position[pairs[:, 1]] - position[pairs[:, 0]]
-    near = apart[:, 0] ** 2 + apart[:, 1] ** 2 <= range_m**2
-    found: Ints = ids[pairs[near]]
-    return found
 
 
 def _hidden(scene: Scene, pairs: Ints, near: Ints) -> Bools:

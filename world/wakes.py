@@ -37,7 +37,8 @@ class Wakes:
         self._due: Floats = np.full(count, NEVER)  # the tick of the next observation
         self._on_packet: Bools = np.zeros(count, dtype=np.bool_)
         self._watching: dict[str, Bools] = {field: np.zeros(count, dtype=np.bool_) for field in SIGNATURES}
-        self._seen: dict[str, dict[int, Any]] = {field: {} for field in SIGNATURES}
+        self._newest: dict[str, dict[int, Any]] = {field: {} for field in SIGNATURES}  # readings
+        self._seen: dict[str, dict[int, Any]] = {field: {} for field in SIGNATURES}  # signatures, of those who watch
         self._asleep: dict[int, None] = {}
         self._ids: Ints = np.zeros(0, dtype=np.int64)
         self._stale = True
@@ -58,8 +59,10 @@ class Wakes:
         due = NEVER if wake.at_s is None else float(np.ceil(wake.at_s / self._dt_s - 1e-9))
         self._due[node] = max(due, tick + 1)
         self._on_packet[node] = wake.on_packet
-        self._watching["touch"][node] = wake.on_contact
-        self._watching["bearings"][node] = wake.on_visible
+        for field, watching in (("touch", wake.on_contact), ("bearings", wake.on_visible)):
+            self._watching[field][node] = watching
+            if watching and node in self._newest[field]:
+                self._seen[field][node] = SIGNATURES[field](self._newest[field][node])
         self._asleep[node] = None
         self._stale = True
 
@@ -82,9 +85,7 @@ class Wakes:
 
     def remember(self, field: str, nodes: Sequence[int], readings: Sequence[Any]) -> None:
         """Take note of what `nodes` observe now."""
-        signature, seen = SIGNATURES[field], self._seen[field]
-        for node, reading in zip(nodes, readings, strict=True):
-            seen[node] = signature(reading)
+        self._newest[field].update(zip(nodes, readings, strict=True))
 
     def awake(self, tick: int) -> Ints:
         """Return the nodes to observe at `tick`, ascending; a sleeper among them is awake from now on."""
