@@ -32,7 +32,7 @@ class Answers:
         self._medium = medium
         self._tick = -1
         self._nodes: Sequence[int] = ()
-        self._asked: dict[int, None] = {}
+        self._owing: dict[int, None] = {}
         self._heard: dict[int, tuple[bytes, Command | Failure]] = {}
         self._late: list[tuple[int, Command | Failure]] = []
         self._newest: dict[int, int] = {}  # the tick that a node answered last, where answers may be late
@@ -40,7 +40,7 @@ class Answers:
     def ask(self, nodes: Sequence[int], tick: int) -> None:
         """Take note that `nodes`, ascending, have been sent the observations of `tick`."""
         self._tick, self._nodes = tick, nodes
-        self._asked = dict.fromkeys(nodes)
+        self._owing = dict.fromkeys(nodes)
         self._heard = {}
 
     def hear(self, node: int, payload: bytes) -> Command | Failure:
@@ -51,7 +51,7 @@ class Answers:
         """
         try:
             answer = open_answer(payload)
-            late = answer.tick != self._tick or node not in self._asked or node in self._heard
+            late = answer.tick != self._tick or node not in self._owing
             if late:
                 self._check_late(node, answer.tick)
             if type(answer) is Command and (
@@ -66,13 +66,14 @@ class Answers:
             self.late_count += 1
         else:
             self._heard[node] = payload, answer
+            del self._owing[node]
         if self.late_allowed:
             self._newest[node] = answer.tick
         return answer
 
     def owing(self) -> list[int]:
         """Return the nodes that were asked and have not been heard, ascending."""
-        return [node for node in self._nodes if node not in self._heard]
+        return list(self._owing)
 
     def close(self) -> tuple[list[bytes], list[tuple[int, Command | Failure]]]:
         """End the tick: return the bytes that each node that was asked said, in order, and all answers, late ones first."""
@@ -95,7 +96,7 @@ class Answers:
             return
         if tick != self._tick:
             raise ProtocolError("out-of-order", f"node {node} answers tick {tick} at tick {self._tick}")
-        if node not in self._asked:
+        if node not in self._heard:
             raise ProtocolError("unasked", f"node {node} was sent no observation at tick {tick}")
         raise ProtocolError("duplicate", f"node {node} answers tick {tick} again")
 

@@ -58,9 +58,8 @@ class LockStep:
     def _tick(self) -> None:
         world, link = self._world, self._link
         self._undertaker.carry_out(world.begin())
-        nodes, observations = world.observe()
-        for node, observation in zip(nodes, observations, strict=True):
-            link.send(node, observation)
+        nodes, _ = world.observe(link.send)
+        world.trace.catch_up()
         self._collect(len(nodes))
         if world.crashed and world.scenario.robots.on_crash == "fail":
             return
@@ -70,18 +69,17 @@ class LockStep:
 
     def _collect(self, missing: int) -> None:
         """Receive until nobody is awaited; `missing` bounds the answers that can come in order."""
-        world, link = self._world, self._link
+        world = self._world
         straggler_s = world.scenario.time.straggler_s
         deadline: float | None = None
-        while missing:
+        while missing > 0:
             patience_s = straggler_s if deadline is None else max(0.0, deadline - time.monotonic())
-            # All but a few, which still come while the others are read.
-            link.gather(missing - missing // _LAST, patience_s)
-            arrival = link.receive(0.0)
-            if arrival is None:
+            # All but a few: those still come while the others are read.
+            arrivals = self._link.receive_many(missing - missing // _LAST, patience_s)
+            if not arrivals:
                 self.lost += len(world.awaited())
                 raise StragglerError(world.awaited(), world.tick, straggler_s)
-            while arrival is not None:
+            for arrival in arrivals:
                 if self._take(arrival):
                     missing -= 1
                 elif arrival.payload is None:
@@ -89,15 +87,15 @@ class LockStep:
                 else:
                     # Time that a babbling node uses up is not given back to it.
                     deadline = deadline or time.monotonic() + straggler_s
-                arrival = link.receive(0.0) if missing else None
 
     def _take(self, arrival: Arrival) -> bool:
         """Tell the world what has come; return whether it was an answer to this tick's observation."""
-        if arrival.payload is None:
-            self._world.crash(arrival.node, "process ended")
+        node, payload = arrival
+        if payload is None:
+            self._world.crash(node, "process ended")
             return False
         try:
-            self._world.accept(arrival.node, arrival.payload)
+            self._world.accept(node, payload)
         except ProtocolError:
             return False  # counted by the world
         return True

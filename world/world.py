@@ -7,8 +7,8 @@ when to advance: the lock-step driver when all have answered, the real-time driv
 The world is deterministic: its state after a tick is a function of the scenario, the seed and the accepted answers.
 """
 
-from collections.abc import Sequence
-from itertools import repeat
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,6 +46,8 @@ from zwerm.world.wakes import SIGNATURES, Wakes
 
 if TYPE_CHECKING:
     from zwerm.world.recording import Recording
+
+Send = Callable[[int, bytes], object]
 
 
 class World:
@@ -128,8 +130,11 @@ class World:
                 del self._deadman_at[node]
         return orders
 
-    def observe(self) -> tuple[list[int], list[bytes]]:
-        """Sense, and return the ids of the nodes that are awake, ascending, with each one's encoded observation."""
+    def observe(self, send: Send | None = None) -> tuple[list[int], list[bytes]]:
+        """Sense, and return the ids of the nodes that are awake, ascending, with each one's encoded observation.
+
+        With `send` each node's is sent as soon as it is encoded: the first work on it while the others' are made.
+        """
         scene, tick = self.scene, self.tick
         receivers = self.medium.arrive(tick)
         if self._wakes.sleeping:
@@ -146,13 +151,16 @@ class World:
         inboxes: Any = self.medium.deliver(nodes, tick) if receivers else repeat(())
         columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]
         ticks, times = repeat(tick, len(robots)), repeat(scene.time_s)
-        self._observations = list(map(encode, map(Observation, ticks, times, inboxes, *columns)))
+        made: Iterator[Observation] = map(Observation, ticks, times, inboxes, *columns)
         if len(robots) < len(nodes):
-            inbox = inboxes[-1] if receivers else ()
-            self._observations.append(encode(Observation(tick, scene.time_s, inbox)))
-        self._nodes = nodes
+            made = chain(made, (Observation(tick, scene.time_s, inboxes[-1] if receivers else ()),))
         self.answers.ask(nodes, tick)
         self.robot_ticks += len(nodes)
+        self._nodes, self._observations = nodes, []
+        for node, observation in zip(nodes, map(encode, made), strict=True):
+            self._observations.append(observation)
+            if send is not None:
+                send(node, observation)
         return nodes, self._observations
 
     def accept(self, node: int, payload: bytes) -> None:

@@ -18,14 +18,28 @@ class Trace:
 
     def __init__(self, scenario: bytes = b"") -> None:
         self._link = blake2b(scenario, digest_size=DIGEST_BYTES).digest()
+        self._newest: tuple[int, Sequence[int], Sequence[bytes], Sequence[bytes]] | None = None
 
     def extend(self, tick: int, nodes: Sequence[int], observations: Sequence[bytes], commands: Sequence[bytes]) -> None:
-        """Chain one tick; the three sequences are parallel and ordered by node id. A node that gave none has b""."""
+        """Chain one tick; the three sequences are parallel and ordered by node id. A node that gave none has b"".
+
+        They must not change afterwards: the work is put off until `catch_up`, or until it is needed.
+        """
+        self.catch_up()
+        self._newest = tick, nodes, observations, commands
+
+    def catch_up(self) -> None:
+        """Do the work that was put off: best while others work."""
+        if self._newest is None:
+            return
+        tick, nodes, observations, commands = self._newest
+        self._newest = None
         parts = [self._link, b"", *observations, *commands]
-        lengths = [len(part) for part in parts[2:]]
+        lengths = [*map(len, observations), *map(len, commands)]
         parts[1] = pack(f"<QQ{len(nodes)}Q{len(lengths)}I", tick, len(nodes), *nodes, *lengths)
         self._link = blake2b(b"".join(parts), digest_size=DIGEST_BYTES).digest()
 
     def hex(self) -> str:
         """Return the newest link of the chain."""
+        self.catch_up()
         return self._link.hex()

@@ -24,8 +24,8 @@ class WorldLink(Protocol):
     def receive(self, timeout_s: float) -> Arrival | None:
         """Return the next arrival, or None after `timeout_s` seconds without one."""
 
-    def gather(self, count: int, timeout_s: float) -> None:
-        """Wait until `count` arrivals can be received at once, or one that is a loss, or `timeout_s` seconds have passed."""
+    def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
+        """Return all that has arrived, as soon as there are `count`, or a loss, or after `timeout_s` seconds."""
 
     def close(self) -> None:
         """Release all that the link holds; idempotent."""

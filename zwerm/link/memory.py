@@ -30,8 +30,11 @@ class MemoryLink:
         """Return the next answer, or None at once: nothing can come later than it was asked for."""
         return self._arrivals.popleft() if self._arrivals else None
 
-    def gather(self, count: int, timeout_s: float) -> None:
-        """Return at once: all that will come is there."""
+    def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
+        """Return all answers, at once: nothing can come later than it was asked for."""
+        arrivals = list(self._arrivals)
+        self._arrivals.clear()
+        return arrivals
 
     def close(self) -> None:
         """Forget what has not been received."""

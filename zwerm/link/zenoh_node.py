@@ -49,7 +49,9 @@ class ZenohNodeLink:
         self._deadline_s = time.monotonic() + deadline_s
         self._inbox: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._deliver: Callable[[bytes], object] = self._inbox.put
+        self._take: Callable[[bytes], object] = self._take_with_care
         self._delivering = threading.Lock()
+        self._listening = False
         self._on_lost = on_lost
         self._session = open_session(
             {
@@ -104,6 +106,7 @@ class ZenohNodeLink:
             while (payload := self.receive(0)) is not None:
                 deliver(payload)
             self._deliver = deliver
+            self._listening = True
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the next message from the world, or None after `timeout_s` seconds without one."""
@@ -139,9 +142,15 @@ class ZenohNodeLink:
         return welcome
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
+        self._take(sample.payload.to_bytes())
+
+    def _take_with_care(self, payload: bytes) -> None:
+        """Take a message while it may not be settled who listens; after that there are no detours."""
         keep_thread()
         with self._delivering:
-            self._deliver(sample.payload.to_bytes())
+            self._deliver(payload)
+            if self._listening:
+                self._take = self._deliver
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         if event.kind == zenoh.SampleKind.DELETE and self._on_lost is not None:

@@ -92,29 +92,18 @@ class ZenohWorldLink:
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """Return the next arrival, or None after `timeout_s` seconds without one. Raises LinkError once closed."""
-        if self._closed:
-            raise LinkError("the world's link is closed")
-        if not self._arrivals:
-            self.gather(1, timeout_s)
+        self._wait(1, timeout_s)
         if not self._arrivals:
             return None
-        arrival = self._arrivals.popleft()
-        if arrival.payload is None or len(self._arrivals) == CAPACITY - 1:
-            with self._changed:
-                self._losses -= arrival.payload is None
-                self._changed.notify_all()
-        return arrival
+        return self._taken(1)[0]
 
-    def gather(self, count: int, timeout_s: float) -> None:
-        """Wait until `count` arrivals can be received at once, or one that is a loss, or `timeout_s` seconds have passed."""
-        if timeout_s <= 0:
-            return
-        with self._changed:
-            self._wanted = min(count, CAPACITY)
-            self._changed.wait_for(
-                lambda: len(self._arrivals) >= self._wanted or self._losses or self._closed, timeout_s
-            )
-            self._wanted = CAPACITY
+    def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
+        """Return all that has arrived, as soon as there are `count`, or a loss, or after `timeout_s` seconds.
+
+        Raises LinkError once closed.
+        """
+        self._wait(count, timeout_s)
+        return self._taken(len(self._arrivals))
 
     def dismiss(self, reason: str) -> None:
         """Tell every joined node that its life is over; their leaving is no loss and is not reported."""
@@ -132,6 +121,27 @@ class ZenohWorldLink:
             self._closed = True
             self._changed.notify_all()
         self._session.close()  # type: ignore[no-untyped-call]
+
+    def _wait(self, count: int, timeout_s: float) -> None:
+        if self._closed:
+            raise LinkError("the world's link is closed")
+        if len(self._arrivals) >= count or timeout_s <= 0:
+            return
+        with self._changed:
+            self._wanted = min(count, CAPACITY)
+            self._changed.wait_for(
+                lambda: len(self._arrivals) >= self._wanted or self._losses or self._closed, timeout_s
+            )
+            self._wanted = CAPACITY
+
+    def _taken(self, count: int) -> list[Arrival]:
+        full = len(self._arrivals) >= CAPACITY
+        arrivals = [self._arrivals.popleft() for _ in range(count)]
+        if full or self._losses:
+            with self._changed:
+                self._losses -= sum(arrival.payload is None for arrival in arrivals)
+                self._changed.notify_all()
+        return arrivals
 
     def _publisher(self, key: str) -> zenoh.Publisher:
         return self._session.declare_publisher(
