@@ -12,6 +12,7 @@ Draws are keyed by (fault, tick, robot, item): readings of other robots, and oth
 
 import dataclasses
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Any, ClassVar, Final
 
@@ -68,7 +69,7 @@ class CameraBlackoutTable(FaultTable):
     robots: Robots
 
 
-class SensingFault:
+class SensingFault(ABC):
     """One fault of sensors. `fields` are those it touches."""
 
     fields: ClassVar[Sequence[str]] = ()
@@ -81,16 +82,25 @@ class SensingFault:
         self._hit: Bools = np.zeros(count, dtype=np.bool_)
         self._hit[range(count) if table.robots is None else table.robots] = True
 
+    @abstractmethod
     def alter(self, field: str, readings: list[Any], scene: Scene, robots: Ints) -> None:
         """Change the readings, one for each of `robots`, in place."""
+
+
+class _OfEach(SensingFault):
+    """A fault of the robots that are hit, each by itself."""
+
+    def alter(self, field: str, readings: list[Any], scene: Scene, robots: Ints) -> None:
+        """Change the readings of those that are hit."""
         for row in np.flatnonzero(self._hit[robots]).tolist():
             readings[row] = self._altered(field, readings[row], scene, int(robots[row]))
 
+    @abstractmethod
     def _altered(self, field: str, reading: Any, scene: Scene, robot: int) -> Any:
-        raise NotImplementedError
+        """Return what a robot that is hit reads in place of `reading`."""
 
 
-class CameraBlackout(SensingFault):
+class CameraBlackout(_OfEach):
     """Nothing is seen."""
 
     fields = tuple(SEEING)
@@ -115,7 +125,7 @@ class DeadBeacon(SensingFault):
             readings[row] = tuple([item for item in reading if not self._hit[item.node]])
 
 
-class StuckTouch(SensingFault):
+class StuckTouch(_OfEach):
     """A switch is always closed, or never."""
 
     fields = ("touch",)
@@ -132,7 +142,7 @@ class StuckTouch(SensingFault):
         return tuple([contact for contact in self._contacts if contact.bearing_rad in closed])
 
 
-class SensorNoise(SensingFault):
+class SensorNoise(_OfEach):
     """Numbers are off, items are missed, and some are imagined."""
 
     def __init__(self, table: SensorNoiseTable, scenario: Scenario, purpose: str) -> None:
@@ -222,7 +232,7 @@ def _shifted(value: Any, offsets: Iterator[float], angle: bool = False) -> Any:
     return tuple([_shifted(part, offsets) for part in value]) if isinstance(value, tuple) else value
 
 
-KINDS: Final[dict[type[FaultTable], type[SensingFault]]] = {
+KINDS: Final[dict[type[FaultTable], Callable[[Any, Scenario, str], SensingFault]]] = {
     SensorNoiseTable: SensorNoise,
     StuckTouchTable: StuckTouch,
     DeadBeaconTable: DeadBeacon,
