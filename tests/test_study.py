@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import pytest
 from PIL import Image
 from scipy import stats
+from support import until
 
 from zwerm.errors import ScenarioError
 from zwerm.running import run
@@ -526,22 +526,23 @@ def start(tmp_path: Path, *arguments: str) -> "subprocess.Popen[str]":
 
 def assert_nothing_remains(group: int) -> None:
     """Wait until the process group is empty."""
-    deadline = time.monotonic() + DEADLINE_S
-    while time.monotonic() < deadline:
+
+    def empty() -> bool:
         try:
             os.killpg(group, 0)
         except ProcessLookupError:
-            return
-        time.sleep(0.02)
-    os.killpg(group, signal.SIGKILL)
-    raise AssertionError("processes remain")
+            return True
+        return False
+
+    try:
+        until(empty, "nothing left", DEADLINE_S)
+    except AssertionError:
+        os.killpg(group, signal.SIGKILL)
+        raise
 
 
 def wait_for_rows(journal: Path) -> None:
-    deadline = time.monotonic() + DEADLINE_S
-    while not (journal.exists() and journal.read_bytes().count(b"\n") >= 2):
-        assert time.monotonic() < deadline, "no rows came"
-        time.sleep(0.02)
+    until(lambda: journal.exists() and journal.read_bytes().count(b"\n") >= 2, "rows", DEADLINE_S)
 
 
 def test_ctrl_c_keeps_what_is_done_and_leaves_no_process(write: Callable[..., Study], tmp_path: Path) -> None:
