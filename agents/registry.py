@@ -1,12 +1,12 @@
 """Controllers by name: the built-in table, and `module:Class` for anyone else's."""
 
-import importlib
 from typing import Any, Final
 
 import msgspec
 
 from zwerm.agents.contract import NoParameters, Setup, Stepper
 from zwerm.errors import ControllerError
+from zwerm.naming import class_named
 
 BUILT_IN: Final = {
     "beacon": "zwerm.agents.gossip:Beacon",
@@ -26,18 +26,10 @@ def find(name: str) -> type[Any]:
 
     Raises ControllerError, in one line, where there is none or it has no `step`.
     """
-    path = BUILT_IN.get(name, name)
-    module_name, _, class_name = path.partition(":")
-    if not class_name:
-        known = ", ".join(sorted(BUILT_IN))
-        raise ControllerError(f"expected a built-in controller ({known}) or module:Class, got {name!r}")
     try:
-        module = importlib.import_module(module_name)
-    except ImportError as error:
-        raise ControllerError(f"cannot import {module_name!r}: {error}") from error
-    found = getattr(module, class_name, None)
-    if not isinstance(found, type):
-        raise ControllerError(f"module {module_name!r} has no class {class_name!r}")
+        found = class_named(BUILT_IN.get(name, name), "controller", sorted(BUILT_IN))
+    except ValueError as error:
+        raise ControllerError(str(error)) from error
     if not callable(getattr(found, "step", None)):
         raise ControllerError(f"{name}: a controller needs a method step(observation) -> Command")
     return found

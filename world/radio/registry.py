@@ -4,7 +4,6 @@ A channel's shorthands and its `models` tables go in; models in the order of the
 tables at once. The shorthands come first: range, line of sight, loss.
 """
 
-import importlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Final
@@ -14,6 +13,7 @@ from pydantic import ValidationError
 
 from zwerm.draws import Draws
 from zwerm.errors import ScenarioError
+from zwerm.naming import class_named
 from zwerm.scenario import ChannelTable, OpenTable, Scenario, mistakes
 from zwerm.world.arena import Arena
 from zwerm.world.radio import ROBOTS, Air, LinkModel, LinkTable, NodeName, Packets, Place, Verdict
@@ -79,15 +79,8 @@ def find(kind: str) -> type[LinkModel]:
     """Return the model class that `kind` names. Raises ValueError, in one line, where there is none."""
     if kind in BUILT_IN:
         return BUILT_IN[kind]
-    module_name, _, class_name = kind.partition(":")
-    if not module_name or not class_name:
-        raise ValueError(f"expected a built-in model ({', '.join(BUILT_IN)}) or module:Class, got {kind!r}")
-    try:
-        module = importlib.import_module(module_name)
-    except ImportError as error:
-        raise ValueError(f"cannot import {module_name!r}: {error}") from None
-    found: Any = getattr(module, class_name, None)
-    if not isinstance(found, type) or not callable(getattr(found, "judge", None)):
+    found = class_named(kind, "model", BUILT_IN)
+    if not callable(getattr(found, "judge", None)):
         raise ValueError(f"{kind} is no model: expected a class with a method judge(air, packets)")
     return found
 

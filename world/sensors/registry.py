@@ -4,14 +4,14 @@ A scenario's `[[robots.sensors]]` tables go in, sensors that fill different fiel
 mistake in the tables at once.
 """
 
-import importlib
 import inspect
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 from pydantic import ValidationError
 
 from zwerm.errors import ScenarioError
+from zwerm.naming import class_named
 from zwerm.protocol import SENSOR_FIELDS, Observation
 from zwerm.scenario import OpenTable, Table, mistakes
 from zwerm.world.sensors import Sensor, Surroundings
@@ -51,16 +51,7 @@ def find(kind: str) -> type[Sensor]:
     """
     if kind in BUILT_IN:
         return BUILT_IN[kind]
-    module_name, _, class_name = kind.partition(":")
-    if not module_name or not class_name:
-        raise ValueError(f"expected a built-in sensor ({', '.join(BUILT_IN)}) or module:Class, got {kind!r}")
-    try:
-        module = importlib.import_module(module_name)
-    except ImportError as error:
-        raise ValueError(f"cannot import {module_name!r}: {error}") from None
-    found: Any = getattr(module, class_name, None)
-    if not isinstance(found, type):
-        raise ValueError(f"module {module_name!r} has no class {class_name!r}")
+    found = class_named(kind, "sensor", BUILT_IN)
     if not callable(getattr(found, "read", None)):
         raise ValueError(f"{kind} is no sensor: it has no method read(scene, robots)")
     name = getattr(found, "field", None)
