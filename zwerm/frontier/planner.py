@@ -18,7 +18,7 @@ from zwerm.frontier.tried import Tried
 from zwerm.simplicial import Edge, FlagComplex, edge
 
 # Which ways a robot with a wide gap in what it sees may go, off the middle of the gap, and how far beside its neighbours.
-VERTEX_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 60, -60))
+VERTEX_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 60, -60, 30, -30))
 # The same for the end of a single file, which has but this chance; it is told by a gap wider than END_RAD.
 END_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 30, -30, 60, -60, 90, -90))
 END_RAD: Final = math.radians(285.0)
@@ -161,10 +161,7 @@ class Planner:
                 key = (i, a, 0, round(math.degrees(turn)))
                 if gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD or key in self.tried.closed or self._walled(i, direction):
                     continue
-                if any(
-                    _apart(each, direction) < (BLOCKED_RAD if end else SIXTY_RAD / 2.0)
-                    for each in self.tried.blocked.get(i, ())
-                ):
+                if any(_apart(each, direction) < BLOCKED_RAD for each in self.tried.blocked.get(i, ())):
                     continue
                 yield Plan(key, i, direction, hop, self._rules.clear_vertex_m, (i,))
 
