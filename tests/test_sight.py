@@ -11,7 +11,7 @@ from zwerm.result import RunResult
 from zwerm.running import run
 from zwerm.scenario import ArenaTable
 from zwerm.world.arena import Arena
-from zwerm.world.sight import hexagonal_packing_robots, holes, obstacles, sight_coverage_fraction
+from zwerm.world.sight import hexagonal_packing_robots, holes, obstacles, reachable, sight_coverage_fraction
 from zwerm.world.stages import stages
 
 
@@ -28,6 +28,32 @@ def test_what_is_behind_a_wall_is_not_covered() -> None:
     hall = arena(size_m=[2.0, 2.0], walls=[[[1.0, 0.0], [1.0, 2.0]]])
     assert sight_coverage_fraction(np.array([[0.5, 1.0]]), 9.0, hall) == pytest.approx(0.5, abs=1e-6)
     assert sight_coverage_fraction(np.array([[0.5, 1.0], [1.5, 1.0]]), 9.0, hall) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_what_lies_behind_a_crack_that_no_body_passes_cannot_be_reached_and_corners_can() -> None:
+    """A room of 2 x 2 m, and beyond a crack another of 1 x 2 m; the way there is 0.1 m wide and 0.5 m long."""
+    rooms = arena(
+        polygon=[
+            [0, 0],
+            [2, 0],
+            [2, 0.95],
+            [2.5, 0.95],
+            [2.5, 0],
+            [3.5, 0],
+            [3.5, 2],
+            [2.5, 2],
+            [2.5, 1.05],
+            [2, 1.05],
+            [2, 2],
+            [0, 2],
+        ]
+    )
+    here = np.array([[1.0, 1.0]])
+    assert reachable(rooms, 0.07, here).area == pytest.approx(4.0, abs=0.005)
+    assert reachable(rooms, 0.04, here).area == pytest.approx(rooms.area_m2, abs=0.005)
+    assert reachable(rooms, 0.07, np.array([[1.0, 1.0], [3.0, 1.0]])).area == pytest.approx(6.0, abs=0.01)
+    cut = arena(size_m=[2.0, 2.0], walls=[[[1.0, 0.0], [1.0, 2.0]]])
+    assert reachable(cut, 0.07, np.array([[0.5, 1.0]])).area == pytest.approx(2.0, abs=0.005)
 
 
 def test_the_shadow_of_an_obstacle_is_that_of_a_lamp() -> None:

@@ -8,7 +8,7 @@ import shapely
 from zwerm.scenario import MetricsTable
 from zwerm.world.arena import Arena
 from zwerm.world.scene import Floats, Ints
-from zwerm.world.sight import hexagonal_packing_robots, holes, living, obstacles, sight_coverage_fraction
+from zwerm.world.sight import Sight, hexagonal_packing_robots, holes, living, obstacles, reachable
 from zwerm.world.visibility import Visibility
 
 if TYPE_CHECKING:  # the world's faults wait for metrics
@@ -67,13 +67,25 @@ def _told(world: "World") -> dict[str, float]:
     return found
 
 
+def _covered(world: "World", position: Floats, range_m: float) -> dict[str, float]:
+    """Return the fractions in sight of the free space, and of what of it robots can get into."""
+    if not len(position):
+        return {"coverage_fraction": 0.0, "reachable_coverage_fraction": 0.0}
+    seen = Sight(world.arena, range_m).area(position)
+    inside = reachable(world.arena, world.scene.radius_m, position)
+    return {
+        "coverage_fraction": min(1.0, float(seen.area / world.arena.area_m2)),
+        "reachable_coverage_fraction": min(1.0, float(shapely.intersection(seen, inside).area / inside.area)),
+    }
+
+
 def _sight(world: "World", range_m: float) -> dict[str, float]:
     """Return how well the living robots cover the arena by sight, and how that compares with the ideal packing."""
     scene = world.scene
     robots = living(scene.present_ids(), world.dead)
     ideal = hexagonal_packing_robots(world.arena, range_m)
     return {
-        "coverage_fraction": sight_coverage_fraction(scene.position[robots], range_m, world.arena),
+        **_covered(world, scene.position[robots], range_m),
         "robots_deployed": float(len(robots)),
         "hexagonal_packing_robots": ideal,
         "robots_over_hexagonal": len(robots) / ideal,

@@ -19,6 +19,8 @@ from zwerm.world.scene import Floats, Ints
 _QUARTER_SIDES = 64
 # A wall's shadow is cut into pieces that span at most this much of the view [rad].
 _PIECE_RAD = 0.5
+# Bodies in contact may overlap a wall by a little.
+_INSIDE = 0.98
 
 
 def hexagonal_packing_robots(arena: Arena, range_m: float) -> float:
@@ -49,6 +51,19 @@ class Sight:
 def sight_coverage_fraction(position: Floats, range_m: float, arena: Arena) -> float:
     """Return the fraction of the arena that is within `range_m` and in sight of a robot at one of position (n, 2)."""
     return Sight(arena, range_m).fraction(position)
+
+
+def reachable(arena: Arena, radius_m: float, position: Floats) -> shapely.Geometry:
+    """Return the part of the free space that bodies of a radius can get into from any of position (n, 2).
+
+    What lies behind a crack that no body passes is not in it; corners are, though a round body does not fill them.
+    """
+    inner = shapely.buffer(arena.free, -_INSIDE * radius_m)
+    if arena.walls:
+        inner = shapely.difference(inner, shapely.buffer(shapely.union_all(list(arena.walls)), _INSIDE * radius_m))
+    parts = [each for each in shapely.get_parts(inner) if shapely.dwithin(each, shapely.multipoints(position), 1e-3)]
+    grown = shapely.buffer(shapely.union_all(parts), _INSIDE * radius_m, join_style="mitre")
+    return shapely.intersection(grown, arena.free)
 
 
 def seen_from(place: Floats, range_m: float, arena: Arena) -> shapely.Geometry:
