@@ -4,6 +4,7 @@ import math
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,7 +24,7 @@ from zwerm.world.pictures import RunView, animate_run, draw_run
 from zwerm.world.sight import Sight
 from zwerm.world.simplices import FRONTIER, OBSTACLE, PUSH, Simplices
 from zwerm.world.simplices import TRIANGLE as FILL
-from zwerm.world.stages import Stage, stages
+from zwerm.world.stages import Stage, stages, true_stage
 from zwerm.world.told import Told
 
 RADIUS_M = 0.1
@@ -215,6 +216,22 @@ def test_the_complex_shows_triangles_frontier_obstacle_and_the_push() -> None:
     assert last.at(1.25, 0.9) == tuple(round(255 * each) for each in to_rgb(OBSTACLE))
     assert first.at(1.0, 0.5) == tuple(round(255 * each) for each in to_rgb(PUSH))
     assert shown(view, None).at(1.0, 0.8) == WHITE
+
+
+def test_a_swarm_that_tells_of_no_complex_is_shown_with_the_true_one(tmp_path: Path) -> None:
+    # Robot 1 is behind the wall without thickness, robot 4 is out of range, robot 5 dead.
+    places = np.array([(1.9, 0.5), (2.1, 0.5), (1.5, 0.5), (1.7, 0.9), (0.3, 1.8), (1.8, 0.6)])
+    standing = np.array([True, True, True, True, True, False])
+    stage = true_stage(0.0, places, standing, ARENA, 1.0)
+    assert sorted(map(sorted, stage.edges.tolist())) == [[0, 2], [0, 3], [2, 3]]
+    assert stage.triangles.tolist() == [[0, 2, 3]]
+    assert len(true_stage(0.0, places, np.eye(6, dtype=bool)[0], ARENA, 1.0).edges) == 0
+    told = deployment()
+    untold = replace(told, told=())
+    assert untold.deployed
+    assert not replace(untold, bases=0).deployed
+    pictures = [draw_run(tmp_path / f"{name}.png", view) for name, view in (("told", told), ("untold", untold))]
+    assert len({path.read_bytes() for path in pictures}) == 2
 
 
 def test_several_paths_are_all_shown() -> None:

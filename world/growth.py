@@ -39,7 +39,7 @@ def growth(series: Mapping[str, Sequence[float]], stages: Sequence[Stage], ideal
     time_s, fraction, robots = (np.array(series[name]) for name in ("time_s", "coverage_fraction", "robots_deployed"))
     if not stages:
         return Growth(time_s, time_s, "time [s]", fraction, robots, ideal)
-    cycle = np.interp(time_s, [each.time_s for each in stages], [each.cycle for each in stages], left=0.0)
+    cycle = np.interp(time_s, [each.time_s for each in stages], [each.cycle or 0 for each in stages], left=0.0)
     return Growth(time_s, cycle, "deployment cycle", fraction, robots, ideal)
 
 

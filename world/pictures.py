@@ -23,7 +23,7 @@ from zwerm.errors import PictureError
 from zwerm.world.arena import Arena
 from zwerm.world.history import History, Tracks
 from zwerm.world.sight import Sight, hexagonal_packing_robots
-from zwerm.world.stages import Stage, stages
+from zwerm.world.stages import Stage, stages, true_stage
 from zwerm.world.told import Told
 
 try:
@@ -82,6 +82,11 @@ class RunView:
         """The stages of the deployment, if it is one that told of them."""
         return stages(self.told)
 
+    @property
+    def deployed(self) -> bool:
+        """Whether there is a complex to show: the one that was told of, or the true one of a swarm from base stations."""
+        return bool(self.stages) or (self.bases > 0 and self.sight_range_m is not None)
+
     @cached_property
     def growth(self) -> Growth | None:
         """How the arena was filled, if that was looked at."""
@@ -112,13 +117,13 @@ def draw_run(
     `metrics` are to be written above. Raises PictureError where the file cannot be written, or the moment is not of the run.
     """
     _make_room(path, (".png", ".pdf", ".svg"))
-    stage = _stage_at(view, cycle, at_s)
-    tracks = _until(view.history.arrays(), stage if cycle is not None else None, at_s)
+    tracks = _until(view.history.arrays(), None if cycle is None else view.stage(cycle), at_s)
+    stage = _stage_at(view, tracks, -1, None if cycle is None and at_s is None else float(tracks.time_s[-1]))
     at_end = cycle is None and at_s is None
     title = view.title if at_end else f"{view.name}: at {float(tracks.time_s[-1]):g} s"
     text = _in_words(metrics or {}) if at_end else _moment_in_words(view, tracks, -1, stage)
     swarm_entries = 3 + len(gone_at_the_end(tracks)) + (view.coverage_radius_m is not None) + (view.cells is not None)
-    entries = (LEGEND_ENTRIES_OF_STAGES + 4) if view.stages else swarm_entries
+    entries = (LEGEND_ENTRIES_OF_STAGES + 4) if view.deployed else swarm_entries
     sheet = Sheet(view.arena, title, text, entries, with_plot=view.growth is not None)
     swarm, simplices = _compose(sheet, view, tracks, names=True)
     swarm.show_ends()
@@ -129,7 +134,7 @@ def draw_run(
         mark = draw_growth(sheet.plot, view.growth)
         mark.set_xdata([view.growth.at(float(tracks.time_s[-1]))[0]])
         mark.set_visible(not at_end)
-    sheet.draw_legend([*swarm.legend(), *(simplices.legend() if simplices else [])])
+    sheet.draw_legend([*swarm.legend(), *(simplices.legend(bool(view.stages)) if simplices else [])])
     try:
         sheet.figure.savefig(path)
     except OSError as error:
@@ -150,14 +155,14 @@ def animate_run(
         raise PictureError(f"{path}: an .mp4 needs ffmpeg, which is not installed; choose a .gif")
     tracks = view.history.arrays()
     start_s, end_s = float(tracks.time_s[0]), float(tracks.time_s[-1])
-    speed_up = speed_up or max(1.0, (end_s - start_s) / (DEPLOYMENT_S if view.stages else ANIMATION_S))
+    speed_up = speed_up or max(1.0, (end_s - start_s) / (DEPLOYMENT_S if view.deployed else ANIMATION_S))
     moments = np.append(np.arange(start_s, end_s, speed_up / fps), end_s)
-    entries = (LEGEND_ENTRIES_OF_STAGES + 4) if view.stages else 4
+    entries = (LEGEND_ENTRIES_OF_STAGES + 4) if view.deployed else 4
     sheet = Sheet(
         view.arena, view.title, "", entries, view.growth is not None, arena_inches=ANIMATION_INCHES, dpi=ANIMATION_DPI
     )
     swarm, simplices = _compose(sheet, view, tracks)
-    sheet.draw_legend([*swarm.legend(moving=True), *(simplices.legend() if simplices else [])])
+    sheet.draw_legend([*swarm.legend(moving=True), *(simplices.legend(bool(view.stages)) if simplices else [])])
     moving = [*swarm.artists, *(simplices.artists if simplices else [])]
     mark = draw_growth(sheet.plot, view.growth) if view.growth is not None and sheet.plot is not None else None
     if mark is not None:
@@ -170,7 +175,7 @@ def animate_run(
         for done, moment_s in enumerate(moments, start=1):
             index = int(np.searchsorted(tracks.time_s, moment_s + 1e-9, side="right")) - 1
             swarm.show(index, since=int(np.searchsorted(tracks.time_s, moment_s - tail_s)))
-            stage = _stage_at(view, None, moment_s)
+            stage = _stage_at(view, tracks, index, moment_s)
             if simplices is not None:
                 simplices.show(stage)
             if mark is not None and view.growth is not None:
@@ -190,8 +195,8 @@ def animate_run(
 
 
 def _compose(sheet: Sheet, view: RunView, tracks: Tracks, names: bool = False) -> tuple[Swarm, Simplices | None]:
-    """Put the swarm on the sheet, over its simplicial complex if it told of one."""
-    simplices = Simplices(sheet, names) if view.stages else None
+    """Put the swarm on the sheet, over its simplicial complex if there is one to show."""
+    simplices = Simplices(sheet, names, view.radius_m) if view.deployed else None
     sight = None if view.sight_range_m is None else Sight(view.arena, view.sight_range_m)
     swarm = Swarm(
         sheet,
@@ -202,15 +207,19 @@ def _compose(sheet: Sheet, view: RunView, tracks: Tracks, names: bool = False) -
         view.cells,
         sight,
         view.bases,
-        bool(view.stages),
+        view.deployed,
     )
     return swarm, simplices
 
 
-def _stage_at(view: RunView, cycle: int | None, at_s: float | None) -> Stage | None:
-    """Return the stage of a cycle, or the last one by a time; of all where neither is given."""
-    if cycle is not None:
-        return view.stage(cycle)
+def _stage_at(view: RunView, tracks: Tracks, index: int, at_s: float | None) -> Stage | None:
+    """Return the last stage by a time, or of all; where none was told of, the true complex at a sample of the tracks."""
+    if not view.stages:
+        if not view.deployed or view.sight_range_m is None:
+            return None
+        standing = tracks.present[index] & ~tracks.dead[index]
+        time_s = float(tracks.time_s[index])
+        return true_stage(time_s, tracks.position[index], standing, view.arena, view.sight_range_m)
     until = [each for each in view.stages if at_s is None or each.time_s <= at_s + 1e-9]
     return until[-1] if until else None
 
@@ -276,7 +285,7 @@ def _make_room(path: Path, suffixes: tuple[str, ...]) -> None:
 def _moment_in_words(view: RunView, tracks: Tracks, index: int, stage: Stage | None) -> str:
     """Return what may be said of a moment: its cycle, how many robots there are, and how much they have in sight."""
     robots = int((tracks.present & ~tracks.dead)[index].sum())
-    words = [f"cycle {stage.cycle}"] if stage is not None else []
+    words = [f"cycle {stage.cycle}"] if stage is not None and stage.cycle is not None else []
     words.append(f"{robots} robot{'' if robots == 1 else 's'}")
     if view.growth is not None:
         words.append(f"{100.0 * view.growth.at(float(tracks.time_s[index]))[1]:.1f} % in sight")

@@ -27,11 +27,12 @@ NO_LINES: Final = np.zeros((0, 2, 2))
 
 
 class Simplices:
-    """The complex on a sheet; `names` writes the robots' ids beside them."""
+    """The complex on a sheet; `names` writes the robots' ids beside them, off bodies of `radius_m`."""
 
-    def __init__(self, sheet: Sheet, names: bool = False) -> None:
+    def __init__(self, sheet: Sheet, names: bool = False, radius_m: float = 0.0) -> None:
         self._axes = sheet.axes
         self._names = names
+        self._beside = 0.7 * radius_m * sheet.inches_per_m * 72.0 + 1.0
         self._arrow_m = ARROW_POINTS / 72.0 / sheet.inches_per_m
         self._triangles = PolyCollection([], **TRIANGLE, linewidths=0, zorder=1.2)
         self._heads = PolyCollection([], facecolors=PUSH, edgecolors="none", zorder=3.7)
@@ -69,11 +70,16 @@ class Simplices:
             else []
         )
 
-    def legend(self) -> list[Line2D | Patch]:
-        """Return the legend's entries for all that may be shown."""
-        return [
+    def legend(self, told: bool = True) -> list[Line2D | Patch]:
+        """Return the legend's entries for all that may be shown: of what was `told`, or of the truth."""
+        entries: list[Line2D | Patch] = [
             Patch(**TRIANGLE, label="three robots that see each other"),
             Line2D([], [], color=EDGE, linewidth=0.8, label="two that see each other"),
+        ]
+        if not told:
+            return entries
+        return [
+            *entries,
             Line2D([], [], color=FRONTIER, linewidth=2.8, label="frontier: there is a way on"),
             Line2D([], [], color=OBSTACLE, linewidth=2.4, label="obstacle: a wall is beyond"),
             Line2D(
@@ -86,7 +92,7 @@ class Simplices:
             str(robot),
             (place[0], place[1]),
             textcoords="offset points",
-            xytext=(4, 3),
+            xytext=(self._beside, self._beside),
             fontsize=6.5,
             color=QUIET,
             zorder=6,

@@ -1,4 +1,4 @@
-"""The stages of a deployment: a swarm's simplicial complex as it was told, cycle by cycle, for pictures.
+"""The stages of a deployment: a swarm's simplicial complex as it was told, cycle by cycle, or as it truly is; for pictures.
 
 What is told is for those who watch (see `Command.told`): `complex` is a table with the `cycle`, and by ids of robots the
 `edges`, those among them that are `frontier` or `obstacle`, and the `path` to push along or several `paths`.
@@ -8,16 +8,18 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from zwerm.simplicial import FlagComplex
+from zwerm.world.arena import Arena
 from zwerm.world.scene import Bools, Floats, Ints
 from zwerm.world.told import Told
 
 
 class Stage(NamedTuple):
-    """The complex at one cycle, and where the robots stood then."""
+    """The complex at one cycle, and where the robots stood then. The true one belongs to no cycle."""
 
-    cycle: int
+    cycle: int | None
     time_s: float
     position: Floats  # (n, 2) [m]
     present: Bools  # (n,)
@@ -39,6 +41,18 @@ class Stage(NamedTuple):
 def stages(told: Sequence[Told]) -> list[Stage]:
     """Return the stages that were told of, in order."""
     return [_stage(each, each.told["complex"]) for each in told if "complex" in each.told]
+
+
+def true_stage(time_s: float, position: Floats, standing: Bools, arena: Arena, range_m: float) -> Stage:
+    """Return the complex of the robots `standing` (n,) at position (n, 2) that see each other within a range [m].
+
+    What they would take for frontier, and where they push, the truth does not tell.
+    """
+    robots = np.flatnonzero(standing)
+    pairs = robots[cKDTree(position[robots]).query_pairs(range_m, output_type="ndarray")].reshape(-1, 2)
+    edges = pairs[~arena.blocked(position[pairs[:, 0]], position[pairs[:, 1]])]
+    none = np.zeros((0, 2), dtype=np.int64)
+    return Stage(None, time_s, position, standing, edges, none, none, ())
 
 
 def _stage(moment: Told, told: dict[str, Any]) -> Stage:
