@@ -15,7 +15,7 @@ from zwerm.errors import PictureError, ScenarioError
 from zwerm.running import run
 from zwerm.statistics import Sample
 from zwerm.study.arguments import parse_sweep, parse_variant
-from zwerm.study.comparison import METRICS, Comparison, make_comparison
+from zwerm.study.comparison import METRICS, Comparison, _less, make_comparison
 from zwerm.study.comparison_pictures import check_figure, draw_comparison, label
 from zwerm.study.comparison_report import shown
 from zwerm.study.plan import make_points
@@ -224,6 +224,8 @@ def test_a_difference_is_of_pairs_and_has_students_interval(gossip: Path) -> Non
     low, high = stats.ttest_rel(ours[:3], theirs[:3]).confidence_interval(0.95)
     assert found.n == 3
     assert (found.mean - found.half_width, found.mean + found.half_width) == pytest.approx((low, high))
+    # Rounding is no difference: its interval would be as narrow as it is, and leave out zero.
+    assert _less(0.1 + 0.2, 0.3) == 0.0
     # The means are of all that have a value, pairs or not.
     assert comparison.sample(place.points[1], "cost").n == 4
 

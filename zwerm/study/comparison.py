@@ -98,6 +98,9 @@ class Comparison:
         self.metrics = [name for name in self.study.table.metrics if name in told]
         if self.study.table.metrics == list(METRICS):
             self.metrics = [name for name in self.metrics if any(row.get(name) for row in rows)]
+            # In a deployment the base or the coordinator says that all is done, and not every robot for itself.
+            if "robots_deployed" in self.metrics and "robots_done_fraction" in self.metrics:
+                self.metrics.remove("robots_done_fraction")
 
     def values(self, point: Point, metric: str) -> dict[int, float]:
         """Return a metric of a point's runs by seed, of those that have one; every run is `completed` or not."""
@@ -112,7 +115,7 @@ class Comparison:
     def difference(self, place: Place, point: Point, metric: str) -> Sample:
         """Return what a metric of a point has over the first variant's there, seed by seed, condensed."""
         ours, theirs = self.values(point, metric), self.values(place.points[0], metric)
-        return condense([ours[seed] - theirs[seed] for seed in sorted(ours) if seed in theirs])
+        return condense([_less(ours[seed], theirs[seed]) for seed in sorted(ours) if seed in theirs])
 
     def outcomes(self, point: Point) -> Counter[str]:
         """Return how a point's runs ended, failed ones by their reason."""
@@ -121,6 +124,11 @@ class Comparison:
     def seeds(self, point: Point) -> list[int]:
         """Return the seeds that a point was run with."""
         return [row["seed"] for row in self.results.every_row(point)]
+
+
+def _less(one: float, other: float) -> float:
+    """Return one number less another; nothing where they differ by no more than the last digits of a computation."""
+    return 0.0 if math.isclose(one, other, rel_tol=1e-9) else one - other
 
 
 def _measured(row: Row, metric: str) -> bool:

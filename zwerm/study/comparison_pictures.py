@@ -105,7 +105,13 @@ def _draw(comparison: Comparison, places: Sequence[Place], metrics: Sequence[str
         handles, labels, loc="upper left", bbox_to_anchor=(0.0, top - 0.42 / size[1]), ncols=len(labels), frameon=False
     )
     if _some_missing(comparison, places, metrics):
-        figure.text(0.01, 0.08 / size[1], "Hollow: not every run came to a value.", va="bottom", fontsize=9)
+        figure.text(
+            0.01,
+            0.08 / size[1],
+            "Hollow or not there: not every run, or none, came to a value.",
+            va="bottom",
+            fontsize=9,
+        )
     return figure
 
 
@@ -130,7 +136,8 @@ def _draw_metric(above: "Axes", below: "Axes", comparison: Comparison, places: S
         _bars(above, shifted, [comparison.sample(point, metric) for point in points], whole, style)
         if number:
             differences = [comparison.difference(place, place.points[number], metric) for place in places]
-            _bars(below, shifted, differences, whole, style)
+            both = [_whole(comparison, place.points[0], metric) for place in places]
+            _bars(below, shifted, differences, [one and other for one, other in zip(whole, both, strict=True)], style)
     above.set_title(label(metric), fontsize=10)
     if metric.endswith("_fraction") or metric == COMPLETED:
         low, high = above.get_ylim()
