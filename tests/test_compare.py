@@ -268,6 +268,7 @@ def test_what_nothing_measured_or_all_as_zero_is_left_out_unless_it_was_asked_fo
         ((2, 0.98765, 0.1, 0.0123), "+0.9877 ± 0.0123"),
         ((2, 1234.5, 1.0, 6.0), "+1234 ± 6"),
         ((1, 12.345, math.nan, math.nan), "+12.35"),
+        ((2, -0.00001, 0.1, 0.0), "+0.0000 ± 0.0000"),
         ((0, math.nan, math.nan, math.nan), "-"),
     ],
 )

@@ -77,4 +77,5 @@ def shown(sample: Sample, signed: bool = False) -> str:
     size = max(abs(sample.mean), 0.0 if math.isnan(sample.half_width) else sample.half_width)
     digits = 4 if size < 1.0 else max(0, 3 - math.floor(math.log10(size)))
     half = "" if math.isnan(sample.half_width) else f" ± {sample.half_width:.{digits}f}"
-    return f"{sample.mean:{'+' if signed else ''}.{digits}f}{half}"
+    mean = round(sample.mean, digits) + 0.0  # no minus before a zero
+    return f"{mean:{'+' if signed else ''}.{digits}f}{half}"
