@@ -113,7 +113,14 @@ def _print_failures(console: Console, results: Results) -> None:
 
 def _ours(line: Line) -> list[str]:
     n, *numbers = line.sample.n, line.sample.mean, line.sample.half_width, line.sample.sd
-    return [str(n), *("-" if math.isnan(number) else f"{number:.4f}" for number in numbers)]
+    return [str(n), *map(_readable, numbers)]
+
+
+def _readable(number: float) -> str:
+    """Return four decimals, or three digits of what is too small for them."""
+    if math.isnan(number):
+        return "-"
+    return f"{number:.4f}" if number == 0.0 or abs(number) >= 0.01 else f"{number:.3g}"
 
 
 def _theirs(line: Line) -> list[str]:
