@@ -6,7 +6,8 @@ come and are moved by others whenever they can; time is a few ticks. A robot's s
 it is computed once.
 
 What cannot matter is left out: a denial does what giving up does, which robots do anyway; a grant only ever allows more, so it
-arrives at once (a robot need not use it); and a message that its receiver will ignore for ever is forgotten.
+arrives at once (a robot need not use it); what a list tells of wishes, messages tell that were sent too; and a message that
+its receiver will ignore for ever is forgotten.
 """
 
 from collections.abc import Iterator, Mapping
@@ -188,7 +189,10 @@ class Explorer:
             for receiver in self._graph(state)[node] if to is None else (to,):
                 if isinstance(message, Grant):
                     robots[receiver], _ = self._step(robots[receiver], state.now, None, "hear", node, message)
-                elif not isinstance(message, Deny):
+                    continue
+                if isinstance(message, Neighbours):
+                    message = Neighbours(message.version, message.listed)
+                if not isinstance(message, Deny):
                     letters |= 1 << self._letter(node, receiver, message)
         return state._replace(robots=tuple(robots), sent=letters)
 

@@ -1,6 +1,9 @@
 """Who may leave: the criterion against gudhi, and the locks one by one. All interleavings are in test_interleavings.py."""
 
+import importlib
+import sys
 from itertools import combinations
+from types import ModuleType
 
 import gudhi
 import msgspec
@@ -8,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import ROOT
 
 from zwerm.agents.sensor_coverage.redundancy import Ask, Deny, Grant, Message, Neighbours, Over, Redundancy, Sent
 
@@ -148,6 +152,27 @@ def test_an_ask_that_arrives_after_it_is_over_locks_nobody() -> None:
     assert not robots[1].locked(START_S)
 
 
+def test_who_asks_again_asks_those_that_have_not_granted() -> None:
+    robots = swarm(everyone(3))
+    ask = only(robots[0].ask(START_S))
+    robots[0].hear(2, only(robots[2].hear(0, ask, START_S)), START_S)
+    again = only(robots[0].ask(START_S + 1.0))
+    assert again == Ask(ask.number, tuple(each for each in ask.versions if each[0] == 1))
+    robots[0].hear(1, only(robots[1].hear(0, again, START_S + 1.0)), START_S + 1.0)
+    assert robots[0].may_leave(START_S + 1.0)
+    assert robots[0].ask(START_S + 1.0) == []
+
+
+def test_a_list_tells_that_a_wish_is_over_where_that_was_lost() -> None:
+    robots = swarm(everyone(2))
+    robots[1].hear(0, only(robots[0].ask(START_S)), START_S)
+    robots[1].hear(0, robots[0].tell(), START_S)
+    assert robots[1].locked(START_S)
+    robots[0].give_up()
+    robots[1].hear(0, robots[0].tell(), START_S)
+    assert not robots[1].locked(START_S)
+
+
 def test_a_lock_is_granted_to_nobody_else_until_it_ends() -> None:
     robots = swarm({0: [1], 1: [0, 2], 2: [1]})
     first, second = only(robots[0].ask(START_S)), only(robots[2].ask(START_S))
@@ -224,7 +249,34 @@ def test_a_robot_that_lost_its_memory_repeats_no_version_and_no_number() -> None
 
 
 @pytest.mark.parametrize(
-    "message", [Neighbours(3, (1, 2)), Neighbours(3, ()), Ask(7, ((1, 3), (2, 5))), Grant(7), Deny(7), Over(7)]
+    "message", [Neighbours(3, (1, 2), 4), Neighbours(3, ()), Ask(7, ((1, 3), (2, 5))), Grant(7), Deny(7), Over(7)]
 )
 def test_every_message_survives_the_wire(message: Message) -> None:
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(message), type=Message) == message
+
+
+# --- with everything going wrong ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def bench() -> ModuleType:
+    """Return the benchmark, which imports another one."""
+    sys.path.insert(0, str(ROOT / "benchmarks"))
+    try:
+        return importlib.import_module("bench_redundancy")
+    finally:
+        sys.path.remove(str(ROOT / "benchmarks"))
+
+
+@pytest.mark.parametrize("loss", [0.1, 0.4])
+def test_no_departure_among_crashes_moves_and_lost_messages_changes_b0_or_b1(bench: ModuleType, loss: float) -> None:
+    troubled = bench.Troubled(24, seed=1, loss=loss)
+    troubled.run(200)
+    assert troubled.departures > 10
+    assert troubled.violations == 0
+
+
+def test_without_locks_the_checker_sees_harm_done(bench: ModuleType) -> None:
+    troubled = bench.Troubled(24, seed=1, loss=0.3, kind=bench.Unlocked)
+    troubled.run(400)
+    assert troubled.violations > 0

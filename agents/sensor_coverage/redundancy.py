@@ -37,10 +37,14 @@ class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True,
 
 
 class Neighbours(_Message, frozen=True):
-    """Whom the sender sees, ascending; the version is another one whenever that is another list."""
+    """Whom the sender sees, ascending; the version is another one whenever that is another list.
+
+    `over` says what `Over` says, in case that was lost.
+    """
 
     version: Count
     listed: tuple[Count, ...]
+    over: Count = 0
 
 
 class Ask(_Message, frozen=True):
@@ -137,8 +141,8 @@ class Redundancy:
             self._over = {node: each for node, each in self._over.items() if node in listed}
 
     def tell(self) -> Neighbours:
-        """Return what to tell all neighbours now and then, and whenever it has changed."""
-        return Neighbours(self._version, self._listed)
+        """Return what to tell all neighbours now and then, and whenever it has changed; for some time after leaving, too."""
+        return Neighbours(self._version, self._listed, self._number if self._wish is None else self._number - 1)
 
     def redundant(self) -> bool:
         """Tell whether the robot could leave, if all lists that it knows are true."""
@@ -151,10 +155,17 @@ class Redundancy:
     # --- leaving ----------------------------------------------------------------------------------------------------
 
     def ask(self, now_s: float) -> list[Sent]:
-        """Ask for locks, or ask again; give up once it has been too long."""
+        """Ask for locks, or ask again; give up once it has been too long.
+
+        To ask again after giving up is better left for later, and for longer each time: all who want to leave disturb each
+        other.
+        """
         wish = self._wish
         if wish is not None:
-            return [Sent(None, wish.ask)] if self._may_still_act(wish, now_s) else self.give_up()
+            if not self._may_still_act(wish, now_s):
+                return self.give_up()
+            missing = tuple(each for each in wish.ask.versions if each[0] not in wish.granted)
+            return [Sent(None, Ask(wish.ask.number, missing))] if missing else []
         if not self._free_to_act(now_s) or not self.redundant():
             return []
         self._number = _fresh(self._number, now_s)
@@ -202,6 +213,7 @@ class Redundancy:
                 known = self._lists.get(sender)
                 if sender in self._listed and (known is None or message.version > known.version):
                     self._lists[sender] = message
+                self._end(sender, message.over)
             case Ask():
                 return self._answer(sender, message, now_s)
             case Grant():
@@ -212,9 +224,7 @@ class Redundancy:
                 if self._wish is not None and message.number == self._wish.ask.number:
                     return self.give_up()
             case Over():
-                self._over[sender] = max(message.number, self._over.get(sender, 0))
-                if self._lock is not None and self._lock.holder == sender and self._lock.number <= message.number:
-                    self._lock = None
+                self._end(sender, message.number)
         return []
 
     def _answer(self, asker: int, ask: Ask, now_s: float) -> list[Sent]:
@@ -232,6 +242,12 @@ class Redundancy:
         given_up = self.give_up()
         self._lock = _Lock(asker, ask.number, now_s + self._lease_s)
         return [*given_up, Sent(asker, Grant(ask.number))]
+
+    def _end(self, asker: int, number: int) -> None:
+        """Take note that the asker will not act upon this or an earlier number."""
+        self._over[asker] = max(number, self._over.get(asker, 0))
+        if self._lock is not None and self._lock.holder == asker and self._lock.number <= number:
+            self._lock = None
 
     # --- means ------------------------------------------------------------------------------------------------------
 
