@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -157,19 +158,17 @@ def test_delay_is_netems_or_left_out_of_both_with_the_reason(nothing_left: None)
 # --- nothing is left ------------------------------------------------------------------------------------------------
 
 
-def networks() -> set[str]:
-    """Return the network namespaces that some process stands in or holds open."""
+def networks(pids: Iterable[int] | None = None) -> set[str]:
+    """Return the network namespaces that some of these processes stand in or hold open, or any process at all."""
     found = set()
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            links = [entry / "ns" / "net"]
-            try:
-                links += list((entry / "fd").iterdir())
-                names = [str(link.readlink()) for link in links]
-            except OSError:
-                continue
-            found |= {name for name in names if name.startswith("net:")}
-    return found
+    for pid in [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()] if pids is None else pids:
+        entry = Path("/proc") / str(pid)
+        try:
+            names = [str(link.readlink()) for link in (entry / "ns" / "net", *(entry / "fd").iterdir())]
+        except OSError:
+            continue
+        found |= {name for name in names if name.startswith("net:")}
+    return found - {str(Path("/proc/self/ns/net").readlink())}
 
 
 def descendants(pid: int) -> set[int]:
@@ -185,8 +184,18 @@ def descendants(pid: int) -> set[int]:
 def test_nothing_is_left_whoever_is_interrupted_or_killed(
     who: str, number: signal.Signals, status: int, private_tmp: Path
 ) -> None:
-    before, interfaces = networks(), sorted(Path("/sys/class/net").iterdir())
-    command = [sys.executable, *ZWERM, "twin", "beacon-twin", "--transport", "udp", "--json"]
+    interfaces = sorted(Path("/sys/class/net").iterdir())
+    command = [
+        sys.executable,
+        *ZWERM,
+        "twin",
+        "beacon-twin",
+        "--transport",
+        "udp",
+        "--json",
+        "--set",
+        "time.duration_s=600",
+    ]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         until(
@@ -195,26 +204,28 @@ def test_nothing_is_left_whoever_is_interrupted_or_killed(
                 and all(log.stat().st_size > 1_000 for log in logs)
             ),
             "robots send",
+            90.0,
         )
         robots = {pid for pid in descendants(process.pid) if not children_of(pid)}
         started = {process.pid, *descendants(process.pid)}
-        assert len(networks() - before) == 5, "one for each robot, and the bridge's"
-        running_robots = [pid for pid in robots if str(Path(f"/proc/{pid}/ns/net").readlink()) not in before]
+        own = networks(started)
+        assert len(own) == 5, "one for each robot, and the bridge's"
+        running_robots = [pid for pid in robots if str(Path(f"/proc/{pid}/ns/net").readlink()) in own]
         assert len(running_robots) == 4
         os.kill(process.pid if who == "itself" else running_robots[0], number)
-        process.communicate(timeout=30.0)
-    assert process.returncode == status
+        _, complaints = process.communicate(timeout=60.0)
+    assert process.returncode == status, complaints
     until(lambda: gone(started), "all processes end")
-    until(lambda: networks() <= before, "all namespaces vanish")
+    until(lambda: not own & networks(), "all namespaces vanish")
     assert sorted(Path("/sys/class/net").iterdir()) == interfaces
 
 
 @on_a_real_network
 def test_namespaces_vanish_with_an_error_inside(nothing_left: None) -> None:
-    before = networks()
+    before = networks([os.getpid()])
     with pytest.raises(LinkError, match=r"^nft -f -: .*syntax error"), Namespaces([0, 1]) as there:
         there.run(["nft", "-f", "-"], "nonsense\n")
-    assert networks() == before
+    assert networks([os.getpid()]) == before
 
 
 # --- what cannot be -------------------------------------------------------------------------------------------------
