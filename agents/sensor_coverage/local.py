@@ -41,8 +41,8 @@ ROUTE_TICKS: Final = 4
 HEARTBEAT_TICKS: Final = 100
 # When to ask those whose word is missing, and how often before they are taken for dead.
 ASK_FIRST_TICKS: Final = 8
-ASK_TICKS: Final = 5
-ASKS_MAX: Final = 60
+ASK_TICKS: Final = 2
+ASKS_MAX: Final = 150
 SILENT_TICKS: Final = 260
 # How often the news that a leader is gone is told, and told on.
 GONE_HOPS: Final = 2
@@ -192,7 +192,7 @@ class LocalRobot(Robot):
         first = not token.chain and token.via == NOWHERE
         self.push = Push(self, token.push, token.fresh, chain, sender, first)
         route = vicinity.route
-        onward = vicinity.onward() if token.chain else token.via
+        onward = token.via if not token.chain and token.via in self.senses.seen else vicinity.onward()
         if first or (route is not None and len(route.places) == 1):
             self.push.lead()
         elif onward is None or onward not in self.senses.seen or any(node == onward for _, node in chain):

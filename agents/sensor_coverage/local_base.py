@@ -9,9 +9,10 @@ from zwerm.protocol import Command, Observation, Wake
 
 # How long to wait for a robot to come out, for a push to end, and without a frontier before all is covered [ticks].
 BIRTH_TICKS: Final = 60
-PUSH_TICKS: Final = 3000
+PUSH_TICKS: Final = 2000
 QUIET_TICKS: Final = 60
-PUSHES_MAX: Final = 2**40
+# How long to wait for who stands at the base, and is not ready [ticks].
+STAY_TICKS: Final = 1500
 
 
 class LocalBase(LocalRobot):
@@ -32,6 +33,7 @@ class LocalBase(LocalRobot):
         self._active: int | None = None
         self._first = False
         self._since = 0
+        self._stays_since = 0
         self._quiet_since: int | None = None
         self._tokens = 0
         self._told: dict[str, Any] = {}
@@ -74,7 +76,8 @@ class LocalBase(LocalRobot):
         self._quiet_since = None
         waiting = [n for n, s in sorted(self.vicinity.states.items()) if s.waiting and n in self.senses.seen]
         if not waiting:
-            self._let_out()
+            if not self._someone_stays():
+                self._let_out()
             return
         born = waiting[0]
         via = NOWHERE if alone else self.vicinity.onward()
@@ -83,7 +86,15 @@ class LocalBase(LocalRobot):
         self._released_at = None
         self._tokens += 1
         self._active, self._since, self._first = self._tokens, self.tick, alone
-        self.post.write(born, Token(self._active, born, (), via))
+        self.post.write(born, Token(self._active, self._active, (), via))
+
+    def _someone_stays(self) -> bool:
+        """Tell whether somebody in sight has no place yet, and may be ready soon."""
+        states = self.vicinity.states
+        homeless = [node for node in self.bearings if node not in states or states[node].place == NOWHERE]
+        if not homeless or self._released_at is not None:
+            self._stays_since = self.tick
+        return self.tick - self._stays_since < STAY_TICKS and bool(homeless) and self._released_at is None
 
     def _let_out(self) -> None:
         if self._released_at is None:

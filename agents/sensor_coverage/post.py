@@ -9,9 +9,9 @@ from typing import Final
 
 from zwerm.agents.sensor_coverage.words import Body, Letter, Receipt, Word
 
-RETRY_TICKS: Final = 3
+RETRY_TICKS: Final = 2
 # Bursts last: about 16 packets where they are long, so this many tries outlast nearly all.
-TRIES_MAX: Final = 120
+TRIES_MAX: Final = 160
 
 
 class _Box:

@@ -39,10 +39,11 @@ from zwerm.frontier.services import Plan
 from zwerm.orders import Arrived, Correct, Deploy, Landmark, Move, Sighting
 
 # How long to wait for what others do [ticks]: a path to be walked twice, a drive, a look around.
-LINK_TICKS: Final = 2500
+LINK_TICKS: Final = 1000
 WAVE_TICKS: Final = 600
 GONE_TICKS: Final = 80
-HOLD_TICKS: Final = 150
+ARMED_TICKS: Final = 300
+HOLD_TICKS: Final = 600
 LOST_TICKS: Final = 100
 CLOSE_TICKS: Final = 80
 
@@ -104,6 +105,7 @@ class Push:
         self._ahead_stands = self._behind_settled = False
         self._loose = self._leaned = False
         self._end: Body | None = None
+        self._epoch = -1
 
     # --- what comes -------------------------------------------------------------------------------------------------
 
@@ -112,6 +114,7 @@ class Push:
         match body:
             case Ready():
                 self._chain, self._memory = body.chain, body.memory
+                self._epoch = self._leader_epoch()
                 self._enter("armed")
             case Take():
                 self._chain, self._memory = body.chain, body.memory
@@ -144,6 +147,8 @@ class Push:
                 self._follow()
             case Token() if lost:
                 self._close(Abort(self.id, False))
+            case Abort() | Done() if self.phase == "telling":
+                self.over = True
             case _:
                 pass
 
@@ -292,6 +297,8 @@ class Push:
                 if self._host.clear or waited > HOLD_TICKS:
                     self._host.vicinity.plan()
                     self._offer()
+            case "armed" if self._leader_epoch() > self._epoch or waited > ARMED_TICKS:
+                self._close(Abort(self.id, True))  # it is back, and its word that it failed was lost
             case "armed" if waited > GONE_TICKS and waited % 20 == 1 and self._vacant():
                 self._call()
             case "there" if self._ahead_stands or waited > WAVE_TICKS:
@@ -326,6 +333,12 @@ class Push:
                 return self.since + max(GONE_TICKS + 1, (waited // 20 + 1) * 20 + 1)
             case _:
                 return self.since + WAVE_TICKS + 1
+
+    def _leader_epoch(self) -> int:
+        """Return since which drive the leader stands at its place, as far as is known."""
+        place, leader = self._chain[-1]
+        state = self._host.vicinity.states.get(leader)
+        return -1 if state is None or state.moving or state.place != place else state.epoch
 
     def _lost_leader(self) -> bool:
         """Tell whether the leader is the one ahead, and has settled out of sight: then this robot says that it is done."""
@@ -380,11 +393,13 @@ class Push:
         self._enter("closing")
 
     def _finish(self) -> None:
-        if self._end is not None:
-            self._write(self._end)
+        """Tell it, and stay out of other pushes until that was heard."""
         if self._host.vicinity.moving:
             self._host.rest()
-        self.over = True
+        self.over = self._end is None or self._back is None
+        if self._end is not None:
+            self._write(self._end)
+        self._enter("telling")
 
     # --- means ------------------------------------------------------------------------------------------------------
 
