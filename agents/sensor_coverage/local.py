@@ -185,15 +185,19 @@ class LocalRobot(Robot):
         """Pass a token on along the gradient, or lead the push if it ends here."""
         vicinity = self.vicinity
         here = vicinity.place if vicinity.place != NOWHERE else 0
-        if not self._free or token.push in self._over or any(node == self.setup.node for _, node in token.chain):
+        lost = (
+            not token.chain and vicinity.place != NOWHERE
+        )  # it is not at the base any more, and the base has not heard
+        if lost or not self._free or token.push in self._over or any(n == self.setup.node for _, n in token.chain):
             self.post.write(sender, Abort(token.push, False))
+            self._again = [self.tick]
             return
         chain = (*token.chain, (here, self.setup.node))
         first = not token.chain and token.via == NOWHERE
         self.push = Push(self, token.push, token.fresh, chain, sender, first)
         route = vicinity.route
         onward = token.via if not token.chain and token.via in self.senses.seen else vicinity.onward()
-        if first or (route is not None and len(route.places) == 1):
+        if first or (route is not None and vicinity.leads and len(route.places) == 1):
             self.push.lead()
         elif onward is None or onward not in self.senses.seen or any(node == onward for _, node in chain):
             self.push.take(Abort(token.push, False))
@@ -245,9 +249,12 @@ class LocalRobot(Robot):
                 self._story = self._recover(self._rest)  # it was pushed aside
             elif self._unsure():
                 self._story = self._look_around()
+        vicinity.find_heading()
         vicinity.learn_references()
         # Places outlive who stands there: while they change hands the frontier and the way to it stay as they were.
-        if not vicinity.changing(self.bearings, self.tick):
+        if self.busy or vicinity.changing(self.bearings, self.tick):
+            vicinity.doubt()
+        else:
             vicinity.plan()
             vicinity.find_route()
         self._ask()

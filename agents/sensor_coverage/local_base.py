@@ -10,7 +10,7 @@ from zwerm.protocol import Command, Observation, Wake
 # How long to wait for a robot to come out, for a push to end, and without a frontier before all is covered [ticks].
 BIRTH_TICKS: Final = 60
 PUSH_TICKS: Final = 2000
-QUIET_TICKS: Final = 60
+QUIET_TICKS: Final = 400
 # How long to wait for who stands at the base, and is not ready [ticks].
 STAY_TICKS: Final = 1500
 
@@ -70,7 +70,7 @@ class LocalBase(LocalRobot):
                 self._end(False)
             return
         alone = not any(s.place not in (0, NOWHERE) for s in self.vicinity.states.values())
-        if not alone and self.vicinity.route is None:
+        if not alone and not self.vicinity.leads:
             self._watch_quiet()
             return
         self._quiet_since = None
@@ -106,7 +106,7 @@ class LocalBase(LocalRobot):
             self._tell_numbers()
 
     def _watch_quiet(self) -> None:
-        if not self.clear:
+        if not self.clear or self.vicinity.route is not None:
             self._quiet_since = None
             return
         if self._quiet_since is None:

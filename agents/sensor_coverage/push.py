@@ -114,7 +114,7 @@ class Push:
         match body:
             case Ready():
                 self._chain, self._memory = body.chain, body.memory
-                self._epoch = self._leader_epoch()
+                self._epoch = body.epoch
                 self._enter("armed")
             case Take():
                 self._chain, self._memory = body.chain, body.memory
@@ -173,7 +173,7 @@ class Push:
             self._deploy()
             return
         self._enter("offering")
-        host.post.write(self._chain[self._index - 1][1], Ready(self.id, self._chain, vicinity.memory()))
+        host.post.write(self._chain[self._index - 1][1], Ready(self.id, self._chain, vicinity.memory(), vicinity.epoch))
 
     def _deploy(self) -> None:
         rules, vicinity = self._host.vicinity.rules, self._host.vicinity

@@ -22,6 +22,9 @@ from zwerm.simplicial import Edge, FlagComplex, edge
 # Robots at gaps expand when no edge can be expanded anywhere: their routes cost that much more.
 GAP_COST: Final = 1000.0
 
+# A robot that does not know yet whether it is at the frontier is not to be gone to, but waited for.
+DOUBT_COST: Final = 10_000.0
+
 # How long a place may be on its way from one robot to the next [ticks].
 AWAIT_TICKS: Final = 80
 
@@ -118,18 +121,10 @@ class Vicinity:
         self._learn_heading()
 
     def _learn_heading(self) -> None:
-        """Refine the heading by reciprocal bearings; who has none yet takes it from the base, where it stands."""
-        if self.place == 0:
+        """Refine the heading by reciprocal bearings."""
+        if self.place == 0 or self.heading is None:
             return
         off = 0j
-        if self.heading is None:
-            there = {each.node: each.direction_rad for each in self._base_sees()}
-            for node, (_, _, bearing) in self.seen.items():
-                if node in there:
-                    off += cmath.exp(1j * (there[node] - bearing))
-            if off or not there:
-                self.heading = cmath.phase(off) if off else 0.0
-            return
         for node, (_, _, bearing) in self.seen.items():
             back = self._back(node)
             if back is not None:
@@ -138,9 +133,18 @@ class Vicinity:
             self.heading += cmath.phase(off) / min(self._headings + 1, 20)
             self._headings += 1
 
-    def _base_sees(self) -> tuple[Seen, ...]:
+    def find_heading(self) -> None:
+        """Take the heading from the base, if this robot stands there: it sees what the base sees."""
         base = next((state for state in self.states.values() if state.place == 0), None)
-        return () if base is None else base.seen
+        if base is None or self.heading is not None or not self.samples:
+            return
+        there = {each.node: each for each in base.seen if each.place != NOWHERE}
+        off = 0j
+        for node, (epoch, _, bearing) in self.seen.items():
+            if node in there and epoch == there[node].epoch != -1:
+                off += cmath.exp(1j * (there[node].direction_rad - bearing))
+        if off or not there:
+            self.heading = cmath.phase(off) if off else 0.0
 
     def _back(self, node: int) -> float | None:
         """Return the direction in which a neighbour sees this robot where it stands now."""
@@ -204,7 +208,7 @@ class Vicinity:
 
     def onward(self) -> int | None:
         """Return the neighbour that is next on the way to the frontier, if it is there; None at the frontier itself."""
-        if self.route is None or len(self.route.places) < 2:
+        if self.route is None or not self.leads or len(self.route.places) < 2:
             return None
         return next((node for node, s in self.mutual().items() if s.place == self.route.places[1]), None)
 
@@ -274,6 +278,16 @@ class Vicinity:
         """Return the plan to carry out here."""
         wanted = self.plans or self.gaps
         return min(wanted, key=lambda each: each.key) if wanted else None
+
+    def doubt(self) -> None:
+        """Let nobody believe that there is no frontier, while this robot does not know."""
+        if self.route is None and self.place not in (0, NOWHERE):
+            self.route = Route(DOUBT_COST, (self.place,))
+
+    @property
+    def leads(self) -> bool:
+        """Whether there is a way to a frontier."""
+        return self.route is not None and self.route.cost < DOUBT_COST
 
     def find_route(self) -> None:
         """Choose the way to the frontier by what neighbours say of theirs; nobody's way leads through here again."""

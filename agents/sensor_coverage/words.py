@@ -125,11 +125,12 @@ class Token(_Message, frozen=True, tag="T"):
 
 
 class Ready(_Message, frozen=True, tag="R"):
-    """The leader to who follows it: this will be your place, once I am gone."""
+    """The leader to who follows it: this will be your place, once I am gone. It stands here since its drive `epoch`."""
 
     push: int
     chain: Chain
     memory: Memory
+    epoch: int
 
 
 class Take(_Message, frozen=True, tag="K"):
