@@ -11,8 +11,9 @@ import msgspec
 
 from zwerm.agents.contract import Setup
 from zwerm.agents.sensor_coverage.homing import Vector
+from zwerm.agents.sensor_coverage.host import Drive
 from zwerm.agents.sensor_coverage.post import Post
-from zwerm.agents.sensor_coverage.push import Drive, Push
+from zwerm.agents.sensor_coverage.push import Push
 from zwerm.agents.sensor_coverage.robot import STOP, Parameters, Robot, Story
 from zwerm.agents.sensor_coverage.vicinity import Vicinity
 from zwerm.agents.sensor_coverage.words import (

@@ -66,6 +66,7 @@ class LocalBase(LocalRobot):
         if self.outcome:
             return
         if self._active is not None:
+            self._stays_since = self.tick
             if self.tick - self._since > PUSH_TICKS:
                 self._end(False)
             return

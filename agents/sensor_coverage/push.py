@@ -15,12 +15,11 @@ becomes frontier again, but no two robots ever take one place.
 
 import math
 from collections.abc import Sequence
-from typing import Final, Protocol
+from typing import Final
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.post import Post
-from zwerm.agents.sensor_coverage.vicinity import Vicinity
+from zwerm.agents.sensor_coverage.host import Host
 from zwerm.agents.sensor_coverage.words import (
     NOWHERE,
     Abort,
@@ -52,37 +51,6 @@ BACK_RAD: Final = 0.3
 
 # The bearings to try from the base, when nobody is out yet.
 FIRST_RAD: Final = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
-
-Drive = Deploy | Move | Correct
-
-
-class Host(Protocol):
-    """The robot that a push is part of."""
-
-    tick: int
-    post: Post
-    vicinity: Vicinity
-
-    @property
-    def node(self) -> int:
-        """Its id."""
-
-    @property
-    def clear(self) -> bool:
-        """Whether it stands, has looked around, and nobody about it is on the way."""
-
-    @property
-    def bearings(self) -> dict[int, float]:
-        """Whom it sees now."""
-
-    def drive(self, order: Drive) -> None:
-        """Begin a drive."""
-
-    def rest(self) -> None:
-        """Say that the drive is over: it stands, for neighbours to look at."""
-
-    def tell_gone(self, push: int) -> None:
-        """Broadcast that this leader is gone."""
 
 
 class Push:

@@ -122,7 +122,7 @@ class Vicinity:
 
     def _learn_heading(self) -> None:
         """Refine the heading by reciprocal bearings."""
-        if self.place == 0 or self.heading is None:
+        if self.place in (0, NOWHERE) or self.heading is None:  # on top of the base there is no bearing to it
             return
         off = 0j
         for node, (_, _, bearing) in self.seen.items():
@@ -179,7 +179,7 @@ class Vicinity:
 
     def learn_references(self) -> None:
         """Let remembered directions follow what both ends see, slowly: else errors would walk at random."""
-        if self.heading is None:
+        if self.heading is None or self.place == NOWHERE:
             return
         for node, state in self.mutual().items():
             looks = self.epoch, self.samples, state.epoch, state.samples
