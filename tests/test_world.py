@@ -260,7 +260,7 @@ def test_a_base_station_releases_robots_one_by_one_and_decides_when_the_run_is_c
 
 
 def test_the_coordinator_hears_everyone_over_the_uplink_and_senses_nothing() -> None:
-    coordinator = {"controller": "random-walk"}
+    coordinator = {"controller": "sensor-coverage"}
     world = world_at(
         (1.0, 1.0, 0.0), (3.0, 3.0, 0.0), coordinator=coordinator, radio={"range_m": 0.1},
         robots={"sensors": [{"kind": "pose"}]},

@@ -8,8 +8,8 @@ import base64
 import ctypes
 import json
 import os
+import threading
 from collections.abc import Mapping
-from threading import get_ident
 from typing import Any, Final
 
 import zenoh
@@ -102,7 +102,7 @@ def open_session(settings: Mapping[str, Any], purpose: str) -> zenoh.Session:
         raise LinkError(f"{purpose}: {reason}") from None
 
 
-_kept: set[int] = set()
+_kept = threading.local()
 
 
 def keep_thread() -> None:
@@ -111,7 +111,6 @@ def keep_thread() -> None:
     For a thread that is not its own Python makes a state when a callback begins and throws it away when it returns, the stack
     included, which is taken from the kernel anew: together a tenth of what a message costs a robot (measured).
     """
-    thread = get_ident()
-    if thread not in _kept:
-        _kept.add(thread)
+    if not hasattr(_kept, "yes"):  # asked of that very state: the number of a thread may be another's next
+        _kept.yes = True
         ctypes.pythonapi.PyGILState_Ensure()  # once more than Zenoh will release
