@@ -201,6 +201,23 @@ def test_what_is_less_wanted_is_done_only_where_nothing_else_can_be() -> None:
     assert assigned(two, {0: 0.0}, edges, gaps) == [(0, 1, 2)]
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_pushes_at_once_have_no_place_and_no_landmark_in_common(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    position = random.uniform(0.0, 9.0, (300, 2))
+    apart = np.hypot(*(position[:, None] - position[None, :]).transpose(2, 0, 1))
+    complex_ = FlagComplex({n: np.flatnonzero((row <= 1.0) & (row > 0.0)).tolist() for n, row in enumerate(apart)})
+    sources = dict.fromkeys(random.choice(300, 12, replace=False).tolist(), 0.0)
+    paths = assigned(complex_, sources, [plan(int(n)) for n in random.choice(300, 60, replace=False)], pushes_max=99)
+    taken: set[int] = set()
+    for path in paths:
+        around = {*path, *(each for place in path for each in complex_.neighbours[place])}
+        assert not around & taken
+        assert path[0] in sources
+        taken |= around
+    assert len(paths) > 2
+
+
 def test_stories_told_at_once_end_when_the_last_does_and_wake_for_the_first() -> None:
     def story(times: list[float]):  # type: ignore[no-untyped-def]
         for at_s in times:
