@@ -2,7 +2,6 @@
 
 import os
 import signal
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from zwerm.deploy.cast import cast
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError, ScenarioError, StragglerError
 from zwerm.link.zenoh_node import ZenohNodeLink
-from zwerm.running import drive, new_run_id, run, serve
+from zwerm.running import Nobody, drive, new_run_id, run, serve
 from zwerm.scenario import Scenario
 
 EVERY_FAULT: list[dict[str, Any]] = [
@@ -156,10 +155,16 @@ def test_robots_elsewhere_cannot_be_killed(tmp_path: Path) -> None:
         serve(chosen, 1, ["tcp/127.0.0.1:0"], tmp_path / "robots.key")
 
 
+class Interrupter(Nobody):
+    """Presses Ctrl-C once the run is a second old."""
+
+    def ticked(self, tick: int, ticks: int) -> None:
+        if tick == 12:
+            os.kill(os.getpid(), signal.SIGINT)
+
+
 def test_an_interrupt_while_robots_are_paused_ends_them_all(nothing_left: None) -> None:
     chosen = scenario(faults=[{"kind": "pause", "nodes": [0, 1, 2], "at_s": 0.2}], time={"duration_s": 600.0})
-    timer = threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
-    result = run(chosen, 1, "processes", realtime=1.0)
-    timer.join()
+    result = run(chosen, 1, "processes", realtime=1.0, watcher=Interrupter())
     assert result.outcome == "interrupted"
+    assert 12 <= result.ticks < 100
