@@ -128,6 +128,24 @@ def test_an_interrupt_stops_everything_reports_the_run_so_far_and_exits_130(
     until(lambda: gone(robots), "all processes ended", 5.0)
 
 
+@pytest.mark.parametrize("loaded", ["msgspec", "typer", "pydantic"])
+def test_an_interrupt_while_the_program_is_still_loading_exits_130_without_a_traceback(loaded: str) -> None:
+    running = subprocess.Popen(
+        [sys.executable, "-X", "importtime", "-m", "zwerm", "run", "computation-free", "--inline", "--set",
+         "time.duration_s=1e6"],
+        cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert running.stderr is not None
+    for line in running.stderr:  # each module, once it is loaded
+        if line.rstrip().endswith(f" {loaded}"):
+            break
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=60)
+    said = [each for each in err.splitlines() if not each.startswith("import time:")]
+    assert running.returncode == 130, said
+    assert not any("Traceback" in each for each in said)
+
+
 def test_a_failed_run_exits_1_and_prints_its_traceback_and_reason() -> None:
     running = start("run", "computation-free", "--inline", "--json", "--set", "robots.controller=troubled:Raises")
     out, err = running.communicate(timeout=60)
