@@ -14,7 +14,7 @@ COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generat
 	--no-emit-index-url --no-annotate --no-header --no-config pyproject.toml --extra record --extra study --group build
 
 .DEFAULT_GOAL := help
-APT_TOOLS := iproute2 nftables
+APT_TOOLS := iproute2 nftables ffmpeg
 
 .PHONY: help setup dev tools run test lint format docs bench fidelity lock clean
 
@@ -25,8 +25,8 @@ setup: $(RUN_READY)  ## make .venv with the zwerm command in it
 
 dev: $(DEV_READY)  ## add what tests, linters and documentation need
 
-tools:  ## install what the twin on a real network needs (as root, where there is apt-get; else say so)
-	@if command -v ip >/dev/null && command -v tc >/dev/null && command -v nft >/dev/null; then echo "tools: all there"; \
+tools:  ## install what the twin on a real network and MP4 need (as root, where there is apt-get; else say so)
+	@if command -v ip >/dev/null && command -v tc >/dev/null && command -v nft >/dev/null && command -v ffmpeg >/dev/null; then echo "tools: all there"; \
 	elif [ "$$(id -u)" != 0 ]; then echo "tools: skipped, because installing $(APT_TOOLS) needs root"; \
 	elif ! command -v apt-get >/dev/null; then echo "tools: skipped, because there is no apt-get: install $(APT_TOOLS)"; \
 	elif { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(APT_TOOLS); } \
