@@ -51,6 +51,17 @@ def test_check_reports_every_mistake_of_every_stage_with_its_place_rule_and_valu
     assert "zwerm: parts.toml: robots.parameters.left_0: expected <= 1.0, got 3.0" in said
 
 
+def test_check_names_a_controller_and_a_sensor_that_do_not_exist_beside_mistakes_in_the_tables(tmp_path: Path) -> None:
+    (tmp_path / "all.toml").write_text(
+        'arena = { size_m = [3.0, 3.0] }\ntime = { dt_s = 0.0 }\n[robots]\ncount = 2\ncontroller = "nobody"\ncuont = 3\n'
+        'sensors = [{ kind = "sonar" }]\nplacement = { kind = "uniform", colour = 1 }\n'
+    )
+    said = zwerm("check", "all.toml", cwd=tmp_path).stderr.splitlines()
+    assert [line.split(": ")[2] for line in said] == [
+        "time.dt_s", "robots.placement.colour", "robots.cuont", "robots.controller", "robots.sensors.0.kind",
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [

@@ -10,7 +10,7 @@ def main() -> None:
 
         command_line()
     except KeyboardInterrupt:
-        print("zwerm: interrupted", file=sys.stderr)
+        sys.stderr.write("zwerm: interrupted\n")
         sys.exit(130)
 
 

@@ -69,15 +69,14 @@ def check(
     scenarios: Annotated[list[str], typer.Argument(help="Built-in names or TOML files.")], sets: Sets = None
 ) -> None:
     """Load and assemble each scenario without running it."""
-    from zwerm.assembly import assemble
+    from zwerm.checking import scenario_mistakes
 
     mistakes: list[str] = []
     for name in scenarios:
-        try:
-            assemble(load(name, tuple(sets or ())), seed=1)
+        found = scenario_mistakes(name, tuple(sets or ()))
+        mistakes += found
+        if not found:
             out.print(f"{locate(name)}: no mistakes", markup=False, highlight=False, soft_wrap=True)
-        except ScenarioError as error:
-            mistakes += error.mistakes
     if mistakes:
         with mistakes_in_one_line():
             raise ScenarioError(mistakes)

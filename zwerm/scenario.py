@@ -357,12 +357,18 @@ def load(name: str, overrides: tuple[str, ...] = ()) -> Scenario:
 
     Raises ScenarioError with every mistake.
     """
+    tables, path = tables_of(name, overrides)
+    return validate(tables, str(path), path.parent)
+
+
+def tables_of(name: str, overrides: tuple[str, ...] = ()) -> tuple[dict[str, Any], Path]:
+    """Return what `load` would validate, and the scenario's file. Raises ScenarioError where there is none to validate."""
     path = locate(name)
     tables = read(path)
     tables.setdefault("name", path.stem)
     for assignment in overrides:
         override(tables, assignment)
-    return validate(tables, str(path), path.parent)
+    return tables, path
 
 
 def validate(tables: dict[str, Any], place: str, folder: Path) -> Scenario:
