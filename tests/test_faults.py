@@ -17,6 +17,7 @@ from zwerm.scenario import Scenario
 from zwerm.world.faults.generator import draw
 from zwerm.world.lives import Order
 from zwerm.world.lockstep import LockStep
+from zwerm.world.world import Send
 
 POSES = [[0.3, 0.3, 0.0], [1.7, 0.3, 0.0], [0.3, 1.7, 0.0], [1.7, 1.7, 0.0]]
 
@@ -54,8 +55,8 @@ class Life:
             self.orders.append(begin())
             return self.orders[-1]
 
-        def spied_observe() -> tuple[list[int], list[bytes]]:
-            nodes, payloads = observe()
+        def spied_observe(send: Send | None = None) -> tuple[list[int], list[bytes]]:
+            nodes, payloads = observe(send)
             self.observed.append(dict(zip(nodes, map(decode_observation, payloads), strict=True)))
             return nodes, payloads
 
