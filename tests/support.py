@@ -1,9 +1,11 @@
 """What several tests share: small scenarios, and a look at the processes of this machine."""
 
+import importlib.util
 import os
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from zwerm.scenario import Scenario, validate
@@ -65,3 +67,13 @@ def until(holds: Callable[[], object], what: str, deadline_s: float = 30.0) -> N
     while not holds():
         assert time.monotonic() < end_s, f"{what} within {deadline_s:g} s"
         os.sched_yield()
+
+
+def script(path: Path) -> ModuleType:
+    """Return a script that is in no package as a module, without running it as a program."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -1,23 +1,17 @@
 """The benchmark of the radio's fidelity, on few packets: every model is as true as it says, and a wrong one is found out."""
 
-import importlib.util
 from types import ModuleType
 
 import pytest
 from air import Radio, ring
-from support import ROOT
+from support import ROOT, script
 
 from zwerm.world.radio.registry import BUILT_IN
 
 
 @pytest.fixture(scope="module")
 def fidelity() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("bench_fidelity", ROOT / "benchmarks" / "bench_fidelity.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script(ROOT / "benchmarks" / "bench_fidelity.py")
 
 
 def test_every_model_keeps_its_promise_over_thirty_thousand_packets(fidelity: ModuleType) -> None:

@@ -199,17 +199,25 @@ def relative_cycles(complex_: FlagComplex, fence: Iterable[Edge]) -> tuple[list[
     whole = boundaries(complex_)
     cycles: list[int] = []
     for number, boundary in enumerate(whole):
-        chain, combination = boundary & inner, 1 << number
-        while chain:
-            known = columns.get(chain.bit_length())
-            if known is None:
-                columns[chain.bit_length()] = chain, combination
-                break
-            chain ^= known[0]
-            combination ^= known[1]
-        else:
+        combination = _absorb(boundary & inner, 1 << number, columns)
+        if combination:
             cycles.append(combination)
     return cycles, [_boundary(cycle, whole) for cycle in cycles]
+
+
+def _absorb(chain: int, combination: int, columns: dict[int, tuple[int, int]]) -> int:
+    """Reduce a chain, and along with it the combination that it is of, by columns kept under their highest bit.
+
+    Keeps what is left as a column and returns 0; where nothing is left, returns the combination that vanishes.
+    """
+    while chain:
+        known = columns.get(chain.bit_length())
+        if known is None:
+            columns[chain.bit_length()] = chain, combination
+            return 0
+        chain ^= known[0]
+        combination ^= known[1]
+    return combination
 
 
 def _boundary(cycle: int, whole: list[int]) -> int:
@@ -301,13 +309,7 @@ def _widest(cycles: list[int], edges: list[int], complex_: FlagComplex) -> tuple
 
     pivots: dict[int, tuple[int, int]] = {}
     for cycle, boundary in zip(cycles, edges, strict=True):
-        while boundary:
-            known = pivots.get(boundary.bit_length())
-            if known is None:
-                pivots[boundary.bit_length()] = boundary, cycle
-                break
-            boundary ^= known[0]
-            cycle ^= known[1]
+        _absorb(boundary, cycle, pivots)
     best_boundary = best_cycle = 0
     best = (0, 0)
     for boundary, cycle in pivots.values():
