@@ -80,15 +80,20 @@ def test_a_letter_that_nobody_acknowledges_is_given_up() -> None:
 # --- the whole swarm ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("noise", [(), (NOISE,)])
-def test_robots_alone_cover_a_small_hall_about_as_well_as_with_a_coordinator(noise: tuple[str, ...]) -> None:
-    central = run("sensor-coverage", runner="inline", overrides=[*HALL, *noise])
-    alone = run("sensor-coverage", runner="inline", overrides=[*ALONE, *noise])
-    assert alone.outcome == central.outcome == "completed"
-    assert alone.metrics["coverage_fraction"] >= 0.99
-    assert alone.metrics["robots_deployed"] <= central.metrics["robots_deployed"] + 2
-    assert alone.metrics["deployment_cycles"] <= 1.3 * central.metrics["deployment_cycles"]
-    assert "uplink" not in alone.radio["channels"], "there is no coordinator"
+@pytest.mark.parametrize(("noise", "seeds"), [((), (1,)), ((NOISE,), (1, 2, 3))])
+def test_robots_alone_cover_a_small_hall_about_as_well_as_with_a_coordinator(
+    noise: tuple[str, ...], seeds: tuple[int, ...]
+) -> None:
+    cycles = 0.0
+    for seed in seeds:
+        central = run("sensor-coverage", seed=seed, runner="inline", overrides=[*HALL, *noise])
+        alone = run("sensor-coverage", seed=seed, runner="inline", overrides=[*ALONE, *noise])
+        assert alone.outcome == central.outcome == "completed"
+        assert alone.metrics["coverage_fraction"] >= 0.99
+        assert alone.metrics["robots_deployed"] <= central.metrics["robots_deployed"] + 2
+        assert "uplink" not in alone.radio["channels"], "there is no coordinator"
+        cycles += alone.metrics["deployment_cycles"] - 1.3 * central.metrics["deployment_cycles"]
+    assert cycles <= 0.0
 
 
 @pytest.mark.parametrize(

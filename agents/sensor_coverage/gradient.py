@@ -1,150 +1,54 @@
 """The way to the nearest frontier robot, hop by hop, from what neighbours say of their own way.
 
-A distance vector with a sequence number for every root, and the feasibility condition of Babel (RFC 8966, section 2.4): a
-neighbour is followed only if what it says is newer than all that this robot has said itself of that root, or as new and
-nearer. With one root there is no loop at any time; with several, one that arises while robots change from root to root is
-gone once word of each root has come around it. Nothing is believed for ever: what a neighbour said expires, and so does
-what was promised, so any state, however wrong, is forgotten, and none counts further than the cap.
+A path vector: who says how far it is says by which places, so nobody's way leads through its own place, and when the
+frontier is cut off nobody counts further than there are places. A way belongs to a place: while places change hands, what
+was said of them holds until who stands there says something else.
 
-Promised is liveness under loss below 1, not that a distance is true at a given moment: it is as old as the way is long.
+Promised is that ways become the shortest once every neighbour's last word has come, in whatever order, however often; who
+tells its way now and then gets it through at any loss below 1.
 """
 
-from typing import Annotated, Final, NamedTuple
+from collections.abc import Mapping
 
-from msgspec import Meta, Struct
+from zwerm.agents.sensor_coverage.words import NOWHERE, Route, Way
 
-COUNT_MAX: Final = 2**62
-Count = Annotated[int, Meta(ge=0, le=COUNT_MAX)]
-
-
-class Advert(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag="advert"):
-    """How far the sender is from the nearest root that it knows of; `root` None: it knows of none.
-
-    `number` counts the sender's adverts, `sequence` is the root's word for how new its own is.
-    """
-
-    number: Count
-    root: Count | None
-    sequence: Count
-    distance: Annotated[float, Meta(ge=0.0)]
-
-
-class _Heard(NamedTuple):
-    """A neighbour's latest advert, the weight of the edge to it, and until when it is believed."""
-
-    advert: Advert
-    weight: float
-    until_s: float
-
-
-class _Promise(NamedTuple):
-    """The newest and nearest that was ever said of a root: who follows this robot relies on it."""
-
-    sequence: int
-    distance: float
-    until_s: float
-
-
-class _Way(NamedTuple):
-    """Ordered as ways are preferred: the shortest, and of equal ones that to the smallest ids."""
-
-    distance: float
-    root: int
-    next_hop: int
-    sequence: int
+# The base is where ways begin: none leads through it.
+BASE = 0
 
 
 class Gradient:
-    """One robot's distance to the nearest root, and the neighbour that is next on the way there.
+    """One robot's way, `route`, and its neighbours'. `version` counts what they said that was new."""
 
-    Distances above `cap` count as none. An advert is believed for `expiry_s`; it should be many intervals between adverts,
-    or a few lost ones in a row cut the way. A root renews its sequence number every `renew_s` (`expiry_s` by default):
-    more often than a word takes along one way and along the other, robots could stay on a way that is fast, but not
-    shortest. `me` is this robot's id.
-    """
+    def __init__(self) -> None:
+        self.route: Route | None = None
+        self.version = 0
+        self._numbers: dict[int, int] = {}  # robot: the newest of its words
+        self._ways: dict[int, Route | None] = {}  # place: the way that begins there
 
-    def __init__(self, me: int, cap: float, expiry_s: float, renew_s: float | None = None) -> None:
-        self._me = me
-        self._cap = cap
-        self._expiry_s = expiry_s
-        self._renew_s = expiry_s if renew_s is None else renew_s
-        self._number = 0
-        self._sequence = 0
-        self._renew_at_s: float | None = None  # None while this robot is no root
-        self._heard: dict[int, _Heard] = {}
-        self._promised: dict[int, _Promise] = {}
-        self._way: _Way | None = None
-
-    @property
-    def distance(self) -> float | None:
-        """The weight of the way to the nearest root, as of the last call; 0 at a root, None where none is known of."""
-        if self._renew_at_s is not None:
-            return 0.0
-        return self._way.distance if self._way is not None else None
-
-    @property
-    def root(self) -> int | None:
-        """The root that the way leads to."""
-        if self._renew_at_s is not None:
-            return self._me
-        return self._way.root if self._way is not None else None
-
-    @property
-    def next_hop(self) -> int | None:
-        """The neighbour next on the way; None at a root, and where none is known of."""
-        return self._way.next_hop if self._way is not None and self._renew_at_s is None else None
-
-    def hear(self, sender: int, advert: Advert, weight: float, now_s: float) -> None:
-        """Take in what a neighbour says, over an edge of this weight (at least 1). An old or repeated advert says nothing."""
-        known = self._heard.get(sender)
-        if known is not None and advert.number <= known.advert.number:
+    def hear(self, sender: int, way: Way) -> None:
+        """Take in what a neighbour says; an old word, or a repeated one, says nothing."""
+        if way.number <= self._numbers.get(sender, -1):
             return
-        if advert.root == self._me and self._sequence <= advert.sequence < COUNT_MAX:
-            # It is from before this robot lost its memory, or damaged: be newer, or nobody would believe this robot.
-            self._sequence = advert.sequence + 1
-        self._heard[sender] = _Heard(advert, weight, now_s + self._expiry_s)
-        self._choose(now_s)
+        self._numbers[sender] = way.number
+        if way.place != NOWHERE and self._ways.get(way.place) != way.route:
+            self._ways[way.place] = way.route
+            self.version += 1
 
-    def lose(self, neighbour: int, now_s: float) -> None:
-        """Forget a neighbour that is none any more."""
-        if self._heard.pop(neighbour, None) is not None:
-            self._choose(now_s)
+    def take_over(self, place: int, otherwise: Route | None) -> None:
+        """Go on with the way that was told of a place, `otherwise` if none was."""
+        self.route = self._ways.get(place) or otherwise
 
-    def advert(self, now_s: float, is_root: bool) -> Advert:
-        """Return what to tell all neighbours now. `is_root`: this robot is at the frontier itself."""
-        self._number += 1
-        self._heard = {sender: each for sender, each in self._heard.items() if now_s < each.until_s}
-        self._promised = {root: each for root, each in self._promised.items() if now_s < each.until_s}
-        if is_root:
-            if self._renew_at_s is None or now_s >= self._renew_at_s:
-                self._sequence += 1
-                self._renew_at_s = now_s + self._renew_s
-            return Advert(self._number, self._me, self._sequence, 0.0)
-        self._renew_at_s = None
-        self._choose(now_s)
-        if self._way is None:
-            return Advert(self._number, None, 0, 0.0)
-        distance, root, _, sequence = self._way
-        known = self._promised.get(root)
-        if known is not None and known.sequence == sequence:
-            distance = min(distance, known.distance)
-        self._promised[root] = _Promise(sequence, distance, now_s + self._expiry_s)
-        return Advert(self._number, root, sequence, self._way.distance)
+    def choose(self, place: int, cost: float | None, weights: Mapping[int, float]) -> None:
+        """Find the shortest way from `place`, by neighbouring places with the weights of the edges there.
 
-    def _choose(self, now_s: float) -> None:
-        ways = [
-            _Way(each.advert.distance + each.weight, each.advert.root, sender, each.advert.sequence)
-            for sender, each in self._heard.items()
-            if now_s < each.until_s and each.advert.root is not None and self._feasible(each.advert, now_s)
-        ]
-        best = min(ways, default=None)
-        self._way = best if best is not None and best.distance <= self._cap else None
-
-    def _feasible(self, advert: Advert, now_s: float) -> bool:
-        """Tell whether following the advert cannot lead back here."""
-        if advert.root is None or advert.root == self._me:
-            return False
-        known = self._promised.get(advert.root)
-        if known is None or now_s >= known.until_s:
-            return True
-        return (known.sequence, -known.distance) < (advert.sequence, -advert.distance)
+        `cost` is that of going nowhere, at the frontier itself. Of equal ways that to the smallest place is taken.
+        """
+        best: tuple[float, tuple[int, ...]] | None = None if cost is None else (cost, (place,))
+        for beside, weight in weights.items():
+            way = self._ways.get(beside)
+            if way is None or place in way.places or beside == BASE:
+                continue
+            found = way.cost + weight, (place, *way.places)
+            if best is None or (found[0], found[1][-1], found[1]) < (best[0], best[1][-1], best[1]):
+                best = found
+        self.route = None if best is None else Route(*best)

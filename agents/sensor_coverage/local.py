@@ -7,14 +7,13 @@ same as under a coordinator (`zwerm.agents.sensor_coverage.robot`); who tells it
 import math
 from typing import Any, Final
 
-import msgspec
-
 from zwerm.agents.contract import Setup
 from zwerm.agents.sensor_coverage.homing import Vector
 from zwerm.agents.sensor_coverage.host import Drive
 from zwerm.agents.sensor_coverage.post import Post
 from zwerm.agents.sensor_coverage.push import Push
 from zwerm.agents.sensor_coverage.robot import STOP, Parameters, Robot, Story
+from zwerm.agents.sensor_coverage.speech import Speech
 from zwerm.agents.sensor_coverage.vicinity import Vicinity
 from zwerm.agents.sensor_coverage.words import (
     CHANNEL,
@@ -28,6 +27,7 @@ from zwerm.agents.sensor_coverage.words import (
     State,
     Take,
     Token,
+    Way,
     Word,
     read,
     write,
@@ -36,10 +36,6 @@ from zwerm.frontier.planner import Parameters as Rules
 from zwerm.orders import Arrived, Cleared
 from zwerm.protocol import Command, Observation, Transmission, Wake
 
-# When a new state is told again, and after how long a silence [ticks].
-AGAIN_TICKS: Final = (6,)
-ROUTE_TICKS: Final = 4
-HEARTBEAT_TICKS: Final = 100
 # When to ask those whose word is missing, and how often before they are taken for dead.
 ASK_FIRST_TICKS: Final = 8
 ASK_TICKS: Final = 2
@@ -60,20 +56,19 @@ class LocalRobot(Robot):
         self.tick = 0
         self.post = Post()
         self.vicinity = Vicinity(setup.node, self.rules)
+        self.speech = Speech(setup.node)
         self.push: Push | None = None
         self._over: dict[int, None] = {}
         self._letters: list[Transmission] = []
-        self._state: State | None = None
-        self._number = 0
-        self._told_at = -ROUTE_TICKS
-        self._again: list[int] = []
-        self._heartbeat = 0
         self._told_on: dict[int, int] = {}
-        self._gone: tuple[int, int] | None = None  # the push whose leader this was, and when to say so again
+        self._gone: tuple[int, int, int] | None = None  # the push whose leader this was, when to say so, when again
         self._asked: dict[int, int] = {}
         self._dead: dict[int, None] = {}
         self._ask_at: int | None = None
         self._rest = 0.0, 0.0
+        self._watched: object = None
+        self._calm = False
+        self._chosen = 0
         self._story = self._look_around()
 
     # --- one tick ---------------------------------------------------------------------------------------------------
@@ -134,8 +129,10 @@ class LocalRobot(Robot):
         if self._story is not None:
             return None
         push = self.push.next_tick() if self.push is not None else None
-        times = [self._heartbeat, *self._again[:1]]
-        times += [each for each in (self.post.next_tick(), push, self._ask_at) if each is not None]
+        times = [self.speech.next_tick()]
+        times += [
+            each for each in (self.post.next_tick(), push, self._ask_at, self.vicinity.awaits_until) if each is not None
+        ]
         if self._gone is not None:
             times.append(self._gone[1])
         return Wake(at_s=max(self.tick + 1, min(times)) * self.setup.dt_s, on_packet=True)
@@ -144,14 +141,21 @@ class LocalRobot(Robot):
 
     def _hear(self, sender: int, word: Word) -> None:
         match word:
+            case Way():
+                self.vicinity.gradient.hear(sender, word)
             case State():
-                self._dead.pop(sender, None)
+                self.vicinity.gradient.hear(sender, word.way)
+                if sender in self._dead:
+                    del self._dead[sender]
+                    self.vicinity.change()
                 self._asked.pop(sender, None)
+                if self.vicinity.missed(sender, word):
+                    self.speech.missed(self.tick)
                 if self.vicinity.hear(sender, word, self.tick):
                     self.senses.forget((sender,))
             case Ask():
                 if not word.nodes or self.setup.node in word.nodes:
-                    self._again = [self.tick]
+                    self.speech.again(self.tick)
             case Gone():
                 self._hear_gone(word)
             case Letter():
@@ -191,7 +195,7 @@ class LocalRobot(Robot):
         )  # it is not at the base any more, and the base has not heard
         if lost or not self._free or token.push in self._over or any(n == self.setup.node for _, n in token.chain):
             self.post.write(sender, Abort(token.push, False))
-            self._again = [self.tick]
+            self.speech.again(self.tick)
             return
         chain = (*token.chain, (here, self.setup.node))
         first = not token.chain and token.via == NOWHERE
@@ -211,24 +215,13 @@ class LocalRobot(Robot):
         self._letters.append(Transmission(CHANNEL, write(word), to))
 
     def _say(self) -> None:
-        state = self.vicinity.state(0, self._waiting)
-        if state != self._state:
-            # A way is often found by and by: it is told no more often than that.
-            same = self._state is not None and state == msgspec.structs.replace(self._state, route=state.route)
-            at = max(self.tick, self._told_at + ROUTE_TICKS) if same else self.tick
-            self._state = state
-            self._number += 1
-            self._again = [at, *(at + each for each in AGAIN_TICKS)]
-        if (self._again and self.tick >= self._again[0]) or self.tick >= self._heartbeat:
-            while self._again and self.tick >= self._again[0]:
-                del self._again[0]
-            self._heartbeat = self.tick + HEARTBEAT_TICKS + self.setup.node % 10
-            self._told_at = self.tick
-            self._send(msgspec.structs.replace(state, number=self._number))
+        for word in self.speech.say(self.tick, self.vicinity, self._waiting):
+            self._send(word)
         if self._gone is not None and self.tick >= self._gone[1]:
-            self._gone = (self._gone[0], self.tick + GONE_TICKS)
-            self._send(Gone(self._gone[0], GONE_HOPS))
-            if self.push is None or self.push.id != self._gone[0] or self.push.phase not in ("deploying", "out"):
+            push, _, wait = self._gone
+            self._gone = push, self.tick + wait, 2 * wait
+            self._send(Gone(push, GONE_HOPS))
+            if self.push is None or self.push.id != push or self.push.phase not in ("deploying", "out"):
                 self._gone = None
         for to, letter in self.post.due(self.tick):
             self._send(letter, to)
@@ -250,15 +243,24 @@ class LocalRobot(Robot):
                 self._story = self._recover(self._rest)  # it was pushed aside
             elif self._unsure():
                 self._story = self._look_around()
-        vicinity.find_heading()
-        vicinity.learn_references()
-        # Places outlive who stands there: while they change hands the frontier and the way to it stay as they were.
-        if self.busy or vicinity.changing(self.bearings, self.tick):
-            vicinity.doubt()
-        else:
-            vicinity.plan()
+        watched = vicinity.version, tuple(self.senses.seen), self._story is None
+        timers = [each for each in (self._ask_at, vicinity.awaits_until, self.speech.heartbeat) if each is not None]
+        if watched != self._watched or self.tick >= min(timers):
+            self._watched = watched
+            vicinity.find_heading()
+            vicinity.learn_references()
+            # Places outlive who stands there: while they change hands the frontier and the way to it stay as they were.
+            self._calm = not (self.busy or vicinity.changing(self.bearings, self.tick))
+            if self._calm:
+                vicinity.plan()
+            self._ask()
+        elif vicinity.gradient.version == self._chosen:
+            return  # nothing is new, so nothing follows
+        self._chosen = vicinity.gradient.version
+        if self._calm:
             vicinity.find_route()
-        self._ask()
+        else:
+            vicinity.doubt()
 
     def _recover(self, rest: Vector) -> Story:
         self._rest = yield from self._return(rest)
@@ -343,9 +345,9 @@ class LocalRobot(Robot):
 
     def rest(self) -> None:
         """Stand again, for neighbours to look at."""
-        self.vicinity.moving = False
+        self.vicinity.rest()
         self.senses.forget()
 
     def tell_gone(self, push: int) -> None:
         """Broadcast that this leader is gone, until the push goes on."""
-        self._gone = push, self.tick
+        self._gone = push, self.tick, GONE_TICKS

@@ -32,6 +32,7 @@ class LocalBase(LocalRobot):
         self._known: dict[int, None] = {}
         self._active: int | None = None
         self._first = False
+        self._pushed = NOWHERE  # who was to take the rear of it
         self._since = 0
         self._stays_since = 0
         self._quiet_since: int | None = None
@@ -69,6 +70,8 @@ class LocalBase(LocalRobot):
             self._stays_since = self.tick
             if self.tick - self._since > PUSH_TICKS:
                 self._end(False)
+            elif self._gone_out():
+                self._let_out()
             return
         alone = not any(s.place not in (0, NOWHERE) for s in self.vicinity.states.values())
         if not alone and not self.vicinity.leads:
@@ -86,7 +89,7 @@ class LocalBase(LocalRobot):
             return
         self._released_at = None
         self._tokens += 1
-        self._active, self._since, self._first = self._tokens, self.tick, alone
+        self._active, self._since, self._first, self._pushed = self._tokens, self.tick, alone, born
         self.post.write(born, Token(self._active, self._active, (), via))
 
     def _someone_stays(self) -> bool:
@@ -96,6 +99,13 @@ class LocalBase(LocalRobot):
         if not homeless or self._released_at is not None:
             self._stays_since = self.tick
         return self.tick - self._stays_since < STAY_TICKS and bool(homeless) and self._released_at is None
+
+    def _gone_out(self) -> bool:
+        """Tell whether whom this push took from the base stands elsewhere: the next one has time to look around."""
+        states = self.vicinity.states
+        born = states.get(self._pushed)
+        nobody = not any(states[node].place == NOWHERE for node in self.bearings if node in states)
+        return not self._first and born is not None and born.place != NOWHERE and not born.moving and nobody
 
     def _let_out(self) -> None:
         if self._released_at is None:
@@ -146,7 +156,7 @@ class LocalBase(LocalRobot):
         new = isinstance(word, State) and sender not in self.vicinity.states
         super()._hear(sender, word)
         if new and isinstance(word, State) and word.place == NOWHERE:
-            self._again = [self.tick]  # it wants to know what the base sees
+            self.speech.again(self.tick)  # it wants to know what the base sees
 
     def _wake(self) -> Wake | None:
         wake = super()._wake()

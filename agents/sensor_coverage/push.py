@@ -173,8 +173,7 @@ class Push:
             self._close(Abort(self.id, True))
             return
         self._anchors = self._who_anchors()
-        vicinity.leave()
-        vicinity.place = self._fresh
+        vicinity.found(self._fresh)
         if self._first:
             vicinity.heading = 0.0
             self._correct(self._anchors)
@@ -269,20 +268,21 @@ class Push:
                 self._close(Abort(self.id, True))  # it is back, and its word that it failed was lost
             case "armed" if waited > GONE_TICKS and waited % 20 == 1 and self._vacant():
                 self._call()
-            case "there" if self._ahead_stands or waited > WAVE_TICKS:
+            case "there" if self._ahead_stands or waited > self._patience(self._index + 1):
                 self._enter("standing")
                 if self._index:
                     self._write(Stand(self.id))
                 else:
                     self._behind_settled = True
-            case "standing" if self._behind_settled or waited > WAVE_TICKS:
+            case "standing" if self._behind_settled or waited > self._patience(self._index - 1):
                 self._straighten()
-            case "out" if self._behind_settled or waited > WAVE_TICKS:
+            case "out" if self._behind_settled or waited > self._patience(self._index - 1):
                 self._correct(self._anchors)
-            case "await" if waited > (LOST_TICKS if self._lost_leader() else WAVE_TICKS):
+            case "await" if waited > self._patience(self._index + 1):
                 self._close(Done(self.id))
             case "closing":
-                if (self._host.clear and waited > 1) or waited > CLOSE_TICKS:
+                leads = self._index == len(self._chain) - 1  # others hear of its drive's end first
+                if (self._host.clear and waited > leads) or waited > CLOSE_TICKS:
                     self._finish()
             case _:
                 pass
@@ -294,8 +294,10 @@ class Push:
                 return self.since + LINK_TICKS + 1
             case "holding" | "closing":
                 return self._host.tick + 1
-            case "await" if self._lost_leader():
-                return max(self._host.tick + 1, self.since + LOST_TICKS + 1)
+            case "there" | "await":
+                return max(self._host.tick + 1, self.since + self._patience(self._index + 1) + 1)
+            case "standing" | "out":
+                return max(self._host.tick + 1, self.since + self._patience(self._index - 1) + 1)
             case "armed":
                 waited = self._host.tick - self.since
                 return self.since + max(GONE_TICKS + 1, (waited // 20 + 1) * 20 + 1)
@@ -308,9 +310,10 @@ class Push:
         state = self._host.vicinity.states.get(leader)
         return -1 if state is None or state.moving or state.place != place else state.epoch
 
-    def _lost_leader(self) -> bool:
-        """Tell whether the leader is the one ahead, and has settled out of sight: then this robot says that it is done."""
-        return self._index == len(self._chain) - 2 and self._chain[-1][1] not in self._host.bearings
+    def _patience(self, index: int) -> int:
+        """Return how long to wait for a letter of one of the path: not long for one who is out of sight and so of reach."""
+        there = 0 <= index < len(self._chain) and self._chain[index][1] in self._host.bearings
+        return WAVE_TICKS if there else LOST_TICKS
 
     def _vacant(self) -> bool:
         """Tell whether the leader is out of sight, or beside its place: its word that it is gone was lost."""
@@ -327,9 +330,16 @@ class Push:
         rear = self._back if self._index == 0 else self._chain[self._index - 1][1]
         if self._loose and rear is not None:
             self._enter("straightening")
-            self._host.drive(Correct(0, (Sighting(rear, 0.0),)))
+            self._host.drive(Correct(0, (Sighting(rear, self._behind()),)))
         else:
             self._home()
+
+    def _behind(self) -> float:
+        """Return the bearing at which whoever has taken this robot's former place should about be."""
+        references = self._memory.references if self._memory is not None else ()
+        origin = self._chain[self._index][0]
+        there = next((each.direction_rad for each in references if each.place == origin), self._heading)
+        return math.remainder(there - self._heading, math.tau)
 
     def _home(self) -> None:
         """Who leaned on moving robots finds its place again, now that they stand."""

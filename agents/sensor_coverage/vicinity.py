@@ -1,181 +1,47 @@
 """What a robot knows of the places around its own, and where it could expand: the planner's rules, over one neighbourhood.
 
-Robots tell each other what they see in one frame, that of the base: each knows its heading from reciprocal bearings, and who
-comes out of the depot sees what the base sees. Every sighting names the drive since which it holds, so that a robot knows
-whether two views belong together. A robot plans only for the edges at itself, and only as their mover.
+A robot plans only for the edges at itself, and only as their mover.
 """
 
 import cmath
 import math
 from collections.abc import Mapping
 from itertools import islice
-from typing import Final, NamedTuple
+from typing import Final
 
-import msgspec
-
-from zwerm.agents.sensor_coverage.words import NOWHERE, Memory, Reference, Route, Seen, State, Try
+from zwerm.agents.sensor_coverage.gradient import Gradient
+from zwerm.agents.sensor_coverage.sight import Sight
+from zwerm.agents.sensor_coverage.words import NOWHERE, UNSAID, Memory, Reference, Route, Seen, State, Try
 from zwerm.frontier.places import REFERENCE_OFF_RAD, REFERENCE_WEIGHT, Places
 from zwerm.frontier.planner import Parameters, Planner
 from zwerm.frontier.services import Picture, Plan
 from zwerm.simplicial import Edge, FlagComplex, edge
 
-# Robots at gaps expand when no edge can be expanded anywhere: their routes cost that much more.
-GAP_COST: Final = 1000.0
-
 # A robot that does not know yet whether it is at the frontier is not to be gone to, but waited for.
-DOUBT_COST: Final = 10_000.0
+DOUBT_COST: Final = 1_000.0
 
-# How long a place may be on its way from one robot to the next [ticks].
-AWAIT_TICKS: Final = 80
-
-
-class Sighting(NamedTuple):
-    """A robot as this one sees it: since which of its drives (-1: not known yet), at which place, and the bearing."""
-
-    epoch: int
-    place: int
-    bearing_rad: float
+# Robots at gaps expand when no edge can be expanded anywhere, and nobody is in doubt: their routes cost that much more.
+GAP_COST: Final = 10_000.0
 
 
-class Vicinity:
-    """One robot's neighbourhood. `place` is where it stands, `heading` its own in the base's frame, once known."""
+class Vicinity(Sight):
+    """One robot's neighbourhood. `looks` counts its plans."""
 
     def __init__(self, node: int, rules: Parameters) -> None:
-        self.node = node
+        super().__init__(node)
         self.rules = rules
-        self.place = NOWHERE
-        self.epoch = 0
-        self.moving = False
-        self.heading: float | None = None
-        self.samples = 0
-        self.states: dict[int, State] = {}
-        self.heard: dict[int, int] = {}  # node: tick
-        self.seen: dict[int, Sighting] = {}
         self.plans: list[Plan] = []
         self.gaps: list[Plan] = []
-        self.route: Route | None = None
+        self.gradient = Gradient()
         self.obstacle: dict[Edge, None] = {}
+        self.looks = 0
         self._references: dict[int, tuple[complex, int]] = {}
         self._learned: dict[int, tuple[int, ...]] = {}
-        self._headings = 0
         self._places = Places()
         self._planner = Planner(rules, self._places)
         self._looked: object = None
-        self._awaited: dict[int, int] = {}  # places beside this one that change hands, and since when
 
-    # --- what others say --------------------------------------------------------------------------------------------
-
-    def hear(self, sender: int, state: State, tick: int) -> bool:
-        """Take in a neighbour's state; tell whether its bearing so far holds no more."""
-        known = self.states.get(sender)
-        self.heard[sender] = tick
-        if known is not None and state.number <= known.number:
-            return False
-        self.states[sender] = state
-        if state.place in self._awaited and not state.moving:
-            del self._awaited[state.place]
-        left = known is not None and (state.moving or known.place != state.place)
-        if known is not None and left and known.place != NOWHERE and not known.moving and sender in self.seen:
-            self._awaited[known.place] = tick
-        sighting = self.seen.get(sender)
-        if sighting is not None and not state.moving and sighting.epoch in (-1, state.epoch):
-            self.seen[sender] = Sighting(state.epoch, state.place, sighting.bearing_rad)
-        if state.place != NOWHERE:
-            for node, each in self.states.items():
-                if node != sender and each.place == state.place:  # who leads a push has left it to its follower
-                    self.states[node] = _elsewhere(each)
-        if known is None:
-            return state.samples == 0
-        return bool(state.epoch != known.epoch or (known.moving and not state.moving))
-
-    def forget(self, node: int) -> None:
-        """Forget a robot that is dead or far away."""
-        self.states.pop(node, None)
-        self.heard.pop(node, None)
-
-    def at(self, place: int) -> int | None:
-        """Return who stands at a place, as far as this robot has heard."""
-        if place == self.place:
-            return self.node
-        return next((node for node, state in self.states.items() if state.place == place), None)
-
-    def go(self) -> None:
-        """Begin a drive: what was seen holds no more."""
-        self.epoch += 1
-        self.moving = True
-        self.samples = 0
-        self.seen = {}
-
-    # --- what this robot sees ---------------------------------------------------------------------------------------
-
-    def look(self, bearings: Mapping[int, float]) -> None:
-        """Take what this robot sees, averaged."""
-        self.seen = {}
-        for node, bearing in bearings.items():
-            state = self.states.get(node)
-            if state is None or state.moving:
-                self.seen[node] = Sighting(-1, NOWHERE, bearing)
-            else:
-                self.seen[node] = Sighting(state.epoch, state.place, bearing)
-        self.samples += 1
-        self._learn_heading()
-
-    def _learn_heading(self) -> None:
-        """Refine the heading by reciprocal bearings."""
-        if self.place in (0, NOWHERE) or self.heading is None:  # on top of the base there is no bearing to it
-            return
-        off = 0j
-        for node, (_, _, bearing) in self.seen.items():
-            back = self._back(node)
-            if back is not None:
-                off += cmath.exp(1j * (back + math.pi - self.heading - bearing))
-        if off:
-            self.heading += cmath.phase(off) / min(self._headings + 1, 20)
-            self._headings += 1
-
-    def find_heading(self) -> None:
-        """Take the heading from the base, if this robot stands there: it sees what the base sees."""
-        base = next((state for state in self.states.values() if state.place == 0), None)
-        if base is None or self.heading is not None or not self.samples:
-            return
-        there = {each.node: each for each in base.seen if each.place != NOWHERE}
-        off = 0j
-        for node, (epoch, _, bearing) in self.seen.items():
-            if node in there and epoch == there[node].epoch != -1:
-                off += cmath.exp(1j * (there[node].direction_rad - bearing))
-        if off or not there:
-            self.heading = cmath.phase(off) if off else 0.0
-
-    def _back(self, node: int) -> float | None:
-        """Return the direction in which a neighbour sees this robot where it stands now."""
-        state = self.states.get(node)
-        if state is None or state.moving or state.place == NOWHERE:
-            return None
-        if node not in self.seen or self.seen[node].epoch != state.epoch:
-            return None
-        return next((s.direction_rad for s in state.seen if s.node == self.node and s.epoch == self.epoch), None)
-
-    def mutual(self) -> dict[int, State]:
-        """Return the robots with a place that see this one and are seen by it, both since they last moved."""
-        return {node: self.states[node] for node in self.seen if self._back(node) is not None}
-
-    def stale(self, sight: Mapping[int, float]) -> list[int]:
-        """Return the robots in sight whose word is missing, or does not fit what this robot sees; it should wait for them."""
-        found = []
-        for node in sight:
-            state = self.states.get(node)
-            if state is None or (state.place != NOWHERE and self._back(node) is None):
-                found.append(node)
-        mutual = self.mutual()
-        for node, state in mutual.items():
-            if any(s.node in mutual and s.epoch != mutual[s.node].epoch for s in state.seen):
-                found.append(node)
-        return found
-
-    def changing(self, sight: Mapping[int, float], tick: int) -> bool:
-        """Tell whether robots around are on their way: what this robot sees is then no picture of places."""
-        self._awaited = {place: since for place, since in self._awaited.items() if tick - since < AWAIT_TICKS}
-        return bool(self._awaited) or bool(self.stale(sight))
+    # --- what is remembered of a place ------------------------------------------------------------------------------
 
     def learn_references(self) -> None:
         """Let remembered directions follow what both ends see, slowly: else errors would walk at random."""
@@ -205,6 +71,7 @@ class Vicinity:
             if all(abs(math.remainder(each - direction, math.tau)) > 0.2 for each in walls):
                 walls.append(direction)
                 self._looked = None
+                self.change()
 
     def onward(self) -> int | None:
         """Return the neighbour that is next on the way to the frontier, if it is there; None at the frontier itself."""
@@ -226,6 +93,7 @@ class Vicinity:
         if self.place == NOWHERE or self.heading is None or picture_of == self._looked:
             return
         self._looked = picture_of
+        self.looks += 1
         me, heading = self.place, self.heading
         views = {me: {state.place: self.seen[node].bearing_rad + heading for node, state in sorted(mutual.items())}}
         for state in mutual.values():
@@ -268,45 +136,49 @@ class Vicinity:
         """Take note that a plan is being tried."""
         self._planner.note_attempt(plan)
         self._looked = None
+        self.change()
 
     def note_failure(self, plan: Plan, driven_m: float) -> None:
         """Take note that it failed."""
         self._planner.note_failure(plan, driven_m)
         self._looked = None
+        self.change()
 
     def best(self) -> Plan | None:
         """Return the plan to carry out here."""
         wanted = self.plans or self.gaps
         return min(wanted, key=lambda each: each.key) if wanted else None
 
-    def doubt(self) -> None:
-        """Let nobody believe that there is no frontier, while this robot does not know."""
-        if self.route is None and self.place not in (0, NOWHERE):
-            self.route = Route(DOUBT_COST, (self.place,))
+    @property
+    def route(self) -> Route | None:
+        """The way to the frontier, as far as this robot knows."""
+        return self.gradient.route
 
     @property
     def leads(self) -> bool:
-        """Whether there is a way to a frontier."""
-        return self.route is not None and self.route.cost < DOUBT_COST
+        """Whether there is a way to a frontier, and none to anybody in doubt before that."""
+        return self.route is not None and not DOUBT_COST <= self.route.cost < GAP_COST
+
+    def doubt(self) -> None:
+        """Let nobody believe that there is no frontier, or none but gaps, while this robot does not know."""
+        if self.place not in (0, NOWHERE) and (self.route is None or self.route.cost >= GAP_COST):
+            self.gradient.route = Route(DOUBT_COST, (self.place,))
 
     def find_route(self) -> None:
-        """Choose the way to the frontier by what neighbours say of theirs; nobody's way leads through here again."""
-        best: tuple[float, tuple[int, ...]] | None = None
-        if self.place not in (0, NOWHERE) and (self.plans or self.gaps):
-            best = (0.0 if self.plans else GAP_COST), (self.place,)
-        for state in self.mutual().values():
-            if state.route is None or self.place in state.route.places or state.place == 0:
-                continue
-            weight = self.rules.obstacle_cost if edge(self.place, state.place) in self.obstacle else 1.0
-            found = state.route.cost + weight, (self.place, *state.route.places)
-            if best is None or (found[0], found[1][-1], found[1]) < (best[0], best[1][-1], best[1]):
-                best = found
-        self.route = None if best is None else Route(*best)
+        """Choose the way to the frontier by what neighbours say of theirs."""
+        at = self.place not in (0, NOWHERE)
+        cost = 0.0 if at and self.plans else GAP_COST if at and self.gaps else None
+        dear = self.rules.obstacle_cost
+        weights = {
+            state.place: dear if edge(self.place, state.place) in self.obstacle else 1.0
+            for state in self.mutual().values()
+        }
+        self.gradient.choose(self.place, cost, weights)
 
     # --- what this robot says ---------------------------------------------------------------------------------------
 
-    def state(self, number: int, waiting: bool) -> State:
-        """Return what to tell everyone."""
+    def state(self, waiting: bool) -> State:
+        """Return what to tell everyone, but for numbers and the way."""
         heading = self.heading
         seen: tuple[Seen, ...] = ()
         if heading is not None:
@@ -315,7 +187,7 @@ class Vicinity:
                 for node, (epoch, place, bearing) in sorted(self.seen.items())
             )
         return State(
-            number,
+            0,
             self.place,
             self.epoch,
             self.moving,
@@ -324,7 +196,7 @@ class Vicinity:
             seen,
             self._tries(),
             tuple(sorted({(_other(each.key, self.place), each.key[2]) for each in self.plans})),
-            self.route,
+            UNSAID,
         )
 
     def _tries(self) -> tuple[Try, ...]:
@@ -366,11 +238,18 @@ class Vicinity:
         self.plans, self.gaps, self.obstacle = [], [], {}
         self._looked = None
         self._awaited = {}
+        self.change()
+
+    def found(self, place: int) -> None:
+        """Be the first at a place."""
+        self.leave()
+        self.place = place
+        self.gradient.take_over(place, Route(DOUBT_COST, (place,)))
 
     def enter(self, memory: Memory) -> None:
         """Take a place over."""
-        self.leave()
-        me = self.place = memory.place
+        self.found(memory.place)
+        me = self.place
         for each in memory.references:
             self._references[each.place] = cmath.rect(1.0, each.direction_rad), each.count
         self._places.walls[me] = list(memory.walls)
@@ -379,10 +258,6 @@ class Vicinity:
         tried.failed = dict.fromkeys((key, me) for key in memory.failed)
         tried.attempts = dict(memory.attempts)
         tried.blocked[me] = list(memory.blocked)
-
-
-def _elsewhere(state: State) -> State:
-    return msgspec.structs.replace(state, place=NOWHERE)
 
 
 def _other(key: tuple[int, ...], me: int) -> int:

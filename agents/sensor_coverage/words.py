@@ -55,6 +55,18 @@ class Route(_Part, frozen=True):
     places: tuple[int, ...]
 
 
+class Way(_Message, frozen=True, tag="w"):
+    """The way from a place, by who stands there; `number` counts what the sender says of ways."""
+
+    number: int
+    place: int
+    route: Route | None
+
+
+# What was said of ways before anything was.
+UNSAID: Final = Way(0, NOWHERE, None)
+
+
 class State(_Message, frozen=True, tag="s"):
     """All that neighbours need to know of a robot.
 
@@ -71,7 +83,7 @@ class State(_Message, frozen=True, tag="s"):
     seen: tuple[Seen, ...]
     tries: tuple[Try, ...]
     could: tuple[tuple[int, int], ...]
-    route: Route | None
+    way: Way
 
 
 class Ask(_Message, frozen=True, tag="a"):
@@ -182,7 +194,7 @@ class Receipt(_Message, frozen=True, tag="r"):
     number: int
 
 
-Word = State | Ask | Gone | Letter | Receipt
+Word = State | Way | Ask | Gone | Letter | Receipt
 
 _encode: Final[Callable[[Word], bytes]] = msgspec.msgpack.Encoder().encode
 _decode: Final[Callable[[bytes], Word]] = msgspec.msgpack.Decoder(Word).decode

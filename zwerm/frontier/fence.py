@@ -130,13 +130,15 @@ def fence(views: Views, complex_: FlagComplex, corner_margin_rad: float, edges: 
     return Fence(tuple(sides), tuple(sorted(corners)))
 
 
-def wedges(views: Views, complex_: FlagComplex) -> Iterable[tuple[int, int, int, float]]:
+def wedges(
+    views: Views, complex_: FlagComplex, vertices: Iterable[int] | None = None
+) -> Iterable[tuple[int, int, int, float]]:
     """Yield (i, a, b, gap_rad) for every pair of neighbours a, b of i, b the next to the left of a, with no triangle iab.
 
     A robot with one neighbour has one such gap, all around: a is b. Together their edges are a closed chain around all
     that is uncovered, where the edges of the sign rule may not be.
     """
-    for i in complex_.vertices:
+    for i in complex_.vertices if vertices is None else vertices:
         around = sorted(complex_.neighbours[i], key=lambda each: (math.remainder(views[i][each], math.tau), each))
         for a, b in zip(around, [*around[1:], *around[:1]], strict=True):
             gap = (views[i][b] - views[i][a]) % math.tau if a != b else math.tau

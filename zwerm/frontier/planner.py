@@ -151,9 +151,8 @@ class Planner:
     def _vertex_plans(self) -> Iterable[Plan]:
         """Yield the ways on for robots with a wide gap in what they see: single files, and doors."""
         hop = self._rules.link_m - self._rules.margin_m
-        for i, a, _, gap in wedges(self._views, self._complex):
-            if i in self._bases:
-                continue
+        movers = [each for each in self._complex.vertices if each not in self._bases]
+        for i, a, _, gap in wedges(self._views, self._complex, movers):
             end = gap > END_RAD
             for turn in END_TURNS_RAD if end else VERTEX_TURNS_RAD:
                 # The bisector first; aside only as far as the gap is wide.

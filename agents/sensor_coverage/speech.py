@@ -1,0 +1,84 @@
+"""What a robot tells all who hear it: its state and its way, when they are new, when asked, and now and then."""
+
+from typing import Final
+
+import msgspec
+
+from zwerm.agents.sensor_coverage.vicinity import Vicinity
+from zwerm.agents.sensor_coverage.words import UNSAID, State, Way, Word
+
+# Where words were lost of late, when what is new is told again [ticks].
+AGAIN_TICKS: Final = (6,)
+LOSSY_TICKS: Final = 600
+# A way is often found by and by: it is told no more often than that.
+WAY_TICKS: Final = 4
+# After how long a silence the state is told as it is.
+HEARTBEAT_TICKS: Final = 100
+
+
+class Speech:
+    """One robot's broadcasts. `heartbeat` is the tick at which it speaks, whatever happens."""
+
+    def __init__(self, node: int) -> None:
+        self.heartbeat = 0
+        self._pause = HEARTBEAT_TICKS + node % 10
+        self._state: State | None = None
+        self._of: object = None
+        self._number = 0
+        self._again: list[int] = []
+        self._way = UNSAID
+        self._way_again: list[int] = []
+        self._way_at = -WAY_TICKS
+        self._lossy_until = LOSSY_TICKS  # until the air is known
+
+    def again(self, tick: int) -> None:
+        """Tell the state at this tick: somebody asked, or may know less than it should."""
+        self._again[:0] = [tick]
+
+    def missed(self, tick: int) -> None:
+        """Take note that words are lost."""
+        self._lossy_until = tick + LOSSY_TICKS
+
+    def say(self, tick: int, vicinity: Vicinity, waiting: bool) -> list[Word]:
+        """Return what to tell now."""
+        return [*self._say_state(tick, vicinity, waiting), *self._say_way(tick, vicinity)]
+
+    def next_tick(self) -> int:
+        """Return when there is something to tell, if nothing else happens."""
+        return min((self.heartbeat, *self._again[:1], *self._way_again[:1]))
+
+    def _say_state(self, tick: int, vicinity: Vicinity, waiting: bool) -> list[Word]:
+        of = vicinity.version, vicinity.looks, waiting
+        if of != self._of:
+            self._of = of
+            state = vicinity.state(waiting)
+            if state != self._state:
+                self._state = state
+                self._number += 1
+                self._again = self._times(tick, tick)
+        if self._state is None or not (tick >= self.heartbeat or (self._again and tick >= self._again[0])):
+            return []
+        self._again = [each for each in self._again if each > tick]
+        self._way_again = [each for each in self._way_again if each > tick]
+        self.heartbeat = tick + self._pause
+        return [msgspec.structs.replace(self._state, number=self._number, way=self._now(tick, vicinity))]
+
+    def _say_way(self, tick: int, vicinity: Vicinity) -> list[Word]:
+        """Tell the way alone, where nothing else is new."""
+        told = self._way
+        if not self._way_again and (told.place, told.route) != (vicinity.place, vicinity.route):
+            self._way_again = self._times(tick, max(tick, self._way_at + WAY_TICKS))
+        if not self._way_again or tick < self._way_again[0]:
+            return []
+        self._way_again = [each for each in self._way_again if each > tick]
+        return [self._now(tick, vicinity)]
+
+    def _times(self, tick: int, first: int) -> list[int]:
+        return [first, *(first + each for each in AGAIN_TICKS if tick < self._lossy_until)]
+
+    def _now(self, tick: int, vicinity: Vicinity) -> Way:
+        """Return the way as it is now."""
+        self._way_at = tick
+        if (self._way.place, self._way.route) != (vicinity.place, vicinity.route):
+            self._way = Way(self._way.number + 1, vicinity.place, vicinity.route)
+        return self._way
