@@ -29,8 +29,12 @@ class Field(Protocol):
     def gradient(self, points: Floats) -> Floats:
         """Return (k, 2) the gradient [1/m] at points (k, 2) [m], in the frame of the arena."""
 
+    def sample(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return value and gradient; quicker than one after the other where they share work."""
+        return self.value(points), self.gradient(points)
 
-class Linear:
+
+class Linear(Field):
     """A plane: `offset` at the origin, rising by `gradient_per_m`."""
 
     class Parameters(Table):
@@ -64,7 +68,7 @@ class Constant(Linear):
         super().__init__(value, (0.0, 0.0))
 
 
-class Gaussians:
+class Gaussians(Field):
     """`offset` plus a bump for each of `amplitudes`, at `centers_m`, `sd_m` wide; it has that height at its centre."""
 
     class Parameters(Table):
@@ -102,18 +106,24 @@ class Gaussians:
 
     def gradient(self, points: Floats) -> Floats:
         """Return (k, 2) the gradient [1/m] at points (k, 2) [m]."""
-        height, apart = self._bumps(points)
-        gradient: Floats = -((height * self._precision)[:, :, None] * apart).sum(axis=1)
-        return gradient
+        return self.sample(points)[1]
 
-    def _bumps(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return (k, g) each bump's height at each point, and (k, g, 2) the way from its centre."""
-        apart = points[:, None, :] - self._centers
-        distance2 = np.square(apart).sum(axis=2)
-        return self._amplitudes * np.exp(-0.5 * distance2 * self._precision), apart
+    def sample(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return value and gradient, which share the bumps."""
+        height, *apart = self._bumps(points)
+        steepness = height * self._precision
+        gradient = np.empty(points.shape)
+        for axis, away in enumerate(apart):
+            np.negative((steepness * away).sum(axis=1), out=gradient[:, axis])
+        return self._offset + height.sum(axis=1), gradient
+
+    def _bumps(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return (k, g) each bump's height at each point, and how far right of its centre and above it that is."""
+        x, y = points.T[:, :, None] - self._centers.T[:, None, :]
+        return self._amplitudes * np.exp(-0.5 * (x * x + y * y) * self._precision), x, y
 
 
-class Lamp:
+class Lamp(Field):
     """A lamp `height_m` above `center_m`, as a sensor that faces it from the floor sees it.
 
     `peak` right below, and from there as one over the square of the distance.
@@ -143,7 +153,7 @@ class Lamp:
         return gradient
 
 
-class Bitmap:
+class Bitmap(Field):
     """A picture: black is `low`, white `high`, bilinear between centres of pixels, constant beyond the outer ones.
 
     It covers the arena's bounds, or `size_m` from its lower left corner `origin_m`. The first row of pixels is the top.

@@ -38,10 +38,12 @@ class Physics:
         self._moment = pymunk.moment_for_circle(body.mass_kg, 0.0, body.radius_m)
         self._space = _make_space(self._substep_s, body.friction, segments)
         self._bodies: dict[int, pymunk.Body] = {}
-        self._ids: Ints = np.zeros(0, dtype=np.int64)
+        # The time in the middle of each substep, and from a change of velocity to the force that makes it.
+        self._middle_s: Floats = np.arange(0.5, body.substeps)[:, None] * self._substep_s
+        self._inertia: Floats = np.array([body.mass_kg, body.mass_kg, self._moment]) / self._substep_s
         self._poses = batch.Buffer()
         self._resting = True
-        self._arrange()
+        self._arranged = False
 
     def add(self, robot: int, position: Floats, heading: float) -> None:
         """Put a robot's body into the arena."""
@@ -56,7 +58,7 @@ class Physics:
         self._bodies[robot] = body
         self.position[robot] = position
         self.heading[robot] = heading
-        self._arrange()
+        self._arranged = False
 
     def fix(self, robot: int, position: Floats, heading: float) -> None:
         """Put a robot into the arena that never moves and that nobody runs into: a base station."""
@@ -67,7 +69,7 @@ class Physics:
         """Take a robot's body out of the arena; its last pose stays on record."""
         body = self._bodies.pop(robot)
         self._space.remove(body, *body.shapes)
-        self._arrange()
+        self._arranged = False
 
     def _arrange(self) -> None:
         """Lay out the buffers anew: pymunk's batches are in its own order of bodies, the static one included."""
@@ -76,29 +78,28 @@ class Physics:
         batch.get_space_bodies(self._space, _POSE, self._poses)
         ids = np.frombuffer(bytes(self._poses.int_buf()), dtype=np.uintp).tolist()
         rows = [(row, owner[body]) for row, body in enumerate(ids) if body in owner]
-        self._rows: Ints = np.array([row for row, _ in rows], dtype=np.int64)
-        self._ids = np.array([robot for _, robot in rows], dtype=np.int64)
+        self._rows = _plain([row for row, _ in rows], len(rows))
+        self._ids = _plain([robot for _, robot in rows], len(self.position))
         self._pushes: Floats = np.zeros((self._table.substeps, len(ids), 3))
         self._start: Floats = np.zeros((len(ids), 3))
         self._push_buffers = [_buffer(pushes) for pushes in self._pushes]
         self._start_buffer = _buffer(self._start)
-        # Bodies come first, in order, unless some were removed: then a plain slice does.
-        self._slice: slice | Ints = slice(len(rows)) if (self._rows == np.arange(len(rows))).all() else self._rows
         self._resting = False
+        self._arranged = True
 
     def advance(self, forward_m_s: Floats, left_m_s: Floats | None, turn_rad_s: Floats) -> bool:
         """Integrate one tick under the drives (n,), by robot id; return whether any robot moved."""
-        ids, rows = self._ids, self._slice
+        if not self._arranged:
+            self._arrange()
+        ids, rows = self._ids, self._rows
         turn = turn_rad_s[ids]
         forward = forward_m_s[ids]
         left = None if left_m_s is None else left_m_s[ids]
-        idle = not (forward.any() or turn.any() or (left is not None and left.any()))
-        if idle and self._resting:
+        idle = self._resting and not (forward.any() or turn.any() or (left is not None and left.any()))
+        if idle:
             return False
-        h = self._substep_s
         # The heading in the middle of each substep, so that an arc is integrated by its chords.
-        middle = np.arange(0.5, self._table.substeps)[:, None] * h
-        angle = self.heading[ids] + middle * turn
+        angle = self.heading[ids] + self._middle_s * turn
         cos, sin = np.cos(angle), np.sin(angle)
         vx, vy = forward * cos, forward * sin
         if left is not None:
@@ -111,12 +112,12 @@ class Physics:
         self._start[:] = pushes[0]
         # The force of substep s acts on the velocity that substep s + 1 integrates.
         pushes[:-1] = pushes[1:]
-        pushes *= (self._table.mass_kg / h, self._table.mass_kg / h, self._moment / h)
+        pushes *= self._inertia
         space = self._space
         batch.set_space_bodies(space, _VELOCITY, self._start_buffer)
         for buffer in self._push_buffers:
             batch.set_space_bodies(space, _FORCE, buffer)
-            space.step(h)
+            space.step(self._substep_s)
         self._poses.clear()
         batch.get_space_bodies(space, _POSE, self._poses)
         poses = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 3)[rows]
@@ -138,6 +139,11 @@ def _make_space(substep_s: float, friction: float, segments: Floats) -> pymunk.S
         wall.friction = friction
         space.add(wall)
     return space
+
+
+def _plain(rows: list[int], count: int) -> slice | Ints:
+    """Return what picks these rows: all of `count` in order, as mostly, in place."""
+    return slice(count) if rows == list(range(count)) else np.array(rows, dtype=np.int64)
 
 
 def _buffer(values: Floats) -> batch.Buffer:

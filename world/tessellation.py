@@ -10,9 +10,12 @@ ranges, walls or noise.
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError
 
 from zwerm.world.scene import Floats, Ints
+
+Complexes = NDArray[np.complex128]
 
 # Where more edges are to be flipped at once, or more often than that, it is quicker to triangulate anew.
 _FLIPS_AT_ONCE: Final = 12
@@ -23,13 +26,12 @@ _A, _B, _C, _D, _LEFT, _RIGHT = range(6)
 
 
 class _Mesh(NamedTuple):
-    """A triangulation: its inner edges, and the corners of what must turn left."""
+    """A triangulation: its inner edges and its rim."""
 
     # (6, e) for every inner edge a -> b: a, b, the corner c left of it, d right of it, and the triangles on either side.
     edges: Ints
-    # (3, t + h) the counter-clockwise triangles, then the rim: the hull's corners with the one before and the one after.
-    turns: Ints
-    triangles: int
+    # (3, h) the hull's corners, between the one before and the one after.
+    rim: Ints
 
 
 class Tessellation:
@@ -49,10 +51,11 @@ class Tessellation:
         Of points at one place, one has the neighbours, and the others are neighbours of it, of its neighbours and of one
         another. Points on one line, and fewer than four, are all neighbours: too many do no harm to who clips a cell.
         """
+        position = np.ascontiguousarray(position)
         if position.shape == self._position.shape and ((position == self._position).all() or self._mended(position)):
             return self._pairs
         self._position = position.copy()
-        self._mesh, self._pairs = _triangulate(position)
+        self._mesh, self._pairs = _triangulate(self._position)
         self._rows = {}
         self._pairs.flags.writeable = False
         return self._pairs
@@ -76,7 +79,7 @@ class Tessellation:
     def _flip(self, wrong: Ints) -> None:
         """Flip these edges, but for those that another flip has changed."""
         assert self._mesh is not None
-        edges, turns, _ = self._mesh
+        edges = self._mesh.edges
         if not self._rows:
             low, high = np.minimum(edges[_A], edges[_B]).tolist(), np.maximum(edges[_A], edges[_B]).tolist()
             self._rows = {ends: row for row, ends in enumerate(zip(low, high, strict=True))}
@@ -89,8 +92,6 @@ class Tessellation:
             del self._rows[_ends(a, b)]
             self._rows[_ends(c, d)] = row
             edges[:, row] = d, c, a, b, left, right
-            turns[:, left] = a, d, c
-            turns[:, right] = d, b, c
             # The four edges around it have another corner across, two of them in the other triangle.
             for p, q, was, old, now, new in (
                 (b, c, a, left, d, right),
@@ -122,16 +123,13 @@ def _triangulate(position: Floats) -> tuple[_Mesh | None, Ints]:
     except QhullError:  # all on one line, or at one place
         return None, _everyone(count)
     triangles = found.simplices.astype(np.int64)
-    a, b, c = (position[triangles[:, corner]] for corner in range(3))
-    clockwise = _turn(a, b, c) < 0.0
+    a, b, c = position.view(np.complex128)[:, 0].take(triangles.T)
+    clockwise = _turn(b - a, c - a) < 0.0
     across = found.neighbors.astype(np.int64)
     triangles[clockwise] = triangles[clockwise][:, ::-1]
     across[clockwise] = across[clockwise][:, ::-1]
     starts, ends = triangles[:, [1, 2, 0]], triangles[:, [2, 0, 1]]  # the side opposite each corner
-    rim = _rim(starts, ends, across)
-    mesh = _Mesh(
-        _inner_edges(triangles, starts, ends, across), np.concatenate([triangles, rim]).T.copy(), len(triangles)
-    )
+    mesh = _Mesh(_inner_edges(triangles, starts, ends, across), _rim(starts, ends, across))
     pairs = _pairs_of(mesh, count)
     if len(found.coplanar):
         return None, _with_coincident(pairs, found.coplanar[:, [0, 2]].astype(np.int64), count)
@@ -148,17 +146,17 @@ def _inner_edges(triangles: Ints, starts: Ints, ends: Ints, across: Ints) -> Int
 
 
 def _rim(starts: Ints, ends: Ints, across: Ints) -> Ints:
-    """Return (h, 3) the hull's corners with the one before and the one after."""
+    """Return (3, h) the hull's corners, between the one before and the one after."""
     row, corner = np.nonzero(across < 0)
     start, end = starts[row, corner], ends[row, corner]
     order = np.argsort(start)
     after = end[order][np.searchsorted(start[order], end)]
-    return np.column_stack([start, end, after])
+    return np.array([start, end, after])
 
 
 def _pairs_of(mesh: _Mesh, count: int) -> Ints:
     """Return (k, 2) the ends of every edge, in order, ascending."""
-    p, q = np.concatenate([mesh.edges[:2], mesh.turns[:2, mesh.triangles :]], axis=1)
+    p, q = np.concatenate([mesh.edges[:2], mesh.rim[:2]], axis=1)
     keys = np.sort(np.minimum(p, q) * count + np.maximum(p, q))
     return np.column_stack([keys // count, keys % count])
 
@@ -176,22 +174,29 @@ def _with_coincident(pairs: Ints, twins: Ints, count: int) -> Ints:
     return np.column_stack([keys // count, keys % count])
 
 
-def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Return twice the signed area of the triangles a, b, c, each (k, 2)."""
-    turn: Floats = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    return turn
-
-
 def _wrong_edges(mesh: _Mesh, position: Floats) -> Ints | None:
     """Return the edges that are to be flipped; None where the triangles do not cover the hull, each place once."""
-    x, y = np.ascontiguousarray(position.T)
-    (px, qx, rx), (py, qy, ry) = x.take(mesh.turns), y.take(mesh.turns)
-    turn = (qx - px) * (ry - py) - (qy - py) * (rx - px)
-    if not (turn[: mesh.triangles].min() > 0.0 and turn[mesh.triangles :].min() >= 0.0):
+    place = position.view(np.complex128)[:, 0]  # so that x and y are looked up at once
+    before, corner, after = place.take(mesh.rim)
+    if _turn(corner - before, after - before).min() < 0.0:
         return None
-    # The corner d, the origin here, lies within the circle through a, b and c.
-    abc, d = mesh.edges[: _C + 1], mesh.edges[_D]
-    (ax, bx, cx), (ay, by, cy) = x.take(abc) - x.take(d), y.take(abc) - y.take(d)
-    ab, bc, ca = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
-    inside = (ax * ax + ay * ay) * bc + (bx * bx + by * by) * ca + (cx * cx + cy * cy) * ab
-    return np.flatnonzero(inside > 0.0)
+    # a, b, c, a, b, with the corner d for the origin.
+    ends = place.take(mesh.edges[: _D + 1])
+    around = np.empty((5, ends.shape[1]), dtype=np.complex128)
+    np.subtract(ends[:_D], ends[_D], out=around[:_D])
+    around[_D:] = around[:2]
+    bc, ca, ab = turns = _turn(around[1:4], around[2:])
+    # Every triangle is on one side of an inner edge: a b c on the left, or b a d on the right.
+    if ab.max() >= 0.0 or (ab + bc + ca).min() <= 0.0:
+        return None
+    # Whether the corner d lies within the circle through a, b and c.
+    x, y = around.real[:_D], around.imag[:_D]
+    a, b, c = (x * x + y * y) * turns
+    return np.flatnonzero(a + b + c > 0.0)
+
+
+def _turn(p: Complexes, q: Complexes) -> Floats:
+    """Return the turn from p to q, vectors of one shape: twice the area of the triangles with the origin."""
+    # Not the product of complex numbers, which rounds differently where a processor can multiply and add at once.
+    turn: Floats = p.real * q.imag - p.imag * q.real
+    return turn

@@ -66,24 +66,33 @@ class KeptCell:
         """
         bounds = self._bounds([*others, *_mirrored(region, self._walls)] if self._walls else others)
         gx, gy, lowest = 0.25 * gx, 0.25 * gy, -0.25 * value
-        turns = 0
-        # Before the first corner stands the robot itself, which makes the first triangle one without area.
-        x0 = y0 = e0 = w0 = m0 = x_first = y_first = e_first = 0.0
-        reach2 = area = sum_m = sum_x = sum_y = 0.0
-        at_first = True
         sides = iter(bounds)
-        side = next(sides)
-        a0, b0 = side.x_m, side.y_m
-        c0 = a0 * a0 + b0 * b0
+        side, after = next(sides), next(sides)
+        a0, b0, a1, b1 = side.x_m, side.y_m, after.x_m, after.y_m
+        c0, c1 = a0 * a0 + b0 * b0, a1 * a1 + b1 * b1
+        across = a0 * b1 - b0 * a1
+        if across <= 0.0:
+            return None
+        # The corner where two bisectors meet: a x + b y = c / 2 for either.
+        half = 0.5 / across
+        x0, y0 = x_first, y_first = (c0 * b1 - b0 * c1) * half, (a0 * c1 - c0 * a1) * half
+        e0 = e_first = gx * x0 + gy * y0
+        if e0 < lowest:
+            return None
+        reach2 = x0 * x0 + y0 * y0
+        turns = 0
+        w0 = m0 = area = sum_m = sum_x = sum_y = 0.0
+        a0, b0, c0 = a1, b1, c1
         for side in sides:
-            a1, b1 = side.x_m, side.y_m
+            a1 = side.x_m
+            b1 = side.y_m
             c1 = a1 * a1 + b1 * b1
             across = a0 * b1 - b0 * a1
             if across <= 0.0:
                 return None
-            # The corner where two bisectors meet: a x + b y = c / 2 for either.
             half = 0.5 / across
-            x, y = (c0 * b1 - b0 * c1) * half, (a0 * c1 - c0 * a1) * half
+            x = (c0 * b1 - b0 * c1) * half
+            y = (a0 * c1 - c0 * a1) * half
             w = x0 * y - y0 * x
             e = gx * x + gy * y
             if w < 0.0 or e < lowest:
@@ -93,16 +102,20 @@ class KeptCell:
             distance2 = x * x + y * y
             if distance2 > reach2:
                 reach2 = distance2
-            if at_first:
-                at_first = False
-                x_first, y_first, e_first = x, y, e
             m = w * (value + e0 + e)
             area += w
             sum_m += m
             k = m0 + m + (w0 + w) * e0
             sum_x += k * x0
             sum_y += k * y0
-            x0, y0, e0, w0, m0, a0, b0, c0 = x, y, e, w, m, a1, b1, c1
+            x0 = x
+            y0 = y
+            e0 = e
+            w0 = w
+            m0 = m
+            a0 = a1
+            b0 = b1
+            c0 = c1
         w = x0 * y_first - y0 * x_first
         if y0 < 0.0 <= y_first:
             turns += 1

@@ -6,7 +6,8 @@ time since.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
@@ -50,11 +51,18 @@ class Sensor(Protocol):
         """Return one reading for each of `robots` (ascending ids of present robots), vectorised over all of them."""
 
 
-def portions(items: list[Item], ends: Ints) -> list[tuple[Item, ...]]:
+def portions(items: Iterable[Item], ends: Ints) -> list[tuple[Item, ...]]:
     """Return `items` cut before each of `ends`, which ascend to the end of items: one tuple for each robot."""
-    readings = []
-    start = 0
-    for end in ends.tolist():
-        readings.append(tuple(items[start:end]))
-        start = end
-    return readings
+    together = tuple(items)
+    return [together[start:end] for start, end in pairwise([0, *ends.tolist()])]
+
+
+def in_body_frames(dx: Floats, dy: Floats, heading: Floats) -> tuple[Floats, Floats]:
+    """Return the vectors (dx, dy) of the arena's frame in the frames of bodies that head there [rad].
+
+    The headings have one row for each of the vectors, or broadcast to them.
+    """
+    if not heading.any():
+        return dx, dy
+    cos, sin = np.cos(heading), np.sin(heading)
+    return cos * dx + sin * dy, cos * dy - sin * dx

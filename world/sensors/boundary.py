@@ -12,7 +12,7 @@ from shapely.geometry import Polygon
 
 from zwerm.scenario import NonNegative, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import Surroundings
+from zwerm.world.sensors import Surroundings, in_body_frames
 
 
 class BoundaryTable(Table):
@@ -37,12 +37,11 @@ class Boundary:
 
     def read(self, scene: Scene, robots: Ints) -> list[tuple[tuple[float, float], ...]]:
         """Return the corners in the frame of each of `robots`."""
-        dx, dy = self._corners.T[:, None, :] - scene.position[robots].T[:, :, None]
-        cos, sin = np.cos(scene.heading[robots])[:, None], np.sin(scene.heading[robots])[:, None]
-        x, y = cos * dx + sin * dy, cos * dy - sin * dx
+        dx, dy = self._corners.T[:, :, None] - scene.position[robots].T[:, None, :]
+        x, y = in_body_frames(dx, dy, scene.heading[robots])
         if self._sd_m > 0.0:
-            corner = np.arange(len(self._corners))
-            x += self._sd_m * scene.draws.normal("sensor.boundary.x", scene.tick, robots[:, None], corner)
-            y += self._sd_m * scene.draws.normal("sensor.boundary.y", scene.tick, robots[:, None], corner)
-        corners = [zip(*each, strict=True) for each in zip(x.T.tolist(), y.T.tolist(), strict=True)]
+            corner = np.arange(len(self._corners))[:, None]
+            x += self._sd_m * scene.draws.normal("sensor.boundary.x", scene.tick, robots, corner)
+            y += self._sd_m * scene.draws.normal("sensor.boundary.y", scene.tick, robots, corner)
+        corners = [zip(*each, strict=True) for each in zip(x.tolist(), y.tolist(), strict=True)]
         return list(zip(*corners, strict=True))

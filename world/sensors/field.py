@@ -6,12 +6,10 @@ The noise is Gaussian and independent for each tick and robot: `sd` of the value
 
 from typing import ClassVar
 
-import numpy as np
-
 from zwerm.protocol import FieldSample
 from zwerm.scenario import NonNegative, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import Surroundings
+from zwerm.world.sensors import Surroundings, in_body_frames
 
 
 class FieldTable(Table):
@@ -36,13 +34,12 @@ class FieldSensor:
     def read(self, scene: Scene, robots: Ints) -> list[FieldSample]:
         """Return what each of `robots` senses of the field."""
         here = scene.position[robots]
-        value = self._field.value(here)
-        gx, gy = self._field.gradient(here).T
-        cos, sin = np.cos(scene.heading[robots]), np.sin(scene.heading[robots])
-        forward, left = cos * gx + sin * gy, cos * gy - sin * gx
+        value, gradient = self._field.sample(here)
+        along_x, along_y = gradient.T
+        forward, left = in_body_frames(along_x, along_y, scene.heading[robots])
         if self._sd > 0.0:
             value = value + self._sd * scene.draws.normal("sensor.field.value", scene.tick, robots)
         if self._gradient_sd_per_m > 0.0:
-            forward += self._gradient_sd_per_m * scene.draws.normal("sensor.field.x", scene.tick, robots)
-            left += self._gradient_sd_per_m * scene.draws.normal("sensor.field.y", scene.tick, robots)
+            forward = forward + self._gradient_sd_per_m * scene.draws.normal("sensor.field.x", scene.tick, robots)
+            left = left + self._gradient_sd_per_m * scene.draws.normal("sensor.field.y", scene.tick, robots)
         return list(map(FieldSample, value.tolist(), forward.tolist(), left.tolist()))

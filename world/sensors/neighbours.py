@@ -14,7 +14,7 @@ import numpy as np
 from zwerm.protocol import Neighbour
 from zwerm.scenario import NonNegative, Positive, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import Surroundings, portions
+from zwerm.world.sensors import Surroundings, in_body_frames, portions
 from zwerm.world.tessellation import Tessellation
 from zwerm.world.visibility import Sightings
 
@@ -47,14 +47,13 @@ class Neighbours:
     def read(self, scene: Scene, robots: Ints) -> list[tuple[Neighbour, ...]]:
         """Return where each of `robots` has the robots it sees."""
         observer, seen, ends = self._sightings(scene, robots)
-        here = np.ascontiguousarray(scene.position.T)
-        dx, dy = here.take(seen, axis=1) - here.take(observer, axis=1)
-        cos, sin = np.cos(scene.heading).take(observer), np.sin(scene.heading).take(observer)
-        x, y = cos * dx + sin * dy, cos * dy - sin * dx
+        here = scene.position.view(np.complex128)[:, 0]  # so that x and y are looked up at once
+        apart = here.take(seen) - here.take(observer)
+        x, y = in_body_frames(apart.real, apart.imag, scene.heading.take(observer))
         if self._sd_m > 0.0:
             x += self._sd_m * scene.draws.normal("sensor.neighbours.x", scene.tick, observer, seen)
             y += self._sd_m * scene.draws.normal("sensor.neighbours.y", scene.tick, observer, seen)
-        return portions(list(map(Neighbour, seen.tolist(), x.tolist(), y.tolist())), ends)
+        return portions(map(Neighbour, seen.tolist(), x.tolist(), y.tolist()), ends)
 
     def _sightings(self, scene: Scene, robots: Ints) -> Sightings:
         if self._tessellation is None:
@@ -67,12 +66,11 @@ class Neighbours:
         if lasting and self._last is not None and found is self._last[0] and np.array_equal(robots, self._last[1]):
             return self._last[2]
         pairs = ids[found]
-        start, end = scene.position[pairs[:, 0]], scene.position[pairs[:, 1]]
         if range_m is not None:
-            pairs = pairs[np.hypot(*(end - start).T) <= range_m]
-            start, end = scene.position[pairs[:, 0]], scene.position[pairs[:, 1]]
+            apart = scene.position[pairs[:, 1]] - scene.position[pairs[:, 0]]
+            pairs = pairs[np.hypot(*apart.T) <= range_m]
         if not (through_walls or scene.arena.is_convex):
-            pairs = pairs[~scene.arena.blocked(start, end)]
+            pairs = pairs[~scene.arena.blocked(scene.position[pairs[:, 0]], scene.position[pairs[:, 1]])]
         sightings = both_ways(pairs, robots, len(scene.present))
         self._last = (found, robots, sightings) if lasting else None
         return sightings
@@ -80,9 +78,10 @@ class Neighbours:
 
 def both_ways(pairs: Ints, robots: Ints, count: int) -> Sightings:
     """Return both directions of pairs (k, 2) of ids below count, for the observers `robots` (ascending ids)."""
-    observer, seen = np.concatenate([pairs, pairs[:, ::-1]]).T
-    order = np.argsort(observer * count + seen)
-    observer, seen = observer[order], seen[order]
+    i, j = pairs.T
+    keys = np.concatenate([i * count + j, j * count + i])
+    keys.sort()
+    observer, seen = np.divmod(keys, count)
     if len(robots) < count:
         rows = np.isin(observer, robots)
         observer, seen = observer[rows], seen[rows]
