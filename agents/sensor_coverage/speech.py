@@ -7,12 +7,13 @@ import msgspec
 from zwerm.agents.sensor_coverage.vicinity import Vicinity
 from zwerm.agents.sensor_coverage.words import UNSAID, State, Way, Word
 
-# Where words were lost of late, when what is new is told again [ticks].
-AGAIN_TICKS: Final = (6,)
+# Where words were lost of late, when what is new is told again, and after how long a silence the state as it is [ticks].
+AGAIN_TICKS: Final = (4, 10, 22)
+LOSSY_HEARTBEAT_TICKS: Final = 24
 LOSSY_TICKS: Final = 600
 # A way is often found by and by: it is told no more often than that.
 WAY_TICKS: Final = 4
-# After how long a silence the state is told as it is.
+# The same where nothing is lost.
 HEARTBEAT_TICKS: Final = 100
 
 
@@ -21,7 +22,7 @@ class Speech:
 
     def __init__(self, node: int) -> None:
         self.heartbeat = 0
-        self._pause = HEARTBEAT_TICKS + node % 10
+        self._node = node
         self._state: State | None = None
         self._of: object = None
         self._number = 0
@@ -60,7 +61,9 @@ class Speech:
             return []
         self._again = [each for each in self._again if each > tick]
         self._way_again = [each for each in self._way_again if each > tick]
-        self.heartbeat = tick + self._pause
+        self.heartbeat = (
+            tick + (LOSSY_HEARTBEAT_TICKS if tick < self._lossy_until else HEARTBEAT_TICKS) + self._node % 10
+        )
         return [msgspec.structs.replace(self._state, number=self._number, way=self._now(tick, vicinity))]
 
     def _say_way(self, tick: int, vicinity: Vicinity) -> list[Word]:
