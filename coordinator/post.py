@@ -1,62 +1,211 @@
-"""The coordinator's post: orders out, answers in, and stories that wait for them.
+"""The coordinator's post: orders out, again and again until they are answered, and answers in, each once.
 
 A story is a generator that yields when it wants to go on: at the next packet, or at a time. Several may be told at once;
 each takes from the mail what is its own.
 """
 
-from collections.abc import Callable, Generator, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Collection, Generator, Sequence
+from dataclasses import dataclass
+from typing import Final, TypeVar
 
-from zwerm.orders import Answer, Order, encode, read_answer
+from zwerm.coordinator.patience import BUSY_TICKS, Patience
+from zwerm.orders import UNKNOWN, Answer, Cleared, Dispatch, Emerged, Heard, Muster, Order, Reply, read_reply, write
 from zwerm.protocol import Packet, Transmission, Wake
 
 T = TypeVar("T")
 Story = Generator[Wake, None, T]
 Letter = tuple[int, Answer]
 
+# Where so many fall silent at once, and this share of all, it is the radio rather than they: how much longer to wait then.
+JAMMED_MIN: Final = 3
+JAMMED_FRACTION: Final = 0.25
+JAMMED_TIMES: Final = 10
+# Who carries an order out and does not come to its end in so many times its time never will.
+STUCK_TIMES: Final = 3
+# An answer is overdue after this part of the time that it may take.
+OVERDUE: Final = 4
+
+
+@dataclass
+class _Open:
+    """An order that is not answered yet."""
+
+    said: Dispatch
+    ticks_max: int
+    since: int  # the tick at which it was said first, or heard of first
+    due: int
+    tries: int = 1  # since anything was heard
+    heard: bool = False
+    cleared: bool = False
+    ping: bool = False
+
 
 class Post:
-    """Mail in and out."""
+    """Mail in and out, of a coordinator in its `life`. `survey_ticks` and `drive_ticks` are how long answers may take."""
 
-    def __init__(self, dt_s: float) -> None:
+    def __init__(self, dt_s: float, life: int = 1, survey_ticks: int = 80, drive_ticks: int = 300) -> None:
         self.now_s = 0.0
+        self.patience = Patience()
+        self.spoken: dict[int, int] = {}  # who has ever said anything, and its life
+        self._life = life
         self._dt_s = dt_s
+        self._ticks = survey_ticks, drive_ticks
         self._mail: list[Letter] = []
         self._outbox: list[Transmission] = []
+        self._open: dict[int, _Open] = {}
+        self._number: dict[int, int] = {}
+        self._mustered: tuple[Dispatch, int] | None = None
+
+    @property
+    def tick(self) -> int:
+        """The present tick."""
+        return round(self.now_s / self._dt_s)
+
+    # --- in ---------------------------------------------------------------------------------------------------------
 
     def take(self, now_s: float, inbox: Sequence[Packet]) -> None:
-        """Take the mail of this moment."""
+        """Take the mail of this moment, and give up who is silent for too long."""
         self.now_s = now_s
         for packet in inbox:
-            answer = read_answer(packet.payload)
-            if answer is not None and packet.sender is not None:
-                self._mail.append((packet.sender, answer))
+            reply = read_reply(packet.payload)
+            if reply is not None and packet.sender is not None:
+                self._read(packet.sender, reply)
+        for node, order in list(self._open.items()):
+            if self._hopeless(order):
+                del self._open[node]
 
-    def say(self, node: int, order: Order) -> None:
-        """Send an order."""
-        self._outbox.append(Transmission("uplink", encode(order), node))
+    def _read(self, node: int, reply: Reply) -> None:
+        if isinstance(reply.answer, Emerged):
+            before = self.spoken.get(node)
+            if before != reply.life:
+                self.spoken[node] = reply.life
+                self._mail.append((node, reply.answer))
+                if before is not None:  # it remembers no order
+                    self._open.pop(node, None)
+            return
+        if reply.to_life != self._life:
+            return
+        order = self._open.get(node)
+        if order is None:
+            if reply.number == 0 and node not in self._number:
+                self.spoken[node] = reply.life
+                self._number[node] = 0
+                self._mail.append((node, reply.answer))
+            return
+        if reply.number != order.said.number:
+            return
+        self.spoken[node] = reply.life
+        order.tries = 0
+        self.patience.lossy = self.patience.lossy or reply.heard < reply.attempt
+        if isinstance(reply.answer, Heard | Cleared):
+            if not order.heard:
+                order.heard, order.since = True, self.tick
+            order.due = self.tick + (BUSY_TICKS if self.patience.lossy else order.ticks_max // OVERDUE)
+            if isinstance(reply.answer, Cleared) and not order.cleared:
+                order.cleared = True
+                self._mail.append((node, reply.answer))
+            return
+        self.patience.note(reply.attempt, reply.heard)
+        self._mail.append((node, reply.answer))
+        del self._open[node]
+
+    def _hopeless(self, order: _Open) -> bool:
+        """Tell whether no answer to an order will come."""
+        waited = self.tick - order.since
+        if order.ping:
+            return waited >= order.ticks_max
+        silent = sum(not each.heard and not each.ping for each in self._open.values())
+        jammed = silent >= max(JAMMED_MIN, JAMMED_FRACTION * len(self.spoken))
+        if order.heard and order.tries <= 2:
+            return waited >= STUCK_TIMES * order.ticks_max
+        return waited >= order.ticks_max * (JAMMED_TIMES if jammed else 1) and order.tries >= self.patience.tries_max
+
+    # --- out --------------------------------------------------------------------------------------------------------
+
+    def muster(self, order: Muster) -> None:
+        """Say to all who hear it that they shall answer, whoever they are."""
+        self._mustered = Dispatch(self._life, 0, 1, UNKNOWN, order), self.tick
+        self._outbox.append(Transmission("uplink", write(self._mustered[0])))
+
+    def expect(self, node: int) -> None:
+        """Wait for a node's answer to the muster."""
+        if self._mustered is not None and node not in self._number:
+            self._number[node] = 0
+            said, tick = self._mustered
+            self._open[node] = _Open(said, self._ticks[0], tick, tick + self.patience.again_ticks)
+
+    def say(self, node: int, order: Order, drive: bool = False, ping: bool = False) -> None:
+        """Send an order, and say it again until it is answered; a `ping` is said once."""
+        number = self._number[node] = self._number.get(node, 0) + 1
+        self._mail = [each for each in self._mail if each[0] != node or isinstance(each[1], Emerged)]
+        said = Dispatch(self._life, number, 1, self.spoken.get(node, UNKNOWN), order)
+        due = self.tick + self._again_ticks(self._ticks[drive])
+        self._open[node] = _Open(said, self._ticks[drive], self.tick, due, ping=ping)
+        self._send(node, said)
+
+    def waits_for(self, node: int) -> bool:
+        """Tell whether an order of a node is not answered yet."""
+        return node in self._open
+
+    def close(self, node: int) -> None:
+        """Say nothing more of the order that a node has."""
+        self._open.pop(node, None)
 
     def sent(self) -> tuple[Transmission, ...]:
-        """Return what was said since the last time."""
+        """Return what was said since the last time, and what is to be said again."""
+        for node, order in self._open.items():
+            if self.tick >= order.due and not order.ping:
+                said = order.said
+                order.said = Dispatch(said.life, said.number, said.attempt + 1, said.to_life, said.order)
+                order.tries += 1
+                order.due = self.tick + self.patience.again_ticks
+                self._send(node, order.said)
         outbox, self._outbox = tuple(self._outbox), []
         return outbox
+
+    def next_s(self) -> float | None:
+        """Return when something is to be said again, or somebody to be given up."""
+        due = [order.since + order.ticks_max if order.ping else order.due for order in self._open.values()]
+        return min(due) * self._dt_s if due else None
+
+    def _send(self, node: int, said: Dispatch) -> None:
+        self._outbox.append(Transmission("uplink", write(said), node))
+
+    def _again_ticks(self, ticks_max: int) -> int:
+        """Return after how long an order is said again: if nothing ever got lost, only when its answer is overdue."""
+        return self.patience.again_ticks if self.patience.lossy else ticks_max // OVERDUE
+
+    # --- waiting ----------------------------------------------------------------------------------------------------
 
     def rest(self) -> list[Letter]:
         """Return the mail that nobody took, and throw it away."""
         mail, self._mail = self._mail, []
         return mail
 
-    def wait(self, wanted: Callable[[int, Answer], bool], count: int, ticks: int) -> Story[list[Letter]]:
-        """Wait until `count` answers that are wanted have come, or so many ticks have passed, and return them."""
-        until_s = self.now_s + ticks * self._dt_s
-        found: list[Letter] = []
+    def answers(self, nodes: Collection[int], *kinds: type[Answer]) -> Story[dict[int, Answer]]:
+        """Wait until each of `nodes` has given an answer of these kinds or was given up, and return the answers by node."""
+        found: dict[int, Answer] = {}
         while True:
             rest: list[Letter] = []
-            for each in self._mail:
-                (found if len(found) < count and wanted(*each) else rest).append(each)
+            for node, answer in self._mail:
+                if node in nodes and node not in found and isinstance(answer, kinds):
+                    found[node] = answer
+                else:
+                    rest.append((node, answer))
             self._mail = rest
-            if len(found) >= count or self.now_s >= until_s - 1e-9:
+            if all(node in found or node not in self._open for node in nodes):
                 return found
+            yield Wake(on_packet=True)
+
+    def first(self, wanted: Callable[[int, Answer], bool], node: int, ticks: int | None = None) -> Story[Letter | None]:
+        """Wait for the first letter that is wanted, until the order of `node` is over, or so many ticks have passed."""
+        until_s = None if ticks is None else self.now_s + ticks * self._dt_s
+        while True:
+            for number, each in enumerate(self._mail):
+                if wanted(*each):
+                    return self._mail.pop(number)
+            if node not in self._open if until_s is None else self.now_s >= until_s - 1e-9:
+                return None
             yield Wake(at_s=until_s, on_packet=True)
 
     def pause(self) -> Story[None]:

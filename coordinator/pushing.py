@@ -43,7 +43,7 @@ class Pushing:
         if robot is None:
             return ()
         for bearing in FIRST_WAYS_RAD:
-            self._post.say(robot, Deploy(self.cycle, bearing, self._hop_m, self._rules.clear_m))
+            self._post.say(robot, Deploy(self.cycle, bearing, self._hop_m, self._rules.clear_m), drive=True)
             arrived = yield from self._arrivals([robot])
             if robot not in arrived:  # dead: the next one tries
                 del self._sources.waiting[base]
@@ -66,31 +66,31 @@ class Pushing:
             # Whom the base sees is about to move: the next robot must look around before that.
             yield from self._sources.let_out(base, cycle, self.picture.views[base], path)
         bearing = plan.direction - places.heading[leader]
-        self._post.say(leader, Deploy(cycle, _wrapped(bearing), plan.hop_m, plan.clear_m))
-        news = yield from self._post.wait(
-            lambda node, answer: node == leader and isinstance(answer, Cleared | Arrived),
-            1,
-            self._rules.drive_ticks_max,
-        )
-        first = news[0][1] if news else None
-        if first is None:  # dead on its way: that says nothing of walls
+        self._post.say(leader, Deploy(cycle, _wrapped(bearing), plan.hop_m, plan.clear_m), drive=True)
+        news = yield from self._post.answers([leader], Cleared, Arrived)
+        if leader not in news:  # dead on its way: that says nothing of walls
             return (leader,)
-        if isinstance(first, Arrived) and not first.ok:
-            self._frontier.note_failure(plan, first.driven_m)
-            return (leader,)
+        first = news[leader]
+        there: dict[int, Arrived] = {}
+        if isinstance(first, Arrived):
+            if not first.ok:
+                self._frontier.note_failure(plan, first.driven_m)
+                return (leader,)
+            there = {leader: first}  # that it was clear got lost
         followers = [places.occupant[place] for place in path[:-1]]
         if base is not None:
             yield from self._sources.let_out(base, cycle, self.picture.views[base], path)
             born = self._sources.waiting.pop(base, None)
             if born is None:  # nobody comes: back
-                yield from self._arrivals([leader])
+                if not there:
+                    yield from self._arrivals([leader])
                 self._move([leader], [plan.mover], [plan.mover], {})
                 yield from self._arrivals([leader])
                 return (leader,)
             followers[0] = born
         going = list(path[1:])
         self._move(followers, path[:-1], going, dict(zip(going, followers, strict=True)))
-        arrived = yield from self._arrivals([*followers, leader])
+        arrived = there | (yield from self._arrivals([*followers, *([] if there else [leader])]))
         self.pushes += 1
         if base is None:
             places.drop(path[0])
@@ -127,7 +127,8 @@ class Pushing:
                 landmarks.append(Landmark(node, _wrapped(there - heading), still))
             if origin in bases and sum(each.still for each in landmarks) > 2:
                 landmarks = [each for each in landmarks if each.node != places.occupant[origin]]
-            self._post.say(robot, Move(self.cycle, _wrapped(direction - heading), length, tuple(landmarks)))
+            order = Move(self.cycle, _wrapped(direction - heading), length, tuple(landmarks))
+            self._post.say(robot, order, drive=True)
 
     def _settle(self, robots: Sequence[int], goals: Sequence[int], arrived: dict[int, Arrived]) -> Story[None]:
         """Who leaned on moving robots finds its place again now that they stand: one by one, rear to front."""
@@ -161,16 +162,13 @@ class Pushing:
             rear = robot
 
     def _correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Story[None]:
-        self._post.say(robot, Correct(self.cycle, tuple(Sighting(node, _wrapped(there)) for node, there in anchors)))
+        sightings = tuple(Sighting(node, _wrapped(there)) for node, there in anchors)
+        self._post.say(robot, Correct(self.cycle, sightings), drive=True)
         yield from self._arrivals([robot])
 
     def _arrivals(self, robots: Sequence[int]) -> Story[dict[int, Arrived]]:
-        answers = yield from self._post.wait(
-            lambda node, answer: node in robots and isinstance(answer, Arrived),
-            len(robots),
-            self._rules.drive_ticks_max,
-        )
-        return {node: answer for node, answer in answers if isinstance(answer, Arrived)}
+        answers = yield from self._post.answers(robots, Arrived)
+        return {node: answer for node, answer in answers.items() if isinstance(answer, Arrived)}
 
 
 def _leaned(arrived: dict[int, Arrived], robot: int) -> bool:

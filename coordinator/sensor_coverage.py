@@ -5,7 +5,7 @@ stands behind one interface each (`zwerm.frontier.services`); here is only the s
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, Final, Protocol
 
 import msgspec
@@ -13,6 +13,7 @@ import msgspec
 from zwerm.coordinator.post import Post, Story, together
 from zwerm.coordinator.pushing import Moved, Pushing
 from zwerm.coordinator.sources import Sources
+from zwerm.draws import stream
 from zwerm.frontier.assignment import CheapestFirst
 from zwerm.frontier.paths import Dijkstra, Reach
 from zwerm.frontier.places import Places
@@ -20,12 +21,15 @@ from zwerm.frontier.planner import Parameters, Planner
 from zwerm.frontier.redundancy import RelativeHomology
 from zwerm.frontier.services import Picture, Plan, Services
 from zwerm.frontier.termination import COVERED, Quiet
-from zwerm.orders import Emerged, Report, Survey
+from zwerm.orders import Emerged, Muster, Report, Survey
 from zwerm.protocol import Command, Observation, Wake
 from zwerm.simplicial import Edge, FlagComplex
 
 # A robot that can be spared is taken before any from a base station.
 SPARED_COST: Final = -100.0
+
+# So many lives can be told apart.
+LIVES: Final = 2**16
 
 # How a deployment ends that does not end with all covered.
 GIVEN_UP: Final = {
@@ -53,6 +57,10 @@ class Setup(Protocol):
         """The ids of the base stations."""
 
     @property
+    def stream_key(self) -> bytes:
+        """The key of its own stream of randomness, another one in each life."""
+
+    @property
     def services(self) -> dict[str, str]:
         """Who provides which service."""
 
@@ -66,8 +74,9 @@ class SensorCoverage:
         rules: Parameters = msgspec.convert(setup.parameters, Parameters)
         self.parameters = rules
         self.places = Places()
-        self.post = Post(setup.dt_s)
-        self.sources = Sources(setup.bases, self.places, self.post, rules.survey_ticks_max)
+        life = int(stream(setup.stream_key).integers(1, LIVES))
+        self.post = Post(setup.dt_s, life, rules.survey_ticks_max, rules.drive_ticks_max)
+        self.sources = Sources(setup.bases, self.places, self.post)
         planner = Planner(rules, self.places)
         self.services = Services(
             planner,
@@ -92,8 +101,12 @@ class SensorCoverage:
         self.post.take(observation.time_s, observation.inbox)
         wake = next(self._story, Wake())
         told, self._told = self._told, {}
+        outbox = self.post.sent()
+        again_s = None if self.outcome else self.post.next_s()
+        if again_s is not None and (wake.at_s is None or again_s < wake.at_s):
+            wake = Wake(at_s=again_s, on_packet=wake.on_packet)
         return Command(
-            outbox=self.post.sent(),
+            outbox=outbox,
             wake=wake,
             done=self.outcome == COVERED,
             gave_up=self._gave_up(),
@@ -111,6 +124,7 @@ class SensorCoverage:
 
     def _tell(self) -> Story[None]:
         moved: Moved = ()
+        self.post.muster(Muster(1))
         while self.cycle < self.parameters.cycles_max and not self.outcome:
             self.cycle += 1
             yield from self._survey(moved)
@@ -188,17 +202,19 @@ class SensorCoverage:
         for robot in asked:
             if robot not in reports:
                 places.drop(place_of[robot])
-        while strangers := self._strangers(reports):
+        self._look(reports)
+        at_door: dict[int, tuple[int, Report]] = {}
+        while strangers := self._strangers(reports, at_door):
             answers = yield from self._ask(strangers, ())
+            doors = {robot: self.sources.door(robot) for robot, answer in answers.items() if answer.home}
+            at_door |= {robot: (door, answers.pop(robot)) for robot, door in doors.items() if door is not None}
             for robot in answers:
                 places.found(robot)
+                self.sources.out[robot] = None
+            self._look(answers)
             reports |= answers
-        fresh = []
-        for robot, report in sorted(reports.items()):
-            if report.sightings is not None:
-                places.take(robot, report.sightings)
-                fresh.append(robot)
-        places.learn_headings(fresh)
+        self._ping(reports)
+        places.learn_headings(robot for robot, report in sorted(reports.items()) if report.sightings is not None)
         place_of = places.place_of()
         for robot, report in sorted(reports.items()):
             place = place_of[robot]
@@ -206,9 +222,16 @@ class SensorCoverage:
                 self._remember(places.walls.setdefault(place, []), bearing + places.heading[robot])
         views = places.views()
         places.learn_references(views)
+        for robot, (door, report) in at_door.items():
+            self.sources.adopt(robot, door, report.sightings or (), views[door])
         self.picture = self.pushing.picture = Picture(views, FlagComplex(views), tuple(self.sources.alive()))
         self.pushing.cycle = self.cycle
         self.services.frontier.look(self.picture)
+
+    def _look(self, reports: Mapping[int, Report]) -> None:
+        for robot, report in reports.items():
+            if report.sightings is not None:
+                self.places.take(robot, report.sightings)
 
     def _ask(self, robots: Sequence[int], moved: Moved) -> Story[dict[int, Report]]:
         """Return what robots report, by robot; who does not answer in time is not asked again.
@@ -217,21 +240,28 @@ class SensorCoverage:
         """
         cycle, known = self.cycle, self.places.view
         for robot in robots:
-            self.post.say(robot, Survey(cycle, tuple(sorted(moved if robot in known else {*moved, robot}))))
-        answers = yield from self.post.wait(
-            lambda _, answer: isinstance(answer, Report) and answer.cycle == cycle,
-            len(robots),
-            self.parameters.survey_ticks_max,
-        )
-        reports = {node: answer for node, answer in answers if isinstance(answer, Report)}
+            if cycle == 1:
+                self.post.expect(robot)
+            else:
+                self.post.say(robot, Survey(cycle, tuple(sorted(moved if robot in known else {*moved, robot}))))
+        answers = yield from self.post.answers(robots, Report)
+        reports = {node: answer for node, answer in answers.items() if isinstance(answer, Report)}
         self._silent |= dict.fromkeys(robot for robot in robots if robot not in reports)
         return reports
 
-    def _strangers(self, reports: Mapping[int, Report]) -> list[int]:
+    def _strangers(self, reports: Mapping[int, Report], at_door: Collection[int]) -> list[int]:
         """Return robots that are seen and have no place: a coordinator that begins anew finds the swarm as it is."""
-        known = {*self.places.occupant.values(), *self.sources.waiting.values(), *self._silent, *self.pushing.lost}
+        waiting = self.sources.waiting.values()
+        known = {*self.places.occupant.values(), *waiting, *at_door, *self._silent, *self.pushing.lost}
         seen = {each.node for report in reports.values() for each in report.sightings or ()}
         return sorted(seen - known)
+
+    def _ping(self, reports: Mapping[int, Report]) -> None:
+        """Ask those who were given up for dead and are still seen, and wait for no answer: they may be back one day."""
+        seen = {node for robot in reports for node in self.places.view.get(robot, ())}
+        for robot in self._silent:
+            if robot in seen and not self.post.waits_for(robot):
+                self.post.say(robot, Survey(self.cycle, (robot,)), ping=True)
 
     def _welcome(self) -> None:
         """Give a place to those who were given up for dead, and speak; who begins anew has a frame of its own."""
@@ -272,7 +302,7 @@ class SensorCoverage:
         self._told |= {
             "deployment_cycles": self.cycle,
             "pushes": self.pushing.pushes,
-            "robots_released": self.sources.released,
+            "robots_released": len(self.sources.out),
             "redundant_robots": len(self.redundant),
         }
 

@@ -8,26 +8,27 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Final
 
-from zwerm.coordinator.post import Letter, Post, Story
+from zwerm.coordinator.post import Post, Story
 from zwerm.frontier.places import Places
-from zwerm.orders import Answer, Emerged, Release
+from zwerm.orders import Answer, Emerged, Release, Released, Report, Sighting, Survey
 
 # A depot is not empty because nobody came out: whoever did may have died at the door.
 RELEASES_MAX: Final = 3
+# Who has come out says so within these [ticks], unless that got lost.
+EMERGENCE_TICKS: Final = 30
 
 
 class Sources:
     """The stations, by place. `dry`: a depot that let nobody out; `blocked`: no robot gets away from there."""
 
-    def __init__(self, bases: Collection[int], places: Places, post: Post, ticks_max: int) -> None:
+    def __init__(self, bases: Collection[int], places: Places, post: Post) -> None:
         self.stations = {places.found(base): base for base in bases}
         self.waiting: dict[int, int] = {}  # place: the robot that came out there and has not gone yet
         self.dry: dict[int, None] = {}
         self.blocked: dict[int, None] = {}
-        self.released = 0
+        self.out: dict[int, None] = {}  # everyone who was ever outside
         self._places = places
         self._post = post
-        self._ticks_max = ticks_max
         self._busy = False
 
     def open(self) -> list[int]:
@@ -53,21 +54,57 @@ class Sources:
         while self._busy:
             yield from self._post.pause()
         self._busy = True
-        answers: list[Letter] = []
         for _ in range(RELEASES_MAX):
-            self._post.say(self.stations[base], Release(cycle))
-            answers = yield from self._post.wait(self._is_new, 1, self._ticks_max)
-            if answers:
-                break
-        self._busy = False
-        for robot, answer in answers:
-            if isinstance(answer, Emerged):
-                self.released += 1
-                self._places.take(robot, answer.sightings)
+            robot = yield from self._newborn(self.stations[base], cycle)
+            if robot is not None:
+                self._busy = False
                 self.waiting[base] = robot
                 return robot
+        self._busy = False
         self.dry[base] = None
         return None
+
+    def _newborn(self, station: int, cycle: int) -> Story[int | None]:
+        """Let a robot out, and return it once it has said what it sees; None if nobody came, or nobody that lives."""
+        self._post.say(station, Release(cycle))
+        letter = yield from self._post.first(
+            lambda node, answer: self._is_new(node, answer) or (node == station and isinstance(answer, Released)),
+            station,
+        )
+        if letter is None:
+            return None
+        robot, answer = letter
+        if isinstance(answer, Released):
+            if answer.robot is None:
+                return None
+            robot = answer.robot
+            self.out[robot] = None
+            return (yield from self._seeing(robot, cycle))
+        self._post.close(station)
+        return self._born(robot, answer.sightings if isinstance(answer, Emerged) else ())
+
+    def _seeing(self, robot: int, cycle: int) -> Story[int | None]:
+        """Wait until a robot that came out says what it sees, and ask it if that may have got lost."""
+        letter = None
+        if not self._post.patience.lossy:
+            letter = yield from self._post.first(
+                lambda node, answer: node == robot and isinstance(answer, Emerged), robot, EMERGENCE_TICKS
+            )
+        if letter is None:
+            self._post.say(robot, Survey(cycle, ()))
+            letter = yield from self._post.first(
+                lambda node, answer: node == robot and isinstance(answer, Emerged | Report), robot
+            )
+        if letter is None:
+            return None
+        self._post.close(robot)
+        answer = letter[1]
+        return self._born(robot, answer.sightings or () if isinstance(answer, Emerged | Report) else ())
+
+    def _born(self, robot: int, sightings: Collection[Sighting]) -> int:
+        self.out[robot] = None
+        self._places.take(robot, sightings)
+        return robot
 
     def _is_new(self, node: int, answer: Answer) -> bool:
         return isinstance(answer, Emerged) and self.place_of(node) is None and node not in self._places.heading
@@ -80,6 +117,17 @@ class Sources:
         if robot is not None:
             frame = self._places.frame[self.stations[base]]
             self._places.orient(robot, frame, self._heading(robot, view, moving))
+
+    def door(self, robot: int) -> int | None:
+        """Return the place of the station that sees a robot which has not left."""
+        places = self._places
+        return next((place for place in self.alive() if robot in places.view.get(self.stations[place], ())), None)
+
+    def adopt(self, robot: int, base: int, sightings: Collection[Sighting], view: Mapping[int, float]) -> None:
+        """Have a robot wait that was found at a station which has this view, unless one does."""
+        if base not in self.waiting:
+            self.waiting[base] = self._born(robot, sightings)
+            self._places.orient(robot, self._places.frame[self.stations[base]], self._heading(robot, view, ()))
 
     def _heading(self, robot: int, view: Mapping[int, float], moving: Collection[int]) -> float:
         place_of = self._places.place_of()

@@ -25,13 +25,15 @@ from zwerm.orders import (
     Cleared,
     Correct,
     Deploy,
+    Dispatch,
     Emerged,
     Move,
     Order,
     Release,
+    Reply,
     Sighting,
-    encode,
-    read_order,
+    read_dispatch,
+    write,
 )
 from zwerm.protocol import Packet
 from zwerm.simplicial import FlagComplex
@@ -250,7 +252,7 @@ def pushed(swarm: Swarm, plan: Plan) -> list[tuple[int, Order]]:
     post = Post(0.1)
     base = swarm.picture.bases[0]
     station = swarm.places.occupant[base]
-    sources = Sources((), swarm.places, post, 10)
+    sources = Sources((), swarm.places, post)
     sources.stations[base] = station
     pushing = Pushing(Parameters(), swarm.places, post, sources, swarm.planner)
     pushing.picture = swarm.picture
@@ -262,20 +264,26 @@ def pushed(swarm: Swarm, plan: Plan) -> list[tuple[int, Order]]:
             next(story)
         except StopIteration:
             return said
-        answers: list[tuple[int, Answer]] = []
+        answers: list[tuple[int, Reply]] = []
         for sent in post.sent():
-            order = read_order(sent.payload)
-            assert order is not None
+            dispatch = read_dispatch(sent.payload)
+            assert dispatch is not None
             assert sent.to is not None
+            order = dispatch.order
             said.append((sent.to, order))
             if isinstance(order, Release):
-                answers.append((13, Emerged(sightings_of(swarm, station, turned=0.4))))
+                emerged = Emerged(sightings_of(swarm, station, turned=0.4))
+                answers.append((13, Reply(1, 0, 0, 0, 0, emerged)))
             elif isinstance(order, Deploy):
-                answers += [(sent.to, Cleared(0)), (sent.to, done)]
+                answers += [(sent.to, reply(dispatch, each)) for each in (Cleared(0), done)]
             elif isinstance(order, Move | Correct):
-                answers.append((sent.to, done))
-        post.take(0.1 * tick, [Packet("uplink", encode(answer), sender) for sender, answer in answers])
+                answers.append((sent.to, reply(dispatch, done)))
+        post.take(0.1 * tick, [Packet("uplink", write(each), sender) for sender, each in answers])
     raise AssertionError("the push never ends")
+
+
+def reply(to: Dispatch, answer: Answer) -> Reply:
+    return Reply(1, to.life, to.number, to.attempt, 1, answer)
 
 
 def sightings_of(swarm: Swarm, robot: int, turned: float) -> tuple[Sighting, ...]:

@@ -53,7 +53,7 @@ def test_a_frontier_that_no_path_leads_to_is_cut_off() -> None:
         alive = [robot for robot in world.scene.present_ids().tolist() if robot not in world.crashed]
         if world.crashed or position[alive, 0].max() > 3.4:
             for robot in alive:
-                if 1.6 < position[robot, 0] < 2.6 and world.tick % 100 == 0:
+                if 1.6 < position[robot, 0] < 2.6 and world.tick % 40 == 0:
                     world.crash(robot, "struck by lightning")
 
     outcome, world = drive(load("sensor-coverage", corridor), strike)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from air import DT_S, Radio, ring
 
-from zwerm.agents.gossip.frame import seal, unseal
 from zwerm.errors import ProtocolError, ScenarioError
+from zwerm.frame import seal, unseal
 from zwerm.protocol import Transmission
 
 Z99 = 2.576

@@ -10,7 +10,7 @@ from halls import HALL, NOISE, OBSTACLE, Link, drive
 from zwerm.agents.contract import Body, Setup
 from zwerm.agents.sensor_coverage import Robot
 from zwerm.agents.sensor_coverage.homing import offset, slid, unit
-from zwerm.orders import Arrived, Correct, Deploy, Report, Sighting, Survey, encode, read_answer
+from zwerm.orders import Answer, Arrived, Correct, Deploy, Dispatch, Order, Report, Sighting, Survey, read_reply, write
 from zwerm.protocol import (
     Bearing,
     BodyVelocity,
@@ -63,9 +63,10 @@ class OneRobot:
         self.neighbour, self.wall_x_m = neighbour, wall_x_m
         self.x = self.y = 0.0
         self.moved = (0.0, 0.0)
-        self.said: list[object] = []
+        self.said: list[Answer] = []
+        self.number = 0
 
-    def tick(self, *orders: bytes) -> Command:
+    def tick(self, *orders: Order) -> Command:
         dx, dy = self.neighbour[0] - self.x, self.neighbour[1] - self.y
         seen = (Bearing(7, math.atan2(dy, dx)),) if math.hypot(dx, dy) <= 1.0 else ()
         touch = (Contact(0.0, math.pi / 12.0),) if self.x >= self.wall_x_m - 0.075 else ()
@@ -73,7 +74,7 @@ class OneRobot:
             Observation(
                 0,
                 0.0,
-                tuple(Packet("uplink", each, 9) for each in orders),
+                tuple(self.packet(each) for each in orders),
                 bearings=seen,
                 touch=touch,
                 odometry=Displacement(*self.moved, 0.0),
@@ -84,10 +85,15 @@ class OneRobot:
         x = min(self.x + 0.1 * drive.forward_m_s, self.wall_x_m - 0.07)
         self.moved = (x - self.x, 0.1 * drive.left_m_s)
         self.x, self.y = x, self.y + self.moved[1]
-        self.said += [read_answer(each.payload) for each in command.outbox]
+        replies = [read_reply(each.payload) for each in command.outbox]
+        self.said += [each.answer for each in replies if each is not None]
         return command
 
-    def until_arrived(self, order: bytes) -> Arrived:
+    def packet(self, order: Order) -> Packet:
+        self.number += 1
+        return Packet("uplink", write(Dispatch(1, self.number, 1, 0, order)), 9)
+
+    def until_arrived(self, order: Order) -> Arrived:
         for _ in range(30):
             self.tick()
         self.tick(order)
@@ -101,7 +107,7 @@ class OneRobot:
 def test_a_test_drive_that_meets_a_wall_leads_back() -> None:
     """Figure 6(d)."""
     alone = OneRobot((-0.9, 0.0), 0.5)
-    arrived = alone.until_arrived(encode(Deploy(1, 0.0, 0.95, 0.8)))
+    arrived = alone.until_arrived(Deploy(1, 0.0, 0.95, 0.8))
     assert not arrived.ok
     assert arrived.touched == (0.0,)
     assert arrived.driven_m == pytest.approx(0.43, abs=0.06)
@@ -110,7 +116,7 @@ def test_a_test_drive_that_meets_a_wall_leads_back() -> None:
 
 def test_a_wall_behind_the_clear_distance_is_where_the_new_place_is() -> None:
     alone = OneRobot((-0.9, 0.0), 0.93)
-    arrived = alone.until_arrived(encode(Deploy(1, 0.0, 0.95, 0.8)))
+    arrived = alone.until_arrived(Deploy(1, 0.0, 0.95, 0.8))
     assert arrived.ok
     assert alone.x == pytest.approx(0.86, abs=0.02)
 
@@ -119,20 +125,20 @@ def test_a_wall_behind_the_clear_distance_is_where_the_new_place_is() -> None:
 def test_the_ruler_sets_the_distance_whatever_it_was(start: float) -> None:
     """Scale correction: break the link, re-establish it, and a margin."""
     alone = OneRobot((start, 0.0), 9.0)
-    assert alone.until_arrived(encode(Correct(1, (Sighting(7, math.pi),)))).ok
+    assert alone.until_arrived(Correct(1, (Sighting(7, math.pi),))).ok
     assert math.dist((alone.x, alone.y), alone.neighbour) == pytest.approx(0.95, abs=0.011)
 
 
 def test_a_robot_that_a_wall_keeps_off_its_place_answers_a_survey_at_once_and_rests_where_it_is() -> None:
     """It arrived pressed against the wall, which then pushed it out by more than it tolerates."""
     alone = OneRobot((-0.9, 0.0), 0.86)
-    assert alone.until_arrived(encode(Deploy(1, 0.0, 0.95, 0.7))).ok
+    assert alone.until_arrived(Deploy(1, 0.0, 0.95, 0.7)).ok
     arrived_m = alone.x
     alone.x, alone.wall_x_m = arrived_m - 0.008, alone.wall_x_m - 0.008
     alone.moved = (-0.008, 0.0)
     for cycle in (2, 3):
         alone.said.clear()
-        alone.tick(encode(Survey(cycle, (1,))))
+        alone.tick(Survey(cycle, (1,)))
         for _ in range(40):
             alone.tick()
         assert [type(each) for each in alone.said] == [Report]

@@ -242,6 +242,11 @@ class World:
 
     # --- inside -----------------------------------------------------------------------------------------------------
 
+    def _decides(self, node: int) -> bool:
+        """Tell whether a node may give up for all: the coordinator, or a base station where there is none any more."""
+        centre = self.coordinator
+        return node in self._fixed and (centre is None or node == centre or centre in self.dead)
+
     def _look(self, moved: Bools) -> Scene:
         physics = self._physics
         return Scene(
@@ -344,7 +349,7 @@ class World:
             if answer.wake is not None:
                 self._wakes.sleep(node, answer.wake, self.tick)
             if answer.told or answer.gave_up:
-                self.audience.hear(self.scene, node, answer, node in self._fixed)
+                self.audience.hear(self.scene, node, answer, self._decides(node))
             if answer.release and self._depots is not None and node < self._depots.stations:
                 self._depots.release(node)
             if answer.done or self._any_done:

@@ -2,6 +2,9 @@
 
 Directions are bearings in the frame of the robot that is spoken to, or that speaks; the coordinator translates. No message
 tells a position, and no distance but those that a robot drove by its own odometry.
+
+The uplink may lose, repeat, delay and damage. So an order comes as a `Dispatch` with a number of its own, again and again until
+it is answered, and an answer as a `Reply` to that number; both under a checksum. Who begins anew has a new life.
 """
 
 from collections.abc import Callable
@@ -10,6 +13,8 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
+from zwerm.errors import ProtocolError
+from zwerm.frame import seal, unseal
 from zwerm.protocol import REFUSABLE
 
 
@@ -41,6 +46,12 @@ class Landmark(_Part, frozen=True):
 
 
 # --- to a robot -----------------------------------------------------------------------------------------------------
+
+
+class Muster(_Message, frozen=True):
+    """To all: stand still, look around anew, and say what you see and touch."""
+
+    cycle: int
 
 
 class Survey(_Message, frozen=True):
@@ -91,11 +102,21 @@ class Correct(_Message, frozen=True):
 
 
 class Report(_Message, frozen=True):
-    """The answer to a survey. `sightings` None: nothing has changed. `touched` are bearings of walls touched."""
+    """The answer to a survey or a muster.
+
+    `sightings` None: nothing has changed. `touched` are bearings of walls touched. `home`: it still stands where it came out.
+    """
 
     cycle: int
     sightings: tuple[Sighting, ...] | None
     touched: tuple[float, ...]
+    home: bool = False
+
+
+class Released(_Message, frozen=True):
+    """The base's answer to a release: the robot that came out, if one did."""
+
+    robot: int | None
 
 
 class Emerged(_Message, frozen=True):
@@ -126,25 +147,67 @@ class Arrived(_Message, frozen=True):
     touched: tuple[float, ...]
 
 
-Order = Survey | Release | Deploy | Move | Correct
-Answer = Report | Emerged | Cleared | Arrived
-
-encode: Final[Callable[[Order | Answer], bytes]] = msgspec.msgpack.Encoder().encode
-_decode_order: Final[Callable[[bytes], Order]] = msgspec.msgpack.Decoder(Order).decode
-_decode_answer: Final[Callable[[bytes], Answer]] = msgspec.msgpack.Decoder(Answer).decode
+class Heard(_Message, frozen=True):
+    """The order has come, and is being carried out."""
 
 
-def read_order(payload: bytes) -> Order | None:
+Order = Muster | Survey | Release | Deploy | Move | Correct
+Answer = Report | Released | Emerged | Cleared | Arrived | Heard
+
+# --- how they cross the radio ---------------------------------------------------------------------------------------
+
+# The life of whom nothing is known.
+UNKNOWN: Final = 0
+
+
+class Dispatch(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """An order: the `number`-th to this robot in the coordinator's `life`, said for the `attempt`-th time.
+
+    It is meant for the robot in its life `to_life`, or in any if that is unknown. Everyone's number 0 is the muster.
+    """
+
+    life: int
+    number: int
+    attempt: int
+    to_life: int
+    order: Order
+
+
+class Reply(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """An answer of a robot in its `life` to the order `number` of the coordinator in its life `to_life`.
+
+    `heard` is how often the order was heard up to its attempt `attempt`. A robot that came out answers nobody: all are 0.
+    """
+
+    life: int
+    to_life: int
+    number: int
+    attempt: int
+    heard: int
+    answer: Answer
+
+
+_encode: Final[Callable[[Dispatch | Reply], bytes]] = msgspec.msgpack.Encoder().encode
+_decode_dispatch: Final[Callable[[bytes], Dispatch]] = msgspec.msgpack.Decoder(Dispatch).decode
+_decode_reply: Final[Callable[[bytes], Reply]] = msgspec.msgpack.Decoder(Reply).decode
+
+
+def write(message: Dispatch | Reply) -> bytes:
+    """Return the payload of a packet that says this."""
+    return seal(_encode(message))
+
+
+def read_dispatch(payload: bytes) -> Dispatch | None:
     """Return the order in a packet, or None where there is none: a packet damaged on its way says nothing."""
     try:
-        return _decode_order(payload)
-    except REFUSABLE:
+        return _decode_dispatch(unseal(payload))
+    except (ProtocolError, *REFUSABLE):
         return None
 
 
-def read_answer(payload: bytes) -> Answer | None:
+def read_reply(payload: bytes) -> Reply | None:
     """Return the answer in a packet, or None where there is none."""
     try:
-        return _decode_answer(payload)
-    except REFUSABLE:
+        return _decode_reply(unseal(payload))
+    except (ProtocolError, *REFUSABLE):
         return None

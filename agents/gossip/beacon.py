@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar, Final
 from msgspec import Meta, Struct
 
 from zwerm.agents.contract import Controller, Setup
-from zwerm.agents.gossip.frame import HEAD_BYTES, seal, unseal
 from zwerm.errors import ProtocolError
+from zwerm.frame import HEAD_BYTES, seal, unseal
 from zwerm.protocol import BodyVelocity, Command, Observation, Transmission, WheelSpeeds
 
 _LAYOUT: Final = Layout(">II")

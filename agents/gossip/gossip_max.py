@@ -10,8 +10,8 @@ from typing import Annotated, Any, ClassVar, Final
 from msgspec import Meta, Struct
 
 from zwerm.agents.contract import Controller, Setup
-from zwerm.agents.gossip.frame import seal, unseal
 from zwerm.errors import ProtocolError
+from zwerm.frame import seal, unseal
 from zwerm.protocol import Command, Observation, Transmission
 
 _LAYOUT: Final = Layout(">I")

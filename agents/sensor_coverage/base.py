@@ -1,9 +1,16 @@
 """The base station: a robot that never moves, and lets the others out one by one when the coordinator asks."""
 
+from typing import Final
+
 from zwerm.agents.contract import Setup
-from zwerm.agents.sensor_coverage.robot import Robot, Story
-from zwerm.orders import Order, Release, Survey
-from zwerm.protocol import Command, Observation
+from zwerm.agents.sensor_coverage.robot import STOP, Robot, Story
+from zwerm.orders import Order, Release, Released
+from zwerm.protocol import Command, Observation, Wake
+
+# Who has not come out by then [ticks] will not.
+BIRTH_TICKS: Final = 12
+# A coordinator that has said nothing for so long is gone [s].
+SILENCE_S: Final = 120.0
 
 
 class Base(Robot):
@@ -12,15 +19,33 @@ class Base(Robot):
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
         self._releasing = False
+        self._heard_s = 0.0
 
     def step(self, observation: Observation) -> Command:
         """Answer surveys, and release."""
         command = super().step(observation)
         command.drive = None
         command.release, self._releasing = self._releasing, False
+        if observation.inbox:
+            self._heard_s = observation.time_s
+        elif observation.time_s > self._heard_s + SILENCE_S - 1e-9:
+            self._heard_s = observation.time_s
+            command.gave_up = f"coordinator-lost: not a word from the coordinator for {SILENCE_S:g} s"
+        if command.wake is not None:
+            command.wake = Wake(at_s=self._heard_s + SILENCE_S, on_packet=True)
         return command
 
     def _begin(self, order: Order) -> Story | None:
-        if isinstance(order, Release):
-            self._releasing = True
-        return self._survey(order) if isinstance(order, Survey) else None
+        return self._let_out() if isinstance(order, Release) else super()._begin(order)
+
+    def _let_out(self) -> Story:
+        """Let a robot out, and say who it is: the one who is in sight now and was not before."""
+        before = self.senses.seen
+        self._releasing = True
+        born: int | None = None
+        for _ in range(BIRTH_TICKS):
+            yield STOP
+            born = min((node for node in self.senses.seen if node not in before), default=None)
+            if born is not None:
+                break
+        self._outbox.append(Released(born))

@@ -13,6 +13,7 @@ from typing import Annotated, NamedTuple
 from msgspec import Meta, Struct
 
 from zwerm.agents.contract import Controller, Setup
+from zwerm.agents.sensor_coverage.duty import Duty
 from zwerm.agents.sensor_coverage.homing import Offset, Vector, offset, slid, unit
 from zwerm.agents.sensor_coverage.senses import Senses
 from zwerm.orders import (
@@ -24,12 +25,11 @@ from zwerm.orders import (
     Emerged,
     Landmark,
     Move,
+    Muster,
     Order,
     Release,
     Report,
     Survey,
-    encode,
-    read_order,
 )
 from zwerm.protocol import BodyVelocity, Command, Observation, Transmission, Wake
 
@@ -41,6 +41,12 @@ NOISE_MIN_RAD = 1e-5
 
 # Who was pushed aside needs not that long to go back; who cannot must still answer a survey in time.
 RETURN_TICKS_MAX = 20
+
+# So many lives can be told apart.
+LIVES = 2**16
+
+# Who is no further from where it came out has not left.
+HOME_M = 0.05
 
 # A contact within this of the heading is ahead.
 AHEAD_RAD = math.pi / 3.0
@@ -96,6 +102,7 @@ class Robot(Controller):
         self.hop_m = p.link_m - p.margin_m
         self.step_m = setup.body.max_speed_m_s * setup.dt_s if setup.body is not None else 0.0
         self.senses = Senses()
+        self.duty = Duty(int(self.random.integers(1, LIVES)))
         self._outbox: list[Answer] = []
         self._rest: Vector | None = None
         self._noise_rad: float | None = None  # how much a bearing errs: the robot finds out for itself
@@ -105,7 +112,7 @@ class Robot(Controller):
         """Go on with the present drive, or start what an order asks for."""
         self.senses.take(observation)
         for packet in observation.inbox:
-            order = read_order(packet.payload)
+            order = self.duty.take(packet.payload)
             if order is not None:
                 self._story = self._begin(order)
         drive, wake = STOP, None
@@ -116,12 +123,15 @@ class Robot(Controller):
                 self._story = None
         if self._story is None:
             wake = Wake(on_packet=True)
-        outbox = tuple(Transmission("uplink", encode(each)) for each in self._outbox)
+        outbox = tuple(Transmission("uplink", each) for each in self.duty.say(self._outbox))
         self._outbox.clear()
         return Command(drive=drive, outbox=outbox, wake=wake)
 
     def _begin(self, order: Order) -> Story | None:
         match order:
+            case Muster():
+                self._rest = None  # who was on its way stands where it is
+                return self._survey(Survey(order.cycle, (self.setup.node,)))
             case Survey():
                 return self._survey(order)
             case Deploy():
@@ -167,7 +177,8 @@ class Robot(Controller):
         if fresh:
             yield from self._sample()
         sightings = self.senses.sightings() if fresh else None
-        self._outbox.append(Report(order.cycle, sightings, self.senses.touched))
+        home = math.hypot(self.senses.x_m, self.senses.y_m) < HOME_M
+        self._outbox.append(Report(order.cycle, sightings, self.senses.touched, home))
 
     def _return(self, rest: Vector) -> Generator[BodyVelocity, None, Vector]:
         """Go back to where the robot rests, if it was pushed aside, and return where it rests now: some cannot."""

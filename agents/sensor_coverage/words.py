@@ -10,8 +10,8 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
-from zwerm.agents.gossip.frame import seal, unseal
 from zwerm.errors import ProtocolError
+from zwerm.frame import seal, unseal
 from zwerm.protocol import REFUSABLE
 
 CHANNEL: Final = "robots"
