@@ -254,6 +254,26 @@ def test_a_run_that_failed_counts_with_what_it_measured_and_is_told_by_its_reaso
     assert comparison.difference(place, place.points[1], "completed").mean == -0.5
 
 
+def test_a_coordinators_crash_is_nothing_to_a_variant_without_one_which_is_run_once(tmp_path: Path) -> None:
+    study = make_comparison(
+        "sensor-coverage",
+        [parse_variant("central"), parse_variant("decentralised:services.path=gradient")],
+        [parse_sweep('faults=none:[],crash:[{kind="crash", nodes=["coordinator"], at_s=1.0}]')],
+        metrics=["coverage_fraction"],
+    )
+    study.table.set.append("time.duration_s=2.0")
+    result = run_study(study, tmp_path / "rows.parquet", seeds=[1, 2], jobs=1)
+    assert result.planned == result.ran == result.done == 6
+    comparison = Comparison(result.results)
+    assert [dict(comparison.outcomes(each)) for place in comparison.places for each in place.points] == [
+        {"time-limit": 2}
+    ] * 4
+    none, crash = comparison.places
+    assert none.points[1].fingerprint == crash.points[1].fingerprint
+    assert crash.points[0].scenario.faults
+    assert comparison.difference(crash, crash.points[1], "coverage_fraction").n == 2
+
+
 def test_what_nothing_measured_or_all_as_zero_is_left_out_unless_it_was_asked_for(gossip: Path) -> None:
     rows = [{"outcome": "completed", "coverage_fraction": 0.0, "robots_deployed": 3.0}]
     told = {"often": rows, "seldom": rows}

@@ -72,7 +72,8 @@ def run_study(
     points = make_points(study, sets)
     trials = make_trials(study, points, study.table.seeds if seeds is None else seeds, runner)
     with Rows(out) as rows:
-        todo = [trial for trial in trials if _wanted(rows.held.get(trial.key), retry)]
+        distinct = _distinct(trials)
+        todo = [trial for trial in distinct if _wanted(rows.held.get(trial.key), retry)]
         ran, interrupted = 0, False
         if watcher is not None:
             watcher.begin(len(todo))
@@ -87,9 +88,17 @@ def run_study(
         except KeyboardInterrupt:
             interrupted = True
         axes = list(study.table.grid)
-        done = [rows.held[trial.key] for trial in trials if trial.key in rows.held]
+        done = [rows.held[trial.key] for trial in distinct if trial.key in rows.held]
         rows.merge(axes, _superseded(rows.held, trials, axes))
-    return StudyResult(Results(study, points, done), out, len(trials), ran, len(done), interrupted)
+    return StudyResult(Results(study, points, done), out, len(distinct), ran, len(done), interrupted)
+
+
+def _distinct(trials: Sequence[Trial]) -> list[Trial]:
+    """Return each trial once: a setting may do nothing to a variant, as a coordinator's crash to one that has none."""
+    found: dict[Key, Trial] = {}
+    for trial in trials:
+        found.setdefault(trial.key, trial)
+    return list(found.values())
 
 
 def _wanted(row: Row | None, retry: bool) -> bool:
