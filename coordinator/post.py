@@ -208,9 +208,11 @@ class Post:
                 return None
             yield Wake(at_s=until_s, on_packet=True)
 
-    def pause(self) -> Story[None]:
-        """Wait for a tick."""
-        yield Wake(at_s=self.now_s + self._dt_s)
+    def pause(self, ticks: int = 1) -> Story[None]:
+        """Wait for so many ticks."""
+        until_s = self.now_s + ticks * self._dt_s
+        while self.now_s < until_s - 1e-9:
+            yield Wake(at_s=until_s)
 
 
 def together(stories: Sequence[Story[T]]) -> Story[list[T]]:

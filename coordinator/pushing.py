@@ -98,7 +98,7 @@ class Pushing:
             places.occupant[place] = robot
         places.found(leader)
         followers, going = self._without_lost(followers, going, arrived)
-        yield from self._straighten(followers, places.occupant.get(path[0]), arrived)
+        yield from self._straighten(followers, going, path[0], arrived)
         yield from self._settle(followers, going, arrived)
         anchors = [places.occupant[each] for each in plan.anchors if each in places.occupant]
         if leader in arrived and anchors:
@@ -154,12 +154,19 @@ class Pushing:
         left = [(robot, place) for robot, place in zip(followers, going, strict=True) if robot not in self.lost]
         return [robot for robot, _ in left], [place for _, place in left]
 
-    def _straighten(self, followers: Sequence[int], rear: int | None, arrived: dict[int, Arrived]) -> Story[None]:
-        """In single file, rear to front: bearings did not tell how far to go, the range of sight does."""
-        for robot in followers:
-            if robot in arrived and arrived[robot].loose and rear is not None:
-                yield from self._correct(robot, [(rear, 0.0)])
-            rear = robot
+    def _straighten(
+        self, followers: Sequence[int], going: Sequence[int], rear: int, arrived: dict[int, Arrived]
+    ) -> Story[None]:
+        """In single file, rear to front: bearings did not tell how far to go, the range of sight does.
+
+        Who went too far has lost sight of the robot at the place behind, and must be told where it is.
+        """
+        places = self._places
+        for robot, place in zip(followers, going, strict=True):
+            back = places.direction(place, rear)
+            if robot in arrived and arrived[robot].loose and rear in places.occupant and back is not None:
+                yield from self._correct(robot, [(places.occupant[rear], back - places.heading[robot])])
+            rear = place
 
     def _correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Story[None]:
         sightings = tuple(Sighting(node, _wrapped(there)) for node, there in anchors)

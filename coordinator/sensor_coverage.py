@@ -31,6 +31,9 @@ SPARED_COST: Final = -100.0
 # So many lives can be told apart.
 LIVES: Final = 2**16
 
+# So long it rests between surveys while it watches over what is covered.
+WATCH_TICKS: Final = 50
+
 # How a deployment ends that does not end with all covered.
 GIVEN_UP: Final = {
     "depot-dry": "the depot is empty",
@@ -132,6 +135,9 @@ class SensorCoverage:
             self._tell_complex(plans)
             self.outcome = self._judge(bool(stories))
             moved = [robot for each in (yield from together(stories)) for robot in each]
+            if self.outcome == COVERED and self.post.now_s < self.parameters.watch_until_s:
+                self.outcome = ""
+                yield from self.post.pause(WATCH_TICKS)
         self.outcome = self.outcome or "no-end"
         self._spare()
         self._tell_numbers()

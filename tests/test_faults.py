@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from halls import HALL
 from support import scenario
 
 from zwerm.agents.node import Node
@@ -296,6 +297,42 @@ def test_what_is_in_no_fault_draws_what_it_drew_without_any() -> None:
     assert without.heard(3, 0) != with_cut.heard(3, 0)
 
 
+# --- who and when is drawn ---------------------------------------------------------------------------------------------
+
+
+def struck(seed: int, *more: dict[str, Any]) -> list[tuple[int, list[int]]]:
+    """Return when the fault that was drawn began, and whom it killed."""
+    world = Life(faulty({"kind": "crash", "fraction": 0.5, "between_s": [0.5, 1.5]}, *more), seed).world
+    return [(fault.begins or 0, fault.nodes) for fault in world.schedule.faults]
+
+
+def test_a_crash_can_strike_a_fraction_of_those_who_live_at_a_time_that_the_seed_draws() -> None:
+    found = [struck(seed)[0] for seed in range(12)]
+    assert len({tick for tick, _ in found}) > 4, "ticks differ from seed to seed"
+    assert all(5 <= tick <= 15 and len(nodes) == 2 for tick, nodes in found)
+    assert {node for _, nodes in found for node in nodes} == {0, 1, 2, 3}
+    assert struck(1) == struck(1)
+
+
+def test_who_is_drawn_is_not_dead_yet_and_no_other_fault_changes_the_draw() -> None:
+    pause = {"kind": "pause", "nodes": [0], "at_s": 0.0}
+    assert struck(1, pause)[0] == struck(1)[0]
+    for seed in range(12):
+        (_, nodes), (_, dead) = struck(seed, {"kind": "crash", "nodes": [2, 3], "at_s": 0.2})
+        assert dead == [2, 3]
+        assert len(nodes) == 1, "half of the two that are left"
+        assert nodes[0] in (0, 1)
+
+
+@pytest.mark.parametrize(("fraction", "most"), [(1.0, 40), (0.001, 1)])
+def test_no_base_station_is_drawn_and_one_at_least_of_those_who_are_out(fraction: float, most: int) -> None:
+    fault = f"faults=[{{kind='crash', fraction={fraction}, between_s=[40.0, 60.0]}}]"
+    nodes = run("sensor-coverage", 1, "inline", [*HALL, fault, "time.duration_s=70"]).as_json()["nodes"]["crashed"]
+    assert 1 <= len(nodes) <= most
+    assert (len(nodes) > 1) == (most > 1)
+    assert 0 not in nodes
+
+
 # --- random schedules -----------------------------------------------------------------------------------------------
 
 RATES = {
@@ -362,7 +399,14 @@ def test_random_faults_that_cannot_be_are_mistakes() -> None:
          "faults.0.until_s: expected later than it begins, got 0.5"),
         ({"kind": "crash", "nodes": [1], "at_s": 1, "until_s": 1.5, "for_s": 1},
          "faults.0: expected for_s or until_s, not both"),
-        ({"kind": "crash", "nodes": [1]}, "faults.0: expected either at_s or when"),
+        ({"kind": "crash", "nodes": [1]}, "faults.0: expected one of at_s, between_s and when"),
+        ({"kind": "crash", "nodes": [1], "at_s": 1, "between_s": [0, 1]},
+         "faults.0: expected one of at_s, between_s and when"),
+        ({"kind": "crash", "nodes": [1], "between_s": [1.5, 0.5]},
+         "faults.0.between_s: expected [first, last] before the end at 2 s, got [1.5, 0.5]"),
+        ({"kind": "crash", "nodes": [1], "between_s": [0.5, 1.5], "until_s": 1},
+         "faults.0.until_s: expected later than it begins, got 1"),
+        ({"kind": "crash", "at_s": 1}, "faults.0: expected either nodes or fraction"),
         ({"kind": "heal", "at_s": 1, "for_s": 1}, "faults.0: happens at once: no for_s and no until_s"),
         ({"kind": "slow", "nodes": [1], "at_s": 1, "every_ticks": 1}, "faults.0.every_ticks: expected >= 2, got 1"),
         ({"kind": "pause", "nodes": [1], "when": {}}, "faults.0.when: expected either metric and at_least, or robot_deployed"),

@@ -247,8 +247,11 @@ def test_figure_9a_the_path_from_the_source_to_a_frontier_robot_is_12_10_6_2() -
     assert {frozenset((12, 11)), frozenset((11, 8)), frozenset((8, 9))} <= edges
 
 
-def pushed(swarm: Swarm, plan: Plan) -> list[tuple[int, Order]]:
-    """Tell a push to its end with robots that do as they are told, robot 13 waiting in the depot; return all orders."""
+def pushed(swarm: Swarm, plan: Plan, loose: bool = False) -> list[tuple[int, Order]]:
+    """Tell a push to its end with robots that do as they are told, robot 13 waiting in the depot; return all orders.
+
+    `loose`: odometry had to say how far to go.
+    """
     post = Post(0.1)
     base = swarm.picture.bases[0]
     station = swarm.places.occupant[base]
@@ -258,7 +261,7 @@ def pushed(swarm: Swarm, plan: Plan) -> list[tuple[int, Order]]:
     pushing.picture = swarm.picture
     said: list[tuple[int, Order]] = []
     story = pushing.push(plan)
-    done = Arrived(0, True, False, False, 0.95, ())
+    done = Arrived(0, True, loose, False, 0.95, ())
     for tick in range(50):
         try:
             next(story)
@@ -295,14 +298,14 @@ def sightings_of(swarm: Swarm, robot: int, turned: float) -> tuple[Sighting, ...
     )
 
 
-def push_of_figure_9() -> tuple[Swarm, list[tuple[int, Order]]]:
+def push_of_figure_9(loose: bool = False) -> tuple[Swarm, list[tuple[int, Order]]]:
     swarm = figure_9()
     place = swarm.place
     upwards = math.pi / 2.0 + swarm.off(2)
     plan = Plan(
         (place[2], place[1], 1), place[2], upwards, HOP_M, 0.8, (place[2],), tuple(place[n] for n in (12, 10, 6, 2))
     )
-    return swarm, pushed(swarm.look(), plan)
+    return swarm, pushed(swarm.look(), plan, loose)
 
 
 def test_figure_9b_robots_take_each_others_places_and_robot_13_appears_beside_the_source() -> None:
@@ -334,6 +337,19 @@ def test_figure_9b_the_new_robot_corrects_its_distance_to_who_then_stands_at_the
     assert robot == 2
     assert isinstance(order, Correct)
     assert [each.node for each in order.anchors] == [6]
+
+
+def test_who_went_by_odometry_corrects_its_distance_to_who_is_behind_and_is_told_where_that_is() -> None:
+    """It may have gone so far that it sees nobody behind it."""
+    swarm, said = push_of_figure_9(loose=True)
+    orders = [(robot, order) for robot, order in said if isinstance(order, Correct)]
+    assert [(robot, order.anchors[0].node) for robot, order in orders] == [(13, 12), (10, 13), (6, 10), (2, 6)]
+    turned = {**swarm.turned, 13: 0.4}
+    behind = {13: (10, 12), 10: (6, 10), 6: (2, 6)}  # robot: its place and the one behind, by who was there
+    for robot, order in orders[:-1]:
+        place, rear = (swarm.position[each] for each in behind[robot])
+        there = math.remainder(direction(place, rear) - turned[robot], math.tau)
+        assert order.anchors[0].bearing_rad == pytest.approx(there)
 
 
 # --- one-sided sight, and frames ------------------------------------------------------------------------------------

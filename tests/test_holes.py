@@ -8,7 +8,7 @@ import pytest
 from zwerm.frontier.holes import Hole, holes, is_bare, sides
 from zwerm.frontier.places import Places
 from zwerm.frontier.planner import Parameters, Planner
-from zwerm.frontier.services import Picture
+from zwerm.frontier.services import Picture, Plan
 from zwerm.orders import Sighting
 from zwerm.simplicial import FlagComplex
 
@@ -63,15 +63,31 @@ def test_what_was_met_beside_a_hole_does_not_make_it_an_obstacle_and_what_was_me
     assert not is_bare(hole, *seen(places), lambda place: {2: (math.pi / 2.0,)}.get(place, ()))
 
 
-def test_what_a_robot_met_that_stands_in_a_hole_counts_whatever_its_direction() -> None:
-    """A ring of seven, and an eighth robot within that sees three of them: whatever it touches is in the ring."""
+def test_what_a_robot_that_stands_in_a_hole_met_counts_but_for_what_is_behind_it() -> None:
+    """A ring of seven, and an eighth robot within that sees three of them: the way around the hole leads through it."""
     ring = {n: (1.05 * math.cos(n * math.tau / 7.0), 1.05 * math.sin(n * math.tau / 7.0)) for n in range(7)}
     within, outside = {**ring, 8: (0.4, 0.0)}, {**ring, 8: (1.7, 0.0)}
-    for places, bare in ((within, False), (outside, True)):
+    for places, direction, bare in (
+        (within, math.pi, False),
+        (within, 0.3, True),
+        (outside, math.pi, True),
+        (outside, 0.3, True),
+    ):
         views, complex_ = seen(places)
         hole = next(each for each in holes(views, complex_) if len(each) > 5)
+        assert [corner.place for corner in hole if corner.place == 8] == ([8] if places is within else [])
         assert is_bare(hole, views, complex_, lambda _: ())
-        assert is_bare(hole, views, complex_, lambda place: (0.3,) if place == 8 else ()) == bare
+        assert is_bare(hole, views, complex_, lambda place, met=direction: (met,) if place == 8 else ()) == bare
+
+
+def test_what_a_robot_met_that_two_see_in_a_hole_counts_whatever_its_direction() -> None:
+    ring = {n: (1.1 * math.cos(n * math.tau / 7.0), 1.1 * math.sin(n * math.tau / 7.0)) for n in range(7)}
+    places = {**ring, 8: (0.35, 0.22)}
+    views, complex_ = seen(places)
+    hole = next(each for each in holes(views, complex_) if len(each) > 5)
+    assert 8 in complex_.neighbours[0]
+    assert 8 not in {corner.place for corner in hole}
+    assert not is_bare(hole, views, complex_, lambda place: (0.3,) if place == 8 else ())
 
 
 def test_a_robot_that_goes_in_halves_the_narrow_corners() -> None:
@@ -107,7 +123,7 @@ def test_four_robots_that_just_miss_each_other_get_a_fifth_unless_there_is_a_wal
     mine = planner(places, wall_at)
     edges = [(1, 2), (1, 4), (2, 3), (3, 4)]
     assert not any(side.edge in edges and _inward(side.edge, side.sign) for side in mine.fence.sides)
-    *_, last = mine.plans()
+    _, _, last, _ = mine.plans()
     assert sorted({plan.key[:2] for plan in last}) == ([] if wall_at else edges)
     for plan in last:
         x, y = places[plan.mover]
@@ -118,3 +134,26 @@ def test_four_robots_that_just_miss_each_other_get_a_fifth_unless_there_is_a_wal
 
 def _inward(pair: tuple[int, int], sign: int) -> bool:
     return sign == {(1, 2): 1, (1, 4): -1, (2, 3): 1, (3, 4): 1}[pair]
+
+
+# --- a swarm that has come apart ------------------------------------------------------------------------------------
+
+
+def test_a_piece_of_the_swarm_that_is_out_of_sight_is_somewhere_to_go() -> None:
+    """Four in single file; the last two have drifted out of sight of the second, whose place is still known."""
+    together = {0: (0.0, 0.0), 1: (0.95, 0.0), 2: (1.9, 0.1), 3: (2.8, 0.1)}
+    mine = planner(together)
+    assert bridges(mine) == {}
+    apart = {place: (x + 0.1 * (place > 1), y) for place, (x, y) in together.items()}
+    mine.look(Picture(*seen(apart), (0,)))
+    found = bridges(mine)
+    assert sorted(found) == [1, 2], "either may go; only one of them can be reached"
+    assert found[1].direction == pytest.approx(math.atan2(0.1, 0.95))
+    assert found[1].anchors == (1,)
+    for _ in range(Parameters().attempts_max):
+        mine.note_attempt(found[1])
+    assert sorted(bridges(mine)) == [2], "not for ever"
+
+
+def bridges(mine: Planner) -> dict[int, Plan]:
+    return {plan.mover: plan for plan in next(mine.plans()) if plan.key[2] == 0}

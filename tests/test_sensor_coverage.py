@@ -162,6 +162,14 @@ def test_a_small_hall_is_covered_with_no_hole_but_the_obstacle(settings: tuple[s
     assert result.robot_ticks < 0.35 * result.ticks * result.metrics["robots_deployed"], "parked robots cost"
 
 
+def test_the_end_of_a_single_file_looks_around_a_corner() -> None:
+    """It stands just before a corridor branches off: no drive into it gets as far as a new place should be."""
+    branch = "arena.polygon=[[0.0,0.0],[2.15,0.0],[2.15,-1.5],[2.65,-1.5],[2.65,0.5],[0.0,0.5]]"
+    result = run("sensor-coverage-narrow", 1, "inline", [branch, "robots.count=12"])
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.99
+
+
 def scrambled(multiple: int, straight: tuple[int, ...]) -> Callable[[int, Link], Link]:
     """Turn the frame of every robot, each by some switches of the touch ring, but for the `straight`."""
 

@@ -77,7 +77,7 @@ class World:
         nodes = count + (self.coordinator is not None)
         self._wakes = Wakes(nodes, scenario.time.dt_s)
         self.fault_tables = scheduled(scenario, seed, arena)
-        self.schedule = Schedule(self.fault_tables, scenario)
+        self.schedule = Schedule(self.fault_tables, scenario, self.draws)
         self.lives = Lives(nodes, self.schedule.unborn)
         for node in self.schedule.unborn:
             self.medium.switch_off(node, "receiver-down")
@@ -118,7 +118,7 @@ class World:
     def begin(self) -> list[Order]:
         """Let the faults of this tick happen, and return what is to be done to programs before anybody is observed."""
         orders: list[Order] = []
-        if self.schedule.faults and self.schedule.turn(self.tick, self.scene):
+        if self.schedule.faults and self.schedule.turn(self.tick, self.scene, self.dead):
             changes = self.lives.change(*self.schedule.states(self.tick))
             restarts = [node for node in self.schedule.restarts() if not self.lives.down[node]]
             orders = [order for order in unite(changes, restarts) if self._happens(order)]

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from zwerm.scenario import NonNegative, Positive, Table
+from zwerm.scenario import ARRAY, NonNegative, Positive, Table
 from zwerm.world.radio import NodeName
 
 Nodes = Annotated[list[NodeName], Field(min_length=1)]
@@ -27,11 +27,15 @@ class WhenTable(Table):
 
 
 class FaultTable(Table):
-    """When a fault begins, `at_s` or `when`, and how long it lasts, `for_s` or `until_s`; without either, to the end."""
+    """When a fault begins, `at_s` or `when`, and how long it lasts, `for_s` or `until_s`; without either, to the end.
+
+    Or it begins at a time that the seed draws, uniformly, from `between_s`.
+    """
 
     lasts: ClassVar[bool] = True  # whether it takes time, or happens at once
 
     at_s: NonNegative | None = None
+    between_s: Annotated[tuple[NonNegative, NonNegative], ARRAY] | None = None
     when: WhenTable | None = None
     for_s: Positive | None = None
     until_s: Positive | None = None

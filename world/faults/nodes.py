@@ -13,13 +13,17 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from zwerm.world.faults import FaultTable, Nodes
+from zwerm.world.faults import FaultTable, Nodes, Share
 
 
 class CrashTable(FaultTable):
-    """These nodes are dead while it lasts."""
+    """These nodes are dead while it lasts, or `fraction` of the robots in the arena, one at least, that the seed draws then.
 
-    nodes: Nodes
+    Who is drawn is no base station, and not dead yet.
+    """
+
+    nodes: Nodes | None = None
+    fraction: Share | None = None
 
 
 class RestartTable(FaultTable):

@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from pydantic import ValidationError
 
+from zwerm.draws import Draws
 from zwerm.errors import ScenarioError
 from zwerm.scenario import OpenTable, Scenario, mistakes
 from zwerm.world.faults import FaultTable, ticks
@@ -72,14 +73,36 @@ class Fault:
     def __init__(self, table: FaultTable, scenario: Scenario) -> None:
         dt_s = scenario.time.dt_s
         self.table = table
+        self.purpose = ""  # of the draws that are its own
         self.begins = None if table.at_s is None else ticks(table.at_s, dt_s)
         self.lasts = None if table.for_s is None else max(1, ticks(table.for_s, dt_s))
         self.ends = None if table.until_s is None else ticks(table.until_s, dt_s)
         self.condition = None if table.when is None else Condition(table.when, scenario)
-        self.nodes: list[int] = [node_id(name, scenario) for name in getattr(table, "nodes", ())]
+        self.nodes: list[int] = [node_id(name, scenario) for name in getattr(table, "nodes", None) or ()]
         self.healed = False
         if self.begins is not None:
             self._begin(self.begins)
+        self._dt_s = dt_s
+        self._stations = scenario.base.stations if scenario.base is not None else 0
+
+    def draw(self, purpose: str, draws: Draws) -> None:
+        """Take a purpose for its draws, and draw when it begins, if that is to be drawn."""
+        self.purpose = purpose
+        if self.table.between_s is not None:
+            first_s, last_s = self.table.between_s
+            time_s = first_s + float(draws.uniform(f"{purpose}/begins", 0)) * (last_s - first_s)
+            self._begin(ticks(time_s, self._dt_s))
+
+    def choose(self, scene: Scene, dead: Sequence[int]) -> bool:
+        """Draw whom it strikes, if that is still to be drawn, once there is anybody; tell whether it did."""
+        fraction = getattr(self.table, "fraction", None)
+        if fraction is None or self.nodes:
+            return False
+        robots = np.setdiff1d(scene.present_ids(), [*range(self._stations), *dead])
+        lot = scene.draws.uniform(f"{self.purpose}/struck", robots)
+        struck = robots[np.argsort(lot, kind="stable")[: max(1, round(fraction * len(robots)))]]
+        self.nodes = sorted(struck.tolist())
+        return bool(self.nodes)
 
     def _begin(self, tick: int) -> None:
         self.begins = tick
@@ -108,7 +131,7 @@ class Fault:
 class Schedule:
     """The faults of one run, each as `(path, table)`: where it stands and what it says."""
 
-    def __init__(self, tables: Sequence[tuple[str, OpenTable]], scenario: Scenario) -> None:
+    def __init__(self, tables: Sequence[tuple[str, OpenTable]], scenario: Scenario, draws: Draws) -> None:
         """Raises ScenarioError with every mistake, each `path: rule, got value`."""
         count = scenario.robots.count
         self._nodes = count + (scenario.coordinator is not None)
@@ -128,12 +151,13 @@ class Schedule:
         made: Counter[str] = Counter()
         self._sensing: list[tuple[Fault, SensingFault]] = []
         for fault in self.faults:
+            # Its draws are keyed by what it says, so that no other fault changes them.
+            says = fault.table.model_dump_json()
+            made[says] += 1
+            fault.draw(f"faults/{made[says]}/{says}", draws)
             sensing = SENSING_KINDS.get(type(fault.table))
             if sensing is not None:
-                # Its draws are keyed by what it says, so that no other fault changes them.
-                says = fault.table.model_dump_json()
-                made[says] += 1
-                self._sensing.append((fault, sensing(fault.table, scenario, f"faults/{made[says]}/{says}")))
+                self._sensing.append((fault, sensing(fault.table, scenario, fault.purpose)))
         self._waiting = [fault for fault in self.faults if fault.condition is not None]
         self._now: list[Fault] = []
 
@@ -147,8 +171,8 @@ class Schedule:
         """Tell whether a fault may be an order to somebody's program."""
         return any(isinstance(fault.table, CrashTable | RestartTable | PauseTable | JoinTable) for fault in self.faults)
 
-    def turn(self, tick: int, scene: Scene) -> bool:
-        """Let faults begin and end at `tick`; tell whether anything has changed."""
+    def turn(self, tick: int, scene: Scene, dead: Sequence[int] = ()) -> bool:
+        """Let faults begin and end at `tick`; tell whether anything has changed. `dead` are nodes that never return."""
         for fault in self._waiting:
             fault.look(tick, scene)
         now = [fault for fault in self.faults if fault.in_force(tick)]
@@ -159,6 +183,9 @@ class Schedule:
             now = [fault for fault in now if not fault.healed]
         # What happens at once is a change each time.
         changed = now != self._now or any(not fault.table.lasts for fault in now)
+        for fault in now:
+            if fault.choose(scene, dead):
+                dead, changed = [*dead, *fault.nodes], True
         self._now = now
         return changed
 
@@ -230,6 +257,8 @@ def _nonsense(table: FaultTable, scenario: Scenario) -> list[str]:
     for key in ("nodes", "senders", "receivers", "robots"):
         found += _strangers(getattr(table, key, None) or (), f".{key}", scenario)
     found += sensing_nonsense(table, scenario)
+    if isinstance(table, CrashTable) and (table.nodes is None) == (table.fraction is None):
+        found.append(": expected either nodes or fraction")
     if isinstance(table, PartitionTable):
         for number, group in enumerate(table.groups):
             found += _strangers(group, f".groups.{number}", scenario)
@@ -250,17 +279,21 @@ def _nonsense(table: FaultTable, scenario: Scenario) -> list[str]:
 def _wrong_times(table: FaultTable, scenario: Scenario) -> list[str]:
     found: list[str] = []
     duration_s = scenario.time.duration_s
-    if (table.at_s is None) == (table.when is None):
-        found.append(": expected either at_s or when")
+    if [table.at_s, table.when, table.between_s].count(None) != 2:
+        found.append(": expected one of at_s, between_s and when")
     if table.for_s is not None and table.until_s is not None:
         found.append(": expected for_s or until_s, not both")
     if not table.lasts and (table.for_s is not None or table.until_s is not None):
         found.append(": happens at once: no for_s and no until_s")
     if table.at_s is not None and table.at_s >= duration_s:
         found.append(f".at_s: the run ends after {duration_s:g} s, got {table.at_s:g}")
+    if table.between_s is not None and not table.between_s[0] < table.between_s[1] < duration_s:
+        found.append(
+            f".between_s: expected [first, last] before the end at {duration_s:g} s, got {list(table.between_s)}"
+        )
     if table.until_s is not None and table.until_s > duration_s:
         found.append(f".until_s: the run ends after {duration_s:g} s, got {table.until_s:g}")
-    if table.until_s is not None and table.until_s <= (table.at_s or 0.0):
+    if table.until_s is not None and table.until_s <= (table.at_s or (table.between_s or (0.0, 0.0))[1]):
         found.append(f".until_s: expected later than it begins, got {table.until_s:g}")
     if table.when is not None:
         found += [f".when{line}" for line in _wrong_condition(table.when, scenario)]

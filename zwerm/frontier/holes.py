@@ -5,7 +5,7 @@ stopped by one, knows in which direction. A hole into which no such direction le
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from zwerm.frontier.fence import SIXTY_RAD, Side, Views
@@ -29,18 +29,49 @@ Hole = tuple[Corner, ...]
 
 
 def holes(views: Views, complex_: FlagComplex) -> list[Hole]:
-    """Return the holes of the complex, each as the shortest way around it; `views` are directions in one frame."""
+    """Return the holes of the complex, each as a shortest way close around it; `views` are directions in one frame."""
     found = []
     for cycle in hole_cycles(complex_):
         for way in (cycle, cycle[::-1]):
-            corners = tuple(
-                Corner(i, after, views[i][after], (views[i][before] - views[i][after]) % math.tau)
-                for before, i, after in zip((way[-1], *way[:-1]), way, (*way[1:], way[0]), strict=True)
-            )
+            corners = _corners(views, way)
             # The turns of the way around what is on the left come to one to the left.
             if math.pi < sum(math.pi - each.width_rad for each in corners) < 3.0 * math.pi:
-                found.append(corners)
+                found.append(_tightened(corners, views, complex_))
     return found
+
+
+def _corners(views: Views, way: Sequence[int]) -> Hole:
+    return tuple(
+        Corner(i, after, views[i][after], (views[i][before] - views[i][after]) % math.tau)
+        for before, i, after in zip((way[-1], *way[:-1]), way, (*way[1:], way[0]), strict=True)
+    )
+
+
+def _tightened(hole: Hole, views: Views, complex_: FlagComplex) -> Hole:
+    """Return a way as long around the same hole, with no place inside that three of its corners in a row see.
+
+    What was met at the middle one of those, or at such a place, need not be in the hole: it may be in their triangles.
+    """
+    left = {place: None for place in complex_.vertices if all(place != each.place for each in hole)}
+    at = 0
+    while at < len(hole):
+        before, middle, after = hole[at - 1].place, hole[at], hole[at].following
+        inside = [
+            each
+            for each in complex_.neighbours[middle.place]
+            if each in left
+            and before in complex_.neighbours[each]
+            and after in complex_.neighbours[each]
+            and middle.faces(views[middle.place][each])
+        ]
+        if inside:
+            del left[inside[0]]
+            way = [each.place for each in hole]
+            way[at] = inside[0]
+            hole, at = _corners(views, way), 0
+        else:
+            at += 1
+    return hole
 
 
 def is_bare(hole: Hole, views: Views, complex_: FlagComplex, met: Callable[[int], Iterable[float]]) -> bool:

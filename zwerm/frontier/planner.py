@@ -23,6 +23,9 @@ VERTEX_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 60, -60, 30, 
 END_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 30, -30, 60, -60, 90, -90))
 END_RAD: Final = math.radians(285.0)
 VERTEX_BESIDE_RAD: Final = math.radians(75.0)
+# What tells keys of bridges, and of last attempts, from those of gaps, whose turns are in degrees.
+BRIDGE: Final = 360
+LAST: Final = 720
 # A drive that a wall stopped says that much about the directions beside it.
 BLOCKED_RAD: Final = math.radians(20.0)
 
@@ -32,12 +35,13 @@ Count = Annotated[int, Meta(ge=1)]
 
 
 class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
-    """What a scenario may set. `link_m` and `margin_m` are the robots'."""
+    """What a scenario may set. `link_m` and `margin_m` are the robots'; nothing is over before `watch_until_s`."""
 
     link_m: Length = 1.0
     margin_m: Length = 0.05
     clear_m: Length = 0.8
     clear_vertex_m: Length = 0.9
+    clear_end_m: Length = 0.6
     near_wall_m: Length = 0.3
     obstacle_cost: Annotated[float, Meta(ge=1.0, le=1000.0)] = 3.0
     corner_margin_rad: Annotated[float, Meta(ge=-1.0, le=1.0)] = 0.15
@@ -47,6 +51,7 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     survey_ticks_max: Count = 80
     drive_ticks_max: Count = 300
     cycles_max: Count = 2000
+    watch_until_s: Annotated[float, Meta(ge=0.0)] = 0.0
 
     def __post_init__(self) -> None:
         """Refuse a margin that leaves no link."""
@@ -83,11 +88,12 @@ class Planner:
 
     def plans(self) -> Iterator[list[Plan]]:
         """Yield the deployments there could be; edges first, since a robot between two others covers more."""
-        yield self._plans
+        yield [*self._bridges(), *self._plans]
         yield list(self._vertex_plans())
         into_holes = list(self._hole_plans())
         self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in into_holes}))
         yield into_holes
+        yield list(self._last_plans())
 
     def note_attempt(self, plan: Plan) -> None:
         """Take note that a plan is being tried."""
@@ -103,6 +109,17 @@ class Planner:
         for i, a, b, _ in wedges(self._views, self._complex):
             fenced[edge(i, a)] = fenced[edge(i, b)] = None
         return tuple(fenced)
+
+    def _bridges(self) -> Iterator[Plan]:
+        """Yield the ways to places that were in sight once, and are in another piece of the complex now."""
+        pieces = self._complex.components()
+        piece = {place: number for number, each in enumerate(pieces) for place in each}
+        for mover in self._complex.vertices if len(pieces) > 1 else ():
+            for other, direction in self._places.known_from(mover):
+                key = (mover, other, 0, BRIDGE)
+                if mover not in self._bases and piece[other] != piece[mover] and key not in self.tried.closed:
+                    hop, clear = self._rules.link_m - self._rules.margin_m, self._rules.near_wall_m
+                    yield Plan(key, mover, direction, hop, clear, (mover,))
 
     def _hole_plans(self) -> Iterator[Plan]:
         """Yield the ways into holes in which nobody met anything: a corner is no wall, nor is an attempt without one."""
@@ -163,6 +180,18 @@ class Planner:
                 if any(_apart(each, direction) < BLOCKED_RAD for each in self.tried.blocked.get(i, ())):
                     continue
                 yield Plan(key, i, direction, hop, self._rules.clear_vertex_m, (i,))
+
+    def _last_plans(self) -> Iterable[Plan]:
+        """Yield the ways on for ends of single files that a wall would stop soon: there may be a way around a corner."""
+        hop = self._rules.link_m - self._rules.margin_m
+        for i, a, _, gap in wedges(self._views, self._complex):
+            if i in self._bases or gap < END_RAD:
+                continue
+            for turn in END_TURNS_RAD:
+                direction = self._views[i][a] + gap / 2.0 + turn
+                key = (i, a, 0, LAST + round(math.degrees(turn)))
+                if key not in self.tried.closed and not self._walled(i, direction):
+                    yield Plan(key, i, direction, hop, self._rules.clear_end_m, (i,))
 
     def _walled(self, place: int, direction: float) -> bool:
         return any(_apart(each, direction) < SIXTY_RAD for each in self._places.walls.get(place, ()))
