@@ -11,6 +11,8 @@ from zwerm.agents.sensor_coverage.words import UNSAID, State, Way, Word
 AGAIN_TICKS: Final = (4, 10, 22)
 LOSSY_HEARTBEAT_TICKS: Final = 24
 LOSSY_TICKS: Final = 600
+# Who is new cannot know, and speaks for so long as if they were.
+NEW_TICKS: Final = 100
 # A way is often found by and by: it is told no more often than that.
 WAY_TICKS: Final = 4
 # The same where nothing is lost.
@@ -30,7 +32,7 @@ class Speech:
         self._way = UNSAID
         self._way_again: list[int] = []
         self._way_at = -WAY_TICKS
-        self._lossy_until = LOSSY_TICKS  # until the air is known
+        self._lossy_until: int | None = None
 
     def again(self, tick: int) -> None:
         """Tell the state at this tick: somebody asked, or may know less than it should."""
@@ -42,6 +44,8 @@ class Speech:
 
     def say(self, tick: int, vicinity: Vicinity, waiting: bool) -> list[Word]:
         """Return what to tell now."""
+        if self._lossy_until is None:
+            self._lossy_until = tick + NEW_TICKS
         return [*self._say_state(tick, vicinity, waiting), *self._say_way(tick, vicinity)]
 
     def next_tick(self) -> int:
@@ -61,9 +65,7 @@ class Speech:
             return []
         self._again = [each for each in self._again if each > tick]
         self._way_again = [each for each in self._way_again if each > tick]
-        self.heartbeat = (
-            tick + (LOSSY_HEARTBEAT_TICKS if tick < self._lossy_until else HEARTBEAT_TICKS) + self._node % 10
-        )
+        self.heartbeat = tick + (LOSSY_HEARTBEAT_TICKS if self._lossy(tick) else HEARTBEAT_TICKS) + self._node % 10
         return [msgspec.structs.replace(self._state, number=self._number, way=self._now(tick, vicinity))]
 
     def _say_way(self, tick: int, vicinity: Vicinity) -> list[Word]:
@@ -77,7 +79,10 @@ class Speech:
         return [self._now(tick, vicinity)]
 
     def _times(self, tick: int, first: int) -> list[int]:
-        return [first, *(first + each for each in AGAIN_TICKS if tick < self._lossy_until)]
+        return [first, *(first + each for each in AGAIN_TICKS if self._lossy(tick))]
+
+    def _lossy(self, tick: int) -> bool:
+        return self._lossy_until is not None and tick < self._lossy_until
 
     def _now(self, tick: int, vicinity: Vicinity) -> Way:
         """Return the way as it is now."""
