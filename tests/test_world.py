@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from support import scenario
@@ -223,6 +224,57 @@ def test_a_crashed_robot_stops_is_never_awaited_again_and_its_packets_are_droppe
     assert list(tick(world)) == [0]
     assert (world.scene.position[1] == halted).all()
     assert world.crashed == {1: "Oops"}
+
+
+def trace_of(*, foreseeing: bool, latency_ticks: int) -> str:
+    """Return the trace of robots that come and go, drive, sleep and crash, in a world that `foresees` or does not."""
+    inflow = {"every_s": 0.3, "entry_m": [0.0, 0.0, 1.0, 4.0], "exit_m": [1.5, 0.0, 4.0, 4.0]}
+    body = {"kind": "holonomic", "radius_m": 0.1, "max_speed_m_s": 2.0, "latency_ticks": latency_ticks}
+    sensors = [
+        {"kind": "odometry", "distance_sd_fraction": 0.1},
+        {"kind": "bearings", "sd_rad": 0.1},
+        {"kind": "line_of_sight"},
+    ]
+    robots = {"count": 12, "inflow": inflow, "body": body, "sensors": sensors, "on_crash": "continue"}
+    noise = {"kind": "sensor_noise", "sensor": "bearings", "at_s": 0.8, "for_s": 0.4, "sd": 0.1}
+    world = world_at(robots=robots, faults=[noise])
+    answer = {7: Command(drive=BodyVelocity(1.8)), 16: Command(wake=Wake(at_s=2.0))}
+    while world.tick < 40:
+        world.begin()
+        nodes, _ = world.observe()
+        if foreseeing:
+            world.foresee()
+        for node in nodes:
+            said = answer.get(world.tick + node, Command(drive=BodyVelocity(1.9, 0.0, 0.05 * node)))
+            failed = world.tick == 30 and node == nodes[0]
+            said = Failure(world.tick, "Oops", "") if failed else msgspec.structs.replace(said, tick=world.tick)
+            world.accept(node, encode(said))
+        world.advance()
+    assert world.exited
+    assert world.crashed
+    return world.trace.hex()
+
+
+def test_foresight_changes_nothing_whoever_comes_goes_sleeps_or_is_blinded() -> None:
+    traces = [trace_of(foreseeing=True, latency_ticks=latency) for latency in (0, 1, 3)]
+    assert traces == [trace_of(foreseeing=False, latency_ticks=latency) for latency in (0, 1, 3)]
+    assert len(set(traces)) == 3
+
+
+def test_what_was_foreseen_is_not_sensed_again() -> None:
+    body = {"kind": "holonomic", "latency_ticks": 1}
+    world = world_at((1.0, 1.0, 0.0), (2.0, 1.0, 0.0), robots={"sensors": [{"kind": "bearings"}], "body": body})
+    (sensor,) = world._sensors.values()
+    asked = []
+    read = sensor.read
+    sensor.read = lambda scene, robots: (asked.append(scene.tick), read(scene, robots))[1]  # type: ignore[method-assign]
+    for _ in range(3):
+        nodes, _ = world.observe()
+        world.foresee()
+        for node in nodes:
+            world.accept(node, encode(Command(tick=world.tick)))
+        world.advance()
+    assert asked == [0, 1, 2, 3]
 
 
 def test_robots_flow_in_through_the_entry_and_out_through_the_exit() -> None:

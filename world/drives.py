@@ -26,7 +26,10 @@ _KINDS: Final[dict[str, type[BodyVelocity] | type[WheelSpeeds]]] = {
 
 
 class Drives:
-    """The drives of a swarm of `count` robots; `kind` is what such a body takes."""
+    """The drives of a swarm of `count` robots; `kind` is what such a body takes.
+
+    They are `lagging` where a command does not act before the next tick.
+    """
 
     def __init__(self, body: BodyTable, count: int, draws: Draws) -> None:
         self._body = body
@@ -34,7 +37,8 @@ class Drives:
         self.kind: type[BodyVelocity] | type[WheelSpeeds] = _KINDS[body.kind]
         self._axes = len(self.kind.__struct_fields__)
         self._commanded: Floats = np.zeros((count, self._axes))
-        self._pending = [self._commanded.copy() for _ in range(body.latency_ticks)]
+        self.lagging = body.latency_ticks > 0
+        self._pending = [self._commanded.copy() for _ in range(body.latency_ticks - 1)]
         self._noise_block = -1
         self._noise: Floats = np.zeros((_BLOCK_TICKS, count, self._axes))
         if body.kind == "differential":
@@ -49,12 +53,16 @@ class Drives:
         self._commanded[robots] = np.fromiter(numbers, np.float64, axes * len(robots)).reshape(-1, axes)
 
     def stop(self, robot: int) -> None:
-        """Cut a robot's motors at once, whatever is still on its way to them."""
+        """Cut a robot's motors, whatever is still on its way to them, from the next step on."""
         for pending in (self._commanded, *self._pending):
             pending[robot] = 0.0
 
     def velocities(self, tick: int) -> tuple[Floats, Floats | None, Floats]:
-        """Return (forward [m/s], left [m/s] or None, turn [rad/s]), each (n,), for the step from `tick` to the next."""
+        """Return (forward [m/s], left [m/s] or None, turn [rad/s]), each (n,), for the step from `tick` to the next.
+
+        To be asked for once a tick: where drives are `lagging`, before those that answer the tick's observations are commanded,
+        and after that where they are not.
+        """
         if self._pending:
             self._pending.append(self._commanded.copy())
             acting = self._pending.pop(0)

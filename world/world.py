@@ -33,6 +33,7 @@ from zwerm.world.faults import ticks
 from zwerm.world.faults.generator import scheduled
 from zwerm.world.faults.schedule import Schedule, unite
 from zwerm.world.faults.sensing import SensingFault, read
+from zwerm.world.foresight import Foreseen, Readings
 from zwerm.world.inflow import Depots, Inflow
 from zwerm.world.lives import Lives, Order
 from zwerm.world.meters import Meters
@@ -94,6 +95,9 @@ class World:
         self.answers = Answers(self._drives.kind, body.kind, self._fixed, self.medium)
         self.refused = self.answers.refused
         self._present: Bools = np.zeros(count, dtype=np.bool_)
+        self._robots: Ints = np.zeros(0, dtype=np.int64)  # those that were observed last
+        self._coming: Scene | None = None
+        self._foreseen: Foreseen | None = None
         self._nodes: list[int] = []
         self._observations: list[bytes] = []
         self._outboxes: list[tuple[int, tuple[Transmission, ...]]] = []
@@ -110,7 +114,7 @@ class World:
             positions, headings = place(scenario.robots.placement, arena, count, body.radius_m, self.draws)
             for robot in range(count):
                 self._enter(robot, positions[robot], float(headings[robot]))
-        self.scene = self._look(np.ones(count, dtype=np.bool_))
+        self.scene = self._look(np.ones(count, dtype=np.bool_), 0)
         self._let_in_and_out()
 
     # --- one tick, in order -----------------------------------------------------------------------------------------
@@ -144,7 +148,7 @@ class World:
         nodes: list[int] = awake.tolist()
         # Ids ascend, and the coordinator's, which has no sensors, is the largest.
         robots = awake[:-1] if nodes and nodes[-1] == self.coordinator else awake
-        readings = {field: self._read(sensor, robots) for field, sensor in self._sensors.items()} if len(robots) else {}
+        readings = self._readings(robots)
         for field in SIGNATURES:
             if field in readings:
                 self._wakes.remember(field, nodes[: len(robots)], readings[field])
@@ -163,6 +167,17 @@ class World:
                 send(node, observation)
         return nodes, self._observations
 
+    def foresee(self) -> None:
+        """Work out what does not hang on the answers to this tick's observations: best while the nodes work on them.
+
+        Where commands act a tick later or more, that is the motion of the bodies, and, as long as everybody is awake, what the
+        same robots sense after it; `observe` takes that if nothing came between.
+        """
+        self._catch_up()
+        self._move_early()
+        if self._coming is not None and len(self._robots) and not (self._wakes.sleeping or self._blinding):
+            self._foreseen = Foreseen(self._coming, self._robots, self._sense(self._coming, self._robots))
+
     def accept(self, node: int, payload: bytes) -> None:
         """Take a node's answer to its observation of this tick, or in real time to an earlier one.
 
@@ -171,6 +186,7 @@ class World:
         answer = self.answers.hear(node, payload)
         if type(answer) is Failure:
             self.failures[node] = answer
+            self._move_early()  # whether it was done already or not, the motors stop after this tick
             self.crash(node, answer.error)
 
     def awaited(self) -> list[int]:
@@ -179,6 +195,8 @@ class World:
 
     def advance(self) -> None:
         """Apply what was accepted, in id order, and go on to the next tick."""
+        self._catch_up()
+        self._move_early()
         payloads, commands = self.answers.close()
         self._apply(self.lives.finished(commands, self.tick))
         self.trace.extend(self.tick, self._nodes, self._observations, payloads)
@@ -187,13 +205,8 @@ class World:
         if self._outboxes:
             self.medium.send(self.scene, self._outboxes)
             self._outboxes = []
-        before = self.scene
-        moving = self._physics.advance(*self._drives.velocities(self.tick))
+        self.scene, self._coming = self._coming or self._move(), None
         self.tick += 1
-        moved: Bools = np.zeros(self.count, dtype=np.bool_)
-        if moving:
-            moved = (self._physics.position != before.position).any(axis=1) | (self._physics.heading != before.heading)
-        self.scene = self._look(moved)
         self._let_in_and_out()
 
     # --- what happens to robots -------------------------------------------------------------------------------------
@@ -247,11 +260,28 @@ class World:
         centre = self.coordinator
         return node in self._fixed and (centre is None or node == centre or centre in self.dead)
 
-    def _look(self, moved: Bools) -> Scene:
+    def _catch_up(self) -> None:
+        self.trace.catch_up()
+        self._wakes.catch_up()
+
+    def _move_early(self) -> None:
+        """Move the bodies, once a tick, if no answer to its observations has a say in that."""
+        if self._drives.lagging and self._coming is None:
+            self._coming = self._move()
+
+    def _move(self) -> Scene:
+        """Move the bodies to the next tick, and return how things are then."""
+        before, physics = self.scene, self._physics
+        moved: Bools = np.zeros(self.count, dtype=np.bool_)
+        if physics.advance(*self._drives.velocities(self.tick)):
+            moved = (physics.position != before.position).any(axis=1) | (physics.heading != before.heading)
+        return self._look(moved, self.tick + 1)
+
+    def _look(self, moved: Bools, tick: int) -> Scene:
         physics = self._physics
         return Scene(
-            self.tick,
-            self.time_s,
+            tick,
+            tick * self.scenario.time.dt_s,
             physics.position.copy(),
             physics.heading.copy(),
             self._present,
@@ -278,7 +308,7 @@ class World:
         if leaving or entering is not None:
             changed = self.scene.moved.copy()
             changed[leaving if entering is None else [*leaving, entering[0]]] = True
-            self.scene = self._look(changed)
+            self.scene = self._look(changed, self.tick)
 
     def _enter(self, robot: int, position: Floats, heading: float) -> None:
         self._physics.add(robot, position, heading)
@@ -300,8 +330,18 @@ class World:
             self._drives.stop(node)
         self.medium.switch_off(node, cause)
 
-    def _read(self, sensor: Sensor, robots: Ints) -> Sequence[Any]:
-        return read(sensor, self._blinding, self.scene, robots) if self._blinding else sensor.read(self.scene, robots)
+    def _readings(self, robots: Ints) -> Readings:
+        """Return what each of `robots` senses now, by field."""
+        foreseen, self._foreseen, self._robots = self._foreseen, None, robots
+        if foreseen is not None and not self._blinding and foreseen.holds(self.scene, robots):
+            return foreseen.readings
+        return self._sense(self.scene, robots) if len(robots) else {}
+
+    def _sense(self, scene: Scene, robots: Ints) -> Readings:
+        return {field: self._read(sensor, scene, robots) for field, sensor in self._sensors.items()}
+
+    def _read(self, sensor: Sensor, scene: Scene, robots: Ints) -> Sequence[Any]:
+        return read(sensor, self._blinding, scene, robots) if self._blinding else sensor.read(scene, robots)
 
     def _happens(self, order: Order) -> bool:
         """Let what an order does to a program have its effect on the world; tell whether there is a program to do it to."""
@@ -334,7 +374,7 @@ class World:
         for field in SIGNATURES:
             sensor = self._sensors.get(field)
             if sensor is not None and len(watchers := self._wakes.watchers(field)):
-                self._wakes.note_readings(field, watchers, self._read(sensor, watchers), self.tick)
+                self._wakes.note_readings(field, watchers, self._read(sensor, self.scene, watchers), self.tick)
 
     def _apply(self, answers: list[tuple[int, Command | Failure]]) -> None:
         drives: list[tuple[int, BodyVelocity | WheelSpeeds]] = []

@@ -104,18 +104,21 @@ def test_displacements_put_end_to_end_lead_where_the_robot_is(make_scene, sensor
 
 
 def test_odometry_speaks_of_the_robots_own_previous_observation(make_scene, sensor_for):
-    scenes = [make_scene([(0.5 + 0.1 * tick, 1.0, 0.0), (0.5, 0.5 + 0.1 * tick, math.pi / 2)]) for tick in range(4)]
+    scenes = [
+        make_scene([(0.5 + 0.1 * tick, 1.0, 0.0), (0.5, 0.5 + 0.1 * tick, math.pi / 2)], tick=tick) for tick in range(4)
+    ]
     sensor = sensor_for(scenes[0], "odometry")
     assert read(sensor, scenes[0]) == pytest.approx(np.zeros((2, 3)))
     (only,) = sensor.read(scenes[2], np.array([1]))
     assert (only.forward_m, only.left_m, only.turn_rad) == pytest.approx((0.2, 0.0, 0.0))
-    assert read(sensor, scenes[3]) == pytest.approx(np.array([[0.3, 0.0, 0.0], [0.1, 0.0, 0.0]]))
+    for _ in "asked", "and asked again":
+        assert read(sensor, scenes[3]) == pytest.approx(np.array([[0.3, 0.0, 0.0], [0.1, 0.0, 0.0]]))
 
 
 def test_a_robot_that_comes_back_into_the_arena_has_not_moved(make_scene, sensor_for):
     before = make_scene([(0.5, 0.5, 0.0), (1.0, 1.0, 0.0)])
-    gone = make_scene([(0.5, 0.5, 0.0), (0.0, 0.0, 0.0)], present=[True, False])
-    back = make_scene([(0.5, 0.5, 0.0), (2.5, 2.5, 1.0)])
+    gone = make_scene([(0.5, 0.5, 0.0), (0.0, 0.0, 0.0)], present=[True, False], tick=1)
+    back = make_scene([(0.5, 0.5, 0.0), (2.5, 2.5, 1.0)], tick=2)
     sensor = sensor_for(before, "odometry")
     for scene in (before, gone, back):
         assert not read(sensor, scene).any()

@@ -2,7 +2,8 @@
 
 Every sensor reads the truth, adds its noise from keyed draws, and returns what crosses the wire. Robots that are not
 present are neither sensed nor read. Which robots are read changes no reading, but for `odometry`, which speaks of the
-time since.
+time since. A tick may be read more than once, and not always of the same robots: what a sensor remembers is what it was
+asked last.
 """
 
 import dataclasses

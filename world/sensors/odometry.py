@@ -36,12 +36,18 @@ class Odometry:
     def __init__(self, parameters: OdometryTable, surroundings: Surroundings) -> None:
         self._distance_noise = (parameters.distance_sd_fraction, parameters.distance_sd_per_root_m)
         self._turn_noise = (parameters.turn_sd_fraction, parameters.turn_sd_per_root_rad)
+        self._tick = -1  # of the newest reading
         self._known = np.zeros(surroundings.count, dtype=np.bool_)
         self._position = np.zeros((surroundings.count, 2))
         self._heading = np.zeros(surroundings.count)
+        self._before = (self._known, self._position, self._heading)  # that reading
 
     def read(self, scene: Scene, robots: Ints) -> list[Displacement]:
         """Return the motion of each of `robots` since it was last read."""
+        if scene.tick != self._tick:
+            self._tick, self._before = scene.tick, (self._known, self._position, self._heading)
+        known, position, heading = self._before
+        self._known, self._position, self._heading = known.copy(), position.copy(), heading.copy()
         self._known &= scene.present
         new = robots[~self._known[robots]]
         self._position[new], self._heading[new], self._known[new] = scene.position[new], scene.heading[new], True
