@@ -58,8 +58,7 @@ class LockStep:
     def _tick(self) -> None:
         world, link = self._world, self._link
         self._undertaker.carry_out(world.begin())
-        with link.undisturbed():
-            nodes, _ = world.observe(link.send)
+        nodes, _ = world.observe(link.send)
         world.foresee()
         self._collect(len(nodes))
         if world.crashed and world.scenario.robots.on_crash == "fail":

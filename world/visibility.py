@@ -6,6 +6,7 @@ the work is near-linear in the robots; without one it is quadratic, and with rob
 is cubic. It knows nothing of headings, noise or radio models.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,9 @@ from zwerm.world.scene import Bools, Floats, Ints, Scene
 
 # Robots that may hide others are tried against so many lines at a time: it bounds memory and fits the cache.
 _TRIPLES_AT_ONCE = 1 << 15
+
+# Up to so many robots all pairs are measured: that takes less than to grow a tree and search it.
+_FEW_ROBOTS = 128
 
 
 class Sightings(NamedTuple):
@@ -79,7 +83,7 @@ class NearPairs:
         """Return (k, 2) ids i < j of present robots at most range_m apart, ascending."""
         if range_m is None:
             ids = scene.present_ids()
-            everyone: Ints = ids[np.column_stack(np.triu_indices(len(ids), 1))]
+            everyone: Ints = ids[np.column_stack(_everyone(len(ids)))]
             return everyone
         self.asked_m = max(self.asked_m, range_m)
         if range_m > self._reach_m:
@@ -91,10 +95,19 @@ class NearPairs:
         ids = scene.present_ids()
         position = scene.position[ids]
         # A little too far, so that one rule, the one above, decides at the very edge.
-        pairs = cKDTree(position).query_pairs(reach_m * (1.0 + 1e-9), output_type="ndarray")
-        pairs = pairs[np.argsort(pairs[:, 0] * len(ids) + pairs[:, 1])]
-        dx, dy = position[pairs[:, 1]].T - position[pairs[:, 0]].T
-        self._reach_m, self._pairs, self._apart2 = reach_m, ids[pairs], dx**2 + dy**2
+        farther_m = reach_m * (1.0 + 1e-9)
+        if len(ids) <= _FEW_ROBOTS:
+            first, second = _everyone(len(ids))
+            x, y = position.T
+            apart2 = (x[second] - x[first]) ** 2 + (y[second] - y[first]) ** 2
+            near = np.flatnonzero(apart2 <= farther_m**2)
+            pairs, apart2 = np.column_stack([first[near], second[near]]), apart2[near]
+        else:
+            pairs = cKDTree(position).query_pairs(farther_m, output_type="ndarray")
+            pairs = pairs[np.argsort(pairs[:, 0] * len(ids) + pairs[:, 1])]
+            dx, dy = position[pairs[:, 1]].T - position[pairs[:, 0]].T
+            apart2 = dx**2 + dy**2
+        self._reach_m, self._pairs, self._apart2 = reach_m, ids[pairs], apart2
 
 
 class Visibility:
@@ -181,6 +194,13 @@ class Visibility:
             reach_m = None if range_m is None else range_m + scene.radius_m
             pairs = pairs[~_hidden(scene, pairs, self._near.within(scene, reach_m))]
         return pairs
+
+
+@lru_cache(maxsize=4)
+def _everyone(count: int) -> tuple[Ints, Ints]:
+    """Return the two rows of every unordered pair of `count` things, ascending; not to be written to."""
+    first, second = np.triu_indices(count, 1)
+    return first, second
 
 
 def _hidden(scene: Scene, pairs: Ints, near: Ints) -> Bools:

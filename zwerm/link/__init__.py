@@ -5,7 +5,6 @@ in the order they were sent, each exactly once, until the node is lost.
 """
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from typing import NamedTuple, Protocol
 
 
@@ -27,9 +26,6 @@ class WorldLink(Protocol):
 
     def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
         """Return all that has arrived, as soon as there are `count`, or a loss, or after `timeout_s` seconds."""
-
-    def undisturbed(self) -> AbstractContextManager[object]:
-        """Return a context in which nothing is taken in, for whoever sends to many."""
 
     def close(self) -> None:
         """Release all that the link holds; idempotent."""

@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
 
 from zwerm.errors import LinkError
 from zwerm.link import Answer, Arrival
@@ -36,10 +35,6 @@ class MemoryLink:
         arrivals = list(self._arrivals)
         self._arrivals.clear()
         return arrivals
-
-    def undisturbed(self) -> AbstractContextManager[object]:
-        """Return a context that changes nothing: who is sent something answers in there."""
-        return nullcontext()
 
     def close(self) -> None:
         """Forget what has not been received."""

@@ -56,7 +56,6 @@ class ZenohWorldLink:
         self._wanted = CAPACITY  # so many arrivals are worth waking somebody for
         self._losses = 0  # among them
         self._closed = False
-        self._gate = threading.Lock()
         set_threads(TWO_THREADS)
         self._session = open_session({"mode": "router", **settings}, "the world cannot listen")
         try:
@@ -105,14 +104,6 @@ class ZenohWorldLink:
         """
         self._wait(count, timeout_s)
         return self._taken(len(self._arrivals))
-
-    def undisturbed(self) -> threading.Lock:
-        """Return a context in which nothing is taken in, for whoever sends to many.
-
-        Zenoh's thread would take Python's lock from the sender between any two messages, and give it back: two switches
-        for each, when what has come can wait in the sockets.
-        """
-        return self._gate
 
     def dismiss(self, reason: str) -> None:
         """Tell every joined node that its life is over; their leaving is no loss and is not reported."""
@@ -163,8 +154,6 @@ class ZenohWorldLink:
     def _on_command(self, sample: zenoh.Sample) -> None:
         """A message came from whoever may write to that key. Runs in Zenoh's thread."""
         keep_thread()
-        with self._gate:
-            pass
         node = self._source_of.get(str(sample.key_expr))
         if node is None:
             with self._changed:
