@@ -16,7 +16,7 @@ COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generat
 .DEFAULT_GOAL := help
 APT_TOOLS := iproute2 nftables ffmpeg
 
-.PHONY: help setup dev tools run test lint format docs bench fidelity lock clean
+.PHONY: help setup dev compile tools run test lint format docs bench fidelity lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -24,6 +24,10 @@ help:  ## list the targets
 setup: $(RUN_READY)  ## make .venv with the zwerm command in it
 
 dev: $(DEV_READY)  ## add what tests, linters and documentation need
+
+compile: dev  ## make a C extension of the inner loop of Voronoi coverage (needs a C compiler)
+	ZWERM_COMPILE=1 $(BIN)/python setup.py -q build_ext --inplace
+	@echo "compile: done; what is changed in zwerm/kept_cell.py from now on counts after the next make compile or make clean"
 
 tools:  ## install what the twin on a real network and MP4 need (as root, where there is apt-get; else say so)
 	@if command -v ip >/dev/null && command -v tc >/dev/null && command -v nft >/dev/null && command -v ffmpeg >/dev/null; then echo "tools: all there"; \
@@ -64,7 +68,7 @@ lock:  ## resolve the dependencies anew (needs uv)
 	$(COMPILE) --group dev --constraint requirements.txt --upgrade --output-file requirements-dev.txt
 
 clean:  ## remove .venv and everything that was built
-	rm -rf $(VENV) build dist site *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) build dist site *.egg-info zwerm/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 $(RUN_READY): requirements.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || \

@@ -1,12 +1,15 @@
 """A cell that is kept from one observation to the next is the one that is clipped anew."""
 
+import importlib.util
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from zwerm import kept_cell
 from zwerm.kept_cell import KeptCell
 from zwerm.polygons import estimated_centroid, nearest_point, voronoi_cell
 from zwerm.protocol import Neighbour
@@ -72,6 +75,20 @@ def test_what_is_kept_changes_no_bit_of_an_answer():
             assert cell.target(*sensed, 1.0, 0.3, -0.2) == KeptCell().target(*sensed, 1.0, 0.3, -0.2)
             found_anew += cell._bounds is not before
     assert 100 < found_anew < 1000  # of 1800: orders were kept, and orders were found
+
+
+@pytest.mark.skipif(kept_cell.__file__.endswith(".py"), reason="make compile has not been run")
+def test_the_compiled_cell_is_that_of_its_source_to_the_bit_and_no_older():
+    source = Path(kept_cell.__file__).with_name("kept_cell.py")
+    assert Path(kept_cell.__file__).stat().st_mtime >= source.stat().st_mtime
+    spec = importlib.util.spec_from_file_location("kept_cell_source", source)
+    interpreted = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(interpreted)
+    pairs = [(KeptCell(), interpreted.KeptCell()) for _ in range(30)]
+    for position in walk(3, 30, 60, 0.003):
+        for robot, (compiled, plain) in enumerate(pairs):
+            sensed = seen(position, robot, SQUARE)
+            assert compiled.target(*sensed, 1.0, 0.3, -0.2) == plain.target(*sensed, 1.0, 0.3, -0.2)
 
 
 @settings(max_examples=150, deadline=None)
