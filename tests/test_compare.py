@@ -16,7 +16,7 @@ from zwerm.running import run
 from zwerm.statistics import Sample
 from zwerm.study.arguments import parse_sweep, parse_variant
 from zwerm.study.comparison import METRICS, Comparison, _less, make_comparison
-from zwerm.study.comparison_pictures import check_figure, draw_comparison, label
+from zwerm.study.comparison_pictures import axis_label, check_figure, draw_comparison, label
 from zwerm.study.comparison_report import shown
 from zwerm.study.plan import make_points
 from zwerm.study.rows import read_rows
@@ -311,6 +311,12 @@ def test_a_metric_on_an_axis_is_words_with_a_unit(metric: str, words: str) -> No
 
 
 # --- whole comparisons --------------------------------------------------------------------------------------------
+
+
+def test_a_sweep_of_loss_is_words_on_its_axis_and_any_other_is_its_path() -> None:
+    assert axis_label("radio.loss+uplink.loss") == axis_label("radio.loss") == "messages lost [fraction]"
+    assert axis_label("faults.0.at_s") == "faults.0.at_s"
+    assert axis_label("") == ""
 
 
 def test_a_comparison_goes_on_where_it_was_and_gives_in_processes_what_it_gives_inline(

@@ -98,7 +98,8 @@ def _draw(comparison: Comparison, places: Sequence[Place], metrics: Sequence[str
     seeds = sorted({seed for place in places for point in place.points for seed in comparison.seeds(point)})
     about = f"{len(seeds)} seeds a point" if len(seeds) > 1 else "one seed a point"
     explained = (
-        f"{about}; means with their 95 % intervals; below, the difference from {comparison.variants[0]}, paired by seed"
+        f"{about}; means with their 95 % intervals; below, the difference from {comparison.variants[0]}, paired by seed. "
+        "A run that failed counts with what it came to."
     )
     figure.text(0.01, top - 0.27 / size[1], explained, va="top", fontsize=9)
     figure.legend(
@@ -127,6 +128,8 @@ def _draw_metric(above: "Axes", below: "Axes", comparison: Comparison, places: S
             "marker": marker,
             "markersize": 4.5,
             "linewidth": 1.3,
+            # Nothing lies between two words.
+            "linestyle": "none" if ticks else "solid",
             "capsize": 2.5,
             "label": variant,
         }
@@ -143,7 +146,7 @@ def _draw_metric(above: "Axes", below: "Axes", comparison: Comparison, places: S
         low, high = above.get_ylim()
         above.set_ylim(max(-0.02, low), min(1.03, max(high, low + 0.02)))
     below.set_ylabel("difference", fontsize=8)
-    below.set_xlabel(next(iter(places[0].settings), ""), fontsize=9)
+    below.set_xlabel(axis_label(next(iter(places[0].settings), "")), fontsize=9)
     if ticks:
         below.set_xticks(x, ticks, rotation=15 if len("".join(ticks)) > 30 else 0)
     for axes in (above, below):
@@ -178,6 +181,11 @@ def _whole(comparison: Comparison, point: Point, metric: str) -> bool:
 def _some_missing(comparison: Comparison, places: Sequence[Place], metrics: Sequence[str]) -> bool:
     points = [point for place in places for point in place.points]
     return any(not _whole(comparison, point, metric) for point in points for metric in metrics)
+
+
+def axis_label(axis: str) -> str:
+    """Return a sweep as words where it is of independent loss, on one channel or several alike."""
+    return "messages lost [fraction]" if all(path.endswith(".loss") for path in axis.split("+")) else axis
 
 
 def label(metric: str) -> str:
