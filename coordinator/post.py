@@ -22,6 +22,8 @@ JAMMED_FRACTION: Final = 0.25
 JAMMED_TIMES: Final = 10
 # Who carries an order out and does not come to its end in so many times its time never will.
 STUCK_TIMES: Final = 3
+# A burst lasts for so many packets, not for so long: after that many attempts they follow each other without a pause.
+URGENT_TRIES: Final = 6
 # An answer is overdue after this part of the time that it may take.
 OVERDUE: Final = 4
 
@@ -158,7 +160,7 @@ class Post:
                 said = order.said
                 order.said = Dispatch(said.life, said.number, said.attempt + 1, said.to_life, said.order)
                 order.tries += 1
-                order.due = self.tick + self.patience.again_ticks
+                order.due = self.tick + (1 if order.tries > URGENT_TRIES else self.patience.again_ticks)
                 self._send(node, order.said)
         outbox, self._outbox = tuple(self._outbox), []
         return outbox
