@@ -32,7 +32,8 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
 class Setup(Struct, frozen=True, forbid_unknown_fields=True):
     """All that a node knows before its first observation.
 
-    The `bases`, ids of base stations, only a coordinator knows. `services` tells who provides which service.
+    The `bases`, ids of base stations, only a coordinator knows. `services` tells who provides which service. A node that has
+    lost its memory is a later `incarnation`.
     """
 
     node: int
@@ -45,6 +46,7 @@ class Setup(Struct, frozen=True, forbid_unknown_fields=True):
     parameters: dict[str, Any] = {}
     bases: tuple[int, ...] = ()
     services: dict[str, str] = {}
+    incarnation: int = 1
 
 
 class Stepper(Protocol):

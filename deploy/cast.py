@@ -40,12 +40,12 @@ def player(role: str, name: str, services: ServicesTable | None = None) -> str:
 
 
 def recast(scenario: Scenario, seed: int, node: int, incarnation: int) -> tuple[str, Setup]:
-    """Return (controller, setup) of a node's later life: all as before, but for a random stream of its own."""
+    """Return (controller, setup) of a node's later life: all is as before, but for a random stream of its own."""
     controller, setup = cast(scenario, seed)[node]
     if incarnation == 1:
         return controller, setup
     key = Draws(seed).stream_key("controller", node, incarnation)
-    return controller, msgspec.structs.replace(setup, stream_key=key)
+    return controller, msgspec.structs.replace(setup, stream_key=key, incarnation=incarnation)
 
 
 def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:

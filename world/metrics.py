@@ -7,6 +7,7 @@ import shapely
 
 from zwerm.scenario import MetricsTable
 from zwerm.world.arena import Arena
+from zwerm.world.removals import removals
 from zwerm.world.scene import Floats, Ints
 from zwerm.world.sight import Sight, hexagonal_packing_robots, holes, living, obstacles, reachable
 from zwerm.world.visibility import Visibility
@@ -54,6 +55,8 @@ def measure(world: "World", table: MetricsTable) -> dict[str, float]:
         found["area_coverage_fraction"] = area_coverage_fraction(position, table.coverage_radius_m, world.arena)
     if table.sight_range_m is not None:
         found |= _sight(world, table.sight_range_m)
+        if world.scenario.services is not None and world.scenario.services.spares == "link":
+            found |= removals(world, table.sight_range_m)
     return found | _told(world)
 
 

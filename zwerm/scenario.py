@@ -184,11 +184,12 @@ class ServicesTable(Table):
     """Who provides what a deployment needs to have decided: the `coordinator`, or the robots among themselves.
 
     With `path` `gradient` robots find the frontier, the way to it and the end by themselves. `redundancy` is who finds the
-    robots that can be spared: the coordinator, by relative homology; or nobody, with `none`.
+    robots that can be spared: the coordinator, by relative homology; robots by agreement among neighbours, with `link`; or
+    nobody, with `none`. Each goes with the path that is found in the same way.
     """
 
     path: Literal["coordinator", "gradient"] = "coordinator"
-    redundancy: Literal["coordinator", "none"] | None = None
+    redundancy: Literal["coordinator", "link", "none"] | None = None
 
     @property
     def spares(self) -> str:
@@ -303,7 +304,13 @@ class Scenario(Table):
             if self.base is None or self.base.stations > 1:
                 raise ValueError("services.path: robots find the path from one base station")
             if services.spares == "coordinator":
-                raise ValueError("services.redundancy: with path 'gradient' expected 'none', got 'coordinator'")
+                raise ValueError(
+                    "services.redundancy: with path 'gradient' expected 'link' or 'none', got 'coordinator'"
+                )
+        elif services.spares == "link":
+            raise ValueError(
+                "services.redundancy: with path 'coordinator' expected 'coordinator' or 'none', got 'link'"
+            )
         return self
 
     @property

@@ -10,6 +10,7 @@ from typing import Any, Final
 from zwerm.agents.contract import Setup
 from zwerm.agents.sensor_coverage.homing import Vector
 from zwerm.agents.sensor_coverage.host import Drive
+from zwerm.agents.sensor_coverage.membership import Membership
 from zwerm.agents.sensor_coverage.post import Post
 from zwerm.agents.sensor_coverage.push import Push
 from zwerm.agents.sensor_coverage.robot import STOP, Parameters, Robot, Story
@@ -21,8 +22,11 @@ from zwerm.agents.sensor_coverage.words import (
     Abort,
     Ask,
     Body,
+    Call,
+    End,
     Gone,
     Letter,
+    Offer,
     Receipt,
     State,
     Take,
@@ -69,6 +73,8 @@ class LocalRobot(Robot):
         self._watched: object = None
         self._calm = False
         self._chosen = 0
+        self._told: dict[str, Any] = {}
+        self.membership = Membership(self, setup, self.random)
         self._story = self._look_around()
 
     # --- one tick ---------------------------------------------------------------------------------------------------
@@ -77,6 +83,7 @@ class LocalRobot(Robot):
         """Hear, go on with the present drive, and say what is new."""
         self.tick = observation.tick
         self.senses.take(observation)
+        self.membership.watch(self.senses.seen)
         for packet in observation.inbox:
             word = read(packet.payload) if packet.channel == CHANNEL and packet.sender is not None else None
             if word is not None and packet.sender is not None:
@@ -85,9 +92,11 @@ class LocalRobot(Robot):
         self._take_part()
         if not self.vicinity.moving:
             self._keep_watch()
+        self._told |= self.membership.turn(self.senses.seen)
         self._say()
         outbox, self._letters = tuple(self._letters), []
-        return Command(drive=drive, outbox=outbox, wake=self._wake())
+        told, self._told = self._told, {}
+        return Command(drive=drive, outbox=outbox, wake=self._wake(), told=told)
 
     def _go_on(self) -> Any:
         drive = STOP
@@ -116,6 +125,7 @@ class LocalRobot(Robot):
             for to, body in letters:
                 if lost:
                     self.vicinity.forget(to)
+                    self.membership.lost(body)
                 if self.push is not None and body.push == self.push.id:
                     self.push.acknowledged(body, lost)
             letters.clear()
@@ -123,13 +133,14 @@ class LocalRobot(Robot):
             self.push.turn()
         if self.push is not None and self.push.over:
             self._over[self.push.id] = None
+            self.membership.over(self.push)
             self.push = None
 
     def _wake(self) -> Wake | None:
         if self._story is not None:
             return None
         push = self.push.next_tick() if self.push is not None else None
-        times = [self.speech.next_tick()]
+        times = [self.speech.next_tick(), *self.membership.next_ticks()]
         times += [
             each for each in (self.post.next_tick(), push, self._ask_at, self.vicinity.awaits_until) if each is not None
         ]
@@ -165,6 +176,8 @@ class LocalRobot(Robot):
                     self._read(sender, body)
             case Receipt():
                 self.post.acknowledge(sender, word)
+            case _:
+                self.membership.hear(sender, word)
 
     def _hear_gone(self, word: Gone) -> None:
         if self.push is not None and self.push.id == word.push:
@@ -176,6 +189,8 @@ class LocalRobot(Robot):
     def _read(self, sender: int, body: Body) -> None:
         if isinstance(body, Token):
             self._take_token(sender, body)
+        elif isinstance(body, Offer | Call | End):
+            self.membership.read(body)
         elif self.push is not None and body.push == self.push.id:
             self.push.take(body)
         elif isinstance(body, Take) and self._free and any(node == self.setup.node for _, node in body.chain):
@@ -184,16 +199,17 @@ class LocalRobot(Robot):
 
     @property
     def _free(self) -> bool:
-        return self.push is None and not self.vicinity.moving and self.vicinity.heading is not None
+        vicinity = self.vicinity
+        return self.push is None and not vicinity.moving and vicinity.heading is not None and not self.membership.locked
 
     def _take_token(self, sender: int, token: Token) -> None:
         """Pass a token on along the gradient, or lead the push if it ends here."""
         vicinity = self.vicinity
         here = vicinity.place if vicinity.place != NOWHERE else 0
-        lost = (
-            not token.chain and vicinity.place != NOWHERE
-        )  # it is not at the base any more, and the base has not heard
-        if lost or not self._free or token.push in self._over or any(n == self.setup.node for _, n in token.chain):
+        # It is not at the base any more, and the base has not heard.
+        lost = not token.chain and vicinity.place != NOWHERE
+        seen = token.push in self._over or any(node == self.setup.node for _, node in token.chain)
+        if lost or seen or vicinity.spare or not self._free:
             self.post.write(sender, Abort(token.push, False))
             self.speech.again(self.tick)
             return
@@ -223,6 +239,8 @@ class LocalRobot(Robot):
             self._send(Gone(push, GONE_HOPS))
             if self.push is None or self.push.id != push or self.push.phase not in ("deploying", "out"):
                 self._gone = None
+        for to, word in self.membership.letters():
+            self._send(word, to)
         for to, letter in self.post.due(self.tick):
             self._send(letter, to)
 
@@ -239,7 +257,8 @@ class LocalRobot(Robot):
             away = 0.0
             if self._rest is not None:
                 away = math.hypot(self.senses.x_m - self._rest[0], self.senses.y_m - self._rest[1])
-            if self._rest is not None and away > 2.0 * self.parameters.tolerance_m:
+            pushed = away > 2.0 * self.parameters.tolerance_m and not self.membership.locked
+            if self._rest is not None and pushed:
                 self._story = self._recover(self._rest)  # it was pushed aside
             elif self._unsure():
                 self._story = self._look_around()
@@ -317,6 +336,21 @@ class LocalRobot(Robot):
                     self._dead[node] = None
 
     # --- what pushes need -------------------------------------------------------------------------------------------
+
+    @property
+    def ready(self) -> bool:
+        """Whether it can take part in a push."""
+        return self._free
+
+    def begin(self, push: int) -> None:
+        """Be the rear of a push; the base has called."""
+        chain = ((self.vicinity.place, self.setup.node),)
+        self.push = Push(self, push, push, chain, None)
+        onward = self.vicinity.onward()
+        if onward is None or onward not in self.senses.seen:
+            self.push.take(Abort(push, False))
+        else:
+            self.post.write(onward, Token(push, push, chain, NOWHERE))
 
     @property
     def node(self) -> int:

@@ -1,10 +1,22 @@
 """The base station without a centre: it lets robots out while the gradient leads to a frontier, and tells when none is left."""
 
-from typing import Any, Final
+from typing import Final
 
 from zwerm.agents.contract import Setup
 from zwerm.agents.sensor_coverage.local import LocalRobot
-from zwerm.agents.sensor_coverage.words import NOWHERE, Abort, Body, Done, State, Take, Token, Word
+from zwerm.agents.sensor_coverage.words import (
+    NOWHERE,
+    Abort,
+    Body,
+    Call,
+    Done,
+    End,
+    Offer,
+    State,
+    Take,
+    Token,
+    Word,
+)
 from zwerm.protocol import Command, Observation, Wake
 
 # How long to wait for a robot to come out, for a push to end, and without a frontier before all is covered [ticks].
@@ -13,6 +25,9 @@ PUSH_TICKS: Final = 2000
 QUIET_TICKS: Final = 400
 # How long to wait for who stands at the base, and is not ready [ticks].
 STAY_TICKS: Final = 1500
+# After so many pushes there is none for so long [ticks]: who can be spared comes to an agreement while all stand.
+SPARE_EVERY: Final = 10
+SPARE_TICKS: Final = 80
 
 
 class LocalBase(LocalRobot):
@@ -37,7 +52,10 @@ class LocalBase(LocalRobot):
         self._stays_since = 0
         self._quiet_since: int | None = None
         self._tokens = 0
-        self._told: dict[str, Any] = {}
+        self._spares = setup.services.get("redundancy") == "link"
+        self._spared_at = 0
+        self._spares_until: int | None = None
+        self._offers: dict[int, tuple[int, ...]] = {}  # place of a spare robot: the way there, from it
 
     def step(self, observation: Observation) -> Command:
         """Hear, and decide whether another robot is wanted."""
@@ -48,7 +66,6 @@ class LocalBase(LocalRobot):
         command = super().step(observation)
         command.drive = None
         command.release, self._release = self._release, False
-        command.told, self._told = self._told, {}
         command.done = self.outcome == "covered"
         command.gave_up = "" if self.outcome in ("", "covered") else self.outcome
         return command
@@ -56,7 +73,7 @@ class LocalBase(LocalRobot):
     def _take_part(self) -> None:
         for to, body in self.post.lost:
             self.vicinity.forget(to)
-            if isinstance(body, Token) and body.push == self._active:
+            if isinstance(body, Token | Call) and body.push == self._active:
                 self._end(False)
         self.post.sent.clear()
         self.post.lost.clear()
@@ -70,7 +87,7 @@ class LocalBase(LocalRobot):
             self._stays_since = self.tick
             if self.tick - self._since > PUSH_TICKS:
                 self._end(False)
-            elif self._gone_out():
+            elif self._gone_out() and not self._offers:
                 self._let_out()
             return
         alone = not any(s.place not in (0, NOWHERE) for s in self.vicinity.states.values())
@@ -78,6 +95,11 @@ class LocalBase(LocalRobot):
             self._watch_quiet()
             return
         self._quiet_since = None
+        if self._waits_for_spares():
+            return
+        if not alone and self._offers:
+            self._call()
+            return
         waiting = [n for n, s in sorted(self.vicinity.states.items()) if s.waiting and n in self.senses.seen]
         if not waiting:
             if not self._someone_stays():
@@ -91,6 +113,27 @@ class LocalBase(LocalRobot):
         self._tokens += 1
         self._active, self._since, self._first, self._pushed = self._tokens, self.tick, alone, born
         self.post.write(born, Token(self._active, self._active, (), via))
+
+    def _waits_for_spares(self) -> bool:
+        """Tell whether it is time for those who can be spared to leave the complex."""
+        if not self._spares or self.pushes // SPARE_EVERY == self._spared_at // SPARE_EVERY:
+            return False
+        if self._spares_until is None:
+            self._spares_until = self.tick + SPARE_TICKS
+        if self.tick < self._spares_until:
+            return True
+        self._spared_at, self._spares_until = self.pushes, None
+        return False
+
+    def _call(self) -> None:
+        """Have the next push come from a robot that has left the complex, rather than from the depot."""
+        place = next(iter(self._offers))
+        way = self._offers.pop(place)
+        node = self.vicinity.at(way[-1])
+        if node is not None and node in self.senses.seen:
+            self._tokens += 1
+            self._active, self._since, self._first, self._pushed = self._tokens, self.tick, False, NOWHERE
+            self.post.write(node, Call(self._active, way))
 
     def _someone_stays(self) -> bool:
         """Tell whether somebody in sight has no place yet, and may be ready soon."""
@@ -144,11 +187,15 @@ class LocalBase(LocalRobot):
     def _read(self, sender: int, body: Body) -> None:
         if isinstance(body, Token):
             self.post.write(sender, Abort(body.push, False))
+        elif isinstance(body, Offer):
+            self._offers[body.places[0]] = body.places
         elif body.push == self._active:
             if isinstance(body, Abort):
                 self._end(body.tried)
             elif isinstance(body, Done):
                 self._end(True, True)
+            elif isinstance(body, End):
+                self._end(body.tried, body.done)
         elif isinstance(body, Take):
             pass
 

@@ -75,6 +75,11 @@ class Push:
         self._end: Body | None = None
         self._epoch = -1
 
+    @property
+    def end(self) -> Body | None:
+        """How it ended, as far as this robot knows."""
+        return self._end
+
     # --- what comes -------------------------------------------------------------------------------------------------
 
     def take(self, body: Body) -> None:

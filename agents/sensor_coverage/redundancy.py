@@ -127,6 +127,16 @@ class Redundancy:
         """Whether it has asked, and neither left nor given up."""
         return self._wish is not None
 
+    @property
+    def stands(self) -> bool:
+        """Whether it is one of the swarm that stands."""
+        return self._stands
+
+    @property
+    def listed(self) -> tuple[int, ...]:
+        """Whom it sees, ascending."""
+        return self._listed
+
     def locked(self, now_s: float) -> bool:
         """Tell whether this robot has to stand still."""
         return now_s < self._quiet_until_s or (self._lock is not None and now_s < self._lock.until_s)

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.words import NOWHERE, State
+from zwerm.agents.sensor_coverage.words import FAR, NOWHERE, State
 
 # How long a place may be on its way from one robot to the next [ticks].
 AWAIT_TICKS: Final = 80
@@ -35,6 +35,8 @@ class Sight:
     def __init__(self, node: int) -> None:
         self.node = node
         self.place = NOWHERE
+        self.spare = False  # it has left the complex, and still stands there in body
+        self.home = FAR
         self.epoch = 0
         self.moving = False
         self.heading: float | None = None
@@ -71,11 +73,12 @@ class Sight:
         if state.place in self._awaited and not state.moving:
             del self._awaited[state.place]
         left = known is not None and (state.moving or known.place != state.place)
-        if known is not None and left and known.place != NOWHERE and not known.moving and sender in self.seen:
+        held = known is not None and _held(known) != NOWHERE and not known.moving
+        if known is not None and left and held and sender in self.seen:
             self._awaited[known.place] = tick
         sighting = self.seen.get(sender)
         if sighting is not None and not state.moving and sighting.epoch in (-1, state.epoch):
-            self.seen[sender] = Sighting(state.epoch, state.place, sighting.bearing_rad)
+            self.seen[sender] = Sighting(state.epoch, _held(state), sighting.bearing_rad)
         if state.place != NOWHERE:
             for node, each in self.states.items():
                 if node != sender and each.place == state.place:  # who leads a push has left it to its follower
@@ -125,7 +128,7 @@ class Sight:
             if state is None or state.moving:
                 self.seen[node] = Sighting(-1, NOWHERE, bearing)
             else:
-                self.seen[node] = Sighting(state.epoch, state.place, bearing)
+                self.seen[node] = Sighting(state.epoch, _held(state), bearing)
         self.samples += 1
         self.change()
         self._learn_heading()
@@ -168,9 +171,10 @@ class Sight:
         return direction if epoch == self.epoch else None
 
     def mutual(self) -> dict[int, State]:
-        """Return the robots with a place that see this one and are seen by it, both since they last moved."""
+        """Return the robots of the complex that see this one and are seen by it, both since they last moved."""
         if self._mutual is None:
-            self._mutual = {node: self.states[node] for node in self.seen if self._back(node) is not None}
+            both = [node for node in self.seen if self._back(node) is not None]
+            self._mutual = {node: self.states[node] for node in both if not self.states[node].spare}
         return self._mutual
 
     def stale(self, sight: Mapping[int, float]) -> list[int]:
@@ -182,7 +186,7 @@ class Sight:
         mutual = self.mutual()
         for node in nodes:
             state = self.states.get(node)
-            if state is None or (state.place != NOWHERE and node not in mutual):
+            if state is None or (state.place != NOWHERE and node not in mutual and self._back(node) is None):
                 found.append(node)
         for node, state in mutual.items():
             if any(s.node in mutual and s.epoch != mutual[s.node].epoch for s in state.seen):
@@ -199,6 +203,11 @@ class Sight:
         """Tell whether robots around are on their way: what this robot sees is then no picture of places."""
         self._awaited = {place: since for place, since in self._awaited.items() if tick - since < AWAIT_TICKS}
         return bool(self._awaited) or bool(self.stale(sight))
+
+
+def _held(state: State) -> int:
+    """Return the place of the complex that a robot holds."""
+    return NOWHERE if state.spare else state.place
 
 
 def _elsewhere(state: State) -> State:

@@ -5,13 +5,13 @@ A robot plans only for the edges at itself, and only as their mover.
 
 import cmath
 import math
-from collections.abc import Mapping
 from itertools import islice
 from typing import Final
 
+from zwerm.agents.sensor_coverage import trying
 from zwerm.agents.sensor_coverage.gradient import Gradient
 from zwerm.agents.sensor_coverage.sight import Sight
-from zwerm.agents.sensor_coverage.words import NOWHERE, UNSAID, Memory, Reference, Route, Seen, State, Try
+from zwerm.agents.sensor_coverage.words import NOWHERE, UNSAID, Memory, Reference, Route, Seen, State
 from zwerm.frontier.places import REFERENCE_OFF_RAD, REFERENCE_WEIGHT, Places
 from zwerm.frontier.planner import Parameters, Planner
 from zwerm.frontier.services import Picture, Plan
@@ -90,24 +90,16 @@ class Vicinity(Sight):
             self.samples,
             [(n, s.epoch, s.seen, s.tries, s.could) for n, s in mutual.items()],
         )
-        if self.place == NOWHERE or self.heading is None or picture_of == self._looked:
+        if self.place == NOWHERE or self.spare or self.heading is None or picture_of == self._looked:
             return
         self._looked = picture_of
         self.looks += 1
-        me, heading = self.place, self.heading
-        views = {me: {state.place: self.seen[node].bearing_rad + heading for node, state in sorted(mutual.items())}}
-        for state in mutual.values():
-            views[state.place] = {s.place: s.direction_rad for s in state.seen if s.place != NOWHERE}
-        near = tuple(views)
-        for place in near:
-            for other, direction in views[place].items():
-                if other not in near:  # two hops away: all that is known of it is who sees it
-                    views.setdefault(other, {})[place] = direction + math.pi
-        complex_ = FlagComplex(views)
-        self._recall(mutual)
-        bases = tuple(each for each in complex_.vertices if each != me or me == 0)
-        mine = [each for each in complex_.edges if me in each]
-        self._planner.look(Picture(views, complex_, bases), mine)
+        me = self.place
+        picture = self.picture()
+        trying.hear(self._planner.tried, me, mutual.values(), self.rules.attempts_max)
+        for place, (mean, _) in self._references.items():
+            self._places.remember(me, place, cmath.phase(mean))
+        self._planner.look(picture, [each for each in picture.complex_.edges if me in each])
         self.plans, self.gaps = islice(self._planner.plans(), 2)  # holes are nothing that a robot alone can tell
         could = {
             (edge(me, state.place), sign) for state in mutual.values() for other, sign in state.could if other == me
@@ -118,19 +110,24 @@ class Vicinity(Sight):
             (*found.corners, *(side.edge for side in found.sides if (side.edge, side.sign) not in could))
         )
 
-    def _recall(self, mutual: Mapping[int, State]) -> None:
-        """Let the planner know what neighbours tried at common edges, and what directions are remembered."""
-        tried, me = self._planner.tried, self.place
+    @property
+    def looked(self) -> object:
+        """What the plans were last made of: another object whenever they were made anew."""
+        return self._looked
+
+    def picture(self) -> Picture:
+        """Return what is known of the places around: what this robot and its neighbours see, from its own place."""
+        me, mutual, heading = self.place, self.mutual(), self.heading or 0.0
+        views = {me: {state.place: self.seen[node].bearing_rad + heading for node, state in sorted(mutual.items())}}
         for state in mutual.values():
-            for each in state.tries:
-                if each.other == me:
-                    key = (*edge(me, state.place), each.sign)
-                    if each.failed:
-                        tried.failed[key, state.place] = None
-                    if each.closed or each.attempts + tried.attempts.get(key, 0) >= self.rules.attempts_max:
-                        tried.closed[key] = None
-        for place, (mean, _) in self._references.items():
-            self._places.remember(me, place, cmath.phase(mean))
+            views[state.place] = {s.place: s.direction_rad for s in state.seen if s.place != NOWHERE}
+        near = tuple(views)
+        for place in near:
+            for other, direction in views[place].items():
+                if other not in near:  # two hops away: all that is known of it is who sees it
+                    views.setdefault(other, {})[place] = direction + math.pi
+        complex_ = FlagComplex(views)
+        return Picture(views, complex_, tuple(each for each in complex_.vertices if each != me or me == 0))
 
     def note_attempt(self, plan: Plan) -> None:
         """Take note that a plan is being tried."""
@@ -194,18 +191,11 @@ class Vicinity(Sight):
             waiting,
             self.samples,
             seen,
-            self._tries(),
-            tuple(sorted({(_other(each.key, self.place), each.key[2]) for each in self.plans})),
+            trying.tell(self._planner.tried, self.place),
+            tuple(sorted({(trying.other_end(each.key, self.place), each.key[2]) for each in self.plans})),
             UNSAID,
-        )
-
-    def _tries(self) -> tuple[Try, ...]:
-        tried, me = self._planner.tried, self.place
-        keys = dict.fromkeys((*tried.attempts, *tried.closed, *(key for key, _ in tried.failed)))
-        return tuple(
-            Try(_other(key, me), key[2], tried.attempts.get(key, 0), (key, me) in tried.failed, key in tried.closed)
-            for key in sorted(keys)
-            if len(key) == 3
+            self.spare,
+            self.home,
         )
 
     # --- places change hands ----------------------------------------------------------------------------------------
@@ -231,6 +221,7 @@ class Vicinity(Sight):
     def leave(self) -> None:
         """Forget all that is known of the place."""
         self.place = NOWHERE
+        self.spare = False
         self._references.clear()
         self._learned.clear()
         self._places = Places()
@@ -238,6 +229,12 @@ class Vicinity(Sight):
         self.plans, self.gaps, self.obstacle = [], [], {}
         self._looked = None
         self._awaited = {}
+        self.change()
+
+    def stand_down(self) -> None:
+        """Leave the complex, and stay in body."""
+        self.spare = True
+        self.plans, self.gaps, self.obstacle = [], [], {}
         self.change()
 
     def found(self, place: int) -> None:
@@ -258,7 +255,3 @@ class Vicinity(Sight):
         tried.failed = dict.fromkeys((key, me) for key in memory.failed)
         tried.attempts = dict(memory.attempts)
         tried.blocked[me] = list(memory.blocked)
-
-
-def _other(key: tuple[int, ...], me: int) -> int:
-    return key[1] if key[0] == me else key[0]

@@ -10,12 +10,14 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
+from zwerm.agents.sensor_coverage import redundancy
 from zwerm.errors import ProtocolError
 from zwerm.frame import seal, unseal
 from zwerm.protocol import REFUSABLE
 
 CHANNEL: Final = "robots"
 NOWHERE: Final = -1
+FAR: Final = 1000
 
 
 class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -71,7 +73,8 @@ class State(_Message, frozen=True, tag="s"):
     """All that neighbours need to know of a robot.
 
     `number` counts its states, `epoch` its drives, `samples` how often it has looked around. `could` are the sides, as
-    (other place, sign), that it could expand. `waiting`: it stands at the base, ready to go.
+    (other place, sign), that it could expand. `waiting`: it stands at the base, ready to go. `spare`: it has left the
+    complex, and stands at its place no more but in body. `home` is how many hops it is from the base (FAR: not known).
     """
 
     number: int
@@ -84,10 +87,18 @@ class State(_Message, frozen=True, tag="s"):
     tries: tuple[Try, ...]
     could: tuple[tuple[int, int], ...]
     way: Way
+    spare: bool = False
+    home: int = FAR
 
 
 class Ask(_Message, frozen=True, tag="a"):
     """These robots shall tell their state again."""
+
+    nodes: tuple[int, ...]
+
+
+class Enquire(_Message, frozen=True, tag="q"):
+    """These robots shall tell the sender whom they see, as an agreement needs it."""
 
     nodes: tuple[int, ...]
 
@@ -178,7 +189,30 @@ class Done(_Message, frozen=True, tag="D"):
     push: int
 
 
-Body = Token | Ready | Take | Abort | Stand | Settled | Done
+class Offer(_Message, frozen=True, tag="O"):
+    """To the base, hop by hop: a robot has left the place that comes first, and can be called. The places are the way back."""
+
+    push: int
+    places: tuple[int, ...]
+
+
+class Call(_Message, frozen=True, tag="C"):
+    """From the base, hop by hop: the robot that has left the place that comes first shall be the rear of a push."""
+
+    push: int
+    places: tuple[int, ...]
+
+
+class End(_Message, frozen=True, tag="E"):
+    """To the base, hop by hop: a push from a robot that was called is over. `tried`: its leader did try; `done`: it is out."""
+
+    push: int
+    tried: bool
+    done: bool
+
+
+Errand = Offer | Call | End
+Body = Token | Ready | Take | Abort | Stand | Settled | Done | Errand
 
 
 class Letter(_Message, frozen=True, tag="l"):
@@ -194,7 +228,7 @@ class Receipt(_Message, frozen=True, tag="r"):
     number: int
 
 
-Word = State | Way | Ask | Gone | Letter | Receipt
+Word = State | Way | Ask | Enquire | Gone | Letter | Receipt | redundancy.Message
 
 _encode: Final[Callable[[Word], bytes]] = msgspec.msgpack.Encoder().encode
 _decode: Final[Callable[[bytes], Word]] = msgspec.msgpack.Decoder(Word).decode

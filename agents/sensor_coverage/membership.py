@@ -1,0 +1,134 @@
+"""Whether a robot is one of the complex: it leaves by agreement among neighbours, offers itself, and comes back with a push.
+
+A robot that has left stands where it stood: it is nobody's neighbour, and still everybody's landmark. The base calls it to
+be the rear of a push, which brings it to the next place ahead, and a robot into the unknown, without another one let out. So
+nobody is lost or counted twice: it has its place until it leaves, none until it is called, and then that of the robot ahead.
+"""
+
+from collections.abc import Collection
+from typing import Any, Protocol
+
+import numpy as np
+
+from zwerm.agents.contract import Setup
+from zwerm.agents.sensor_coverage import redundancy
+from zwerm.agents.sensor_coverage.leaving import Leaving
+from zwerm.agents.sensor_coverage.push import Push
+from zwerm.agents.sensor_coverage.reserve import Caller, Reserve
+from zwerm.agents.sensor_coverage.words import NOWHERE, Body, Call, End, Enquire, Errand, Offer, Word
+from zwerm.frontier.fence import Side, fence, wedges
+from zwerm.frontier.services import Picture
+from zwerm.simplicial import may_leave
+
+
+class Member(Caller, Protocol):
+    """The robot that stays or leaves."""
+
+    push: Push | None
+
+
+class Membership:
+    """One robot's part. With another redundancy service than `link` nobody leaves, and all of it does nothing."""
+
+    def __init__(self, robot: Member, setup: Setup, random: np.random.Generator) -> None:
+        self._robot = robot
+        self._leaving: Leaving | None = None
+        if setup.services.get("redundancy") == "link":
+            self._leaving = Leaving(setup.node, setup.dt_s, random, setup.incarnation == 1)
+        self._reserve = Reserve(robot)
+        self._known: tuple[object, bool] = None, False
+        self._out = False
+
+    @property
+    def locked(self) -> bool:
+        """Whether the robot has to stand still."""
+        return self._leaving is not None and self._leaving.locked
+
+    def watch(self, sight: Collection[int]) -> None:
+        """Take in whom the robot sees; first in every tick."""
+        if self._leaving is not None:
+            self._leaving.watch(self._robot.tick, sight)
+
+    def hear(self, sender: int, word: redundancy.Message | Enquire) -> None:
+        """Take in what another robot says of leaving."""
+        if self._leaving is not None:
+            self._leaving.note(self._stands)
+            self._leaving.hear(sender, word)
+
+    def read(self, errand: Errand) -> None:
+        """Take in a letter between the base and a robot that has left."""
+        self._reserve.read(errand)
+
+    def lost(self, body: Body) -> None:
+        """A letter was never acknowledged."""
+        if isinstance(body, Offer | Call | End):
+            self._reserve.lost(body)
+
+    def over(self, push: Push) -> None:
+        """A push is over that the robot was part of."""
+        self._reserve.over(push)
+
+    def turn(self, sight: Collection[int]) -> dict[str, Any]:
+        """Go on, and return what is to be told to those who watch."""
+        if self._leaving is None:
+            return {}
+        told: dict[str, Any] = {}
+        vicinity = self._robot.vicinity
+        self._leaving.note(self._stands)
+        if self._leaving.turn(self._redundant(sight)):
+            vicinity.stand_down()
+            self._leaving.note(stands=False)
+            self._out, told = True, {"removal": {"out": self._robot.node}}
+        elif self._out and not vicinity.spare:
+            self._out, told = False, {"removal": {"in": self._robot.node}}
+        self._reserve.turn()
+        return told
+
+    def letters(self) -> list[tuple[int | None, Word]]:
+        """Return what is to be sent now, with whom it is for (None: all that hear it)."""
+        return self._leaving.letters() if self._leaving is not None else []
+
+    def next_ticks(self) -> list[int]:
+        """Return when to be looked after, at the latest."""
+        if self._leaving is None:
+            return []
+        return [each for each in (self._leaving.next_tick(), self._reserve.next_tick()) if each is not None]
+
+    @property
+    def _stands(self) -> bool:
+        """Whether it is one of those who stand, at its place or the base's, and has nothing else to do."""
+        vicinity = self._robot.vicinity
+        return not vicinity.spare and not vicinity.moving and self._robot.push is None
+
+    def _redundant(self, sight: Collection[int]) -> bool:
+        """Tell whether coverage would not miss it, and somebody is wanted at the frontier."""
+        robot, vicinity = self._robot, self._robot.vicinity
+        if vicinity.place in (0, NOWHERE) or not (self._stands and vicinity.leads and robot.clear):
+            return False
+        mutual = vicinity.mutual()
+        others = [vicinity.states.get(node) for node in sight if node not in mutual]
+        if vicinity.plans or vicinity.gaps or not all(each is not None and each.waiting for each in others):
+            return False
+        if self._known[0] is not vicinity.looked:
+            margin_rad = vicinity.rules.corner_margin_rad
+            self._known = vicinity.looked, can_be_spared(vicinity.picture(), vicinity.place, margin_rad)
+        return self._known[1]
+
+
+def can_be_spared(picture: Picture, place: int, corner_margin_rad: float) -> bool:
+    """Tell whether a place can be left: it is not on the fence, the link criterion holds, and no side of an edge comes open."""
+    views, complex_, _ = picture
+    around = complex_.neighbours[place]
+    if not around or any(True for _ in wedges(views, complex_, [place])):
+        return False
+    if not may_leave(place, complex_.neighbours):
+        return False
+    edges = [each for each in complex_.edges if each[0] in around and each[1] in around]
+    now, then = (
+        _sides(fence(views, each, corner_margin_rad, edges).sides) for each in (complex_, complex_.without([place]))
+    )
+    return all(side in now for side in then)
+
+
+def _sides(sides: Collection[Side]) -> list[tuple[int, int, int]]:
+    return [(each.i, each.j, each.sign) for each in sides]

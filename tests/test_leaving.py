@@ -1,0 +1,134 @@
+"""Leaving as a robot does it: agreements over a radio that loses half of all words, and the checker that watches a run."""
+
+import random
+
+import networkx
+import numpy as np
+import pytest
+
+from zwerm.agents.sensor_coverage.leaving import Leaving
+from zwerm.agents.sensor_coverage.words import Enquire, Word, read, write
+from zwerm.assembly import assemble
+from zwerm.errors import ScenarioError
+from zwerm.protocol import Command
+from zwerm.running import run
+from zwerm.scenario import load
+from zwerm.simplicial import FlagComplex, betti
+from zwerm.world.removals import removals
+
+DT_S = 0.1
+CLOSE = ("robots.parameters.margin_m=0.45", "base.parameters.margin_m=0.45")
+HALL = ("arena.size_m=[2.6,2.2]", "base.pose=[0.2,1.1,0.0]", "robots.count=30")
+LINK = ("services.path=gradient", "services.redundancy=link")
+
+
+def leave_at_random(seed: int, loss: float, wanting: int = 12, ticks: int = 400) -> tuple[int, int]:
+    """Let robots at random places leave; return how many did, and how often that changed b0 or b1."""
+    luck = random.Random(seed)
+    graph = networkx.random_geometric_graph(wanting, 0.5, seed=seed)
+    robots = {node: Leaving(node, DT_S, np.random.Generator(np.random.Philox(seed + node)), True) for node in graph}
+    there = dict.fromkeys(robots)
+    air: list[tuple[int, int, Word]] = []
+    left = changed = 0
+    for tick in range(ticks):
+        lists = {node: sorted(each for each in graph[node] if each in there) for node in there}
+        for node, robot in robots.items():
+            robot.watch(tick, sorted(each for each in graph[node] if each in there))
+            robot.note(node in there)
+        heard, air = air, []
+        for sender, receiver, word in heard:
+            if luck.random() >= loss:
+                said = read(write(word))
+                assert said == word
+                robots[receiver].hear(sender, said)  # type: ignore[arg-type]
+        for node, robot in robots.items():
+            whole = FlagComplex(lists)
+            redundant = node in there and betti(whole) == betti(whole.without([node]))
+            if robot.turn(redundant):
+                now = FlagComplex({each: [other for other in lists[each] if other in there] for each in there})
+                changed += betti(now) != betti(now.without([node]))
+                left += 1
+                del there[node]
+                robot.note(stands=False)
+            for to, word in robot.letters():
+                air += [(node, each, word) for each in (graph[node] if to is None else [to])]
+    return left, changed
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.5])
+def test_robots_leave_by_agreement_and_never_open_a_hole(loss: float) -> None:
+    found = [leave_at_random(seed, loss) for seed in range(4)]
+    assert sum(left for left, _ in found) > 8
+    assert sum(changed for _, changed in found) == 0
+
+
+def test_a_robot_that_has_granted_a_lock_stands_still_until_it_is_over() -> None:
+    first, second = (Leaving(node, DT_S, np.random.Generator(np.random.Philox(node)), True) for node in (1, 2))
+    ticks = iter(range(100))
+
+    def turn(wants: bool) -> bool:
+        tick = next(ticks)
+        for robot, other in ((first, 2), (second, 1)):
+            robot.watch(tick, [other])
+            robot.note(stands=True)
+        left = first.turn(wants)
+        second.turn(redundant=False)
+        for sender, receiver, at in ((first, second, 1), (second, first, 2)):
+            for _, word in sender.letters():
+                assert not isinstance(word, Enquire) or receiver is second
+                receiver.hear(at, word)  # type: ignore[arg-type]
+        return left
+
+    assert not second.locked
+    while not second.locked:
+        assert not turn(wants=True)
+    assert not first.locked
+    while second.locked:
+        turn(wants=False)
+    assert next(ticks) < 50, "it was told, and did not wait for the lease"
+
+
+# --- in a run -------------------------------------------------------------------------------------------------------
+
+
+def test_robots_in_processes_are_freed_and_pushed_again_while_words_are_lost() -> None:
+    settings = [*HALL, *CLOSE, *LINK, "radio.loss=0.1", "time.duration_s=230.0"]
+    result = run("sensor-coverage", runner="processes", overrides=settings)
+    removed = [each.told["removal"] for each in result.told if "removal" in each.told]
+    assert result.outcome in ("completed", "time-limit")
+    assert result.metrics["removals"] >= 1
+    assert result.metrics["unsafe_removals"] == 0
+    assert any("in" in each for each in removed), "who was freed has taken another place"
+
+
+def test_the_checker_finds_a_removal_that_opens_a_hole() -> None:
+    scenario = load("sensor-coverage", (*LINK, "robots.count=8", "base.pose=[1.0,3.75,0.0]"))
+    world = assemble(scenario, 1)
+    around = [(2.0 + 0.9 * np.cos(a), 3.75 + 0.9 * np.sin(a)) for a in np.linspace(0.0, 2.0 * np.pi, 7)[:-1]]
+    world.scene.position[1:8] = [(2.0, 3.75), *around]
+    world.scene.present[:] = True
+    world.scene.present[0] = False
+    for node in (1, 2):  # the hub of a wheel, and then one of its rim: a hole comes, and goes
+        world.audience.hear(world.scene, node, Command(told={"removal": {"out": node}}), decides=False)
+        assert removals(world, 1.0) == {"removals": node, "unsafe_removals": node}
+    world.audience.hear(world.scene, 1, Command(told={"removal": {"in": 1}}), decides=False)
+    world.audience.hear(world.scene, 2, Command(told={"removal": {"in": 2}}), decides=False)
+    world.audience.hear(world.scene, 2, Command(told={"removal": {"out": 2}}), decides=False)
+    assert removals(world, 1.0) == {"removals": 3.0, "unsafe_removals": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("settings", "line"),
+    [
+        (("services.redundancy=link",), "with path 'coordinator' expected 'coordinator' or 'none', got 'link'"),
+        (
+            ("services.path=gradient", "services.redundancy=coordinator"),
+            "with path 'gradient' expected 'link' or 'none', got 'coordinator'",
+        ),
+    ],
+)
+def test_who_finds_the_path_and_who_the_spares_go_together(settings: tuple[str, ...], line: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load("sensor-coverage", settings)
+    assert len(caught.value.mistakes) == 1
+    assert line in caught.value.mistakes[0]
