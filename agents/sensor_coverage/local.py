@@ -199,8 +199,11 @@ class LocalRobot(Robot):
 
     @property
     def _free(self) -> bool:
-        vicinity = self.vicinity
-        return self.push is None and not vicinity.moving and vicinity.heading is not None and not self.membership.locked
+        return self._idle and not self.membership.locked
+
+    @property
+    def _idle(self) -> bool:
+        return self.push is None and not self.vicinity.moving and self.vicinity.heading is not None
 
     def _take_token(self, sender: int, token: Token) -> None:
         """Pass a token on along the gradient, or lead the push if it ends here."""
@@ -246,7 +249,7 @@ class LocalRobot(Robot):
 
     @property
     def _waiting(self) -> bool:
-        return self.vicinity.place == NOWHERE and self._free
+        return self.vicinity.place == NOWHERE and self._idle
 
     # --- standing still ---------------------------------------------------------------------------------------------
 
