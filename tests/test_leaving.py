@@ -120,10 +120,10 @@ def test_the_checker_finds_a_removal_that_opens_a_hole() -> None:
 @pytest.mark.parametrize(
     ("settings", "line"),
     [
-        (("services.redundancy=link",), "with path 'coordinator' expected 'coordinator' or 'none', got 'link'"),
+        (("services.redundancy=link",), "services.redundancy: 'link' does not go with path 'coordinator'"),
         (
             ("services.path=gradient", "services.redundancy=coordinator"),
-            "with path 'gradient' expected 'link' or 'none', got 'coordinator'",
+            "services.redundancy: 'coordinator' does not go with path 'gradient'",
         ),
     ],
 )

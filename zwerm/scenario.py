@@ -303,14 +303,8 @@ class Scenario(Table):
                 raise ValueError("services.path: robots that find the path need the table [radio]")
             if self.base is None or self.base.stations > 1:
                 raise ValueError("services.path: robots find the path from one base station")
-            if services.spares == "coordinator":
-                raise ValueError(
-                    "services.redundancy: with path 'gradient' expected 'link' or 'none', got 'coordinator'"
-                )
-        elif services.spares == "link":
-            raise ValueError(
-                "services.redundancy: with path 'coordinator' expected 'coordinator' or 'none', got 'link'"
-            )
+        if services.spares == {"gradient": "coordinator", "coordinator": "link"}[services.path]:
+            raise ValueError(f"services.redundancy: {services.spares!r} does not go with path {services.path!r}")
         return self
 
     @property
