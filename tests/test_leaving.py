@@ -92,7 +92,7 @@ def test_a_robot_that_has_granted_a_lock_stands_still_until_it_is_over() -> None
 
 
 def test_robots_in_processes_are_freed_and_pushed_again_while_words_are_lost() -> None:
-    settings = [*HALL, *CLOSE, *LINK, "radio.loss=0.1", "time.duration_s=170.0"]
+    settings = [*HALL, *CLOSE, *LINK, "radio.loss=0.1", "time.duration_s=260.0"]
     result = run("sensor-coverage", runner="processes", overrides=settings)
     removed = [each.told["removal"] for each in result.told if "removal" in each.told]
     assert result.outcome in ("completed", "time-limit")

@@ -21,7 +21,7 @@ ENQUIRE_TICKS: Final = 4
 ENQUIRIES_MAX: Final = 25
 # How long to wait after a wish that came to nothing [ticks]: doubled every time.
 WAIT_TICKS: Final = 8
-WAIT_TICKS_MAX: Final = 120
+WAIT_TICKS_MAX: Final = 40
 # When to say again that a wish is over [ticks after].
 AGAIN_TICKS: Final = (4, 8, 14, 22, 32, 48, 70)
 
