@@ -40,6 +40,8 @@ from zwerm.frontier.planner import Parameters as Rules
 from zwerm.orders import Arrived, Cleared
 from zwerm.protocol import Command, Observation, Transmission, Wake
 
+# How long a robot may be unsure whether it is at the frontier before it says so: most pushes beside it are over before.
+DOUBT_TICKS: Final = 100
 # When to ask those whose word is missing, and how often before they are taken for dead.
 ASK_FIRST_TICKS: Final = 8
 ASK_TICKS: Final = 2
@@ -72,6 +74,7 @@ class LocalRobot(Robot):
         self._rest = 0.0, 0.0
         self._watched: object = None
         self._calm = False
+        self._doubts_at: int | None = None
         self._chosen = 0
         self._told: dict[str, Any] = {}
         self.membership = Membership(self, setup, self.random)
@@ -139,10 +142,13 @@ class LocalRobot(Robot):
     def _wake(self) -> Wake | None:
         if self._story is not None:
             return None
+        doubts = self._doubts_at if self._doubts_at is not None and self._doubts_at > self.tick else None
         push = self.push.next_tick() if self.push is not None else None
         times = [self.speech.next_tick(), *self.membership.next_ticks()]
         times += [
-            each for each in (self.post.next_tick(), push, self._ask_at, self.vicinity.awaits_until) if each is not None
+            each
+            for each in (self.post.next_tick(), push, self._ask_at, self.vicinity.awaits_until, doubts)
+            if each is not None
         ]
         if self._gone is not None:
             times.append(self._gone[1])
@@ -266,13 +272,15 @@ class LocalRobot(Robot):
             elif self._unsure():
                 self._story = self._look_around()
         watched = vicinity.version, tuple(self.senses.seen), self._story is None
-        timers = [each for each in (self._ask_at, vicinity.awaits_until, self.speech.heartbeat) if each is not None]
+        times = self._ask_at, vicinity.awaits_until, self._doubts_at, self.speech.heartbeat
+        timers = [each for each in times if each is not None]
         if watched != self._watched or self.tick >= min(timers):
             self._watched = watched
             vicinity.find_heading()
             vicinity.learn_references()
             # Places outlive who stands there: while they change hands the frontier and the way to it stay as they were.
             self._calm = not (self.busy or vicinity.changing(self.bearings, self.tick))
+            self._doubts_at = None if self._calm else self._doubts_at or self.tick + DOUBT_TICKS
             if self._calm:
                 vicinity.plan()
             self._ask()
@@ -281,7 +289,7 @@ class LocalRobot(Robot):
         self._chosen = vicinity.gradient.version
         if self._calm:
             vicinity.find_route()
-        else:
+        elif self._doubts_at is not None and self.tick >= self._doubts_at:
             vicinity.doubt()
 
     def _recover(self, rest: Vector) -> Story:

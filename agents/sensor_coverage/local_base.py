@@ -23,6 +23,8 @@ from zwerm.protocol import Command, Observation, Wake
 BIRTH_TICKS: Final = 60
 PUSH_TICKS: Final = 2000
 QUIET_TICKS: Final = 400
+# How long after a push to wait for word of an edge before gaps are gone to [ticks].
+GAP_TICKS: Final = 24
 # How long to wait for who stands at the base, and is not ready [ticks].
 STAY_TICKS: Final = 1500
 # After so many pushes there is none for so long [ticks]: who can be spared comes to an agreement while all stand.
@@ -48,7 +50,8 @@ class LocalBase(LocalRobot):
         self._active: int | None = None
         self._first = False
         self._pushed = NOWHERE  # who was to take the rear of it
-        self._since = 0
+        self._since = self._edges_since = 0
+        self._to_gap = False
         self._stays_since = 0
         self._quiet_since: int | None = None
         self._tokens = 0
@@ -94,6 +97,8 @@ class LocalBase(LocalRobot):
         if not alone and not self.vicinity.leads:
             self._watch_quiet()
             return
+        if not alone and self.vicinity.to_gap and self.tick - self._edges_since < GAP_TICKS:
+            return  # word of an edge may be on its way
         self._quiet_since = None
         if self._waits_for_spares():
             return
@@ -111,6 +116,7 @@ class LocalBase(LocalRobot):
             return
         self._released_at = None
         self._tokens += 1
+        self._to_gap = self.vicinity.to_gap
         self._active, self._since, self._first, self._pushed = self._tokens, self.tick, alone, born
         self.post.write(born, Token(self._active, self._active, (), via))
 
@@ -178,6 +184,8 @@ class LocalBase(LocalRobot):
 
     def _end(self, tried: bool, done: bool = False) -> None:
         self._active = None
+        if done or not self._to_gap:  # a gap that nobody came through makes no edges
+            self._edges_since = self.tick
         self.cycles += tried or done
         self.pushes += done
         if self._first and tried and not done:

@@ -152,6 +152,11 @@ class Vicinity(Sight):
         return self.gradient.route
 
     @property
+    def to_gap(self) -> bool:
+        """Whether the way to the frontier is one to a gap."""
+        return self.route is not None and self.route.cost >= GAP_COST
+
+    @property
     def leads(self) -> bool:
         """Whether there is a way to a frontier, and none to anybody in doubt before that."""
         return self.route is not None and not DOUBT_COST <= self.route.cost < GAP_COST
