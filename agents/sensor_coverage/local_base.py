@@ -90,7 +90,7 @@ class LocalBase(LocalRobot):
             self._stays_since = self.tick
             if self.tick - self._since > PUSH_TICKS:
                 self._end(False)
-            elif self._gone_out() and not self._offers:
+            elif self._released_at is None and self._gone_out() and not self._offers:
                 self._let_out()
             return
         alone = not any(s.place not in (0, NOWHERE) for s in self.vicinity.states.values())
@@ -138,6 +138,7 @@ class LocalBase(LocalRobot):
         node = self.vicinity.at(way[-1])
         if node is not None and node in self.senses.seen:
             self._tokens += 1
+            self._to_gap = self.vicinity.to_gap
             self._active, self._since, self._first, self._pushed = self._tokens, self.tick, False, NOWHERE
             self.post.write(node, Call(self._active, way))
 
