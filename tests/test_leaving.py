@@ -120,10 +120,13 @@ def test_the_checker_finds_a_removal_that_opens_a_hole() -> None:
 @pytest.mark.parametrize(
     ("settings", "line"),
     [
-        (("services.redundancy=link",), "services.redundancy: 'link' does not go with path 'coordinator'"),
+        (
+            ("services.redundancy=link",),
+            "services.redundancy: 'link' with path 'coordinator': only who finds the path is told who sees whom",
+        ),
         (
             ("services.path=gradient", "services.redundancy=coordinator"),
-            "services.redundancy: 'coordinator' does not go with path 'gradient'",
+            "services.redundancy: 'coordinator' with path 'gradient': only who finds the path is told who sees whom",
         ),
     ],
 )

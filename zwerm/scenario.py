@@ -183,9 +183,8 @@ class CoordinatorTable(Table):
 class ServicesTable(Table):
     """Who provides what a deployment needs to have decided: the `coordinator`, or the robots among themselves.
 
-    With `path` `gradient` robots find the frontier, the way to it and the end by themselves. `redundancy` is who finds the
-    robots that can be spared: the coordinator, by relative homology; robots by agreement among neighbours, with `link`; or
-    nobody, with `none`. Each goes with the path that is found in the same way.
+    With `path` `gradient` robots find the frontier, the way to it and the end by themselves. By `redundancy`, who can be spared
+    is found by the coordinator, by relative homology; with `link` by robots, by agreement among neighbours; or not at all.
     """
 
     path: Literal["coordinator", "gradient"] = "coordinator"
@@ -304,7 +303,8 @@ class Scenario(Table):
             if self.base is None or self.base.stations > 1:
                 raise ValueError("services.path: robots find the path from one base station")
         if services.spares == {"gradient": "coordinator", "coordinator": "link"}[services.path]:
-            raise ValueError(f"services.redundancy: {services.spares!r} does not go with path {services.path!r}")
+            why = "only who finds the path is told who sees whom"
+            raise ValueError(f"services.redundancy: {services.spares!r} with path {services.path!r}: {why}")
         return self
 
     @property

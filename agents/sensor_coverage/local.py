@@ -77,6 +77,7 @@ class LocalRobot(Robot):
         self._doubts_at: int | None = None
         self._chosen = 0
         self._told: dict[str, Any] = {}
+        self.drives = False
         self.membership = Membership(self, setup, self.random)
         self._story = self._look_around()
 
@@ -108,6 +109,7 @@ class LocalRobot(Robot):
                 drive = next(self._story)
             except StopIteration:
                 self._story = None
+        self.drives = drive != STOP
         events, self._outbox = self._outbox, []
         for event in events:
             if self.push is not None and isinstance(event, Cleared):

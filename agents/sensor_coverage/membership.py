@@ -25,6 +25,7 @@ class Member(Caller, Protocol):
     """The robot that stays or leaves."""
 
     push: Push | None
+    drives: bool
 
 
 class Membership:
@@ -97,8 +98,8 @@ class Membership:
     @property
     def _stands(self) -> bool:
         """Whether it is one of those who stand, at its place or the base's, and has nothing else to do."""
-        vicinity = self._robot.vicinity
-        return not vicinity.spare and not vicinity.moving and self._robot.push is None
+        robot, vicinity = self._robot, self._robot.vicinity
+        return not (vicinity.spare or vicinity.moving or robot.drives) and robot.push is None
 
     def _redundant(self, sight: Collection[int]) -> bool:
         """Tell whether coverage would not miss it, and somebody is wanted at the frontier."""
