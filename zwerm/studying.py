@@ -38,7 +38,9 @@ COMPARE_HELP: Final = (
     "[bold]zwerm compare gossip-max --variant often --variant seldom:robots.parameters.every_ticks=5 "
     "--sweep radio.loss=0,0.1,...,0.9 --seeds 20[/bold]\n\n"
     "[bold]zwerm compare my.toml --variants variants.toml --sweep "
-    "'faults=none:\\[],crash:\\[{kind=\"crash\", nodes=\\[3], at_s=10.0}]'[/bold]"
+    "'faults=none:\\[],crash:\\[{kind=\"crash\", nodes=\\[3], at_s=10.0}]'[/bold]\n\n"
+    "[bold]zwerm compare sensor-coverage --variants sensor-coverage-loss --sweep radio.loss+uplink.loss=0,0.5 "
+    "--seeds 20 --figure loss.pdf[/bold]"
 )
 
 Seeds = Annotated[
