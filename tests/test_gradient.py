@@ -26,15 +26,17 @@ class Network:
         self.told = dict.fromkeys(self.robots, 0)
         self.roots: dict[int, None] = {}
         self.under_way: list[tuple[int, int, Way]] = []
+        self.tick = 0
 
     def beside(self, place: int) -> dict[int, float]:
         return {other: self.weights[edge(place, other)] for other in self.robots if edge(place, other) in self.weights}
 
     def tell(self, place: int) -> None:
         robot = self.robots[place]
-        robot.choose(place, 0.0 if place in self.roots else None, self.beside(place))
+        self.tick += 1
+        robot.choose(place, 0.0 if place in self.roots else None, self.beside(place), self.tick)
         self.told[place] += 1
-        way = Way(self.told[place], place, robot.route)
+        way = Way(self.told[place], place, robot.route, robot.ended)
         self.under_way += [(place, other, way) for other in self.beside(place)]
 
     def deliver(self, sender: int, receiver: int, way: Way) -> None:
@@ -160,7 +162,7 @@ TestAnyFiniteSequenceOfFaults = Lossy.TestCase
 class Gullible(Gradient):
     """Believes in ways through its own place, up to a length: plain distance vector, as a control."""
 
-    def choose(self, place: int, cost: float | None, weights: dict[int, float]) -> None:  # type: ignore[override]
+    def choose(self, place: int, cost: float | None, weights: dict[int, float], tick: int) -> None:  # type: ignore[override]
         best = None if cost is None else Route(cost, (place,))
         for beside, weight in weights.items():
             way = self._ways.get(beside)
@@ -225,21 +227,21 @@ def test_a_way_along_an_obstacle_costs_more() -> None:
     network = Network(4, {(1, 2): 1.0, (2, 3): 1.0, (1, 4): 1.0, (3, 4): OBSTACLE_COST})
     network.roots[1] = None
     settled(network, 4)
-    assert network.robots[3].route == Route(2.0, (3, 2, 1))
+    assert network.robots[3].route == Route(2.0, (3, 2, 1), since=1)
 
 
 def test_of_equal_ways_that_to_the_smallest_place_at_the_frontier_wins_and_then_that_by_the_smallest() -> None:
     robot = Gradient()
     for place, root in ((5, 4), (3, 4), (2, 7), (1, 8)):
-        robot.hear(place, Way(1, place, Route(1.0, (place, root))))
-    robot.choose(9, None, dict.fromkeys((5, 3, 2, 1), 1.0))
-    assert robot.route == Route(2.0, (9, 3, 4))
+        robot.hear(place, Way(1, place, Route(1.0, (place, root), 5)))
+    robot.choose(9, None, dict.fromkeys((5, 3, 2, 1), 1.0), 9)
+    assert robot.route == Route(2.0, (9, 3, 4), 5)
 
 
 def test_the_base_is_where_ways_begin_and_none_leads_through_it() -> None:
     robot = Gradient()
-    robot.hear(0, Way(1, 0, Route(1.0, (0, 7))))
-    robot.choose(9, None, {0: 1.0})
+    robot.hear(0, Way(1, 0, Route(1.0, (0, 7), 5)))
+    robot.choose(9, None, {0: 1.0}, 9)
     assert robot.route is None
 
 
@@ -255,28 +257,52 @@ def test_the_nearest_of_two_roots_is_told_and_who_stops_being_one_tells_the_othe
 
 def test_an_older_word_that_comes_late_and_a_copy_change_nothing() -> None:
     robot = Gradient()
-    robot.hear(4, Way(7, 1, Route(0.0, (1,))))
+    robot.hear(4, Way(7, 1, Route(0.0, (1,), 5)))
     version = robot.version
     robot.hear(4, Way(6, 1, None))
     robot.hear(4, Way(7, 1, None))
-    robot.choose(2, None, {1: 1.0})
-    assert robot.route == Route(1.0, (2, 1))
+    robot.choose(2, None, {1: 1.0}, 9)
+    assert robot.route == Route(1.0, (2, 1), 5)
     assert robot.version == version
 
 
 def test_a_way_belongs_to_a_place_and_outlives_who_told_it() -> None:
     robot = Gradient()
-    robot.hear(4, Way(7, 1, Route(1.0, (1, 5))))
+    robot.hear(4, Way(7, 1, Route(1.0, (1, 5), 5)))
     robot.hear(4, Way(8, 6, None))  # it has gone on, and tells of another place
-    robot.choose(2, None, {1: 1.0, 6: 1.0})
-    assert robot.route == Route(2.0, (2, 1, 5))
+    robot.choose(2, None, {1: 1.0, 6: 1.0}, 9)
+    assert robot.route == Route(2.0, (2, 1, 5), 5)
     robot.take_over(1, None)
-    assert robot.route == Route(1.0, (1, 5))
+    assert robot.route == Route(1.0, (1, 5), 5)
     robot.hear(9, Way(1, 1, None))  # whoever stands there now
-    robot.choose(2, None, {1: 1.0, 6: 1.0})
+    robot.choose(2, None, {1: 1.0, 6: 1.0}, 9)
     assert robot.route is None
 
 
+def test_all_ways_to_a_place_end_with_the_word_that_it_is_not_at_the_frontier_any_more() -> None:
+    robot = Gradient()
+    robot.hear(4, Way(1, 4, Route(1.0, (4, 7), 5)))
+    robot.hear(3, Way(1, 3, Route(2.0, (3, 5, 7), 5)))
+    robot.hear(4, Way(2, 4, None, ended=((7, 8),)))
+    robot.choose(2, None, {3: 1.0, 4: 1.0}, 9)
+    assert robot.route is None
+    assert robot.ended == ((7, 8),)
+    robot.hear(3, Way(2, 3, Route(2.0, (3, 5, 7), 10)))  # it is again
+    robot.choose(2, None, {3: 1.0, 4: 1.0}, 11)
+    assert robot.route == Route(3.0, (2, 3, 5, 7), 10)
+
+
+def test_who_claims_something_else_ends_what_it_claimed_before() -> None:
+    robot = Gradient()
+    robot.choose(2, 0.0, {}, 5)
+    robot.choose(2, 0.0, {}, 6)
+    assert robot.route == Route(0.0, (2,), 5)
+    robot.claim(2, 1000.0, 7)
+    assert (robot.route, robot.ended) == (Route(1000.0, (2,), 7), ((2, 6),))
+    robot.choose(2, None, {}, 9)
+    assert (robot.route, robot.ended) == (None, ((2, 8),))
+
+
 def test_a_way_survives_the_wire() -> None:
-    for way in (Way(1, 2, Route(4.5, (2, 3))), Way(1, 2, None)):
+    for way in (Way(1, 2, Route(4.5, (2, 3), 7), ((4, 5),)), Way(1, 2, None)):
         assert read(write(way)) == way

@@ -290,9 +290,9 @@ class LocalRobot(Robot):
             return  # nothing is new, so nothing follows
         self._chosen = vicinity.gradient.version
         if self._calm:
-            vicinity.find_route()
+            vicinity.find_route(self.tick)
         elif self._doubts_at is not None and self.tick >= self._doubts_at:
-            vicinity.doubt()
+            vicinity.doubt(self.tick)
 
     def _recover(self, rest: Vector) -> Story:
         self._rest = yield from self._return(rest)

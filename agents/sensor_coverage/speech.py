@@ -88,5 +88,5 @@ class Speech:
         """Return the way as it is now."""
         self._way_at = tick
         if (self._way.place, self._way.route) != (vicinity.place, vicinity.route):
-            self._way = Way(self._way.number + 1, vicinity.place, vicinity.route)
+            self._way = Way(self._way.number + 1, vicinity.place, vicinity.route, vicinity.gradient.ended)
         return self._way

@@ -161,12 +161,12 @@ class Vicinity(Sight):
         """Whether there is a way to a frontier, and none to anybody in doubt before that."""
         return self.route is not None and not DOUBT_COST <= self.route.cost < GAP_COST
 
-    def doubt(self) -> None:
+    def doubt(self, tick: int) -> None:
         """Let nobody believe that there is no frontier, or none but gaps, while this robot does not know."""
         if self.place not in (0, NOWHERE) and (self.route is None or self.route.cost >= GAP_COST):
-            self.gradient.route = Route(DOUBT_COST, (self.place,))
+            self.gradient.claim(self.place, DOUBT_COST, tick)
 
-    def find_route(self) -> None:
+    def find_route(self, tick: int) -> None:
         """Choose the way to the frontier by what neighbours say of theirs."""
         at = self.place not in (0, NOWHERE)
         cost = 0.0 if at and self.plans else GAP_COST if at and self.gaps else None
@@ -175,7 +175,7 @@ class Vicinity(Sight):
             state.place: dear if edge(self.place, state.place) in self.obstacle else 1.0
             for state in self.mutual().values()
         }
-        self.gradient.choose(self.place, cost, weights)
+        self.gradient.choose(self.place, cost, weights, tick)
 
     # --- what this robot says ---------------------------------------------------------------------------------------
 

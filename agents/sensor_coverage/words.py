@@ -51,18 +51,26 @@ class Try(_Part, frozen=True):
 
 
 class Route(_Part, frozen=True):
-    """The way to the nearest robot at the frontier: what it costs, and the places on it, the sender's first."""
+    """The way to the nearest robot at the frontier: what it costs, and the places on it, the sender's first.
+
+    `since`: the tick from which on the last place is at the frontier.
+    """
 
     cost: float
     places: tuple[int, ...]
+    since: int = 0
 
 
 class Way(_Message, frozen=True, tag="w"):
-    """The way from a place, by who stands there; `number` counts what the sender says of ways."""
+    """The way from a place, by who stands there; `number` counts what the sender says of ways.
+
+    `ended`: places, the newest last, that are not at the frontier any more as they were at a tick.
+    """
 
     number: int
     place: int
     route: Route | None
+    ended: tuple[tuple[int, int], ...] = ()
 
 
 # What was said of ways before anything was.
