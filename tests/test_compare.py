@@ -169,6 +169,10 @@ def test_variants_grid_and_settings_come_from_a_study_and_what_is_given_here_win
     assert [variant.name for variant in study.variants] == ["a", "b"]
     assert {point.scenario.robots.count for point in make_points(study)} == {5}
     assert make_comparison(str(gossip), metrics=["ticks"], base=base).table.metrics == ["ticks"]
+    late = make_comparison(str(gossip), sweeps=[parse_sweep("lag=long")], base=base)
+    assert [len(point.scenario.radio.models) for point in make_points(late) if point.scenario.radio] == [1, 1]
+    with pytest.raises(ScenarioError, match="lag: unknown key"):
+        make_points(make_comparison(str(gossip), sweeps=[parse_sweep("lag=longer")], base=base))
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,12 @@ def make_comparison(
     given = {each.name: each for each in sweeps}
     grid = {name: each.values for name, each in given.items()}
     tables["grid"] = grid | {axis: values for axis, values in tables.get("grid", {}).items() if axis not in grid}
-    levels = {axis: each for axis, each in tables.get("levels", {}).items() if axis not in grid}
+    # A sweep over words that the base has levels for is one over those levels.
+    levels = {
+        axis: each
+        for axis, each in tables.get("levels", {}).items()
+        if axis not in given or (not given[axis].levels and all(str(value) in each for value in given[axis].values))
+    }
     tables["levels"] = levels | {name: each.levels for name, each in given.items() if each.levels}
     tables["metrics"] = list(metrics or tables.get("metrics", METRICS))
     study = check_study(tables, place)
