@@ -106,6 +106,24 @@ def test_a_triangulation_that_is_kept_or_mended_is_the_one_made_anew(monkeypatch
     assert 20 < mended < changes < 290  # the kept, the mended and the new have been compared
 
 
+def test_a_rim_that_is_dented_or_crossed_is_mended_too(monkeypatch):
+    angle = np.arange(9) * (math.tau / 9)
+    inner = np.random.default_rng(6).uniform(-0.5, 0.5, (20, 2))
+    made, rims = [], []
+    kept = Tessellation()
+    triangulate = tessellation._triangulate
+    for step in range(120):
+        # Every third of the outer robots goes in and out again, the others stay, at their own distances from the middle.
+        radius = 1.0 - 0.4 * math.sin(step * math.pi / 120) * (np.arange(9) % 3 == 0) + 0.001 * np.arange(9)
+        position = np.concatenate([radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]), inner])
+        expected = Tessellation().pairs(position)
+        monkeypatch.setattr(tessellation, "_triangulate", lambda place: made.append(1) or triangulate(place))
+        np.testing.assert_array_equal(kept.pairs(position), expected)
+        monkeypatch.setattr(tessellation, "_triangulate", triangulate)
+        rims.append(kept._mesh.rim.shape[1])
+    assert (len(made), max(rims), min(rims), rims[-1]) == (1, 9, 6, 9)
+
+
 @pytest.mark.parametrize(
     "position",
     [

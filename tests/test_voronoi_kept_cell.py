@@ -70,10 +70,10 @@ def test_what_is_kept_changes_no_bit_of_an_answer():
     found_anew = 0
     for position in walk(3, 30, 60, 0.003):
         for robot, cell in enumerate(kept):
-            before = cell._bounds
+            before = cell._order
             sensed = seen(position, robot, SQUARE)
             assert cell.target(*sensed, 1.0, 0.3, -0.2) == KeptCell().target(*sensed, 1.0, 0.3, -0.2)
-            found_anew += cell._bounds is not before
+            found_anew += cell._order is not before
     assert 100 < found_anew < 1000  # of 1800: orders were kept, and orders were found
 
 

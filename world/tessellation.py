@@ -18,11 +18,13 @@ from zwerm.world.scene import Floats, Ints
 Complexes = NDArray[np.complex128]
 
 # Where more edges are to be flipped at once, or more often than that, it is quicker to triangulate anew.
-_FLIPS_AT_ONCE: Final = 12
-_ROUNDS: Final = 4
+_FLIPS_AT_ONCE: Final = 12  # or this share of the points
+_FLIPS_SHARE: Final = 0.06
+_ROUNDS: Final = 8
 
-# The rows of a mesh's edges.
+# The rows of a mesh's edges, and of its rim.
 _A, _B, _C, _D, _LEFT, _RIGHT = range(6)
+_BEFORE, _CORNER, _AFTER, _APEX, _WITHIN = range(5)
 
 
 class _Mesh(NamedTuple):
@@ -30,7 +32,8 @@ class _Mesh(NamedTuple):
 
     # (6, e) for every inner edge a -> b: a, b, the corner c left of it, d right of it, and the triangles on either side.
     edges: Ints
-    # (3, h) the hull's corners, between the one before and the one after.
+    # (5, h) the hull's corners: the one before, the corner, the one after; and the triangle on the side to that, by the
+    # corner across from the side and by its number.
     rim: Ints
 
 
@@ -52,7 +55,9 @@ class Tessellation:
         another. Points on one line, and fewer than four, are all neighbours: too many do no harm to who clips a cell.
         """
         position = np.ascontiguousarray(position)
-        if position.shape == self._position.shape and ((position == self._position).all() or self._mended(position)):
+        if position.shape == self._position.shape and (
+            (position == self._position).all() if self._mesh is None else self._mended(position)
+        ):
             return self._pairs
         self._position = position.copy()
         self._mesh, self._pairs = _triangulate(self._position)
@@ -62,24 +67,79 @@ class Tessellation:
 
     def _mended(self, position: Floats) -> bool:
         """Make the mesh the Delaunay triangulation of these positions by flipping edges, and tell whether it is."""
-        if self._mesh is None:
-            return False
-        for flips in range(_ROUNDS):
+        assert self._mesh is not None
+        for changes in range(_ROUNDS):
             wrong = _wrong_edges(self._mesh, position)
-            if wrong is None or len(wrong) > _FLIPS_AT_ONCE:
+            if wrong is None:
+                if not self._rim_mended(position):
+                    return False
+            elif len(wrong) > max(_FLIPS_AT_ONCE, _FLIPS_SHARE * len(position)):
                 return False
-            if not len(wrong):
-                if flips:
+            elif len(wrong):
+                self._flip(wrong)
+            else:
+                if changes:
                     self._pairs = _pairs_of(self._mesh, len(position))
                     self._pairs.flags.writeable = False
                 return True
-            self._flip(wrong)
         return False
+
+    def _rim_mended(self, position: Floats) -> bool:
+        """Fill a dent in the rim with a triangle, or take one away whose inner corner is beyond it; tell whether one was."""
+        assert self._mesh is not None
+        rim = self._mesh.rim
+        place = position.view(np.complex128)[:, 0]
+        before, corner, after, apex = place.take(rim[:_WITHIN])
+        dented = np.flatnonzero(_turn(corner - before, after - before) < 0.0)
+        if len(dented):
+            return self._fill(int(dented[0]))
+        turned = np.flatnonzero(_turn(after - corner, apex - corner) <= 0.0)
+        return len(turned) > 0 and self._uncover(int(turned[0]))
+
+    def _fill(self, at: int) -> bool:
+        """Add the triangle outside the dent at this column of the rim, and tell whether that leaves a rim."""
+        assert self._mesh is not None
+        edges, rim = self._mesh
+        p, q, r, far, beyond = rim[:, at].tolist()
+        (first,), (last,) = np.flatnonzero(rim[_CORNER] == p), np.flatnonzero(rim[_CORNER] == r)
+        if rim.shape[1] <= 3:
+            return False
+        new = int(max(edges[_LEFT:].max(), rim[_WITHIN].max())) + 1
+        inner = [[p, q], [q, r], [rim[_APEX, first], far], [r, p], [rim[_WITHIN, first], beyond], [new, new]]
+        rim[_AFTER:, first] = r, q, new
+        rim[_BEFORE, last] = p
+        self._mesh = _Mesh(np.concatenate([edges, np.array(inner)], axis=1), np.delete(rim, at, axis=1))
+        self._rows = {}
+        return True
+
+    def _uncover(self, at: int) -> bool:
+        """Take away the triangle on the side after this corner of the rim, and tell whether its inner corner was no other's."""
+        assert self._mesh is not None
+        edges, rim = self._mesh
+        _, q, r, s, gone = rim[:, at].tolist()
+        if (rim[_CORNER] == s).any():
+            return False
+        # Its two inner sides, q s and s r, are sides of the rim from now on, with what lies across from them.
+        rows, sides = [], []
+        for p in (q, r):
+            (row,) = np.flatnonzero(
+                ((edges[_A] == p) & (edges[_B] == s)) | ((edges[_A] == s) & (edges[_B] == p))
+            ).tolist()
+            across = 1 if edges[_LEFT, row] == gone else 0
+            rows.append(row)
+            sides.append((int(edges[_C + across, row]), int(edges[_LEFT + across, row])))
+        (last,) = np.flatnonzero(rim[_CORNER] == r)
+        rim[_AFTER:, at] = s, *sides[0]
+        rim[_BEFORE, last] = s
+        rim = np.concatenate([rim, np.array([[q], [s], [r], [sides[1][0]], [sides[1][1]]])], axis=1)
+        self._mesh = _Mesh(np.delete(edges, rows, axis=1), rim)
+        self._rows = {}
+        return True
 
     def _flip(self, wrong: Ints) -> None:
         """Flip these edges, but for those that another flip has changed."""
         assert self._mesh is not None
-        edges = self._mesh.edges
+        edges, rim = self._mesh
         if not self._rows:
             low, high = np.minimum(edges[_A], edges[_B]).tolist(), np.maximum(edges[_A], edges[_B]).tolist()
             self._rows = {ends: row for row, ends in enumerate(zip(low, high, strict=True))}
@@ -100,7 +160,9 @@ class Tessellation:
                 (d, b, a, right, c, right),
             ):
                 around = self._rows.get(_ends(p, q))
-                if around is not None:  # it is none of the rim
+                if around is None:
+                    rim[_APEX:, rim[_CORNER] == p] = [[now], [new]]
+                else:
                     side = 0 if edges[_C, around] == was and edges[_LEFT, around] == old else 1
                     edges[_C + side, around] = now
                     edges[_LEFT + side, around] = new
@@ -129,7 +191,7 @@ def _triangulate(position: Floats) -> tuple[_Mesh | None, Ints]:
     triangles[clockwise] = triangles[clockwise][:, ::-1]
     across[clockwise] = across[clockwise][:, ::-1]
     starts, ends = triangles[:, [1, 2, 0]], triangles[:, [2, 0, 1]]  # the side opposite each corner
-    mesh = _Mesh(_inner_edges(triangles, starts, ends, across), _rim(starts, ends, across))
+    mesh = _Mesh(_inner_edges(triangles, starts, ends, across), _rim(triangles, starts, ends, across))
     pairs = _pairs_of(mesh, count)
     if len(found.coplanar):
         return None, _with_coincident(pairs, found.coplanar[:, [0, 2]].astype(np.int64), count)
@@ -145,13 +207,13 @@ def _inner_edges(triangles: Ints, starts: Ints, ends: Ints, across: Ints) -> Int
     return np.array([a, b, c, d, row, other])
 
 
-def _rim(starts: Ints, ends: Ints, across: Ints) -> Ints:
-    """Return (3, h) the hull's corners, between the one before and the one after."""
+def _rim(triangles: Ints, starts: Ints, ends: Ints, across: Ints) -> Ints:
+    """Return (5, h) the hull's corners: before, corner, after, and the triangle on the side to that."""
     row, corner = np.nonzero(across < 0)
     start, end = starts[row, corner], ends[row, corner]
-    order = np.argsort(start)
-    after = end[order][np.searchsorted(start[order], end)]
-    return np.array([start, end, after])
+    order = np.argsort(end)
+    before = start[order][np.searchsorted(end[order], start)]
+    return np.array([before, start, end, triangles[row, corner], row])
 
 
 def _pairs_of(mesh: _Mesh, count: int) -> Ints:
@@ -177,7 +239,7 @@ def _with_coincident(pairs: Ints, twins: Ints, count: int) -> Ints:
 def _wrong_edges(mesh: _Mesh, position: Floats) -> Ints | None:
     """Return the edges that are to be flipped; None where the triangles do not cover the hull, each place once."""
     place = position.view(np.complex128)[:, 0]  # so that x and y are looked up at once
-    before, corner, after = place.take(mesh.rim)
+    before, corner, after = place.take(mesh.rim[:_APEX])
     if _turn(corner - before, after - before).min() < 0.0:
         return None
     # a, b, c, a, b, with the corner d for the origin.

@@ -6,10 +6,9 @@ it is seen from the corners themselves, and where it is not so the cell is clipp
 one that clipping finds, so what is kept changes no answer.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
-from operator import itemgetter
-from typing import Any, Final
+from typing import Final
 
 from zwerm.polygons import COINCIDENT_M, MASS_MIN, Point, Polygon, estimated_centroid, nearest_point, voronoi_cell
 from zwerm.protocol import Neighbour
@@ -36,7 +35,9 @@ class KeptCell:
         self._walls: list[int] = []  # the region's sides that bound the cell, by the corner they end in
         self._far_walls: list[int] = []  # those that do not
         self._far_others: list[int] = []  # the neighbours that do not
-        self._bounds: Callable[[Any], tuple[Neighbour, ...]] = tuple
+        self._order: list[
+            int
+        ] = []  # the neighbours that do, then the walls, as they follow one another; the first twice
 
     def target(self, region: Polygon, others: Neighbours, value: float, gx: float, gy: float) -> Point:
         """Return where the robot should go: the centroid of its cell under the linear estimate value + gx x + gy y [m].
@@ -64,10 +65,10 @@ class KeptCell:
         rises by from the robot to a corner, and s = value + e0 + e1, that is w (q0 (s + e0) + q1 (s + e1)) / 6; and the
         mass is w (4 s - value) / 6. No term is negative, so nothing cancels.
         """
-        bounds = self._bounds([*others, *_mirrored(region, self._walls)] if self._walls else others)
+        everyone = [*others, *_mirrored(region, self._walls)] if self._walls else others
+        bounds = [everyone[which] for which in self._order]
         gx, gy, lowest = 0.25 * gx, 0.25 * gy, -0.25 * value
-        sides = iter(bounds)
-        side, after = next(sides), next(sides)
+        side, after = bounds[0], bounds[1]
         a0, b0, a1, b1 = side.x_m, side.y_m, after.x_m, after.y_m
         c0, c1 = a0 * a0 + b0 * b0, a1 * a1 + b1 * b1
         across = a0 * b1 - b0 * a1
@@ -83,7 +84,7 @@ class KeptCell:
         turns = 0
         w0 = m0 = area = sum_m = sum_x = sum_y = 0.0
         a0, b0, c0 = a1, b1, c1
-        for side in sides:
+        for side in bounds[2:]:
             a1 = side.x_m
             b1 = side.y_m
             c1 = a1 * a1 + b1 * b1
@@ -129,11 +130,14 @@ class KeptCell:
         k, k_first = m0 + m + (w0 + w) * e0, m + w * e_first
         return (sum_x + k * x0 + k_first * x_first) / mass, (sum_y + k * y0 + k_first * y_first) / mass
 
-    def _is_cut(self, region: Polygon, others: Neighbours, bounds: Sequence[Neighbour], reach2: float) -> bool:
+    def _is_cut(self, region: Polygon, others: Neighbours, bounds: list[Neighbour], reach2: float) -> bool:
         """Tell whether anything that does not bound the cell, whose corners are within the root of reach2, cuts it."""
         for end in self._far_walls:
-            (x0, y0), (x1, y1) = region[end - 1], region[end]
-            a, b, c = y1 - y0, x0 - x1, x0 * y1 - y0 * x1
+            x0, y0 = region[end - 1]
+            x1, y1 = region[end]
+            a = y1 - y0
+            b = x0 - x1
+            c = x0 * y1 - y0 * x1
             if c <= 0.0:
                 return True
             if c * c < reach2 * (a * a + b * b) and _reaches(bounds, a, b, c):
@@ -166,7 +170,7 @@ class KeptCell:
         order = [label if label < count else count + self._walls.index(label - count) for label in labels]
         start = order.index(min(order))
         order = order[start:] + order[:start]
-        self._bounds = itemgetter(*order, order[0])
+        self._order = [*order, order[0]]
         return True
 
 

@@ -63,8 +63,10 @@ class Neighbours:
         range_m, through_walls, _ = self._sight
         # Without a range or walls everyone sees the same robots until the triangulation changes.
         lasting = range_m is None and (through_walls or scene.arena.is_convex) and len(robots) == len(ids)
-        if lasting and self._last is not None and found is self._last[0] and np.array_equal(robots, self._last[1]):
-            return self._last[2]
+        if lasting and self._last is not None and found is self._last[0]:
+            last = self._last[1]
+            if robots is last or np.array_equal(robots, last):
+                return self._last[2]
         pairs = ids[found]
         if range_m is not None:
             apart = scene.position[pairs[:, 1]] - scene.position[pairs[:, 0]]
