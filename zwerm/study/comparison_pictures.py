@@ -144,11 +144,14 @@ def _draw_metric(above: "Axes", below: "Axes", comparison: Comparison, places: S
     above.set_title(label(metric), fontsize=10)
     if metric.endswith("_fraction") or metric == COMPLETED:
         low, high = above.get_ylim()
-        above.set_ylim(max(-0.02, low), min(1.03, max(high, low + 0.02)))
+        limits = max(-0.02, low), min(1.03, max(high, low + 0.02))
+        above.set_yticks([tick for tick in above.get_yticks() if limits[0] <= tick <= 1.0 + 1e-9])
+        above.set_ylim(*limits)
     below.set_ylabel("difference", fontsize=8)
     below.set_xlabel(axis_label(next(iter(places[0].settings), "")), fontsize=9)
     if ticks:
-        below.set_xticks(x, ticks, rotation=15 if len("".join(ticks)) > 30 else 0)
+        slanted = len("".join(ticks)) > 30
+        below.set_xticks(x, ticks, rotation=20 if slanted else 0, ha="right" if slanted else "center")
     for axes in (above, below):
         axes.grid(alpha=0.3)
         axes.tick_params(labelsize=8)
