@@ -1,13 +1,11 @@
 """Sensor coverage without a coordinator, run for real in a small hall: how it ends, who decides, and that nobody is lost."""
 
-from collections.abc import Callable
-
 import pytest
 
 from zwerm.agents.node import Node
 from zwerm.agents.sensor_coverage.local import LocalRobot
 from zwerm.agents.sensor_coverage.post import TRIES_MAX, Post
-from zwerm.agents.sensor_coverage.words import Done, Letter, State, Token, read, write
+from zwerm.agents.sensor_coverage.words import NOWHERE, Done, Letter, State, Token, read, write
 from zwerm.assembly import assemble
 from zwerm.deploy.cast import cast
 from zwerm.errors import ScenarioError
@@ -23,14 +21,28 @@ ALONE = (*HALL, "services.path=gradient")
 NOISE = "robots.sensors.0.sd_rad=0.0436332"
 
 
-def drive(scenario: Scenario, on_tick: Callable[[World], None] | None = None) -> tuple[str, World, list[LocalRobot]]:
-    """Run inline, and return how it ended, the world, and the robots that are out."""
+def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
+    """Run inline, and return how it ended, the world, and the robots that are out.
+
+    At no tick may two robots that are not part of a push have the same place, or a robot that is out be gone.
+    """
     world = assemble(scenario, 1)
     nodes = {node: Node(*each) for node, each in cast(scenario, 1).items()}
-    driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), on_tick)
-    outcome = driver.run()
-    out = [nodes[robot]._controller for robot in world.scene.present_ids().tolist() if robot]
-    return outcome, world, [each for each in out if isinstance(each, LocalRobot)]
+    seen: dict[int, None] = {}
+
+    def out() -> list[LocalRobot]:
+        there = [nodes[robot]._controller for robot in world.scene.present_ids().tolist() if robot]
+        return [each for each in there if isinstance(each, LocalRobot)]
+
+    def watch(world: World) -> None:
+        robots = out()
+        seen.update(dict.fromkeys(each.node for each in robots))
+        assert len(seen) == len(robots), "nobody that was let out is lost"
+        held = [each.vicinity.place for each in robots if each.push is None and each.vicinity.place != NOWHERE]
+        assert len(held) == len(set(held)), f"tick {world.tick}: each has a place of its own, but {sorted(held)}"
+
+    driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), watch)
+    return driver.run(), world, out()
 
 
 # --- words and letters ----------------------------------------------------------------------------------------------
@@ -112,6 +124,7 @@ def test_nobody_is_lost_or_counted_twice_whatever_the_radio_does(air: tuple[str,
     places = [robot.vicinity.place for robot in robots if not robot._waiting]
     assert outcome == "completed"
     assert found["coverage_fraction"] >= 0.98
+    assert found["concluded_early"] == 0.0
     assert len(places) == len(set(places)) >= len(robots) - 1, "each holds a place of its own, but for one at the base"
     assert found["robots_released"] == len(robots) == found["pushes"] + len(robots) - len(places)
 

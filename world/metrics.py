@@ -57,7 +57,18 @@ def measure(world: "World", table: MetricsTable) -> dict[str, float]:
         found |= _sight(world, table.sight_range_m)
         if world.scenario.services is not None and world.scenario.services.spares == "link":
             found |= removals(world, table.sight_range_m)
+    if world.scenario.services is not None and world.scenario.services.path == "gradient":
+        found["concluded_early"] = concluded_early(world)
     return found | _told(world)
+
+
+def concluded_early(world: "World") -> float:
+    """Return 1 where the base station has concluded while a living robot knew where to expand, else 0."""
+    claimed: dict[int, bool] = {}
+    for each in world.audience.told:
+        if "frontier" in each.told:
+            claimed[each.node] = each.told["frontier"]["claimed"]
+    return float(world.completed and any(there and node not in world.dead for node, there in claimed.items()))
 
 
 def _told(world: "World") -> dict[str, float]:

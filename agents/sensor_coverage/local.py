@@ -8,13 +8,16 @@ import math
 from typing import Any, Final
 
 from zwerm.agents.contract import Setup
+from zwerm.agents.sensor_coverage.ending import Ending
 from zwerm.agents.sensor_coverage.homing import Vector
 from zwerm.agents.sensor_coverage.host import Drive
+from zwerm.agents.sensor_coverage.inquiry import Inquiry
 from zwerm.agents.sensor_coverage.membership import Membership
 from zwerm.agents.sensor_coverage.post import Post
 from zwerm.agents.sensor_coverage.push import Push
 from zwerm.agents.sensor_coverage.robot import STOP, Parameters, Robot, Story
 from zwerm.agents.sensor_coverage.speech import Speech
+from zwerm.agents.sensor_coverage.termination import Tally, Wave
 from zwerm.agents.sensor_coverage.vicinity import Vicinity
 from zwerm.agents.sensor_coverage.words import (
     CHANNEL,
@@ -42,11 +45,6 @@ from zwerm.protocol import Command, Observation, Transmission, Wake
 
 # How long a robot may be unsure whether it is at the frontier before it says so: most pushes beside it are over before.
 DOUBT_TICKS: Final = 100
-# When to ask those whose word is missing, and how often before they are taken for dead.
-ASK_FIRST_TICKS: Final = 8
-ASK_TICKS: Final = 2
-ASKS_MAX: Final = 150
-SILENT_TICKS: Final = 260
 # How often the news that a leader is gone is told, and told on.
 GONE_HOPS: Final = 2
 GONE_TICKS: Final = 4
@@ -68,16 +66,15 @@ class LocalRobot(Robot):
         self._letters: list[Transmission] = []
         self._told_on: dict[int, int] = {}
         self._gone: tuple[int, int, int] | None = None  # the push whose leader this was, when to say so, when again
-        self._asked: dict[int, int] = {}
-        self._dead: dict[int, None] = {}
-        self._ask_at: int | None = None
+        self.inquiry = Inquiry()
         self._rest = 0.0, 0.0
         self._watched: object = None
-        self._calm = False
+        self._calm = self._claimed = False
         self._doubts_at: int | None = None
         self._chosen = 0
         self._told: dict[str, Any] = {}
         self.drives = False
+        self.ending = Ending(setup, self.random, base=setup.role == "base")
         self.membership = Membership(self, setup, self.random)
         self._story = self._look_around()
 
@@ -88,6 +85,7 @@ class LocalRobot(Robot):
         self.tick = observation.tick
         self.senses.take(observation)
         self.membership.watch(self.senses.seen)
+        self.ending.note(self.tick, self.bearings, self._claims, self._occupied)
         for packet in observation.inbox:
             word = read(packet.payload) if packet.channel == CHANNEL and packet.sender is not None else None
             if word is not None and packet.sender is not None:
@@ -97,6 +95,9 @@ class LocalRobot(Robot):
         if not self.vicinity.moving:
             self._keep_watch()
         self._told |= self.membership.turn(self.senses.seen)
+        if bool(self._claims) != self._claimed:
+            self._claimed = bool(self._claims)
+            self._told["frontier"] = {"claimed": self._claimed}
         self._say()
         outbox, self._letters = tuple(self._letters), []
         told, self._told = self._told, {}
@@ -149,7 +150,10 @@ class LocalRobot(Robot):
         times = [self.speech.next_tick(), *self.membership.next_ticks()]
         times += [
             each
-            for each in (self.post.next_tick(), push, self._ask_at, self.vicinity.awaits_until, doubts)
+            for each in (
+                *(self.post.next_tick(), push, self.inquiry.at, self.vicinity.awaits_until),
+                *(doubts, self.ending.next_tick()),
+            )
             if each is not None
         ]
         if self._gone is not None:
@@ -164,10 +168,8 @@ class LocalRobot(Robot):
                 self.vicinity.gradient.hear(sender, word)
             case State():
                 self.vicinity.gradient.hear(sender, word.way)
-                if sender in self._dead:
-                    del self._dead[sender]
+                if self.inquiry.answered(sender):
                     self.vicinity.change()
-                self._asked.pop(sender, None)
                 if self.vicinity.missed(sender, word):
                     self.speech.missed(self.tick)
                 if self.vicinity.hear(sender, word, self.tick):
@@ -184,6 +186,8 @@ class LocalRobot(Robot):
                     self._read(sender, body)
             case Receipt():
                 self.post.acknowledge(sender, word)
+            case Wave() | Tally():
+                self.ending.hear(sender, word)
             case _:
                 self.membership.hear(sender, word)
 
@@ -250,10 +254,24 @@ class LocalRobot(Robot):
             self._send(Gone(push, GONE_HOPS))
             if self.push is None or self.push.id != push or self.push.phase not in ("deploying", "out"):
                 self._gone = None
-        for to, word in self.membership.letters():
+        for to, word in (*self.membership.letters(), *self.ending.letters(self._takes_census)):
             self._send(word, to)
         for to, letter in self.post.due(self.tick):
             self._send(letter, to)
+
+    @property
+    def _takes_census(self) -> bool:
+        return True
+
+    @property
+    def _claims(self) -> int:
+        return len(self.vicinity.plans) + len(self.vicinity.gaps)
+
+    @property
+    def _occupied(self) -> bool:
+        """Whether it moves, is part of a push, has a letter that was not acknowledged, or does not know its neighbours."""
+        here = self.push is not None or self._story is not None or self.vicinity.moving
+        return here or not self._calm or self.post.next_tick() is not None
 
     @property
     def _waiting(self) -> bool:
@@ -274,7 +292,7 @@ class LocalRobot(Robot):
             elif self._unsure():
                 self._story = self._look_around()
         watched = vicinity.version, tuple(self.senses.seen), self._story is None
-        times = self._ask_at, vicinity.awaits_until, self._doubts_at, self.speech.heartbeat
+        times = self.inquiry.at, vicinity.awaits_until, self._doubts_at, self.speech.heartbeat
         timers = [each for each in times if each is not None]
         if watched != self._watched or self.tick >= min(timers):
             self._watched = watched
@@ -285,7 +303,9 @@ class LocalRobot(Robot):
             self._doubts_at = None if self._calm else self._doubts_at or self.tick + DOUBT_TICKS
             if self._calm:
                 vicinity.plan()
-            self._ask()
+            ask = self.inquiry.turn(self.tick, vicinity, self.senses.seen, self._samples)
+            if ask is not None:
+                self._send(ask)
         elif vicinity.gradient.version == self._chosen:
             return  # nothing is new, so nothing follows
         self._chosen = vicinity.gradient.version
@@ -322,32 +342,6 @@ class LocalRobot(Robot):
         self.vicinity.look({s.node: s.bearing_rad for s in self.senses.sightings() if s.node in standing})
         self.vicinity.touch(self.senses.touched)
 
-    def _ask(self) -> None:
-        """Ask those whose word is missing or old; who does not answer for long is dead."""
-        vicinity, tick = self.vicinity, self.tick
-        wanted = [node for node in dict.fromkeys(vicinity.stale(self.senses.seen)) if node not in self._dead]
-        wanted += [n for n in self.senses.seen if n not in wanted and tick - vicinity.heard.get(n, tick) > SILENT_TICKS]
-        wanted = [
-            node
-            for node in wanted
-            if node not in vicinity.states
-            or not vicinity.states[node].moving
-            or tick - vicinity.heard[node] > SILENT_TICKS
-        ]
-        if not wanted:
-            self._asked.clear()
-            self._ask_at = None
-        elif self._ask_at is None:
-            self._ask_at = tick + ASK_FIRST_TICKS + self._samples
-        elif tick >= self._ask_at:
-            self._ask_at = tick + ASK_TICKS
-            self._send(Ask(tuple(wanted)))
-            self._asked = {node: self._asked.get(node, 0) + 1 for node in wanted}
-            for node, times in self._asked.items():
-                if times > ASKS_MAX and tick - vicinity.heard.get(node, -SILENT_TICKS) > SILENT_TICKS:
-                    vicinity.forget(node)
-                    self._dead[node] = None
-
     # --- what pushes need -------------------------------------------------------------------------------------------
 
     @property
@@ -378,7 +372,7 @@ class LocalRobot(Robot):
     @property
     def bearings(self) -> dict[int, float]:
         """Whom it sees now, but for the dead."""
-        return {node: bearing for node, bearing in self.senses.seen.items() if node not in self._dead}
+        return {node: bearing for node, bearing in self.senses.seen.items() if node not in self.inquiry.dead}
 
     @property
     def clear(self) -> bool:

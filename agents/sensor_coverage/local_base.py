@@ -22,7 +22,9 @@ from zwerm.protocol import Command, Observation, Wake
 # How long to wait for a robot to come out, for a push to end, and without a frontier before all is covered [ticks].
 BIRTH_TICKS: Final = 60
 PUSH_TICKS: Final = 2000
-QUIET_TICKS: Final = 400
+QUIET_TICKS: Final = 60
+# How long to wait for a census that comes to a conclusion [ticks].
+CENSUS_TICKS: Final = 6000
 # How long after a push to wait for word of an edge before gaps are gone to [ticks].
 GAP_TICKS: Final = 24
 # How long to wait for who stands at the base, and is not ready [ticks].
@@ -167,14 +169,29 @@ class LocalBase(LocalRobot):
             self._tell_numbers()
 
     def _watch_quiet(self) -> None:
+        """Where no way leads to a frontier for a while, take the census; conclude from it, or from a very long silence."""
         if not self.clear or self.vicinity.route is not None:
             self._quiet_since = None
             return
         if self._quiet_since is None:
             self._quiet_since = self.tick
-        if self.tick - self._quiet_since > QUIET_TICKS + 4 * self._samples:
+        last = self.ending.last
+        if self._takes_census and self.ending.concluded:
             self.outcome = "covered"
+        elif self.tick - self._quiet_since > CENSUS_TICKS:
+            claimed = last is not None and last.claims > 0
+            self.outcome = "cut-off: no way leads to the frontier" if claimed else "covered"
+        if self.outcome:
             self._tell_numbers()
+
+    @property
+    def _takes_census(self) -> bool:
+        waited = 0 if self._quiet_since is None else self.tick - self._quiet_since
+        return waited > QUIET_TICKS + 4 * self._samples and not self.outcome
+
+    @property
+    def _occupied(self) -> bool:
+        return super()._occupied or not self._takes_census
 
     def _tell_numbers(self) -> None:
         self._told |= {

@@ -96,6 +96,11 @@ class Census:
         return self._concluded
 
     @property
+    def waits(self) -> bool:
+        """Whether the robot has joined a wave and lacks an answer."""
+        return self._number > 0 and self._told is None
+
+    @property
     def last(self) -> Tally | None:
         """What the latest wave that came back to the base has counted."""
         return self._last

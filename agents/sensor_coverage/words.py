@@ -11,6 +11,7 @@ import msgspec
 from msgspec import Struct
 
 from zwerm.agents.sensor_coverage import redundancy
+from zwerm.agents.sensor_coverage.termination import Tally, Wave
 from zwerm.errors import ProtocolError
 from zwerm.frame import seal, unseal
 from zwerm.protocol import REFUSABLE
@@ -236,7 +237,7 @@ class Receipt(_Message, frozen=True, tag="r"):
     number: int
 
 
-Word = State | Way | Ask | Enquire | Gone | Letter | Receipt | redundancy.Message
+Word = Wave | Tally | State | Way | Ask | Enquire | Gone | Letter | Receipt | redundancy.Message
 
 _encode: Final[Callable[[Word], bytes]] = msgspec.msgpack.Encoder().encode
 _decode: Final[Callable[[bytes], Word]] = msgspec.msgpack.Decoder(Word).decode
