@@ -6,15 +6,21 @@ import networkx
 import numpy as np
 import pytest
 
+from zwerm.agents.node import Node
 from zwerm.agents.sensor_coverage.leaving import Leaving
-from zwerm.agents.sensor_coverage.words import Enquire, Word, read, write
+from zwerm.agents.sensor_coverage.local import LocalRobot
+from zwerm.agents.sensor_coverage.words import NOWHERE, Enquire, Word, read, write
 from zwerm.assembly import assemble
+from zwerm.deploy.cast import cast
 from zwerm.errors import ScenarioError
+from zwerm.link.memory import MemoryLink
 from zwerm.protocol import Command
 from zwerm.running import run
 from zwerm.scenario import load
 from zwerm.simplicial import FlagComplex, betti
+from zwerm.world.lockstep import LockStep
 from zwerm.world.removals import removals
+from zwerm.world.world import World
 
 DT_S = 0.1
 CLOSE = ("robots.parameters.margin_m=0.45", "base.parameters.margin_m=0.45")
@@ -99,6 +105,29 @@ def test_robots_in_processes_are_freed_and_pushed_again_while_words_are_lost() -
     assert result.metrics["removals"] >= 1
     assert result.metrics["unsafe_removals"] == 0
     assert any("in" in each for each in removed), "who was freed has taken another place"
+
+
+def test_nobody_is_lost_and_no_place_has_two_robots_while_some_are_freed() -> None:
+    scenario = load("sensor-coverage", (*HALL, *CLOSE, *LINK, "radio.loss=0.3", "time.duration_s=240.0"))
+    world = assemble(scenario, 1)
+    nodes = {node: Node(*each) for node, each in cast(scenario, 1).items()}
+
+    def robots() -> list[LocalRobot]:
+        out = [nodes[robot]._controller for robot in world.scene.present_ids().tolist() if robot]
+        return [each for each in out if isinstance(each, LocalRobot)]
+
+    def look(world: World) -> None:
+        held = [each.vicinity.place for each in robots() if each.push is None and each.vicinity.place != NOWHERE]
+        assert len(held) == len(set(held))
+
+    LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), look).run()
+    told = [each.told["removal"] for each in world.audience.told if "removal" in each.told]
+    spare = [each.node for each in robots() if each.vicinity.spare]
+    assert len(spare) == sum("out" in each for each in told) - sum("in" in each for each in told)
+    assert sum(each.vicinity.place == NOWHERE for each in robots()) <= 2, (
+        "one waits at the base, and one may be on its way"
+    )
+    assert told
 
 
 def test_the_checker_finds_a_removal_that_opens_a_hole() -> None:
