@@ -5,7 +5,7 @@ be the rear of a push, which brings it to the next place ahead, and a robot into
 nobody is lost or counted twice: it has its place until it leaves, none until it is called, and then that of the robot ahead.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,9 +16,10 @@ from zwerm.agents.sensor_coverage.leaving import Leaving
 from zwerm.agents.sensor_coverage.push import Push
 from zwerm.agents.sensor_coverage.reserve import Caller, Reserve
 from zwerm.agents.sensor_coverage.words import NOWHERE, Body, Call, End, Enquire, Errand, Offer, Word
-from zwerm.frontier.fence import Side, fence, wedges
+from zwerm.frontier.fence import Views, fence, wedges
+from zwerm.frontier.planner import VERTEX_BESIDE_RAD
 from zwerm.frontier.services import Picture
-from zwerm.simplicial import may_leave
+from zwerm.simplicial import Edge, FlagComplex, may_leave
 
 
 class Member(Caller, Protocol):
@@ -117,7 +118,10 @@ class Membership:
 
 
 def can_be_spared(picture: Picture, place: int, corner_margin_rad: float) -> bool:
-    """Tell whether a place can be left: it is not on the fence, the link criterion holds, and no side of an edge comes open."""
+    """Tell whether a place can be left: it is not on the fence, the link criterion holds, and nobody would be sent there again.
+
+    Somebody would be where a side of an edge comes open, or a gap beside a neighbour so wide that one expands there.
+    """
     views, complex_, _ = picture
     around = complex_.neighbours[place]
     if not around or any(True for _ in wedges(views, complex_, [place])):
@@ -125,11 +129,15 @@ def can_be_spared(picture: Picture, place: int, corner_margin_rad: float) -> boo
     if not may_leave(place, complex_.neighbours):
         return False
     edges = [each for each in complex_.edges if each[0] in around and each[1] in around]
-    now, then = (
-        _sides(fence(views, each, corner_margin_rad, edges).sides) for each in (complex_, complex_.without([place]))
-    )
-    return all(side in now for side in then)
+    now, then = (_open(views, each, edges, around, corner_margin_rad) for each in (complex_, complex_.without([place])))
+    return all(each in now for each in then)
 
 
-def _sides(sides: Collection[Side]) -> list[tuple[int, int, int]]:
-    return [(each.i, each.j, each.sign) for each in sides]
+def _open(
+    views: Views, complex_: FlagComplex, edges: Iterable[Edge], around: Iterable[int], corner_margin_rad: float
+) -> list[tuple[int, int, int]]:
+    """Return the open sides of edges, and the wide gaps around vertices."""
+    sides = fence(views, complex_, corner_margin_rad, edges).sides
+    gaps = wedges(views, complex_, around)
+    wide = [(i, a, b) for i, a, b, gap_rad in gaps if gap_rad >= 2.0 * VERTEX_BESIDE_RAD]
+    return [*((each.i, each.j, each.sign) for each in sides), *wide]
