@@ -95,13 +95,13 @@ class Gaussians(Field):
     def __init__(
         self, amplitudes: Sequence[float], centers_m: Sequence[Point], sd_m: Sequence[float], offset: float = 0.0
     ) -> None:
-        self._offset, self._amplitudes = offset, np.array(amplitudes)
+        self._offset, self._amplitudes = offset, np.reshape(amplitudes, (-1, 1))
         self._centers = np.array(centers_m)
-        self._precision = np.array(sd_m) ** -2.0
+        self._precision = np.reshape(sd_m, (-1, 1)) ** -2.0
 
     def value(self, points: Floats) -> Floats:
         """Return (k,) the value at points (k, 2) [m]."""
-        value: Floats = self._offset + self._bumps(points)[0].sum(axis=1)
+        value: Floats = self._offset + self._bumps(points)[0].sum(axis=0)
         return value
 
     def gradient(self, points: Floats) -> Floats:
@@ -114,12 +114,12 @@ class Gaussians(Field):
         steepness = height * self._precision
         gradient = np.empty(points.shape)
         for axis, away in enumerate(apart):
-            np.negative((steepness * away).sum(axis=1), out=gradient[:, axis])
-        return self._offset + height.sum(axis=1), gradient
+            np.negative((steepness * away).sum(axis=0), out=gradient[:, axis])
+        return self._offset + height.sum(axis=0), gradient
 
     def _bumps(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return (k, g) each bump's height at each point, and how far right of its centre and above it that is."""
-        x, y = points.T[:, :, None] - self._centers.T[:, None, :]
+        """Return (g, k) each bump's height at each point, and how far right of its centre and above it that is."""
+        x, y = points.T[:, None, :] - self._centers.T[:, :, None]
         return self._amplitudes * np.exp(-0.5 * (x * x + y * y) * self._precision), x, y
 
 

@@ -42,12 +42,10 @@ class VoronoiCoverage(Controller):
 
     def step(self, observation: Observation) -> Command:
         """Return the velocity u = k (C_hat - p). Schwager 2006, eq. 8."""
-        here = observation.field
-        assert observation.boundary is not None
-        assert observation.neighbours is not None
+        region, others, here = observation.boundary, observation.neighbours, observation.field
+        assert region is not None
+        assert others is not None
         assert here is not None
-        x, y = self._cell.target(
-            observation.boundary, observation.neighbours, here.value, here.gradient_x, here.gradient_y
-        )
+        x, y = self._cell.target(region, others, here.value, here.gradient_x, here.gradient_y)
         k = self._gain_per_s
         return Command(drive=BodyVelocity(k * x, k * y), done=x * x + y * y < self._tolerance2)
