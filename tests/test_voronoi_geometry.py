@@ -1,6 +1,7 @@
 """Cells, closed forms and quadrature: each judged by something written differently."""
 
 import math
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -22,7 +23,12 @@ SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 HEPTAGON = [(0.5 + 0.5 * math.cos(angle), 0.5 + 0.4 * math.sin(angle)) for angle in np.arange(7) * (math.tau / 7)]
 
 unit = st.floats(0.001, 0.999)
-swarms = st.lists(st.tuples(unit, unit), min_size=1, max_size=40, unique=True).map(np.array)
+# Apart by more than what counts as one place.
+swarms = (
+    st.lists(st.tuples(unit, unit), min_size=1, max_size=40, unique=True)
+    .filter(lambda places: all(math.dist(p, q) > 1e-10 for p, q in combinations(places, 2)))
+    .map(np.array)
+)
 
 
 def relative(polygon, here):
