@@ -236,12 +236,13 @@ def main() -> None:
     parser.add_argument("--decisions", type=int, default=30_000, help="at each loss")
     parser.add_argument("--losses", type=float, nargs="+", default=[0.0, 0.1, 0.3, 0.5])
     parser.add_argument("--robots", type=int, default=40)
-    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=1, help="of the swarms in trouble")
+    parser.add_argument("--seeds", type=int, default=5, help="of the swarms beside relative H2")
     chosen = parser.parse_args()
     print(f"{'loss':>6} {'decisions':>10} {'departures':>10} {'changed b0 or b1':>17} {'messages a decision':>20}")
     for kind in (Redundancy, Unlocked):
         for loss in chosen.losses:
-            each = Troubled(chosen.robots, seed=1, loss=loss, kind=kind)
+            each = Troubled(chosen.robots, seed=chosen.seed, loss=loss, kind=kind)
             each.run(chosen.decisions if kind is Redundancy else chosen.decisions // 10)
             told = f"{loss:>6} {each.decisions:>10,} {each.departures:>10,} {each.violations:>17}"
             print(f"{told} {each.radio.sent / each.decisions:>20.1f}  {kind.__name__}", flush=True)
