@@ -7,7 +7,8 @@ import msgspec
 from zwerm.agents.contract import Body, Setup
 from zwerm.draws import Draws
 from zwerm.errors import ControllerError
-from zwerm.scenario import Scenario, ServicesTable
+from zwerm.scenario import Scenario
+from zwerm.services import ServicesTable
 
 ROBOT: Final = "robot"
 BASE: Final = "base"

@@ -159,6 +159,14 @@ def test_an_empty_depot_is_noticed_by_the_base() -> None:
     [
         (("services.path=mesh",), 'services.path: expected "coordinator" or "gradient", got "mesh"'),
         (("services.pathh=gradient",), "services.pathh"),
+        (
+            ("services.fence=local",),
+            "services.fence: 'local' with path 'coordinator': a way is known to whoever knows where it ends",
+        ),
+        (
+            ("services.path=gradient", "services.termination=coordinator"),
+            "services.termination: 'coordinator' with path 'gradient': a way is known to whoever knows where it ends",
+        ),
         (("services.path=gradient",), "services.path: robots find the path from one base station"),
     ],
 )
@@ -167,6 +175,25 @@ def test_a_mistake_in_the_services_is_one_clear_line(settings: tuple[str, ...], 
         load("sensor-coverage-multi-source" if settings == ("services.path=gradient",) else "sensor-coverage", settings)
     assert len(caught.value.mistakes) == 1
     assert line in caught.value.mistakes[0]
+
+
+@pytest.mark.parametrize(
+    "services",
+    [
+        {"path": path, "redundancy": redundancy, "fence": side, "termination": side}
+        for path, side, redundancies in (
+            ("coordinator", "coordinator", ("coordinator", "none")),
+            ("gradient", "local", ("link", "none")),
+        )
+        for redundancy in redundancies
+    ],
+)
+def test_every_combination_of_services_that_goes_together_covers_a_small_hall(services: dict[str, str]) -> None:
+    small = ("arena.size_m=[1.8,1.2]", "base.pose=[0.2,0.6,0.0]", "robots.count=10")
+    settings = [*small, *(f"services.{name}={provider}" for name, provider in services.items())]
+    result = run("sensor-coverage", runner="inline", overrides=settings)
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.99
 
 
 def test_a_state_tells_no_position() -> None:

@@ -15,6 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, 
 from zwerm.errors import ScenarioError
 from zwerm.mistakes import mistakes as mistakes  # for those who type tables of their own
 from zwerm.overrides import override as override
+from zwerm.services import ServicesTable
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -180,27 +181,6 @@ class CoordinatorTable(Table):
     parameters: dict[str, Any] = {}
 
 
-class ServicesTable(Table):
-    """Who provides what a deployment needs to have decided: the `coordinator`, or the robots among themselves.
-
-    With `path` `gradient` robots find the frontier, the way to it and the end by themselves. By `redundancy`, who can be spared
-    is found by the coordinator, by relative homology; with `link` by robots, by agreement among neighbours; or not at all.
-    """
-
-    path: Literal["coordinator", "gradient"] = "coordinator"
-    redundancy: Literal["coordinator", "link", "none"] | None = None
-
-    @property
-    def spares(self) -> str:
-        """Who finds redundant robots: whoever finds the path where nothing else is said, and no robot does so far."""
-        return self.redundancy or ("coordinator" if self.path == "coordinator" else "none")
-
-    @property
-    def centre(self) -> bool:
-        """Whether anything is the coordinator's."""
-        return "coordinator" in (self.path, self.spares)
-
-
 class ChannelTable(Table):
     """What happens to packets on a channel: `loss` is independent loss, `models` judge in order. `check` audits every tick.
 
@@ -302,9 +282,7 @@ class Scenario(Table):
                 raise ValueError("services.path: robots that find the path need the table [radio]")
             if self.base is None or self.base.stations > 1:
                 raise ValueError("services.path: robots find the path from one base station")
-        if services.spares == {"gradient": "coordinator", "coordinator": "link"}[services.path]:
-            why = "only who finds the path is told who sees whom"
-            raise ValueError(f"services.redundancy: {services.spares!r} with path {services.path!r}: {why}")
+        services.check()
         return self
 
     @property

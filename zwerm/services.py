@@ -1,0 +1,45 @@
+"""Who provides what a deployment needs to have decided, and which providers go together."""
+
+from typing import Final, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+# By who finds the path: who then finds fence and end, and who cannot find redundant robots.
+GOES_WITH: Final = {"coordinator": "coordinator", "gradient": "local"}
+NO_SPARES: Final = {"coordinator": "link", "gradient": "coordinator"}
+
+
+class ServicesTable(BaseModel):
+    """Who provides what: the `coordinator`, or the robots among themselves.
+
+    With `path` `gradient` robots find the frontier, the way to it and the end by themselves; `fence` and `termination` go with
+    it. By `redundancy`, who can be spared is found by the coordinator, by relative homology; with `link` by robots, by
+    agreement among neighbours; or not at all.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    path: Literal["coordinator", "gradient"] = "coordinator"
+    redundancy: Literal["coordinator", "link", "none"] | None = None
+    fence: Literal["coordinator", "local"] | None = None
+    termination: Literal["coordinator", "local"] | None = None
+
+    @property
+    def spares(self) -> str:
+        """Who finds redundant robots: whoever finds the path where nothing else is said, and no robot does so far."""
+        return self.redundancy or ("coordinator" if self.path == "coordinator" else "none")
+
+    @property
+    def centre(self) -> bool:
+        """Whether anything is the coordinator's."""
+        return "coordinator" in (self.path, self.spares)
+
+    def check(self) -> None:
+        """Raise ValueError where providers do not go together."""
+        for name, provider in (("fence", self.fence), ("termination", self.termination)):
+            if provider not in (None, GOES_WITH[self.path]):
+                why = "a way is known to whoever knows where it ends"
+                raise ValueError(f"services.{name}: {provider!r} with path {self.path!r}: {why}")
+        if self.spares == NO_SPARES[self.path]:
+            why = "only who finds the path is told who sees whom"
+            raise ValueError(f"services.redundancy: {self.spares!r} with path {self.path!r}: {why}")
