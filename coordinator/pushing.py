@@ -60,6 +60,8 @@ class Pushing:
         """Push along the plan's path; section III-B. Return the robots that moved."""
         places, cycle, path = self._places, self.cycle, plan.path
         base = path[0] if path[0] in self.picture.bases else None
+        if plan.mover in self.picture.bases:
+            return (yield from self._set_out(plan))
         leader = places.occupant[path[-1]]
         self._frontier.note_attempt(plan)
         if base is not None and not any(each not in path for each in self.picture.views[base]):
@@ -105,6 +107,28 @@ class Pushing:
             back = plan.direction + math.pi - places.heading[leader]
             yield from self._correct(leader, [(each, back) for each in anchors])
         return (*followers, leader)
+
+    def _set_out(self, plan: Plan) -> Story[Moved]:
+        """Deploy a robot from a station's own place."""
+        places, base = self._places, plan.mover
+        self._frontier.note_attempt(plan)
+        yield from self._sources.let_out(base, self.cycle, self.picture.views[base], ())
+        robot = self._sources.waiting.get(base)
+        if robot is None:
+            return ()
+        heading = places.heading[robot]
+        order = Deploy(self.cycle, _wrapped(plan.direction - heading), plan.hop_m, plan.clear_m)
+        self._post.say(robot, order, drive=True)
+        arrived = yield from self._arrivals([robot])
+        if robot in arrived and not arrived[robot].ok:  # it waits on
+            self._frontier.note_failure(plan, arrived[robot].driven_m)
+            return (robot,)
+        del self._sources.waiting[base]
+        if robot in arrived:
+            self.pushes += 1
+            places.found(robot)
+            yield from self._correct(robot, [(places.occupant[base], plan.direction + math.pi - heading)])
+        return (robot,)
 
     def _move(
         self, robots: Sequence[int], origins: Sequence[int], goals: Sequence[int], future: dict[int, int]

@@ -272,6 +272,18 @@ def test_scale_applies_to_thin_walls_too() -> None:
     assert arena.segments[-1].tolist() == [1.0, 1.0, 2.0, 1.0]
 
 
+def test_a_passage_that_is_too_narrow_is_closed_and_what_lies_behind_it_is_left_out() -> None:
+    """Two rooms of 1 m2 and 2 m2 with a gap of 0.2 m in the wall between them."""
+    wall = [[(1.0, 0.0), (1.1, 0.0), (1.1, 0.4), (1.0, 0.4)], [(1.0, 0.6), (1.1, 0.6), (1.1, 1.0), (1.0, 1.0)]]
+    rooms = {"size_m": (3.1, 1.0), "obstacles": wall}
+    assert read(**rooms, passage_m=0.2).area_m2 == pytest.approx(3.02)
+    narrow = read(**rooms, passage_m=0.21)
+    assert narrow.area_m2 == pytest.approx(2.0, abs=0.03), "and a mouth of the gap"
+    assert 0.9 < narrow.bounds[0] < 1.1, "and nothing of the other room"
+    assert narrow.bounds[1:] == pytest.approx((0.0, 3.1, 1.0))
+    assert not narrow.blocked(np.array([[1.2, 0.05]]), np.array([[3.0, 0.95]])).any()
+
+
 def test_a_file_is_sought_beside_the_scenario_and_then_where_the_command_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -332,6 +344,7 @@ BOW = [(0, 0), (1, 1), (1, 0), (0, 1)]
                 "arena.walls.0: expected a length > 0, got [(0.0, 0.0), (0.0, 0.0)]",
             ],
         ),
+        ({"size_m": (1, 1), "passage_m": 2.0}, ["arena.passage_m: expected some place that is wider, got 2"]),
     ],
 )
 def test_every_mistake_in_the_table_is_one_line(table: Any, lines: list[str]) -> None:

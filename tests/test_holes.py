@@ -64,7 +64,7 @@ def test_what_was_met_beside_a_hole_does_not_make_it_an_obstacle_and_what_was_me
 
 
 def test_what_a_robot_that_stands_in_a_hole_met_counts_but_for_what_is_behind_it() -> None:
-    """A ring of seven, and an eighth robot within that sees three of them: the way around the hole leads through it."""
+    """A ring of seven, and an eighth robot within that sees three of them: with those it makes two triangles."""
     ring = {n: (1.05 * math.cos(n * math.tau / 7.0), 1.05 * math.sin(n * math.tau / 7.0)) for n in range(7)}
     within, outside = {**ring, 8: (0.4, 0.0)}, {**ring, 8: (1.7, 0.0)}
     for places, direction, bare in (
@@ -75,7 +75,6 @@ def test_what_a_robot_that_stands_in_a_hole_met_counts_but_for_what_is_behind_it
     ):
         views, complex_ = seen(places)
         hole = next(each for each in holes(views, complex_) if len(each) > 5)
-        assert [corner.place for corner in hole if corner.place == 8] == ([8] if places is within else [])
         assert is_bare(hole, views, complex_, lambda _: ())
         assert is_bare(hole, views, complex_, lambda place, met=direction: (met,) if place == 8 else ()) == bare
 

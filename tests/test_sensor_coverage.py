@@ -170,6 +170,13 @@ def test_the_end_of_a_single_file_looks_around_a_corner() -> None:
     assert result.metrics["coverage_fraction"] >= 0.99
 
 
+def test_a_station_in_the_middle_of_a_corridor_sends_robots_both_ways() -> None:
+    corridor = "arena.polygon=[[0.0,0.0],[5.0,0.0],[5.0,0.7],[0.0,0.7]]"
+    result = run("sensor-coverage-narrow", 1, "inline", [corridor, "base.pose=[2.4,0.35,0.0]", "robots.count=12"])
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.99
+
+
 def scrambled(multiple: int, straight: tuple[int, ...]) -> Callable[[int, Link], Link]:
     """Turn the frame of every robot, each by some switches of the touch ring, but for the `straight`."""
 

@@ -21,6 +21,11 @@ from zwerm.world.maps import read_map
 Space: TypeAlias = Polygon | MultiPolygon
 T = TypeVar("T")
 
+# A gap that is exactly as wide as it must be is open.
+_NARROWER = 1.0 - 1e-6
+# Right-angled corners stay as they are; sharper ones lose their tips.
+_CORNER = 1.5
+
 _SOURCES = ("size_m", "polygon", "wkt", "geojson", "map")
 
 
@@ -52,10 +57,24 @@ def read_shape(table: ArenaTable, folder: Path) -> tuple[Space, list[LineString]
         if factor != 1.0:
             raise ScenarioError([f"arena.scale: expected none beside free_area_m2, got {factor:g}"])
         factor = math.sqrt(table.free_area_m2 / free.area)
-    if factor == 1.0:
-        return free, walls
-    by = {"xfact": factor, "yfact": factor, "origin": (0.0, 0.0)}
-    return scale(free, **by), [scale(wall, **by) for wall in walls]
+    if factor != 1.0:
+        by = {"xfact": factor, "yfact": factor, "origin": (0.0, 0.0)}
+        free, walls = scale(free, **by), [scale(wall, **by) for wall in walls]
+    if table.passage_m is not None:
+        start = None if table.start is None else shapely.Point(factor * table.start[0], factor * table.start[1])
+        free = _passable(free, table.passage_m, start)
+    return free, walls
+
+
+def _passable(free: Space, passage_m: float, start: shapely.Point | None) -> Polygon:
+    """Return the part of free space that a disc of a diameter can get about in, with the corners that it does not fill."""
+    inner = shapely.buffer(free, -_NARROWER * passage_m / 2.0)
+    if inner.is_empty:
+        raise ScenarioError([f"arena.passage_m: expected some place that is wider, got {passage_m:g}"])
+    parts = shapely.get_parts(inner)
+    kept = max(parts, key=lambda each: each.area) if start is None else min(parts, key=start.distance)
+    grown = shapely.buffer(kept, passage_m / 2.0, join_style="mitre", mitre_limit=_CORNER)
+    return max(shapely.get_parts(shapely.intersection(grown, free)), key=lambda each: each.area)
 
 
 def _space(table: ArenaTable, folder: Path) -> Space:

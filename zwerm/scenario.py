@@ -78,10 +78,9 @@ class TimeTable(Table):
 class ArenaTable(Table):
     """The space robots live in: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
 
-    `map` is a ROS map_server YAML, or a bitmap (dark is wall), which needs `resolution_m`, or `size_m` to stretch it to;
-    `start` is a place [m] in the part of the map to keep, else the largest is. Paths are relative to the scenario.
-    `scale` multiplies every length of this table; or `free_area_m2` says how much free space there shall be after scaling.
-    """
+    `map` is a ROS map_server YAML, or a bitmap (dark is wall) with `resolution_m` or `size_m`; `start` is a place [m] in the
+    part to keep, else the largest is. Paths are relative to the scenario. `scale` multiplies all lengths, or `free_area_m2`
+    is the free space after scaling. Then gaps narrower than `passage_m` are closed, and what lies behind them is left out."""
 
     size_m: Size | None = None
     polygon: list[Point] | None = Field(default=None, min_length=3)
@@ -92,6 +91,7 @@ class ArenaTable(Table):
     start: Point | None = None
     scale: Positive = 1.0
     free_area_m2: Positive | None = None
+    passage_m: Positive | None = None
     obstacles: list[Annotated[list[Point], Field(min_length=3)]] = []
     walls: list[Annotated[list[Point], Field(min_length=2)]] = []
 

@@ -29,14 +29,14 @@ Hole = tuple[Corner, ...]
 
 
 def holes(views: Views, complex_: FlagComplex) -> list[Hole]:
-    """Return the holes of the complex, each as a shortest way close around it; `views` are directions in one frame."""
+    """Return the holes of the complex, each as a shortest way around it; `views` are directions in one frame."""
     found = []
     for cycle in hole_cycles(complex_):
         for way in (cycle, cycle[::-1]):
             corners = _corners(views, way)
             # The turns of the way around what is on the left come to one to the left.
             if math.pi < sum(math.pi - each.width_rad for each in corners) < 3.0 * math.pi:
-                found.append(_tightened(corners, views, complex_))
+                found.append(corners)
     return found
 
 
@@ -50,7 +50,7 @@ def _corners(views: Views, way: Sequence[int]) -> Hole:
 def _tightened(hole: Hole, views: Views, complex_: FlagComplex) -> Hole:
     """Return a way as long around the same hole, with no place inside that three of its corners in a row see.
 
-    What was met at the middle one of those, or at such a place, need not be in the hole: it may be in their triangles.
+    What such a place met need not be in the hole: it may be in the triangles that it makes with those.
     """
     left = {place: None for place in complex_.vertices if all(place != each.place for each in hole)}
     at = 0
@@ -79,8 +79,10 @@ def is_bare(hole: Hole, views: Views, complex_: FlagComplex, met: Callable[[int]
 
     A robot within the hole, whom at least two around it see there and none elsewhere, may have met it in any direction.
     """
-    if any(corner.faces(each) for corner in hole for each in met(corner.place)):
+    tight = _tightened(hole, views, complex_)
+    if any(corner.faces(each) for corner in (*hole, *tight) for each in met(corner.place)):
         return False
+    hole = tight
     inside: dict[int, list[bool]] = {}
     for corner in hole:
         for each in complex_.neighbours[corner.place]:

@@ -23,9 +23,9 @@ VERTEX_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 60, -60, 30, 
 END_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 30, -30, 60, -60, 90, -90))
 END_RAD: Final = math.radians(285.0)
 VERTEX_BESIDE_RAD: Final = math.radians(75.0)
-# What tells keys of bridges, and of last attempts, from those of gaps, whose turns are in degrees.
-BRIDGE: Final = 360
-LAST: Final = 720
+# What tells keys of bridges and last attempts from those of gaps, whose turns are numbered.
+BRIDGE: Final = 100
+LAST: Final = 200
 # A drive that a wall stopped says that much about the directions beside it.
 BLOCKED_RAD: Final = math.radians(20.0)
 
@@ -171,27 +171,30 @@ class Planner:
         movers = [each for each in self._complex.vertices if each not in self._bases]
         for i, a, _, gap in wedges(self._views, self._complex, movers):
             end = gap > END_RAD
-            for turn in END_TURNS_RAD if end else VERTEX_TURNS_RAD:
+            for number, turn in enumerate(END_TURNS_RAD if end else VERTEX_TURNS_RAD):
                 # The bisector first; aside only as far as the gap is wide.
                 direction = self._views[i][a] + gap / 2.0 + turn
-                key = (i, a, 0, round(math.degrees(turn)))
+                key = (i, a, 0, number)
                 if gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD or key in self.tried.closed or self._walled(i, direction):
                     continue
                 if any(_apart(each, direction) < BLOCKED_RAD for each in self.tried.blocked.get(i, ())):
                     continue
                 yield Plan(key, i, direction, hop, self._rules.clear_vertex_m, (i,))
 
-    def _last_plans(self) -> Iterable[Plan]:
-        """Yield the ways on for ends of single files that a wall would stop soon: there may be a way around a corner."""
+    def _last_plans(self) -> Iterator[Plan]:
+        """Yield what is left where nothing else is: ways on from stations, and around corners from ends of single files."""
         hop = self._rules.link_m - self._rules.margin_m
         for i, a, _, gap in wedges(self._views, self._complex):
-            if i in self._bases or gap < END_RAD:
+            station = i in self._bases
+            if not station and len(self._complex.neighbours[i]) > 1:
                 continue
-            for turn in END_TURNS_RAD:
+            clear = self._rules.clear_vertex_m if station else self._rules.clear_end_m
+            for number, turn in enumerate(END_TURNS_RAD):
                 direction = self._views[i][a] + gap / 2.0 + turn
-                key = (i, a, 0, LAST + round(math.degrees(turn)))
-                if key not in self.tried.closed and not self._walled(i, direction):
-                    yield Plan(key, i, direction, hop, self._rules.clear_end_m, (i,))
+                key = (i, a, 0, LAST + number)
+                beside = gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD
+                if not beside and key not in self.tried.closed and not self._walled(i, direction):
+                    yield Plan(key, i, direction, hop, clear, (i,))
 
     def _walled(self, place: int, direction: float) -> bool:
         return any(_apart(each, direction) < SIXTY_RAD for each in self._places.walls.get(place, ()))
