@@ -28,6 +28,7 @@ class Gradient:
     def __init__(self) -> None:
         self.route: Route | None = None
         self.version = 0
+        self.homes: dict[int, int] = {}  # place: how many hops it is to the base
         self._numbers: dict[int, int] = {}  # robot: the newest of its words
         self._ways: dict[int, Route | None] = {}  # place: the way that begins there
         self._ended: dict[int, int] = {}  # place: until when it was at the frontier, the newest last
@@ -39,6 +40,7 @@ class Gradient:
         self._numbers[sender] = way.number
         for place, tick in way.ended:
             self._end(place, tick)
+        self.homes[way.place] = way.home
         if way.place != NOWHERE and self._ways.get(way.place) != way.route:
             self._ways[way.place] = way.route
             self.version += 1

@@ -44,7 +44,6 @@ class Reserve:
         self._offer_at: int | None = None
         self._wait_ticks = OFFER_TICKS
         self._called: int | None = None
-        self._known = -1
 
     def read(self, errand: Errand) -> None:
         """Take in a letter, and pass it on."""
@@ -77,12 +76,7 @@ class Reserve:
     def turn(self) -> None:
         """Offer, if it is time to, and send what waits for a way."""
         robot, vicinity = self._robot, self._robot.vicinity
-        if vicinity.version != self._known:
-            home = _home(vicinity)
-            if home != vicinity.home:
-                vicinity.home = home
-                vicinity.change()
-            self._known = vicinity.version
+        vicinity.home = _home(vicinity)
         if not vicinity.spare:
             self._offer_at, self._wait_ticks = None, OFFER_TICKS
         elif self._offer_at is None:
@@ -116,11 +110,13 @@ class Reserve:
 
 
 def _home(vicinity: Vicinity) -> int:
-    """Return how many hops it is to the base, by what neighbours say."""
-    return 0 if vicinity.place == 0 else min([FAR, *(1 + state.home for state in vicinity.mutual().values())])
+    """Return how many hops it is to the base, by what neighbours said last."""
+    homes = vicinity.gradient.homes
+    return 0 if vicinity.place == 0 else min([FAR, *(1 + homes.get(s.place, FAR) for s in vicinity.mutual().values())])
 
 
 def _homeward(vicinity: Vicinity) -> int | None:
     """Return the neighbour that is nearest to the base."""
-    found = min(((state.home, node) for node, state in vicinity.mutual().items()), default=None)
+    homes = vicinity.gradient.homes
+    found = min(((homes.get(state.place, FAR), node) for node, state in vicinity.mutual().items()), default=None)
     return found[1] if found is not None and found[0] < FAR else None

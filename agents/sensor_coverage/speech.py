@@ -87,6 +87,7 @@ class Speech:
     def _now(self, tick: int, vicinity: Vicinity) -> Way:
         """Return the way as it is now."""
         self._way_at = tick
-        if (self._way.place, self._way.route) != (vicinity.place, vicinity.route):
-            self._way = Way(self._way.number + 1, vicinity.place, vicinity.route, vicinity.gradient.ended)
+        place, route, home = vicinity.place, vicinity.route, vicinity.home
+        if (self._way.place, self._way.route, self._way.home) != (place, route, home):
+            self._way = Way(self._way.number + 1, place, route, vicinity.gradient.ended, home)
         return self._way

@@ -180,7 +180,7 @@ class Vicinity(Sight):
     # --- what this robot says ---------------------------------------------------------------------------------------
 
     def state(self, waiting: bool) -> State:
-        """Return what to tell everyone, but for numbers and the way."""
+        """Return what to tell everyone, but for numbers, the way, and how far the base is."""
         heading = self.heading
         seen: tuple[Seen, ...] = ()
         if heading is not None:
@@ -200,7 +200,6 @@ class Vicinity(Sight):
             tuple(sorted({(trying.other_end(each.key, self.place), each.key[2]) for each in self.plans})),
             UNSAID,
             self.spare,
-            self.home,
         )
 
     # --- places change hands ----------------------------------------------------------------------------------------

@@ -65,13 +65,15 @@ class Route(_Part, frozen=True):
 class Way(_Message, frozen=True, tag="w"):
     """The way from a place, by who stands there; `number` counts what the sender says of ways.
 
-    `ended`: places, the newest last, that are not at the frontier any more as they were at a tick.
+    `ended`: places, the newest last, that are not at the frontier any more as they were at a tick. `home` is how many hops it
+    is to the base (FAR: not known).
     """
 
     number: int
     place: int
     route: Route | None
     ended: tuple[tuple[int, int], ...] = ()
+    home: int = FAR
 
 
 # What was said of ways before anything was.
@@ -83,7 +85,7 @@ class State(_Message, frozen=True, tag="s"):
 
     `number` counts its states, `epoch` its drives, `samples` how often it has looked around. `could` are the sides, as
     (other place, sign), that it could expand. `waiting`: it stands at the base, ready to go. `spare`: it has left the
-    complex, and stands at its place no more but in body. `home` is how many hops it is from the base (FAR: not known).
+    complex, and stands at its place no more but in body.
     """
 
     number: int
@@ -97,7 +99,6 @@ class State(_Message, frozen=True, tag="s"):
     could: tuple[tuple[int, int], ...]
     way: Way
     spare: bool = False
-    home: int = FAR
 
 
 class Ask(_Message, frozen=True, tag="a"):
