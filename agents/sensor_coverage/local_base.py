@@ -206,9 +206,9 @@ class LocalBase(LocalRobot):
             self._edges_since = self.tick
         self.cycles += tried or done
         self.pushes += done
+        self._tell_numbers()
         if self._first and tried and not done:
             self.outcome = "source-blocked: no robot gets away from the base"
-            self._tell_numbers()
 
     def _read(self, sender: int, body: Body) -> None:
         if isinstance(body, Token):

@@ -44,6 +44,7 @@ class Sight:
         self.version = 0
         self.states: dict[int, State] = {}
         self.heard: dict[int, int] = {}  # node: tick
+        self._heard_in: dict[int, int] = {}  # node: this robot's drive then
         self.seen: dict[int, Sighting] = {}
         self._headings = 0
         self._awaited: dict[int, int] = {}  # places beside this one that change hands, and since when
@@ -62,6 +63,7 @@ class Sight:
         """Take in a neighbour's state; tell whether its bearing so far holds no more."""
         known = self.states.get(sender)
         self.heard[sender] = tick
+        self._heard_in[sender] = self.epoch
         if known is not None and state.number <= known.number:
             return False
         self.change()
@@ -88,10 +90,12 @@ class Sight:
         return bool(state.epoch != known.epoch or (known.moving and not state.moving))
 
     def missed(self, sender: int, state: State) -> bool:
-        """Tell whether a state before this one was lost: its sender has stood within sight all the while."""
+        """Tell whether a state before this one was lost: neither its sender nor this robot has moved meanwhile."""
         known = self.states.get(sender)
-        stood = known is not None and sender in self.seen and not (known.moving or state.moving)
-        return stood and known is not None and state.number > known.number + 1
+        if known is None or sender not in self.seen or self._heard_in.get(sender) != self.epoch:
+            return False
+        stood = known.epoch == state.epoch and not (known.moving or state.moving)
+        return stood and state.number > known.number + 1
 
     def forget(self, node: int) -> None:
         """Forget a robot that is dead or far away."""
