@@ -77,15 +77,9 @@ class Answers:
 
     def close(self) -> tuple[list[bytes], list[tuple[int, Command | Failure]]]:
         """End the tick: return the bytes that each node that was asked said, in order, and all answers, late ones first."""
-        payloads: list[bytes] = []
-        answers, heard = self._late, self._heard
-        for node in self._nodes:
-            if node in heard:
-                payload, answer = heard[node]
-                payloads.append(payload)
-                answers.append((node, answer))
-            else:
-                payloads.append(NO_ANSWER)
+        heard = self._heard
+        payloads = [heard[node][0] if node in heard else NO_ANSWER for node in self._nodes]
+        answers = self._late + [(node, heard[node][1]) for node in self._nodes if node in heard]
         self._late = []
         self.ask((), self._tick + 1)
         return payloads, answers

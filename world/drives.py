@@ -4,7 +4,7 @@ A commanded drive persists until the next one. It takes effect a fixed number of
 (the body's actuation latency), is disturbed by noise, drawn anew every tick, and is then clamped to what the motors can do.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from itertools import chain
 from typing import Final
 
@@ -46,11 +46,10 @@ class Drives:
         else:
             self._limit = np.array([body.max_speed_m_s, body.max_speed_m_s, body.max_turn_rad_s])
 
-    def command(self, drives: Sequence[tuple[int, BodyVelocity | WheelSpeeds]]) -> None:
+    def command(self, drives: Mapping[int, BodyVelocity | WheelSpeeds]) -> None:
         """Take the new drives of some robots, all of this body's `kind`."""
-        axes, robots = self._axes, [robot for robot, _ in drives]
-        numbers = chain.from_iterable([msgspec.structs.astuple(drive) for _, drive in drives])
-        self._commanded[robots] = np.fromiter(numbers, np.float64, axes * len(robots)).reshape(-1, axes)
+        axes, numbers = self._axes, chain.from_iterable(map(msgspec.structs.astuple, drives.values()))
+        self._commanded[list(drives)] = np.fromiter(numbers, np.float64, axes * len(drives)).reshape(-1, axes)
 
     def stop(self, robot: int) -> None:
         """Cut a robot's motors, whatever is still on its way to them, from the next step on."""

@@ -79,12 +79,17 @@ class LockStep:
             if not arrivals:
                 self.lost += len(world.awaited())
                 raise StragglerError(world.awaited(), world.tick, straggler_s)
+            accept = world.accept
             for arrival in arrivals:
-                if self._take(arrival):
-                    missing -= 1
-                elif arrival.payload is None:
+                node, payload = arrival
+                if payload is None:
+                    self._take(arrival)
                     missing = len(world.awaited())
-                else:
+                    continue
+                try:
+                    accept(node, payload)
+                    missing -= 1
+                except ProtocolError:  # counted by the world
                     # Time that a babbling node uses up is not given back to it.
                     deadline = deadline or time.monotonic() + straggler_s
 

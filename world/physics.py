@@ -100,14 +100,18 @@ class Physics:
             return False
         # The heading in the middle of each substep, so that an arc is integrated by its chords.
         angle = self.heading[ids] + self._middle_s * turn
-        cos, sin = np.cos(angle), np.sin(angle)
-        vx, vy = forward * cos, forward * sin
-        if left is not None:
-            vx -= left * sin
-            vy += left * cos
         pushes = self._pushes
-        pushes[:, rows, 0] = vx
-        pushes[:, rows, 1] = vy
+        if angle.any():
+            cos, sin = np.cos(angle), np.sin(angle)
+            vx, vy = forward * cos, forward * sin
+            if left is not None:
+                vx -= left * sin
+                vy += left * cos
+            pushes[:, rows, 0] = vx
+            pushes[:, rows, 1] = vy
+        else:
+            pushes[:, rows, 0] = forward
+            pushes[:, rows, 1] = 0.0 if left is None else left
         pushes[:, rows, 2] = turn
         self._start[:] = pushes[0]
         # The force of substep s acts on the velocity that substep s + 1 integrates.
@@ -121,9 +125,10 @@ class Physics:
         self._poses.clear()
         batch.get_space_bodies(space, _POSE, self._poses)
         poses = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 3)[rows]
-        moved = bool((self.position[ids] != poses[:, :2]).any() or (self.heading[ids] != poses[:, 2]).any())
-        self.position[ids] = poses[:, :2]
-        self.heading[ids] = poses[:, 2]
+        place, angle = poses[:, :2], poses[:, 2]
+        moved = bool((self.position[ids] != place).any() or (self.heading[ids] != angle).any())
+        self.position[ids] = place
+        self.heading[ids] = angle
         self._resting = not moved
         return moved
 

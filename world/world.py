@@ -274,7 +274,8 @@ class World:
         before, physics = self.scene, self._physics
         moved: Bools = np.zeros(self.count, dtype=np.bool_)
         if physics.advance(*self._drives.velocities(self.tick)):
-            moved = (physics.position != before.position).any(axis=1) | (physics.heading != before.heading)
+            x, y = (physics.position != before.position).T
+            moved = x | y | (physics.heading != before.heading)
         return self._look(moved, self.tick + 1)
 
     def _look(self, moved: Bools, tick: int) -> Scene:
@@ -377,13 +378,13 @@ class World:
                 self._wakes.note_readings(field, watchers, self._read(sensor, self.scene, watchers), self.tick)
 
     def _apply(self, answers: list[tuple[int, Command | Failure]]) -> None:
-        drives: list[tuple[int, BodyVelocity | WheelSpeeds]] = []
+        drives: dict[int, BodyVelocity | WheelSpeeds] = {}
         done = self._done
         for node, answer in answers:
             if type(answer) is not Command:
                 continue
             if answer.drive is not None:
-                drives.append((node, answer.drive))
+                drives[node] = answer.drive
             if answer.outbox:
                 self._outboxes.append((node, answer.outbox))
             if answer.wake is not None:

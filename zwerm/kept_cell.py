@@ -31,7 +31,9 @@ class KeptCell:
     """
 
     def __init__(self) -> None:
-        self._counts: tuple[int, int] | None = None  # neighbours and walls when the order was found, if one was
+        self._others = (
+            self._sides
+        ) = -1  # how many neighbours and sides of the region there were when the order was found
         self._walls: list[int] = []  # the region's sides that bound the cell, by the corner they end in
         self._far_walls: list[int] = []  # those that do not
         self._far_others: list[int] = []  # the neighbours that do not
@@ -46,14 +48,14 @@ class KeptCell:
         which must have corners.
         """
         kept = None
-        if (len(others), len(region)) == self._counts:
+        if len(others) == self._others and len(region) == self._sides:
             kept = self._centroid(region, others, value, gx, gy)
         if kept is None and self._find(region, others):
             kept = self._centroid(region, others, value, gx, gy)
         if kept is not None:
             return kept
         # Outside the region, a field that is negative somewhere in the cell, a region that is not convex, and the like.
-        self._counts = None
+        self._others = -1
         cell = voronoi_cell(region, [(other.x_m, other.y_m) for other in others])
         return estimated_centroid(cell, value, gx, gy) or nearest_point(region)
 
@@ -163,7 +165,7 @@ class KeptCell:
         ]
         if len(labels) < 3:
             return False
-        self._counts = count, walls
+        self._others, self._sides = count, walls
         self._walls = sorted([label - count for label in labels if label >= count])
         self._far_walls = [end for end in range(walls) if end not in self._walls]
         self._far_others = [which for which in range(count) if which not in labels]

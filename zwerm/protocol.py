@@ -270,7 +270,12 @@ def open_answer(payload: bytes) -> Command | Failure:
         raise refusal(error) from None
     if type(answer) is Command:
         drive, wake = answer.drive, answer.wake
-        if drive is not None and not is_finite_drive(drive):
+        # Most drives are finite velocities: those are seen to be without a call.
+        if not (
+            drive is None
+            or (type(drive) is BodyVelocity and isfinite(drive.forward_m_s + drive.left_m_s + drive.turn_rad_s))
+            or is_finite_drive(drive)
+        ):
             raise ProtocolError("not-finite", repr(drive))
         if wake is not None and wake.at_s is not None and not isfinite(wake.at_s):
             raise ProtocolError("not-finite", repr(wake))

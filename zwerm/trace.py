@@ -35,8 +35,8 @@ class Trace:
         tick, nodes, observations, commands = self._newest
         self._newest = None
         parts = [self._link, b"", *observations, *commands]
-        lengths = [*map(len, observations), *map(len, commands)]
-        parts[1] = pack(f"<QQ{len(nodes)}Q{len(lengths)}I", tick, len(nodes), *nodes, *lengths)
+        count = len(nodes)
+        parts[1] = pack(f"<QQ{count}Q{2 * count}I", tick, count, *nodes, *map(len, parts[2:]))
         self._link = blake2b(b"".join(parts), digest_size=DIGEST_BYTES).digest()
 
     def hex(self) -> str:

@@ -58,12 +58,13 @@ def portions(items: Iterable[Item], ends: Ints) -> list[tuple[Item, ...]]:
     return [together[start:end] for start, end in pairwise([0, *ends.tolist()])]
 
 
-def in_body_frames(dx: Floats, dy: Floats, heading: Floats) -> tuple[Floats, Floats]:
-    """Return the vectors (dx, dy) of the arena's frame in the frames of bodies that head there [rad].
+def in_body_frames(dx: Floats, dy: Floats, heading: Floats, whose: Ints) -> tuple[Floats, Floats]:
+    """Return the vectors (dx, dy) of the arena's frame in the body frames of the robots `whose`, of (n,) headings [rad].
 
-    The headings have one row for each of the vectors, or broadcast to them.
+    There is one robot for each of the vectors, or for each column of them.
     """
     if not heading.any():
         return dx, dy
+    heading = heading.take(whose)
     cos, sin = np.cos(heading), np.sin(heading)
     return cos * dx + sin * dy, cos * dy - sin * dx

@@ -37,8 +37,8 @@ class Boundary:
 
     def read(self, scene: Scene, robots: Ints) -> list[tuple[tuple[float, float], ...]]:
         """Return the corners in the frame of each of `robots`."""
-        dx, dy = self._corners.T[:, :, None] - scene.position[robots].T[:, None, :]
-        x, y = in_body_frames(dx, dy, scene.heading[robots])
+        dx, dy = self._corners.T[:, :, None] - scene.position.take(robots, axis=0).T[:, None, :]
+        x, y = in_body_frames(dx, dy, scene.heading, robots)
         if self._sd_m > 0.0:
             corner = np.arange(len(self._corners))[:, None]
             x += self._sd_m * scene.draws.normal("sensor.boundary.x", scene.tick, robots, corner)

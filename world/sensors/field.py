@@ -36,7 +36,7 @@ class FieldSensor:
         here = scene.position[robots]
         value, gradient = self._field.sample(here)
         along_x, along_y = gradient.T
-        forward, left = in_body_frames(along_x, along_y, scene.heading[robots])
+        forward, left = in_body_frames(along_x, along_y, scene.heading, robots)
         if self._sd > 0.0:
             value = value + self._sd * scene.draws.normal("sensor.field.value", scene.tick, robots)
         if self._gradient_sd_per_m > 0.0:

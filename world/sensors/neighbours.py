@@ -49,7 +49,7 @@ class Neighbours:
         observer, seen, ends = self._sightings(scene, robots)
         here = scene.position.view(np.complex128)[:, 0]  # so that x and y are looked up at once
         apart = here.take(seen) - here.take(observer)
-        x, y = in_body_frames(apart.real, apart.imag, scene.heading.take(observer))
+        x, y = in_body_frames(apart.real, apart.imag, scene.heading, observer)
         if self._sd_m > 0.0:
             x += self._sd_m * scene.draws.normal("sensor.neighbours.x", scene.tick, observer, seen)
             y += self._sd_m * scene.draws.normal("sensor.neighbours.y", scene.tick, observer, seen)
