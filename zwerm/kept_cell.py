@@ -31,9 +31,8 @@ class KeptCell:
     """
 
     def __init__(self) -> None:
-        self._others = (
-            self._sides
-        ) = -1  # how many neighbours and sides of the region there were when the order was found
+        # How many neighbours and sides of the region there were when the order was found.
+        self._others = self._sides = -1
         self._walls: list[int] = []  # the region's sides that bound the cell, by the corner they end in
         self._far_walls: list[int] = []  # those that do not
         self._far_others: list[int] = []  # the neighbours that do not
