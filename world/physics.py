@@ -13,7 +13,7 @@ import pymunk
 from pymunk import batch
 
 from zwerm.scenario import BodyTable
-from zwerm.world.scene import Floats, Ints
+from zwerm.world.scene import Bools, Floats, Ints
 
 # Sweeps of the contact solver a substep: discs in the plane seldom touch more than a few others.
 _SWEEPS: Final = 4
@@ -87,8 +87,9 @@ class Physics:
         self._resting = False
         self._arranged = True
 
-    def advance(self, forward_m_s: Floats, left_m_s: Floats | None, turn_rad_s: Floats) -> bool:
-        """Integrate one tick under the drives (n,), by robot id; return whether any robot moved."""
+    def advance(self, forward_m_s: Floats, left_m_s: Floats | None, turn_rad_s: Floats) -> Bools:
+        """Integrate one tick under the drives (n,), by robot id; return (n,) which robots moved."""
+        moved: Bools = np.zeros(len(self.position), dtype=np.bool_)
         if not self._arranged:
             self._arrange()
         ids, rows = self._ids, self._rows
@@ -97,7 +98,7 @@ class Physics:
         left = None if left_m_s is None else left_m_s[ids]
         idle = self._resting and not (forward.any() or turn.any() or (left is not None and left.any()))
         if idle:
-            return False
+            return moved
         # The heading in the middle of each substep, so that an arc is integrated by its chords.
         angle = self.heading[ids] + self._middle_s * turn
         pushes = self._pushes
@@ -126,10 +127,11 @@ class Physics:
         batch.get_space_bodies(space, _POSE, self._poses)
         poses = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 3)[rows]
         place, angle = poses[:, :2], poses[:, 2]
-        moved = bool((self.position[ids] != place).any() or (self.heading[ids] != angle).any())
+        x, y = (self.position[ids] != place).T
+        moved[ids] = x | y | (self.heading[ids] != angle)
         self.position[ids] = place
         self.heading[ids] = angle
-        self._resting = not moved
+        self._resting = not moved.any()
         return moved
 
 

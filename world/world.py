@@ -271,11 +271,7 @@ class World:
 
     def _move(self) -> Scene:
         """Move the bodies to the next tick, and return how things are then."""
-        before, physics = self.scene, self._physics
-        moved: Bools = np.zeros(self.count, dtype=np.bool_)
-        if physics.advance(*self._drives.velocities(self.tick)):
-            x, y = (physics.position != before.position).T
-            moved = x | y | (physics.heading != before.heading)
+        moved = self._physics.advance(*self._drives.velocities(self.tick))
         return self._look(moved, self.tick + 1)
 
     def _look(self, moved: Bools, tick: int) -> Scene:
