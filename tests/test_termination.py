@@ -6,6 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from zwerm.agents.contract import Setup
+from zwerm.agents.sensor_coverage.ending import Ending
 from zwerm.agents.sensor_coverage.termination import Census, Message, Tally, Wave
 
 POLL_S = 1.0
@@ -258,3 +260,17 @@ def test_a_robot_that_went_while_it_was_waited_for_does_not_stop_the_wave_but_no
 @pytest.mark.parametrize("message", [Wave(3, None, (1, 2), False), Wave(3, 4, (), True), Tally(3, 4, 5, 6, 7)])
 def test_every_message_survives_the_wire(message: Message) -> None:
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(message), type=Message) == message
+
+
+def test_a_claim_that_has_come_to_an_end_is_not_counted() -> None:
+    setup = Setup(node=0, role="base", dt_s=0.1, sensors=(), stream_key=bytes(16))
+    base = Ending(setup, np.random.Generator(np.random.Philox(1)), base=True)
+    for tick, claims in enumerate((2, 2, 0)):
+        base.note(tick, (), claims, busy=False)
+        base.letters(asks=tick in (0, 2))
+        assert base.last is not None
+        assert base.last.claims == 2
+    base.note(200, (), 0, busy=False)
+    base.letters()
+    assert base.last is not None
+    assert base.last.claims == 0

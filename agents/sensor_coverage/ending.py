@@ -21,7 +21,7 @@ class Ending:
         life = int(random.integers(LIVES))
         self._census = Census(setup.node, POLL_TICKS * setup.dt_s, WAVE_TICKS * setup.dt_s, life, base)
         self._sent: list[Sent] = []
-        self._noted: tuple[int, ...] | None = None
+        self._noted: tuple[tuple[int, ...], int] | None = None
         self._tick = 0
 
     @property
@@ -37,10 +37,10 @@ class Ending:
     def note(self, tick: int, neighbours: Collection[int], claims: int, busy: bool) -> None:
         """Take in whom the robot sees, how many frontiers it claims, and whether it has something to do; before it hears."""
         self._tick = tick
-        listed = tuple(neighbours)
-        if busy or claims or listed != self._noted:
-            self._noted = listed
-            self._census.note(listed, claims, busy)
+        noted = tuple(neighbours), claims
+        if busy or claims or noted != self._noted:
+            self._noted = noted
+            self._census.note(noted[0], claims, busy)
 
     def hear(self, sender: int, message: Message) -> None:
         """Take in what another robot says of the census."""

@@ -81,7 +81,7 @@ class Reserve:
             self._offer_at, self._wait_ticks = None, OFFER_TICKS
         elif self._offer_at is None:
             self._offer_at = robot.tick + SOON_TICKS
-        elif robot.tick >= self._offer_at and self._called is None:
+        elif self._offers(self._offer_at):
             self._offer_at = robot.tick + self._wait_ticks
             self._wait_ticks = min(2 * self._wait_ticks, OFFER_TICKS_MAX)
             self._pending.append(Offer(0, (vicinity.place,)))
@@ -93,7 +93,14 @@ class Reserve:
 
     def next_tick(self) -> int | None:
         """Return when to be looked after, at the latest."""
-        return self._robot.tick + 1 if self._pending else self._offer_at if self._called is None else None
+        if self._pending:
+            return self._robot.tick + 1
+        wanted = self._offer_at is None or self._robot.vicinity.leads
+        return self._offer_at if wanted and self._called is None else None
+
+    def _offers(self, at: int) -> bool:
+        """Tell whether it is time to offer, and there is anything to be called for."""
+        return self._robot.tick >= at and self._called is None and self._robot.vicinity.leads
 
     def _take_call(self, call: Call) -> None:
         robot, vicinity = self._robot, self._robot.vicinity
