@@ -45,6 +45,7 @@ ARMED_TICKS: Final = 300
 HOLD_TICKS: Final = 600
 LOST_TICKS: Final = 100
 CLOSE_TICKS: Final = 80
+TOLD_TICKS: Final = 4
 
 # A leader is still at its place, or back, if it is seen that near to the place's direction [rad].
 BACK_RAD: Final = 0.3
@@ -100,8 +101,6 @@ class Push:
                 self._behind_settled = True
             case Done():
                 self._close(body)
-            case Token():
-                pass
 
     def hear_gone(self) -> None:
         """The leader is gone."""
@@ -285,6 +284,9 @@ class Push:
                 self._correct(self._anchors)
             case "await" if waited > self._patience(self._index + 1):
                 self._close(Done(self.id))
+            case "telling" if self._index and waited > TOLD_TICKS and self._back not in self._host.bearings:
+                self._host.post.drop(self.id)  # out of reach; it finds out by itself that it is over
+                self.over = True
             case "closing":
                 leads = self._index == len(self._chain) - 1  # others hear of its drive's end first
                 if (self._host.clear and waited > leads) or waited > CLOSE_TICKS:
@@ -297,7 +299,7 @@ class Push:
         match self.phase:
             case "link":
                 return self.since + LINK_TICKS + 1
-            case "holding" | "closing":
+            case "holding" | "closing" | "telling":
                 return self._host.tick + 1
             case "there" | "await":
                 return max(self._host.tick + 1, self.since + self._patience(self._index + 1) + 1)
