@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from zwerm.agents.sensor_coverage.gradient import Gradient
+from zwerm.agents.sensor_coverage.gradient import RENEW_TICKS, Gradient
 from zwerm.agents.sensor_coverage.words import Route, Way, read, write
 from zwerm.frontier.paths import reach
 from zwerm.simplicial import Edge, FlagComplex, edge
@@ -301,6 +301,18 @@ def test_who_claims_something_else_ends_what_it_claimed_before() -> None:
     assert (robot.route, robot.ended) == (Route(1000.0, (2,), 7), ((2, 6),))
     robot.choose(2, None, {}, 9)
     assert (robot.route, robot.ended) == (None, ((2, 8),))
+
+
+def test_who_took_a_place_over_and_missed_the_end_of_its_way_is_believed_after_a_while() -> None:
+    follower, other = Gradient(), Gradient()
+    follower.hear(4, Way(1, 2, Route(0.0, (2,), 5)))
+    other.hear(4, Way(2, 2, None, ended=((2, 8),)))  # the follower has not heard that
+    follower.take_over(2, None)
+    for number, tick in ((1, 9), (2, 9 + RENEW_TICKS)):
+        follower.choose(2, 0.0, {}, tick)
+        other.hear(6, Way(number, 2, follower.route))
+        other.choose(3, None, {2: 1.0}, tick)
+        assert (other.route is not None) == (number == 2)
 
 
 def test_a_way_survives_the_wire() -> None:

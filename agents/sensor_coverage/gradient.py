@@ -18,6 +18,8 @@ from zwerm.agents.sensor_coverage.words import NOWHERE, Route, Way
 
 # The base is where ways begin: none leads through it.
 BASE: Final = 0
+# Who is at the frontier for long says so anew: who took the place over may not have heard that its way had ended.
+RENEW_TICKS: Final = 600
 # So many places that are not at the frontier any more are told of at a time.
 ENDED_MAX: Final = 6
 
@@ -56,6 +58,8 @@ class Gradient:
             if own is not None:
                 self._end(place, tick - 1)
             own = None if cost is None else Route(cost, (place,), tick)
+        elif tick - own.since > RENEW_TICKS:
+            own = Route(own.cost, (place,), tick)
         self.route = self._ways[place] = own
 
     @property
