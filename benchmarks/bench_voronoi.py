@@ -43,7 +43,7 @@ def controller(scenario: Scenario, seed: int) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--duration_s", type=float, default=5.0)
+    parser.add_argument("--duration_s", type=float, default=20.0, help="virtual time of a run; its start counts")
     arguments = parser.parse_args()
     print(
         f"best of {arguments.repeats}, the cell {'interpreted' if kept_cell.__file__.endswith('.py') else 'compiled'}"
