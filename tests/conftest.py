@@ -2,12 +2,17 @@
 
 import multiprocessing.util
 import shutil
+import signal
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from support import ROBOTS, robots_of_this_process
+
+# A shell has what it runs in the background ignore Ctrl-C, children included, and Python leaves it at that: tests that press
+# it would wait for ever.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(autouse=True)
