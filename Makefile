@@ -56,7 +56,9 @@ format: dev  ## rewrite the code in the project's format
 docs: dev  ## build the documentation into site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-bench: dev  ## run the benchmarks
+bench: dev  ## run the benchmarks, Voronoi coverage compiled where there is a C compiler
+	@if command -v cc >/dev/null && $(BIN)/python -c "import os, sys, sysconfig as s; sys.exit(not os.path.exists(s.get_path('include') + '/Python.h'))"; \
+	then $(MAKE) --no-print-directory compile; else echo "bench: Voronoi coverage is interpreted, there is no C compiler"; fi
 	@for each in benchmarks/bench_*.py; do \
 	  test -e "$$each" || continue; echo "== $$each"; $(BIN)/python "$$each" || exit 1; done
 

@@ -12,7 +12,11 @@ from zwerm.scenario import load
     [
         ("robots.parameters.link=2", "robots.parameters.link: unknown key; known are link_m, ", "drive_ticks_max"),
         ("base.parameters.link=2", "base.parameters.link: unknown key; known are link_m, ", "drive_ticks_max"),
-        ("coordinator.parameters.link=2", "coordinator.parameters.link: unknown key; known are link_m, ", "cycles_max"),
+        (
+            "coordinator.parameters.link=2",
+            "coordinator.parameters.link: unknown key; known are link_m, ",
+            "watch_until_s",
+        ),
         ("robots.parameters.samples=0", "robots.parameters.samples: expected >= 1, got 0", ""),
         ("base.parameters.samples=1.5", "base.parameters.samples: expected an integer, got 1.5", ""),
         ("coordinator.parameters.link_m=far", 'coordinator.parameters.link_m: expected a number, got "far"', ""),
