@@ -21,15 +21,12 @@ from zwerm.frontier.planner import Parameters, Planner
 from zwerm.frontier.redundancy import RelativeHomology
 from zwerm.frontier.services import Picture, Plan, Services
 from zwerm.frontier.termination import COVERED, Quiet
-from zwerm.orders import Emerged, Muster, Report, Survey
+from zwerm.orders import LIVES, Emerged, Muster, Report, Survey
 from zwerm.protocol import Command, Observation, Wake
 from zwerm.simplicial import Edge, FlagComplex
 
 # A robot that can be spared is taken before any from a base station.
 SPARED_COST: Final = -100.0
-
-# So many lives can be told apart.
-LIVES: Final = 2**16
 
 # So long it rests between surveys while it watches over what is covered.
 WATCH_TICKS: Final = 50

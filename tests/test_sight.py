@@ -11,7 +11,7 @@ from zwerm.result import RunResult
 from zwerm.running import run
 from zwerm.scenario import ArenaTable
 from zwerm.world.arena import Arena
-from zwerm.world.sight import hexagonal_packing_robots, holes, obstacles, reachable, sight_coverage_fraction
+from zwerm.world.sight import Sight, hexagonal_packing_robots, holes, obstacles, reachable
 from zwerm.world.stages import stages
 
 
@@ -20,14 +20,14 @@ def arena(**table: object) -> Arena:
 
 
 def test_a_disc_in_an_open_hall_covers_its_area() -> None:
-    found = sight_coverage_fraction(np.array([[5.0, 5.0]]), 1.0, arena(size_m=[10.0, 10.0]))
+    found = Sight(arena(size_m=[10.0, 10.0]), 1.0).fraction(np.array([[5.0, 5.0]]))
     assert found == pytest.approx(math.pi / 100.0, rel=1e-3)
 
 
 def test_what_is_behind_a_wall_is_not_covered() -> None:
     hall = arena(size_m=[2.0, 2.0], walls=[[[1.0, 0.0], [1.0, 2.0]]])
-    assert sight_coverage_fraction(np.array([[0.5, 1.0]]), 9.0, hall) == pytest.approx(0.5, abs=1e-6)
-    assert sight_coverage_fraction(np.array([[0.5, 1.0], [1.5, 1.0]]), 9.0, hall) == pytest.approx(1.0, abs=1e-6)
+    assert Sight(hall, 9.0).fraction(np.array([[0.5, 1.0]])) == pytest.approx(0.5, abs=1e-6)
+    assert Sight(hall, 9.0).fraction(np.array([[0.5, 1.0], [1.5, 1.0]])) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_what_lies_behind_a_crack_that_no_body_passes_cannot_be_reached_and_corners_can() -> None:
@@ -61,13 +61,13 @@ def test_the_shadow_of_an_obstacle_is_that_of_a_lamp() -> None:
     hall = arena(size_m=[4.0, 4.0], obstacles=[[[2.0, 1.5], [3.0, 1.5], [3.0, 2.5], [2.0, 2.5]]])
     # The wedge between the rays through the near corners, x from 2 to 4, less the square itself.
     hidden = (1.0 + 3.0) / 2.0 * 2.0 - 1.0
-    found = sight_coverage_fraction(np.array([[1.0, 2.0]]), 20.0, hall)
+    found = Sight(hall, 20.0).fraction(np.array([[1.0, 2.0]]))
     assert found == pytest.approx(1.0 - hidden / 15.0, abs=1e-6)
 
 
 def test_a_robot_that_nearly_touches_a_wall_sees_nothing_beyond_it() -> None:
     hall = arena(size_m=[4.0, 4.0], walls=[[[0.0, 2.0], [4.0, 2.0]]])
-    assert sight_coverage_fraction(np.array([[2.0, 1.999]]), 20.0, hall) == pytest.approx(0.5, abs=1e-3)
+    assert Sight(hall, 20.0).fraction(np.array([[2.0, 1.999]])) == pytest.approx(0.5, abs=1e-3)
 
 
 def test_the_ideal_packing_is_the_mean_over_many_ways_to_lay_it() -> None:
@@ -151,7 +151,7 @@ def test_a_share_of_the_arena_is_in_sight_when_it_is_said_to_be(deployed: RunRes
     assert times == sorted(times)
     for percent, time_s in zip((50, 90, 99), times, strict=True):
         before, after = (
-            sight_coverage_fraction(tracks.position[k][tracks.present[k]], 1.0, deployed.arena)
+            Sight(deployed.arena, 1.0).fraction(tracks.position[k][tracks.present[k]])
             for k in (np.searchsorted(tracks.time_s, time_s - 1.0) - 1, np.searchsorted(tracks.time_s, time_s + 1.0))
         )
         assert before < percent / 100.0 <= after

@@ -7,7 +7,8 @@ living robots in the arena but those; who sees whom is what the world knows, not
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from zwerm.simplicial import FlagComplex, betti
+from zwerm.simplicial import betti
+from zwerm.world.sight import complex_of
 from zwerm.world.visibility import Visibility
 
 if TYPE_CHECKING:
@@ -28,14 +29,8 @@ def removals(world: "World", range_m: float) -> dict[str, float]:
             out.pop(removal["in"], None)
             continue
         scene = replace(world.scene, tick=each.tick, position=each.position, present=each.present)
-        seen: dict[int, list[int]] = {
-            node: [] for node in scene.present_ids().tolist() if node not in out and node not in dead
-        }
-        for i, j in sight.pairs(scene, range_m).tolist():
-            if i in seen and j in seen:
-                seen[i].append(j)
-                seen[j].append(i)
-        whole = FlagComplex(seen)
+        members = [node for node in scene.present_ids().tolist() if node not in out and node not in dead]
+        whole = complex_of(sight.pairs(scene, range_m), members)
         count += 1
         unsafe += betti(whole) != betti(whole.without([removal["out"]]))
         out[removal["out"]] = None

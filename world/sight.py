@@ -7,7 +7,7 @@ all ways is the free area divided by that of a point's cell, and that is what is
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
@@ -46,11 +46,6 @@ class Sight:
     def fraction(self, position: Floats) -> float:
         """Return the fraction of the arena that is seen from any of position (n, 2)."""
         return min(1.0, float(self.area(position).area / self.arena.area_m2)) if len(position) else 0.0
-
-
-def sight_coverage_fraction(position: Floats, range_m: float, arena: Arena) -> float:
-    """Return the fraction of the arena that is within `range_m` and in sight of a robot at one of position (n, 2)."""
-    return Sight(arena, range_m).fraction(position)
 
 
 def reachable(arena: Arena, radius_m: float, position: Floats) -> shapely.Geometry:
@@ -100,14 +95,19 @@ def _shadow(
     return [shapely.Polygon([walls[n], walls[n + 1], rays[n + 1], rays[n]]) for n in range(pieces)]
 
 
-def holes(pairs: Ints, robots: Ints) -> int:
-    """Return the number of holes (b1) of the complex of `robots` (n,) that see each other in `pairs` (k, 2)."""
-    lists: dict[int, list[int]] = {robot: [] for robot in robots.tolist()}
+def complex_of(pairs: Ints, robots: Iterable[int]) -> FlagComplex:
+    """Return the complex of `robots` that see each other in `pairs` (k, 2)."""
+    lists: dict[int, list[int]] = {robot: [] for robot in robots}
     for i, j in pairs.tolist():
         if i in lists and j in lists:
             lists[i].append(j)
             lists[j].append(i)
-    return betti(FlagComplex(lists))[1]
+    return FlagComplex(lists)
+
+
+def holes(pairs: Ints, robots: Ints) -> int:
+    """Return the number of holes (b1) of the complex of `robots` (n,) that see each other in `pairs` (k, 2)."""
+    return betti(complex_of(pairs, robots.tolist()))[1]
 
 
 def obstacles(arena: Arena) -> int:

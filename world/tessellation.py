@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError
 
+from zwerm.world.pairs import every_pair
 from zwerm.world.scene import Floats, Ints
 
 Complexes = NDArray[np.complex128]
@@ -172,18 +173,14 @@ def _ends(p: int, q: int) -> tuple[int, int]:
     return (p, q) if p < q else (q, p)
 
 
-def _everyone(count: int) -> Ints:
-    return np.column_stack(np.triu_indices(count, 1)).astype(np.int64)
-
-
 def _triangulate(position: Floats) -> tuple[_Mesh | None, Ints]:
     count = len(position)
     if count < 4:
-        return None, _everyone(count)
+        return None, np.column_stack(every_pair(count))
     try:
         found = Delaunay(position)
     except QhullError:  # all on one line, or at one place
-        return None, _everyone(count)
+        return None, np.column_stack(every_pair(count))
     triangles = found.simplices.astype(np.int64)
     a, b, c = position.view(np.complex128)[:, 0].take(triangles.T)
     clockwise = _turn(b - a, c - a) < 0.0

@@ -6,13 +6,13 @@ the work is near-linear in the robots; without one it is quadratic, and with rob
 is cubic. It knows nothing of headings, noise or radio models.
 """
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from zwerm.world.arena import Arena
+from zwerm.world.pairs import every_pair
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 
 # Robots that may hide others are tried against so many lines at a time: it bounds memory and fits the cache.
@@ -83,7 +83,7 @@ class NearPairs:
         """Return (k, 2) ids i < j of present robots at most range_m apart, ascending."""
         if range_m is None:
             ids = scene.present_ids()
-            everyone: Ints = ids[np.column_stack(_everyone(len(ids)))]
+            everyone: Ints = ids[np.column_stack(every_pair(len(ids)))]
             return everyone
         self.asked_m = max(self.asked_m, range_m)
         if range_m > self._reach_m:
@@ -97,7 +97,7 @@ class NearPairs:
         # A little too far, so that one rule, the one above, decides at the very edge.
         farther_m = reach_m * (1.0 + 1e-9)
         if len(ids) <= _FEW_ROBOTS:
-            first, second = _everyone(len(ids))
+            first, second = every_pair(len(ids))
             x, y = position.T
             apart2 = (x[second] - x[first]) ** 2 + (y[second] - y[first]) ** 2
             near = np.flatnonzero(apart2 <= farther_m**2)
@@ -194,13 +194,6 @@ class Visibility:
             reach_m = None if range_m is None else range_m + scene.radius_m
             pairs = pairs[~_hidden(scene, pairs, self._near.within(scene, reach_m))]
         return pairs
-
-
-@lru_cache(maxsize=4)
-def _everyone(count: int) -> tuple[Ints, Ints]:
-    """Return the two rows of every unordered pair of `count` things, ascending; not to be written to."""
-    first, second = np.triu_indices(count, 1)
-    return first, second
 
 
 def _hidden(scene: Scene, pairs: Ints, near: Ints) -> Bools:

@@ -36,9 +36,8 @@ class KeptCell:
         self._walls: list[int] = []  # the region's sides that bound the cell, by the corner they end in
         self._far_walls: list[int] = []  # those that do not
         self._far_others: list[int] = []  # the neighbours that do not
-        self._order: list[
-            int
-        ] = []  # the neighbours that do, then the walls, as they follow one another; the first twice
+        # The neighbours that do, then the walls, as they follow one another; the first twice.
+        self._order: list[int] = []
 
     def target(self, region: Polygon, others: Neighbours, value: float, gx: float, gy: float) -> Point:
         """Return where the robot should go: the centroid of its cell under the linear estimate value + gx x + gy y [m].

@@ -156,8 +156,9 @@ Answer = Report | Released | Emerged | Cleared | Arrived | Heard
 
 # --- how they cross the radio ---------------------------------------------------------------------------------------
 
-# The life of whom nothing is known.
+# The life of whom nothing is known; and below this there are so many others.
 UNKNOWN: Final = 0
+LIVES: Final = 2**16
 
 
 class Dispatch(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

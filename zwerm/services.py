@@ -26,7 +26,7 @@ class ServicesTable(BaseModel):
 
     @property
     def spares(self) -> str:
-        """Who finds redundant robots: whoever finds the path where nothing else is said, and no robot does so far."""
+        """Who finds redundant robots: where nothing else is said a coordinator that finds the path, and else nobody."""
         return self.redundancy or ("coordinator" if self.path == "coordinator" else "none")
 
     @property

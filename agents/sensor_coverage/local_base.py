@@ -13,7 +13,6 @@ from zwerm.agents.sensor_coverage.words import (
     End,
     Offer,
     State,
-    Take,
     Token,
     Word,
 )
@@ -222,8 +221,6 @@ class LocalBase(LocalRobot):
                 self._end(True, True)
             elif isinstance(body, End):
                 self._end(body.tried, body.done)
-        elif isinstance(body, Take):
-            pass
 
     def _hear(self, sender: int, word: Word) -> None:
         new = isinstance(word, State) and sender not in self.vicinity.states

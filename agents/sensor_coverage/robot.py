@@ -17,6 +17,7 @@ from zwerm.agents.sensor_coverage.duty import Duty
 from zwerm.agents.sensor_coverage.homing import Offset, Vector, offset, slid, unit
 from zwerm.agents.sensor_coverage.senses import Senses
 from zwerm.orders import (
+    LIVES,
     Answer,
     Arrived,
     Cleared,
@@ -41,9 +42,6 @@ NOISE_MIN_RAD = 1e-5
 
 # Who was pushed aside needs not that long to go back; who cannot must still answer a survey in time.
 RETURN_TICKS_MAX = 20
-
-# So many lives can be told apart.
-LIVES = 2**16
 
 # Who is no further from where it came out has not left.
 HOME_M = 0.05

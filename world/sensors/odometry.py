@@ -15,7 +15,7 @@ from zwerm.angles import wrap
 from zwerm.protocol import Displacement
 from zwerm.scenario import NonNegative, Table
 from zwerm.world.scene import Floats, Ints, Scene
-from zwerm.world.sensors import Surroundings
+from zwerm.world.sensors import Surroundings, in_body_frames
 
 
 class OdometryTable(Table):
@@ -51,12 +51,10 @@ class Odometry:
         self._known &= scene.present
         new = robots[~self._known[robots]]
         self._position[new], self._heading[new], self._known[new] = scene.position[new], scene.heading[new], True
-        before = self._heading[robots]
         dx, dy = (scene.position[robots] - self._position[robots]).T
-        turn = scene.heading[robots] - before
+        forward, left = in_body_frames(dx, dy, self._heading, robots)
+        turn = scene.heading[robots] - self._heading[robots]
         self._position[robots], self._heading[robots] = scene.position[robots], scene.heading[robots]
-        cos, sin = np.cos(before), np.sin(before)
-        forward, left = cos * dx + sin * dy, cos * dy - sin * dx
         if any(self._distance_noise):
             distance = np.hypot(dx, dy)
             draw = scene.draws.normal("sensor.odometry.distance", scene.tick, robots)
