@@ -24,6 +24,7 @@ PARTS: Final = {
 ALONE: Final = {
     (ROBOT, "sensor-coverage"): "zwerm.agents.sensor_coverage.local:LocalRobot",
     (BASE, "sensor-coverage"): "zwerm.agents.sensor_coverage.local_base:LocalBase",
+    (COORDINATOR, "sensor-coverage"): "zwerm.coordinator.sparing:Sparing",
 }
 
 

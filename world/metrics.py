@@ -55,7 +55,7 @@ def measure(world: "World", table: MetricsTable) -> dict[str, float]:
         found["area_coverage_fraction"] = area_coverage_fraction(position, table.coverage_radius_m, world.arena)
     if table.sight_range_m is not None:
         found |= _sight(world, table.sight_range_m)
-        if world.scenario.services is not None and world.scenario.services.spares == "link":
+        if world.scenario.services is not None and world.scenario.services.leaving:
             found |= removals(world, table.sight_range_m)
     if world.scenario.services is not None and world.scenario.services.path == "gradient":
         found["concluded_early"] = concluded_early(world)

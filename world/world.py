@@ -91,8 +91,10 @@ class World:
         self._done: Bools = np.zeros(nodes, dtype=np.bool_)
         self._any_done = False
         stations = range(scenario.base.stations if scenario.base is not None else 0)
-        self._fixed = [*([self.coordinator] if self.coordinator is not None else []), *stations]
-        self.answers = Answers(self._drives.kind, body.kind, self._fixed, self.medium)
+        centre = [] if self.coordinator is None else [self.coordinator]
+        alone = scenario.services is not None and scenario.services.path == "gradient"
+        self._deciding = [*([] if alone else centre), *stations]
+        self.answers = Answers(self._drives.kind, body.kind, [*centre, *stations], self.medium)
         self.refused = self.answers.refused
         self._present: Bools = np.zeros(count, dtype=np.bool_)
         self._robots: Ints = np.zeros(0, dtype=np.int64)  # those that were observed last
@@ -226,10 +228,11 @@ class World:
     def completed(self) -> bool:
         """Tell whether the task is done: the coordinator says so, or the base station does, or all robots that live do.
 
-        Where there is a coordinator, it decides; else the base station, if there is one. Robots that left count as done.
+        Where there is a coordinator that finds the path, it decides; else the base station, if there is one. Robots that left
+        count as done.
         """
-        if self._fixed:
-            return bool(self._done[self._fixed[0]])
+        if self._deciding:
+            return bool(self._done[self._deciding[0]])
         if not (self._any_done or self.exited):
             return False
         over = self._done.copy()
@@ -258,7 +261,7 @@ class World:
     def _decides(self, node: int) -> bool:
         """Tell whether a node may give up for all: the coordinator, or a base station where there is none any more."""
         centre = self.coordinator
-        return node in self._fixed and (centre is None or node == centre or centre in self.dead)
+        return node in self._deciding and (centre not in self._deciding or node == centre or centre in self.dead)
 
     def _catch_up(self) -> None:
         self.trace.catch_up()

@@ -4,9 +4,8 @@ from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-# By who finds the path: who then finds fence and end, and who cannot find redundant robots.
+# By who finds the path: who then finds fence and end.
 GOES_WITH: Final = {"coordinator": "coordinator", "gradient": "local"}
-NO_SPARES: Final = {"coordinator": "link", "gradient": "coordinator"}
 
 
 class ServicesTable(BaseModel):
@@ -14,7 +13,7 @@ class ServicesTable(BaseModel):
 
     With `path` `gradient` robots find the frontier, the way to it and the end by themselves; `fence` and `termination` go with
     it. By `redundancy`, who can be spared is found by the coordinator, by relative homology; with `link` by robots, by
-    agreement among neighbours; or not at all.
+    agreement among neighbours; or not at all. A coordinator may find that alone, where robots find the path.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -30,6 +29,11 @@ class ServicesTable(BaseModel):
         return self.redundancy or ("coordinator" if self.path == "coordinator" else "none")
 
     @property
+    def leaving(self) -> bool:
+        """Whether robots leave the complex before anybody pushes from where they stand."""
+        return self.spares == "link" or (self.path, self.spares) == ("gradient", "coordinator")
+
+    @property
     def centre(self) -> bool:
         """Whether anything is the coordinator's."""
         return "coordinator" in (self.path, self.spares)
@@ -40,6 +44,6 @@ class ServicesTable(BaseModel):
             if provider not in (None, GOES_WITH[self.path]):
                 why = "a way is known to whoever knows where it ends"
                 raise ValueError(f"services.{name}: {provider!r} with path {self.path!r}: {why}")
-        if self.spares == NO_SPARES[self.path]:
-            why = "only who finds the path is told who sees whom"
+        if (self.path, self.spares) == ("coordinator", "link"):
+            why = "robots that are told their way are not told who sees whom"
             raise ValueError(f"services.redundancy: {self.spares!r} with path {self.path!r}: {why}")

@@ -66,6 +66,11 @@ class Leaving:
             self._send(agreement.depart())
 
     @property
+    def told(self) -> redundancy.Neighbours | None:
+        """What it tells of whom it sees, and under which version."""
+        return self._agreement.tell() if self._agreement is not None else None
+
+    @property
     def locked(self) -> bool:
         """Whether the robot has to stand still."""
         return self._agreement is not None and self._agreement.locked(self._now_s)
@@ -82,8 +87,11 @@ class Leaving:
         elif self._node in word.nodes:
             self._outbox.append((sender, agreement.tell()))
 
-    def turn(self, redundant: bool) -> bool:
-        """Go on; tell whether the robot leaves now. `redundant`: by all that it knows it could, and it should."""
+    def turn(self, redundant: bool, versions: tuple[tuple[int, int], ...] | None = None) -> bool:
+        """Go on; tell whether the robot leaves now.
+
+        `redundant`: by all that it knows it could, and it should. `versions`: it was told so, for these of neighbours' lists.
+        """
         agreement, tick = self._agreement, self._tick
         if agreement is None:
             return False
@@ -98,7 +106,7 @@ class Leaving:
         if self._redundant and self._try_at is None:
             self._try_at = tick + 1 + int(self._random.integers(SPREAD_TICKS))
         elif self._redundant and tick >= (self._try_at or 0):
-            self._try(agreement)
+            self._try(agreement, versions)
         if self._wanted and not agreement.wants:
             self._end()
         self._wanted = agreement.wants
@@ -123,12 +131,12 @@ class Leaving:
     def _now_s(self) -> float:
         return self._tick * self._dt_s
 
-    def _try(self, agreement: Redundancy) -> None:
-        """Ask for lists that are new, and then for locks."""
+    def _try(self, agreement: Redundancy, versions: tuple[tuple[int, int], ...] | None) -> None:
+        """Ask for lists that are new, unless it is known which to rely on, and then for locks."""
         if not self._enquiries:
-            self._unanswered = agreement.listed
+            self._unanswered = agreement.listed if versions is None else ()
         if agreement.wants or not self._unanswered:
-            self._send(agreement.ask(self._now_s))
+            self._send(agreement.ask(self._now_s, versions))
             self._try_at = self._tick + ASK_TICKS
             if not agreement.wants:
                 self._wait()

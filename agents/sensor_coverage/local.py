@@ -87,6 +87,7 @@ class LocalRobot(Robot):
         self.membership.watch(self.senses.seen)
         self.ending.note(self.tick, self.bearings, self._claims, self._occupied)
         for packet in observation.inbox:
+            self.membership.advise(packet)
             word = read(packet.payload) if packet.channel == CHANNEL and packet.sender is not None else None
             if word is not None and packet.sender is not None:
                 self._hear(packet.sender, word)
@@ -258,6 +259,7 @@ class LocalRobot(Robot):
             self._send(word, to)
         for to, letter in self.post.due(self.tick):
             self._send(letter, to)
+        self._letters += self.membership.uplink()
 
     @property
     def _takes_census(self) -> bool:

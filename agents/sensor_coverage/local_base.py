@@ -56,7 +56,7 @@ class LocalBase(LocalRobot):
         self._stays_since = 0
         self._quiet_since: int | None = None
         self._tokens = 0
-        self._spares = setup.services.get("redundancy") == "link"
+        self._spares = setup.services.get("redundancy") in ("link", "coordinator")
         self._spared_at = 0
         self._spares_until: int | None = None
         self._offers: dict[int, tuple[int, ...]] = {}  # place of a spare robot: the way there, from it

@@ -12,13 +12,17 @@ import numpy as np
 
 from zwerm.agents.contract import Setup
 from zwerm.agents.sensor_coverage import redundancy
+from zwerm.agents.sensor_coverage.counsel import Counsel
 from zwerm.agents.sensor_coverage.leaving import Leaving
 from zwerm.agents.sensor_coverage.push import Push
 from zwerm.agents.sensor_coverage.reserve import Caller, Reserve
 from zwerm.agents.sensor_coverage.words import NOWHERE, Body, Call, End, Enquire, Errand, Offer, Word
+from zwerm.counsel import CHANNEL as UPLINK
+from zwerm.counsel import Standing
 from zwerm.frontier.fence import Views, fence, wedges
 from zwerm.frontier.planner import VERTEX_BESIDE_RAD
 from zwerm.frontier.services import Picture
+from zwerm.protocol import Packet, Transmission
 from zwerm.simplicial import Edge, FlagComplex, may_leave
 
 
@@ -30,13 +34,17 @@ class Member(Caller, Protocol):
 
 
 class Membership:
-    """One robot's part. With another redundancy service than `link` nobody leaves, and all of it does nothing."""
+    """One robot's part. Where nobody finds who can be spared nobody leaves, and all of it does nothing."""
 
     def __init__(self, robot: Member, setup: Setup, random: np.random.Generator) -> None:
         self._robot = robot
         self._leaving: Leaving | None = None
-        if setup.services.get("redundancy") == "link":
+        self._counsel: Counsel | None = None
+        if setup.services.get("redundancy") in ("link", "coordinator"):
             self._leaving = Leaving(setup.node, setup.dt_s, random, setup.incarnation == 1)
+        if setup.services.get("redundancy") == "coordinator":
+            self._counsel = Counsel(setup.dt_s)
+        self._fenced: tuple[object, tuple[int, ...]] = None, ()
         self._reserve = Reserve(robot)
         self._known: tuple[object, bool] = None, False
         self._out = False
@@ -56,6 +64,11 @@ class Membership:
         if self._leaving is not None:
             self._leaving.note(self._stands)
             self._leaving.hear(sender, word)
+
+    def advise(self, packet: Packet) -> None:
+        """Take in what a coordinator says."""
+        if self._counsel is not None and packet.channel == UPLINK:
+            self._counsel.hear(self._robot.tick, packet.payload)
 
     def read(self, errand: Errand) -> None:
         """Take in a letter between the base and a robot that has left."""
@@ -77,24 +90,34 @@ class Membership:
         told: dict[str, Any] = {}
         vicinity = self._robot.vicinity
         self._leaving.note(self._stands)
-        if self._leaving.turn(self._redundant(sight)):
+        versions = None
+        if self._counsel is not None and self._leaving.told is not None:
+            versions = self._counsel.verdict(self._robot.tick, self._leaving.told.listed)
+        if self._leaving.turn(self._redundant(sight, told=versions is not None), versions):
             vicinity.stand_down()
             self._leaving.note(stands=False)
             self._out, told = True, {"removal": {"out": self._robot.node}}
         elif self._out and not vicinity.spare:
             self._out, told = False, {"removal": {"in": self._robot.node}}
         self._reserve.turn()
+        if self._counsel is not None:
+            self._counsel.note(self._robot.tick, self._standing())
         return told
 
     def letters(self) -> list[tuple[int | None, Word]]:
-        """Return what is to be sent now, with whom it is for (None: all that hear it)."""
+        """Return what is to be sent now to robots, with whom it is for (None: all that hear it)."""
         return self._leaving.letters() if self._leaving is not None else []
+
+    def uplink(self) -> list[Transmission]:
+        """Return what is to be sent now to a coordinator."""
+        return [] if self._counsel is None else [Transmission(UPLINK, each) for each in self._counsel.letters()]
 
     def next_ticks(self) -> list[int]:
         """Return when to be looked after, at the latest."""
         if self._leaving is None:
             return []
-        return [each for each in (self._leaving.next_tick(), self._reserve.next_tick()) if each is not None]
+        times = [each for each in (self._leaving.next_tick(), self._reserve.next_tick()) if each is not None]
+        return times if self._counsel is None else [*times, *self._counsel.next_ticks()]
 
     @property
     def _stands(self) -> bool:
@@ -102,8 +125,11 @@ class Membership:
         robot, vicinity = self._robot, self._robot.vicinity
         return not (vicinity.spare or vicinity.moving or robot.drives) and robot.push is None
 
-    def _redundant(self, sight: Collection[int]) -> bool:
-        """Tell whether coverage would not miss it, and somebody is wanted at the frontier."""
+    def _redundant(self, sight: Collection[int], told: bool) -> bool:
+        """Tell whether coverage would not miss it, and somebody is wanted at the frontier.
+
+        Where there is a coordinator it says so or nobody does: it is `told`, and need not find out what makes it safe.
+        """
         robot, vicinity = self._robot, self._robot.vicinity
         if vicinity.place in (0, NOWHERE) or not (self._stands and vicinity.leads and robot.clear):
             return False
@@ -111,23 +137,55 @@ class Membership:
         others = [vicinity.states.get(node) for node in sight if node not in mutual]
         if vicinity.plans or vicinity.gaps or not all(each is not None and each.waiting for each in others):
             return False
+        if self._counsel is not None and not told:
+            return False
         if self._known[0] is not vicinity.looked:
             margin_rad = vicinity.rules.corner_margin_rad
-            self._known = vicinity.looked, can_be_spared(vicinity.picture(), vicinity.place, margin_rad)
+            judge = is_within if told else can_be_spared
+            self._known = vicinity.looked, judge(vicinity.picture(), vicinity.place, margin_rad)
         return self._known[1]
+
+    def _standing(self) -> Standing | None:
+        """Return how the robot stands, for a coordinator; None as long as it has not found out."""
+        vicinity, told = self._robot.vicinity, self._leaving.told if self._leaving is not None else None
+        if told is None or not (self._stands or vicinity.spare):
+            return None
+        if vicinity.place == NOWHERE or vicinity.spare:
+            return Standing(0, told.version, told.listed, (), not vicinity.spare, False)
+        looked = vicinity.looked
+        if looked is None:
+            return None
+        if self._fenced[0] is not looked:
+            self._fenced = looked, tuple(sorted(n for p in vicinity.rim() if (n := vicinity.at(p)) is not None))
+        missed = self._known[0] is looked and not self._known[1]
+        willing = vicinity.place != 0 and not (vicinity.plans or vicinity.gaps or missed)
+        return Standing(0, told.version, told.listed, self._fenced[1], True, willing)
 
 
 def can_be_spared(picture: Picture, place: int, corner_margin_rad: float) -> bool:
-    """Tell whether a place can be left: it is not on the fence, the link criterion holds, and nobody would be sent there again.
+    """Tell whether a place can be left: it is within what is covered, and the link criterion holds."""
+    linked = _surrounded(picture, place) and may_leave(place, picture.complex_.neighbours)
+    return linked and _opens_nothing(picture, place, corner_margin_rad)
+
+
+def is_within(picture: Picture, place: int, corner_margin_rad: float) -> bool:
+    """Tell whether a place is within what is covered, and would be if it were left."""
+    return _surrounded(picture, place) and _opens_nothing(picture, place, corner_margin_rad)
+
+
+def _surrounded(picture: Picture, place: int) -> bool:
+    """Tell whether a place has triangles all around."""
+    views, complex_, _ = picture
+    return bool(complex_.neighbours[place]) and not any(True for _ in wedges(views, complex_, [place]))
+
+
+def _opens_nothing(picture: Picture, place: int, corner_margin_rad: float) -> bool:
+    """Tell whether nobody would be sent to a place again.
 
     Somebody would be where a side of an edge comes open, or a gap beside a neighbour so wide that one expands there.
     """
     views, complex_, _ = picture
     around = complex_.neighbours[place]
-    if not around or any(True for _ in wedges(views, complex_, [place])):
-        return False
-    if not may_leave(place, complex_.neighbours):
-        return False
     edges = [each for each in complex_.edges if each[0] in around and each[1] in around]
     now, then = (_open(views, each, edges, around, corner_margin_rad) for each in (complex_, complex_.without([place])))
     return all(each in now for each in then)

@@ -164,8 +164,11 @@ class Redundancy:
 
     # --- leaving ----------------------------------------------------------------------------------------------------
 
-    def ask(self, now_s: float) -> list[Sent]:
+    def ask(self, now_s: float, versions: tuple[tuple[int, int], ...] | None = None) -> list[Sent]:
         """Ask for locks, or ask again; give up once it has been too long.
+
+        `versions`: somebody has found that the criterion holds for these lists of all neighbours, ascending; else the robot
+        has to find so by those that it knows. What neighbours answer does not depend on who found it.
 
         To ask again after giving up is better left for later, and for longer each time: all who want to leave disturb each
         other.
@@ -176,10 +179,16 @@ class Redundancy:
                 return self.give_up()
             missing = tuple(each for each in wish.ask.versions if each[0] not in wish.granted)
             return [Sent(None, Ask(wish.ask.number, missing))] if missing else []
-        if not self._free_to_act(now_s) or not self.redundant():
+        if not self._free_to_act(now_s):
+            return []
+        if versions is None:
+            if not self.redundant():
+                return []
+            versions = tuple((node, self._lists[node].version) for node in self._listed)
+        elif tuple(node for node, _ in versions) != self._listed:
             return []
         self._number = _fresh(self._number, now_s)
-        ask = Ask(self._number, tuple((node, self._lists[node].version) for node in self._listed))
+        ask = Ask(self._number, versions)
         self._wish = _Wish(ask, self._version, now_s + self._lease_s / 2.0, ())
         return [Sent(None, ask)]
 

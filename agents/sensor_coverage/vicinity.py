@@ -129,6 +129,10 @@ class Vicinity(Sight):
         complex_ = FlagComplex(views)
         return Picture(views, complex_, tuple(each for each in complex_.vertices if each != me or me == 0))
 
+    def rim(self) -> tuple[int, ...]:
+        """Return the places to which an edge of the rim leads from here, as of the last plan."""
+        return tuple(b if a == self.place else a for a, b in self._planner.rim() if self.place in (a, b))
+
     def note_attempt(self, plan: Plan) -> None:
         """Take note that a plan is being tried."""
         self._planner.note_attempt(plan)

@@ -1,0 +1,79 @@
+"""What robots that find their way by themselves, and a coordinator that finds only who can be spared, say to each other.
+
+All of it crosses the uplink, under a checksum, and may get lost, come late, or twice. A robot says how it stands until it
+hears that this was noted. What it is told to rely on are versions of lists, which never come again: so an old word is either
+still true or is found out by those whose lists it names; nobody needs to know which life of the coordinator spoke.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, Final
+
+import msgspec
+from msgspec import Meta, Struct
+
+from zwerm.errors import ProtocolError
+from zwerm.frame import seal, unseal
+from zwerm.protocol import REFUSABLE
+
+CHANNEL: Final = "uplink"
+
+Count = Annotated[int, Meta(ge=0, le=2**62)]
+
+
+def _tag(class_name: str) -> str:
+    return class_name.lower()
+
+
+class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=_tag):
+    """A whole message, led by its name."""
+
+
+class Standing(_Message, frozen=True):
+    """How the sender stands in the complex.
+
+    `number` grows with everything new that it says. It sees those in `listed`, ascending, as its list of that version has it,
+    and shares an edge of the rim of what is covered with those in `fenced`. `stands`: it is one of the complex. `willing`: it
+    has no frontier, no place at a base station, and no side that would come open without it, as far as it knows.
+    """
+
+    number: Count
+    version: Count
+    listed: tuple[Count, ...]
+    fenced: tuple[Count, ...]
+    stands: bool
+    willing: bool
+
+
+class Noted(_Message, frozen=True):
+    """What the receiver said under this number has been noted."""
+
+    number: Count
+
+
+class Collect(_Message, frozen=True):
+    """The sender lacks the receiver's word."""
+
+
+class Spare(_Message, frozen=True):
+    """The receiver can be spared as long as each of its neighbours' lists is of this version; it sees nobody else."""
+
+    versions: tuple[tuple[Count, Count], ...]
+
+
+Word = Standing | Noted | Collect | Spare
+
+_encode: Final[Callable[[Word], bytes]] = msgspec.msgpack.Encoder().encode
+_decode: Final[Callable[[bytes], Word]] = msgspec.msgpack.Decoder(Word).decode
+
+
+def write(word: Word) -> bytes:
+    """Return the payload of a packet that says this."""
+    return seal(_encode(word))
+
+
+def read(payload: bytes) -> Word | None:
+    """Return what a packet says, or None where that is nothing: it was damaged on its way, or is somebody else's."""
+    try:
+        return _decode(unseal(payload))
+    except (ProtocolError, *REFUSABLE):
+        return None
