@@ -9,7 +9,20 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 from zwerm.coordinator.patience import BUSY_TICKS, Patience
-from zwerm.orders import UNKNOWN, Answer, Cleared, Dispatch, Emerged, Heard, Muster, Order, Reply, read_reply, write
+from zwerm.orders import (
+    UNKNOWN,
+    Answer,
+    Cleared,
+    Dispatch,
+    Emerged,
+    Heard,
+    Muster,
+    Order,
+    Reply,
+    Report,
+    read_reply,
+    write,
+)
 from zwerm.protocol import Packet, Transmission, Wake
 
 T = TypeVar("T")
@@ -26,6 +39,10 @@ STUCK_TIMES: Final = 3
 URGENT_TRIES: Final = 6
 # An answer is overdue after this part of the time that it may take.
 OVERDUE: Final = 4
+# A coordinator that begins anew is in haste until its first order after the muster is heard: how often it says the muster to
+# all at once, and, where things get lost, an order to one at every tick.
+MUSTER_COPIES: Final = 8
+HASTE_COPIES: Final = 3
 
 
 @dataclass
@@ -36,7 +53,7 @@ class _Open:
     ticks_max: int
     since: int  # the tick at which it was said first, or heard of first
     due: int
-    tries: int = 1  # since anything was heard
+    tries: int = 0  # since anything was heard
     heard: bool = False
     cleared: bool = False
     ping: bool = False
@@ -57,6 +74,7 @@ class Post:
         self._open: dict[int, _Open] = {}
         self._number: dict[int, int] = {}
         self._mustered: tuple[Dispatch, int] | None = None
+        self._hasty = False
 
     @property
     def tick(self) -> int:
@@ -87,16 +105,13 @@ class Post:
             return
         if reply.to_life != self._life:
             return
+        if reply.number == 0:
+            self.expect(node)
         order = self._open.get(node)
-        if order is None:
-            if reply.number == 0 and node not in self._number:
-                self.spoken[node] = reply.life
-                self._number[node] = 0
-                self._mail.append((node, reply.answer))
-            return
-        if reply.number != order.said.number:
+        if order is None or reply.number != order.said.number:
             return
         self.spoken[node] = reply.life
+        self._hasty = self._hasty and reply.number == 0
         order.tries = 0
         self.patience.lossy = self.patience.lossy or reply.heard < reply.attempt
         if isinstance(reply.answer, Heard | Cleared):
@@ -110,6 +125,7 @@ class Post:
         self.patience.note(reply.attempt, reply.heard)
         self._mail.append((node, reply.answer))
         del self._open[node]
+        self._expect_seen(reply)
 
     def _hopeless(self, order: _Open) -> bool:
         """Tell whether no answer to an order will come."""
@@ -124,26 +140,38 @@ class Post:
 
     # --- out --------------------------------------------------------------------------------------------------------
 
-    def muster(self, order: Muster) -> None:
-        """Say to all who hear it that they shall answer, whoever they are."""
-        self._mustered = Dispatch(self._life, 0, 1, UNKNOWN, order), self.tick
-        self._outbox.append(Transmission("uplink", write(self._mustered[0])))
+    def muster(self, order: Muster, copies: int = 1) -> None:
+        """Say to all who hear it, so often, that they shall answer, whoever they are."""
+        said = [Dispatch(self._life, 0, attempt, UNKNOWN, order) for attempt in range(1, copies + 1)]
+        self._outbox += [Transmission("uplink", write(each)) for each in said]
+        self._mustered = said[-1], self.tick
+        self._hasty = copies > 1
 
     def expect(self, node: int) -> None:
         """Wait for a node's answer to the muster."""
         if self._mustered is not None and node not in self._number:
             self._number[node] = 0
             said, tick = self._mustered
-            self._open[node] = _Open(said, self._ticks[0], tick, tick + self.patience.again_ticks)
+            due = tick + self.patience.again_ticks
+            self._open[node] = _Open(said, self._ticks[0], tick, due, tries=said.attempt)
+
+    def _expect_seen(self, reply: Reply) -> None:
+        """Wait for the answers to the muster of all whom somebody sees that has answered it: theirs should be here too."""
+        if reply.number == 0 and isinstance(reply.answer, Report):
+            for each in reply.answer.sightings or ():
+                self.expect(each.node)
+                order = self._open.get(each.node)
+                if order is not None and order.said.number == 0 and self.patience.lossy:
+                    order.due = min(order.due, self.tick)
 
     def say(self, node: int, order: Order, drive: bool = False, ping: bool = False) -> None:
         """Send an order, and say it again until it is answered; a `ping` is said once."""
         number = self._number[node] = self._number.get(node, 0) + 1
         self._mail = [each for each in self._mail if each[0] != node or isinstance(each[1], Emerged)]
-        said = Dispatch(self._life, number, 1, self.spoken.get(node, UNKNOWN), order)
+        said = Dispatch(self._life, number, 0, self.spoken.get(node, UNKNOWN), order)
         due = self.tick + self._again_ticks(self._ticks[drive])
         self._open[node] = _Open(said, self._ticks[drive], self.tick, due, ping=ping)
-        self._send(node, said)
+        self._utter(node, self._open[node])
 
     def waits_for(self, node: int) -> bool:
         """Tell whether an order of a node is not answered yet."""
@@ -157,11 +185,9 @@ class Post:
         """Return what was said since the last time, and what is to be said again."""
         for node, order in self._open.items():
             if self.tick >= order.due and not order.ping:
-                said = order.said
-                order.said = Dispatch(said.life, said.number, said.attempt + 1, said.to_life, said.order)
-                order.tries += 1
-                order.due = self.tick + (1 if order.tries > URGENT_TRIES else self.patience.again_ticks)
-                self._send(node, order.said)
+                self._utter(node, order)
+                urgent = order.tries > URGENT_TRIES or self._copies > 1
+                order.due = self.tick + (1 if urgent else self.patience.again_ticks)
         outbox, self._outbox = tuple(self._outbox), []
         return outbox
 
@@ -170,11 +196,23 @@ class Post:
         due = [order.since + order.ticks_max if order.ping else order.due for order in self._open.values()]
         return min(due) * self._dt_s if due else None
 
-    def _send(self, node: int, said: Dispatch) -> None:
-        self._outbox.append(Transmission("uplink", write(said), node))
+    def _utter(self, node: int, order: _Open) -> None:
+        """Say an order, as often as haste wants."""
+        for _ in range(1 if order.ping else self._copies):
+            said = order.said
+            order.said = Dispatch(said.life, said.number, said.attempt + 1, said.to_life, said.order)
+            order.tries += 1
+            self._outbox.append(Transmission("uplink", write(order.said), node))
+
+    @property
+    def _copies(self) -> int:
+        """How many copies an order to one has."""
+        return HASTE_COPIES if self._hasty and self.patience.lossy else 1
 
     def _again_ticks(self, ticks_max: int) -> int:
         """Return after how long an order is said again: if nothing ever got lost, only when its answer is overdue."""
+        if self._copies > 1:
+            return 1
         return self.patience.again_ticks if self.patience.lossy else ticks_max // OVERDUE
 
     # --- waiting ----------------------------------------------------------------------------------------------------

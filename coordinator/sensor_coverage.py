@@ -10,7 +10,7 @@ from typing import Any, Final, Protocol
 
 import msgspec
 
-from zwerm.coordinator.post import Post, Story, together
+from zwerm.coordinator.post import MUSTER_COPIES, Post, Story, together
 from zwerm.coordinator.pushing import Moved, Pushing
 from zwerm.coordinator.sources import Sources
 from zwerm.draws import stream
@@ -64,6 +64,10 @@ class Setup(Protocol):
     def services(self) -> dict[str, str]:
         """Who provides which service."""
 
+    @property
+    def incarnation(self) -> int:
+        """How often it has begun."""
+
 
 class SensorCoverage:
     """Fills an unknown space with robots, from what they tell by radio (Ramaithitima et al. 2015, algorithm 1)."""
@@ -90,6 +94,7 @@ class SensorCoverage:
         self.redundant: tuple[int, ...] = ()
         self.outcome = ""
         self.cycle = 0
+        self._anew = setup.incarnation > 1
         self._spares = setup.services.get("redundancy", "coordinator") == "coordinator"
         self._spared_at = 0
         self._silent: dict[int, None] = {}
@@ -124,7 +129,7 @@ class SensorCoverage:
 
     def _tell(self) -> Story[None]:
         moved: Moved = ()
-        self.post.muster(Muster(1))
+        self.post.muster(Muster(1), MUSTER_COPIES if self._anew else 1)
         while self.cycle < self.parameters.cycles_max and not self.outcome:
             self.cycle += 1
             yield from self._survey(moved)

@@ -9,7 +9,7 @@ from zwerm.agents.node import Node
 from zwerm.agents.sensor_coverage.duty import COPIES_MAX, Duty
 from zwerm.assembly import assemble
 from zwerm.coordinator.patience import BURST_TRIES, Patience
-from zwerm.coordinator.post import Post
+from zwerm.coordinator.post import HASTE_COPIES, MUSTER_COPIES, Post
 from zwerm.coordinator.sensor_coverage import SensorCoverage
 from zwerm.deploy.cast import cast, recast
 from zwerm.link.memory import MemoryLink
@@ -20,11 +20,13 @@ from zwerm.orders import (
     Dispatch,
     Emerged,
     Heard,
+    Muster,
     Order,
     Release,
     Released,
     Reply,
     Report,
+    Sighting,
     Survey,
     read_dispatch,
     read_reply,
@@ -162,6 +164,47 @@ def test_without_a_loss_an_order_is_said_once_until_it_is_overdue_and_after_the_
     assert [desk.turn() for _ in range(4)] == [[(9, 2, 2)], [], [(9, 2, 3)], []]
 
 
+def mustered() -> Desk:
+    """Return the desk of a coordinator that has begun anew, a tick after its muster, with one station."""
+    desk = Desk()
+    desk.post.muster(Muster(1), MUSTER_COPIES)
+    desk.post.expect(0)
+    assert desk.turn() == [(None, 0, attempt) for attempt in range(1, MUSTER_COPIES + 1)]
+    return desk
+
+
+SEES_4 = Report(1, (Sighting(4, 0.0),), ())
+
+
+def test_after_a_muster_whoever_is_seen_is_asked_at_once_and_in_copies_where_something_was_lost() -> None:
+    desk = mustered()
+    asked = desk.turn((9, answered(0, SEES_4, attempt=MUSTER_COPIES, heard=5)))
+    assert asked == [(node, 0, MUSTER_COPIES + copy) for node in (0, 4) for copy in (1, 2, 3)]
+    assert desk.turn((0, answered(0, REPORT, heard=1)), (4, answered(0, REPORT, heard=1))) == []
+    desk.post.say(9, AHEAD, drive=True)
+    assert desk.turn() == [(9, 1, attempt) for attempt in range(1, 2 * HASTE_COPIES + 1)]
+    assert desk.turn((9, answered(1, Heard(), attempt=6, heard=2))) == []
+    desk.say(4, AHEAD)  # once: there is no haste any more
+
+
+def test_where_nothing_is_lost_no_order_after_a_muster_has_copies() -> None:
+    desk = mustered()
+    every = answered(0, SEES_4, attempt=MUSTER_COPIES, heard=MUSTER_COPIES)
+    assert desk.turn(*((node, every) for node in (9, 0, 4))) == []
+    desk.say(9, AHEAD)
+    assert [desk.turn() for _ in range(18)] == [[]] * 18
+
+
+def test_to_have_heard_a_muster_is_no_answer_to_it() -> None:
+    desk = mustered()
+    heard = [(node, answered(0, Heard(), attempt=MUSTER_COPIES, heard=MUSTER_COPIES)) for node in (0, 9)]
+    assert desk.turn(*heard) == []
+    assert desk.post.rest() == []
+    assert desk.post.waits_for(9)
+    desk.turn((9, answered(0, REPORT, attempt=MUSTER_COPIES, heard=MUSTER_COPIES)))
+    assert desk.post.rest() == [(9, REPORT)]
+
+
 def test_who_is_on_the_way_is_asked_less_often() -> None:
     desk = Desk()
     desk.post.patience.note(2, 1)
@@ -265,7 +308,20 @@ def resumed(result: RunResult, from_s: float) -> None:
     assert result.metrics["robots_released"] == result.metrics["robots_deployed"] - 1
 
 
-@pytest.mark.parametrize(("at_s", "more"), [(27.3, ()), (33.3, ()), (47.5, ("robots.sensors.0.sd_rad=0.0436332",))])
+NOISE = "robots.sensors.0.sd_rad=0.0436332"
+
+
+@pytest.mark.parametrize(
+    ("at_s", "more"),
+    [
+        (27.3, ()),
+        (33.3, ()),
+        (47.5, (NOISE,)),
+        (27.3, ("uplink.loss=0.5",)),
+        (33.3, ("uplink.loss=0.5",)),
+        (58.4, ("uplink.loss=0.5", NOISE)),
+    ],
+)
 def test_a_coordinator_that_begins_anew_goes_on_within_two_seconds(at_s: float, more: tuple[str, ...]) -> None:
     resumed(run("sensor-coverage", runner="inline", overrides=[*HALL, *more, crash(at_s, ", for_s=3.0")]), at_s + 3.0)
 
