@@ -168,7 +168,8 @@ class Arena:
 
     def _nearest(self, x: Floats, y: Floats, wall: Ints | slice) -> tuple[Floats, Floats]:
         px, py, ex, ey = self._px[wall], self._py[wall], self._ex[wall], self._ey[wall]
-        along = np.clip(((x - px) * ex + (y - py) * ey) / self._length2[wall], 0.0, 1.0)
+        # What np.clip does, without its detours.
+        along = np.minimum(np.maximum(((x - px) * ex + (y - py) * ey) / self._length2[wall], 0.0), 1.0)
         return px + along * ex, py + along * ey
 
 

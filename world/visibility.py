@@ -114,6 +114,7 @@ class Visibility:
     """The visible pairs of one run, remembered from scene to scene."""
 
     def __init__(self) -> None:
+        self._scene: Scene | None = None
         self._position: Floats = np.empty((0, 2))
         self._present: Bools = np.empty(0, dtype=np.bool_)
         self._verdicts = WallVerdicts()
@@ -168,12 +169,15 @@ class Visibility:
 
     def _advance(self, scene: Scene) -> None:
         """Forget what no longer holds. Positions are compared, so it does not matter which scenes were asked about."""
+        if scene is self._scene:
+            return
+        self._scene = scene
         if len(self._present) != len(scene.present):
             changed = np.ones(len(scene.present), dtype=np.bool_)
             self._verdicts = WallVerdicts()
         else:
-            changed = (scene.position != self._position).any(axis=1) & scene.present
-            changed |= scene.present != self._present
+            x, y = (scene.position != self._position).T
+            changed = ((x | y) & scene.present) | (scene.present != self._present)
         if not changed.any():
             return
         self._near = NearPairs(self._near.asked_m)

@@ -38,7 +38,7 @@ class Wakes:
         self._on_packet: Bools = np.zeros(count, dtype=np.bool_)
         self._watching: dict[str, Bools] = {field: np.zeros(count, dtype=np.bool_) for field in SIGNATURES}
         self._newest: dict[str, dict[int, Any]] = {field: {} for field in SIGNATURES}  # readings
-        self._unfiled: list[tuple[str, Sequence[int], Sequence[Any]]] = []
+        self._unfiled: dict[str, tuple[Sequence[int], Sequence[Any]]] = {}  # the newest, of those observed together
         self._seen: dict[str, dict[int, Any]] = {field: {} for field in SIGNATURES}  # signatures, of those who watch
         self._asleep: dict[int, None] = {}
         self._ids: Ints = np.zeros(0, dtype=np.int64)
@@ -57,7 +57,7 @@ class Wakes:
 
     def sleep(self, node: int, wake: Wake, tick: int) -> None:
         """Put a node to sleep until `wake`; a time that has passed means the next tick."""
-        self.catch_up()
+        self._catch_up()
         due = NEVER if wake.at_s is None else float(np.ceil(wake.at_s / self._dt_s - 1e-9))
         self._due[node] = max(due, tick + 1)
         self._on_packet[node] = wake.on_packet
@@ -86,12 +86,13 @@ class Wakes:
                 self._due[node] = tick
 
     def remember(self, field: str, nodes: Sequence[int], readings: Sequence[Any]) -> None:
-        """Take note of what `nodes` observe now. The work is put off until `catch_up`, or until it is needed."""
-        self._unfiled.append((field, nodes, readings))
+        """Take note of what `nodes` observe now. As long as the same ones are awake that takes the place of what they had."""
+        if field in self._unfiled and self._unfiled[field][0] != nodes:
+            self._catch_up()
+        self._unfiled[field] = nodes, readings
 
-    def catch_up(self) -> None:
-        """Do the work that was put off: best while others work."""
-        for field, nodes, readings in self._unfiled:
+    def _catch_up(self) -> None:
+        for field, (nodes, readings) in self._unfiled.items():
             self._newest[field].update(zip(nodes, readings, strict=True))
         self._unfiled.clear()
 

@@ -175,7 +175,7 @@ class World:
         Where commands act a tick later or more, that is the motion of the bodies, and, as long as everybody is awake, what the
         same robots sense after it; `observe` takes that if nothing came between.
         """
-        self._catch_up()
+        self.trace.catch_up()
         self._move_early()
         if self._coming is not None and len(self._robots) and not (self._wakes.sleeping or self._blinding):
             self._foreseen = Foreseen(self._coming, self._robots, self._sense(self._coming, self._robots))
@@ -197,7 +197,7 @@ class World:
 
     def advance(self) -> None:
         """Apply what was accepted, in id order, and go on to the next tick."""
-        self._catch_up()
+        self.trace.catch_up()
         self._move_early()
         payloads, commands = self.answers.close()
         self._apply(self.lives.finished(commands, self.tick))
@@ -262,10 +262,6 @@ class World:
         """Tell whether a node may give up for all: the coordinator, or a base station where there is none any more."""
         centre = self.coordinator
         return node in self._deciding and (centre not in self._deciding or node == centre or centre in self.dead)
-
-    def _catch_up(self) -> None:
-        self.trace.catch_up()
-        self._wakes.catch_up()
 
     def _move_early(self) -> None:
         """Move the bodies, once a tick, if no answer to its observations has a say in that."""

@@ -50,14 +50,16 @@ class Touch:
         walls = scene.arena.walls_within(here, scene.radius_m + self._reach_m)
         # A wall thin enough to stand between two bodies in reach is in reach of both: it need not be looked for.
         others = self._visibility.sightings(scene, robots, 2.0 * scene.radius_m + self._reach_m, through_walls=True)
+        errs = self._false_negative > 0.0 or self._false_positive > 0.0
+        if not (errs or len(walls.point) or len(others.observer)):
+            return [()] * len(robots)
         row = np.concatenate([walls.point, np.searchsorted(robots, others.observer)])
         place = np.concatenate([walls.nearest, scene.position[others.seen]])
         closed = np.zeros((len(robots), len(self._switch)), dtype=np.bool_)
-        if len(row):
-            dx, dy = (place - here[row]).T
-            bearing = np.arctan2(dy, dx) - scene.heading[robots[row]]
-            closed[row, np.rint(bearing / self._sector_rad).astype(np.int64) % len(self._switch)] = True
-        if self._false_negative > 0.0 or self._false_positive > 0.0:
+        dx, dy = (place - here[row]).T
+        bearing = np.arctan2(dy, dx) - scene.heading[robots[row]]
+        closed[row, np.rint(bearing / self._sector_rad).astype(np.int64) % len(self._switch)] = True
+        if errs:
             draw = scene.draws.uniform("sensor.touch", scene.tick, robots[:, None], self._switch)
             closed ^= draw < np.where(closed, self._false_negative, self._false_positive)
         row, switch = closed.nonzero()
