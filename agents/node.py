@@ -11,6 +11,7 @@ import msgspec
 
 from zwerm.agents.contract import Setup, Stepper
 from zwerm.agents.registry import make
+from zwerm.link import Answer
 from zwerm.link.station import Radio
 from zwerm.protocol import MESSAGE_BYTES_MAX, Command, Failure, Observation, decode_observation, encode
 
@@ -19,18 +20,27 @@ ERROR_CHARS_MAX: Final = 2_000
 TRACEBACK_CHARS_MAX: Final = 10_000
 
 
-class Node:
-    """One node: its controller and the wire format around it."""
+def _nothing() -> None:
+    """Be told of a failure, and do nothing about it."""
 
-    def __init__(self, controller: str, setup: Setup) -> None:
+
+class Node:
+    """One node: its controller and the wire format around it.
+
+    `answer` returns the encoded command for one encoded observation, or the encoded Failure if the controller raises; before
+    that it calls `on_failure`. It is one function that has all it needs at hand: between two ticks of a big swarm a
+    processor forgets a robot, and what has to be looked up again is what an answer costs.
+    """
+
+    def __init__(self, controller: str, setup: Setup, on_failure: Callable[[], object] = _nothing) -> None:
         self.id = setup.node
-        self.failed = False
+        self._on_failure = on_failure
         self._controller: Stepper = make(controller, setup)
-        self._step: Callable[[Observation], Command] = self._controller.step
+        self.answer: Answer = self._answering(self._controller.step)
 
     def go_on_air(self, radio: Radio) -> None:
         """From now on hear what `radio` hears, and nothing else, and send by it what the controller sends."""
-        step, began = self._step, radio.begin
+        step, began = self._controller.step, radio.begin
 
         def step_on_air(observation: Observation) -> Command:
             began()
@@ -40,27 +50,35 @@ class Node:
                 radio.send(tick, message)
             return command
 
-        self._step = step_on_air
+        self.answer = self._answering(step_on_air)
 
-    def answer(self, payload: bytes) -> bytes:
-        """Return the encoded command for one encoded observation, or the encoded Failure if the controller raises."""
-        observation = decode_observation(payload)
-        try:
-            command = self._step(observation)
-            command.tick = observation.tick
-            answer = encode(command)
-            if len(answer) > MESSAGE_BYTES_MAX:
-                raise ValueError(f"the command takes {len(answer)} bytes, at most {MESSAGE_BYTES_MAX} are allowed")
-            return answer
-        except (Exception, SystemExit) as error:
-            self.failed = True
-            return encode(
-                Failure(
-                    observation.tick,
-                    _printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX],
-                    _printable(traceback.format_exc())[-TRACEBACK_CHARS_MAX:],
-                )
+    def _answering(self, step: Callable[[Observation], Command]) -> Answer:
+        decode, write, fail = decode_observation, encode, self._fail
+
+        def answer(payload: bytes) -> bytes:
+            observation = decode(payload)
+            tick = observation.tick
+            try:
+                command = step(observation)
+                command.tick = tick
+                said = write(command)
+                if len(said) > MESSAGE_BYTES_MAX:
+                    raise ValueError(f"the command takes {len(said)} bytes, at most {MESSAGE_BYTES_MAX} are allowed")
+                return said
+            except (Exception, SystemExit) as error:
+                return fail(tick, error)
+
+        return answer
+
+    def _fail(self, tick: int, error: BaseException) -> bytes:
+        self._on_failure()
+        return encode(
+            Failure(
+                tick,
+                _printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX],
+                _printable(traceback.format_exc())[-TRACEBACK_CHARS_MAX:],
             )
+        )
 
 
 def _printable(text: str) -> str:

@@ -10,6 +10,7 @@ none of its code: no protocol, no controller, no asyncio, no deadline.
 import argparse
 import contextlib
 import multiprocessing
+import os
 import shutil
 import signal
 import tempfile
@@ -36,8 +37,9 @@ RUN = "echo"
 BLOCK = zenoh.CongestionControl.BLOCK
 
 
-def echo(credential: Credential, endpoint: str) -> None:
+def echo(credential: Credential, endpoint: str, niceness: int) -> None:
     """Be one robot: say that it is there, and send back whatever comes."""
+    os.nice(niceness)
     set_threads(ONE_THREAD)
     session = open_session(
         {
@@ -61,8 +63,11 @@ def echo(credential: Credential, endpoint: str) -> None:
     signal.pause()
 
 
-def echo_rate(count: int, ticks: int, payload_bytes: int) -> float:
-    """Return how many robot ticks a second `count` processes echo, over `ticks` rounds after a few to warm up."""
+def echo_rate(count: int, ticks: int, payload_bytes: int, niceness: int = 0) -> float:
+    """Return how many robot ticks a second `count` processes echo, over `ticks` rounds after a few to warm up.
+
+    They give way to the world by `niceness`, as a bare process does not.
+    """
     prepare(count)
     set_threads(TWO_THREADS)
     with contextlib.ExitStack() as stack:
@@ -83,7 +88,7 @@ def echo_rate(count: int, ticks: int, payload_bytes: int) -> float:
             wave = credentials.nodes[first : first + JOINING_MAX]
             with main_module_hidden():
                 for credential in wave:
-                    process = context.Process(target=echo, args=(credential, endpoint), daemon=True)
+                    process = context.Process(target=echo, args=(credential, endpoint, niceness), daemon=True)
                     process.start()
                     stack.callback(process.join)
                     stack.callback(process.kill)

@@ -36,7 +36,9 @@ def _type_tag(class_name: str) -> str:
     return f"{class_name.lower()}/{PROTOCOL_VERSION}"
 
 
-class _Message(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="type", tag=_type_tag):
+class _Message(
+    Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True, tag_field="type", tag=_type_tag
+):
     """A whole message: a map on the wire, led by its type and the protocol version."""
 
 
@@ -156,7 +158,7 @@ class Transmission(_Part, frozen=True):
     to: int | None = None
 
 
-class Wake(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+class Wake(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True):
     """When the node wants its next observation: at `at_s`, or at the first event it names, if that is earlier.
 
     With nothing set the node sleeps until the run ends.
@@ -168,7 +170,7 @@ class Wake(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     on_visible: bool = False
 
 
-class Command(Struct, forbid_unknown_fields=True, omit_defaults=True, tag_field="type", tag=_type_tag):
+class Command(Struct, gc=False, forbid_unknown_fields=True, omit_defaults=True, tag_field="type", tag=_type_tag):
     """A node's answer to one observation.
 
     `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation

@@ -142,7 +142,8 @@ class ZenohNodeLink:
         return welcome
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
-        self._take(sample.payload.to_bytes())
+        take = self._take  # called as an attribute it would be looked for as a method first, every time
+        take(sample.payload.to_bytes())
 
     def _take_with_care(self, payload: bytes) -> None:
         """Take a message while it may not be settled who listens; after that there are no detours."""
