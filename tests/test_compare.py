@@ -1,5 +1,6 @@
 """Comparisons: what the command line may say, that pairs share their luck, what the differences are, and what is shown."""
 
+import io
 import json
 import math
 import subprocess
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 from scipy import stats
 from support import ROOT, ZWERM
 
@@ -17,7 +19,7 @@ from zwerm.statistics import Sample
 from zwerm.study.arguments import parse_sweep, parse_variant
 from zwerm.study.comparison import METRICS, Comparison, _less, make_comparison
 from zwerm.study.comparison_pictures import axis_label, check_figure, draw_comparison, label
-from zwerm.study.comparison_report import shown
+from zwerm.study.comparison_report import print_comparison, shown
 from zwerm.study.plan import make_points
 from zwerm.study.rows import read_rows
 from zwerm.study.running import run_study
@@ -346,6 +348,27 @@ def test_there_is_one_figure_for_every_setting_of_the_further_sweeps(gossip: Pat
         drawn = draw_comparison(tmp_path / f"figure{suffix}", Comparison(result.results))
         assert [path.name for path in drawn] == [f"figure-radio.range_m={each}{suffix}" for each in (0.8, 1.0)]
         assert all(path.read_bytes().startswith(start) for path in drawn)
+
+
+@pytest.mark.parametrize("width", [80, 140])
+def test_tables_are_readable_on_a_narrow_terminal_and_no_wider_than_it(
+    gossip: Path, tmp_path: Path, width: int
+) -> None:
+    variants = [parse_variant(each) for each in ("as-it-is", "decentralised-seldom:robots.parameters.every_ticks=5")]
+    sweeps = [parse_sweep("radio.loss+robots.body.radius_m=0.05,0.1"), parse_sweep("robots.parameters.done_at=9")]
+    study = make_comparison(str(gossip), variants, sweeps, metrics=["messages_per_robot_mean"])
+    comparison = Comparison(run_study(study, tmp_path / "out.parquet", seeds=[1, 2], jobs=1).results)
+    console = Console(width=width, record=True, file=io.StringIO())
+    print_comparison(console, comparison)
+    lines = console.export_text().splitlines()
+    assert max(map(len, lines)) <= width
+    words = [line.split() for line in lines]
+    # Names are in one piece, or broken at their joints, and so are values.
+    for name in ("radio.loss", "+robots.body.radius_m", "as-it-is", "decentralised-seldom"):
+        assert sum(name in line for line in words) >= 2, name
+    rows = [line for line in words if line[:1] in (["0.05"], ["0.1"])]
+    assert {tuple(line[:2]) for line in rows} == {("0.05", "9"), ("0.1", "9")}
+    assert sum(line.count("±") for line in rows) == 2 * 3, "two means and a difference at each of two places"
 
 
 def zwerm(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:

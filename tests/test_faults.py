@@ -1,14 +1,17 @@
 """Faults come and go as the schedule says, do exactly what they say, and a mistake in one is a line that names it."""
 
+import io
 from typing import Any
 
 import numpy as np
 import pytest
 from halls import HALL
+from rich.console import Console
 from support import scenario
 
 from zwerm.agents.node import Node
 from zwerm.assembly import assemble
+from zwerm.console import print_result
 from zwerm.deploy.cast import cast, recast
 from zwerm.errors import LinkError, ScenarioError
 from zwerm.link.memory import MemoryLink
@@ -89,6 +92,30 @@ class Life:
 
 
 ALL = list(range(20))
+
+
+def test_a_fault_that_never_came_is_counted_and_told() -> None:
+    never = [
+        {"kind": "crash", "nodes": [0], "at_s": 9.0},
+        {"kind": "blackout", "when": {"metric": "cell_coverage_fraction", "at_least": 1.0}},
+    ]
+    came = [
+        {"kind": "pause", "nodes": [1], "at_s": 0.0, "for_s": 1.0},
+        {"kind": "restart", "nodes": [2], "at_s": 0.1},
+        {"kind": "heal", "at_s": 0.1},
+    ]
+    agreeing = {"controller": "gossip-max", "parameters": {"done_at": 3}}
+    chosen = faulty(*never, *came, time={"duration_s": 10.0}, metrics={"cells": [3, 3]}, robots=agreeing)
+    result = run(chosen, runner="inline")
+    assert (result.outcome, result.sim_s < 9.0) == ("completed", True)
+    assert result.missed_faults == ["crash at 9 s", "blackout on a condition"]
+    assert result.metrics["faults_missed"] == 2.0
+    console = Console(width=80, record=True, file=io.StringIO())
+    print_result(console, result, ())
+    assert "faults that never came" in console.export_text()
+    healthy = run(faulty(time={"duration_s": 0.5}), runner="inline")
+    assert "faults_missed" not in healthy.metrics
+    assert healthy.missed_faults == []
 
 
 # --- the radio ------------------------------------------------------------------------------------------------------

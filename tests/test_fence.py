@@ -97,6 +97,11 @@ def test_robots_that_stand_exactly_in_line_along_a_wall_are_no_exception_to_anyt
     assert not is_exception(views, complex_, 1, 2)
 
 
+def test_robots_that_stand_at_one_place_are_no_exception_to_anything() -> None:
+    views, complex_ = swarm({1: (0.0, 0.0), 2: (0.9, 0.0), 3: (0.9, 0.0), 4: (0.45, 0.3)})
+    assert not is_exception(views, complex_, 2, 3)
+
+
 def test_a_gap_below_120_degrees_is_bisected() -> None:
     """Figure 8(b): min(60 degrees, half the angle to the next neighbour)."""
     places = {1: (0.0, 0.0), 2: (0.95, 0.0), 3: (0.95 * math.cos(1.7), 0.95 * math.sin(1.7))}

@@ -306,6 +306,11 @@ def resumed(result: RunResult, from_s: float) -> None:
     assert result.outcome == "completed"
     assert result.metrics["coverage_fraction"] >= 0.99
     assert result.metrics["robots_released"] == result.metrics["robots_deployed"] - 1
+    lives = [
+        [each for each in result.told if "complex" in each.told and (each.time_s < from_s) == old]
+        for old in (True, False)
+    ]
+    assert result.metrics["deployment_cycles"] == sum(life[-1].told["complex"]["cycle"] for life in lives)
 
 
 NOISE = "robots.sensors.0.sd_rad=0.0436332"

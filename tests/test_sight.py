@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from zwerm.result import RunResult
 from zwerm.running import run
 from zwerm.scenario import ArenaTable
 from zwerm.world.arena import Arena
+from zwerm.world.metrics import deployment_cycles
 from zwerm.world.sight import Sight, hexagonal_packing_robots, holes, obstacles, reachable
 from zwerm.world.stages import stages
+from zwerm.world.told import Told
 
 
 def arena(**table: object) -> Arena:
@@ -143,6 +146,21 @@ def test_cycles_are_those_told_of_and_ticks_and_messages_are_shared_out_among_th
     sent = sum(sum(channel["messages"]) for channel in deployed.radio["channels"].values())
     assert found["messages_per_cycle_mean"] == sent / found["deployment_cycles"]
     assert 0.0 <= found["redundant_robots"] < found["robots_deployed"]
+
+
+def test_cycles_are_counted_over_all_lives_of_who_tells_of_them() -> None:
+    def cycles(*told: dict[str, Any]) -> float:
+        nowhere, nobody = np.zeros((0, 2)), np.zeros(0, dtype=np.bool_)
+        return deployment_cycles([Told(0, 0.0, 3, each, nowhere, nobody) for each in told])["deployment_cycles"]
+
+    def complexes(*numbers: int) -> list[dict[str, Any]]:
+        return [{"complex": {"cycle": number}} for number in numbers]
+
+    assert cycles(*complexes(1, 2, 3), {"deployment_cycles": 3}) == 3.0
+    assert cycles(*complexes(1, 2, 3, 1, 2), {"deployment_cycles": 2}) == 3.0 + 2.0
+    assert cycles(*complexes(1, 1, 1, 2)) == 1.0 + 1.0 + 2.0
+    assert cycles(*({"deployment_cycles": number} for number in (1, 2, 2, 5, 1, 4))) == 5.0 + 4.0
+    assert deployment_cycles([]) == {}
 
 
 def test_a_share_of_the_arena_is_in_sight_when_it_is_said_to_be(deployed: RunResult) -> None:

@@ -1,5 +1,6 @@
 """What is measured of a run, by name; units are last in the names."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ from zwerm.world.arena import Arena
 from zwerm.world.removals import removals
 from zwerm.world.scene import Floats, Ints
 from zwerm.world.sight import Sight, hexagonal_packing_robots, holes, living, obstacles, reachable
+from zwerm.world.told import Told
 from zwerm.world.visibility import Visibility
 
 if TYPE_CHECKING:  # the world's faults wait for metrics
@@ -59,6 +61,8 @@ def measure(world: "World", table: MetricsTable) -> dict[str, float]:
             found |= removals(world, table.sight_range_m)
     if world.scenario.services is not None and world.scenario.services.path == "gradient":
         found["concluded_early"] = concluded_early(world)
+    if world.schedule.faults:
+        found["faults_missed"] = float(len(world.schedule.missed))
     return found | _told(world)
 
 
@@ -72,12 +76,35 @@ def concluded_early(world: "World") -> float:
 
 
 def _told(world: "World") -> dict[str, float]:
-    """Return the numbers that nodes told, the newest of each; and the cycle that the last complex told of is in."""
+    """Return the numbers that nodes told, the newest of each; but cycles over all lives."""
     found: dict[str, float] = {}
     for each in world.audience.told:
-        if "complex" in each.told:
-            found["deployment_cycles"] = float(each.told["complex"]["cycle"])
         found |= {name: float(value) for name, value in each.told.items() if isinstance(value, int | float)}
+    return found | deployment_cycles(world.audience.told)
+
+
+def deployment_cycles(told: Sequence[Told]) -> dict[str, float]:
+    """Return the `deployment_cycles` of the node that told of them last: of all its lives, also those that died on the way.
+
+    Who begins anew counts anew: a complex whose cycle is not a later one, or fewer cycles than before, are another life's.
+    """
+    before: dict[int, float] = {}
+    newest: dict[int, float] = {}
+    found: dict[str, float] = {}
+    for each in told:
+        known = newest.get(each.node, 0.0)
+        if "complex" in each.told:
+            cycle = float(each.told["complex"]["cycle"])
+            anew = cycle <= known
+        elif "deployment_cycles" in each.told:
+            cycle = float(each.told["deployment_cycles"])
+            anew = cycle < known
+        else:
+            continue
+        if anew:
+            before[each.node] = before.get(each.node, 0.0) + known
+        newest[each.node] = cycle
+        found["deployment_cycles"] = before.get(each.node, 0.0) + cycle
     return found
 
 

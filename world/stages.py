@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from zwerm.draws import Draws
 from zwerm.simplicial import FlagComplex
 from zwerm.world.arena import Arena
-from zwerm.world.scene import Bools, Floats, Ints
+from zwerm.world.scene import Bools, Floats, Ints, Scene
 from zwerm.world.told import Told
+from zwerm.world.visibility import Visibility
 
 
 class Stage(NamedTuple):
@@ -48,11 +49,10 @@ def true_stage(time_s: float, position: Floats, standing: Bools, arena: Arena, r
 
     What they would take for frontier, and where they push, the truth does not tell.
     """
-    robots = np.flatnonzero(standing)
-    pairs = robots[cKDTree(position[robots]).query_pairs(range_m, output_type="ndarray")].reshape(-1, 2)
-    edges = pairs[~arena.blocked(position[pairs[:, 0]], position[pairs[:, 1]])]
+    still = np.zeros(len(standing), dtype=np.bool_)
+    scene = Scene(0, time_s, position, still.astype(np.float64), standing, still, 0.0, arena, Draws(0))
     none = np.zeros((0, 2), dtype=np.int64)
-    return Stage(None, time_s, position, standing, edges, none, none, ())
+    return Stage(None, time_s, position, standing, Visibility().pairs(scene, range_m), none, none, ())
 
 
 def _stage(moment: Told, told: dict[str, Any]) -> Stage:

@@ -99,6 +99,8 @@ def print_result(console: Console, result: RunResult, drawn: Sequence[Path]) -> 
     for what, nodes in (("restarted", result.restarted), *result.hindered.items()):
         if nodes:
             table.add_row(what, ", ".join(map(str, nodes)))
+    if result.missed_faults:
+        table.add_row("faults that never came", ", ".join(result.missed_faults))
     table.add_row("wall time", f"{result.wall_s:.1f} s, {rate:,.0f} robot-ticks/s, {result.runner}")
     table.add_row("trace", result.trace)
     for path in drawn:

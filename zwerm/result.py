@@ -40,6 +40,7 @@ class RunResult:
     cell_counts: Ints | None = None
     hindered: dict[str, list[int]] = field(default_factory=dict)
     faults: list[dict[str, Any]] = field(default_factory=list)
+    missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
     series: dict[str, list[float]] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     tracebacks: dict[int, str] = field(default_factory=dict)

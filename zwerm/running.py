@@ -269,6 +269,7 @@ def _result(
         restarted=sorted(world.lives.ever.get("restarted", ())),
         hindered={what: sorted(world.lives.ever.get(what, ())) for what in ("paused", "slow", "late")},
         faults=[table.model_dump() for _, table in world.fault_tables],
+        missed_faults=[fault.in_words for fault in world.schedule.missed],
         arena=world.arena,
         history=history,
         cell_counts=counts,

@@ -80,6 +80,7 @@ class Fault:
         self.condition = None if table.when is None else Condition(table.when, scenario)
         self.nodes: list[int] = [node_id(name, scenario) for name in getattr(table, "nodes", None) or ()]
         self.healed = False
+        self.came = False
         if self.begins is not None:
             self._begin(self.begins)
         self._dt_s = dt_s
@@ -121,6 +122,12 @@ class Fault:
         if not self.table.lasts:
             return tick == self.begins
         return self.ends is None or tick < self.ends
+
+    @property
+    def in_words(self) -> str:
+        """What kind it is, and when it is due, if that is known."""
+        kind = next(name for name, each in KINDS.items() if each is type(self.table))
+        return f"{kind} at {self.begins * self._dt_s:g} s" if self.begins is not None else f"{kind} on a condition"
 
     @property
     def endless(self) -> bool:
@@ -167,6 +174,11 @@ class Schedule:
         return sorted({node for fault in self.faults if isinstance(fault.table, JoinTable) for node in fault.nodes})
 
     @property
+    def missed(self) -> list[Fault]:
+        """The faults that have not come, in the order of the schedule: at the end of a run, those that never did."""
+        return [fault for fault in self.faults if not fault.came]
+
+    @property
     def touches_programs(self) -> bool:
         """Tell whether a fault may be an order to somebody's program."""
         return any(isinstance(fault.table, CrashTable | RestartTable | PauseTable | JoinTable) for fault in self.faults)
@@ -176,6 +188,8 @@ class Schedule:
         for fault in self._waiting:
             fault.look(tick, scene)
         now = [fault for fault in self.faults if fault.in_force(tick)]
+        for fault in now:
+            fault.came = True
         if any(isinstance(fault.table, HealTable) for fault in now):
             for fault in now:
                 if not isinstance(fault.table, CrashTable | RestartTable | JoinTable | HealTable):

@@ -30,7 +30,7 @@ METRICS: Final = (
     *("robots_deployed", "deployment_cycles", "robots_done_fraction"),
     *("messages_per_robot_mean", "bytes_per_robot_mean", "delivered_fraction"),
     *("time_to_50_percent_coverage_s", "time_to_90_percent_coverage_s", "time_to_99_percent_coverage_s"),
-    *("convergence_time_s", "sim_s"),
+    *("convergence_time_s", "sim_s", "faults_missed"),
 )
 COMPLETED: Final = "completed"
 SEEDS: Final = 10

@@ -2,15 +2,21 @@
 
 import math
 from collections import Counter
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 
 from zwerm.statistics import Sample
-from zwerm.study.comparison import METRICS, Comparison
+from zwerm.study.comparison import METRICS, Comparison, Place
 
 NOTHING: Final = "-"
+# Between columns; and what is wider in the column of an axis is folded.
+GAP: Final = 2
+AXIS_WIDTH_MAX: Final = 24
+# Wide enough for every word of how a run ended.
+ENDING_WIDTH_MIN: Final = 12
 
 
 def print_comparison(console: Console, comparison: Comparison) -> None:
@@ -20,10 +26,12 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     console.print(f"{comparison.study.name}: {against}", style="bold", markup=False, highlight=False)
     console.print("± is half the 95 % interval, of a mean or of the paired difference; * where that leaves out zero")
     console.print()
-    console.print(_endings(comparison))
+    for table in _endings(comparison, console.width):
+        console.print(table)
     for metric in comparison.metrics:
         console.print()
-        console.print(_metric(comparison, metric))
+        for table in _metric(comparison, metric, console.width):
+            console.print(table)
     measured = set(comparison.results.known_metrics)
     for metric in comparison.study.table.metrics:
         if metric not in measured and comparison.study.table.metrics != list(METRICS):
@@ -31,43 +39,112 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
             console.print(f"{metric}: no trial measured it; they measured: {known}", style="red", markup=False)
 
 
-def _endings(comparison: Comparison) -> Table:
-    table = _table(comparison, "how runs ended")
-    for variant in comparison.variants:
-        table.add_column(variant, overflow="fold")
-    for place in comparison.places:
-        endings = [_count(comparison.outcomes(point)) for point in place.points]
-        table.add_row(*map(str, place.settings.values()), *endings)
-    return table
+def _endings(comparison: Comparison, width: int) -> list[Table]:
+    """Return how runs ended: one table, or, where variants' names are wider than the terminal, several of the same rows."""
+    tables: list[Table] = []
+    widths = [max(len(variant), ENDING_WIDTH_MIN) + GAP for variant in comparison.variants]
+    for group in _groups(widths, _room(comparison, width)):
+        table = _table("" if tables else "how runs ended")
+        _add_axes(table, comparison)
+        for k in group:
+            table.add_column(comparison.variants[k], overflow="fold", min_width=widths[k] - GAP)
+        for place in comparison.places:
+            endings = [_count(comparison.outcomes(place.points[k])) for k in group]
+            table.add_row(*map(str, place.settings.values()), *endings)
+        tables.append(table)
+    return tables
 
 
 def _count(outcomes: Counter[str]) -> str:
     return ", ".join(f"{count} {what}" for what, count in outcomes.most_common()) or NOTHING
 
 
-def _metric(comparison: Comparison, metric: str) -> Table:
-    table = _table(comparison, metric)
-    for variant in comparison.variants:
-        table.add_column(variant, justify="right", no_wrap=True)
-    for variant in comparison.variants[1:]:
-        table.add_column(f"{variant} - {comparison.variants[0]}", justify="right", no_wrap=True)
-        table.add_column("pairs", justify="right")
-    for place in comparison.places:
-        means = [shown(comparison.sample(point, metric)) for point in place.points]
-        beside = []
-        for point in place.points[1:]:
-            difference = comparison.difference(place, point, metric)
-            clear = abs(difference.mean) > difference.half_width
-            beside += [shown(difference, signed=True) + (" *" if clear else "  "), str(difference.n)]
-        table.add_row(*map(str, place.settings.values()), *means, *beside)
-    return table
+class _Columns(NamedTuple):
+    """Columns that stand beside each other, and their cells by row."""
+
+    headers: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+    @property
+    def width(self) -> int:
+        lines = [[header.splitlines() for header in self.headers], *([[each] for each in row] for row in self.rows)]
+        return sum(max(len(line) for row in lines for line in row[k]) + GAP for k in range(len(self.headers)))
 
 
-def _table(comparison: Comparison, title: str) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0))
-    for axis in comparison.study.table.grid:
-        table.add_column(axis, overflow="fold")
-    return table
+def _metric(comparison: Comparison, metric: str, width: int) -> list[Table]:
+    """Return the tables of a metric: one, or, where that is wider than the terminal, several of the same rows."""
+    room = _room(comparison, width)
+    columns = _columns(comparison, metric, " - ")
+    if sum(each.width for each in columns) > room:
+        columns = _columns(comparison, metric, "\n- ")
+    tables: list[Table] = []
+    for group in _groups([each.width for each in columns], room):
+        table = _table("" if tables else metric)
+        _add_axes(table, comparison)
+        for header in (header for k in group for header in columns[k].headers):
+            table.add_column(header, justify="right", no_wrap=True)
+        for row, place in enumerate(comparison.places):
+            table.add_row(*map(str, place.settings.values()), *(cell for k in group for cell in columns[k].rows[row]))
+        tables.append(table)
+    return tables
+
+
+def _columns(comparison: Comparison, metric: str, less: str) -> list[_Columns]:
+    """Return each variant's means, and each other one's differences from the first, under its name `less` the first's."""
+    places, (first, *others) = comparison.places, comparison.variants
+    means = [
+        _Columns((variant,), [(shown(comparison.sample(place.points[k], metric)),) for place in places])
+        for k, variant in enumerate(comparison.variants)
+    ]
+    differences = [
+        _Columns((f"{variant}{less}{first}", "pairs"), [_beside(comparison, place, k, metric) for place in places])
+        for k, variant in enumerate(others, 1)
+    ]
+    return [*means, *differences]
+
+
+def _beside(comparison: Comparison, place: Place, k: int, metric: str) -> tuple[str, str]:
+    """Return what the k-th variant has over the first at a place, and of how many pairs."""
+    difference = comparison.difference(place, place.points[k], metric)
+    clear = abs(difference.mean) > difference.half_width
+    return shown(difference, signed=True) + (" *" if clear else "  "), str(difference.n)
+
+
+def _groups(widths: Sequence[int], room: int) -> list[list[int]]:
+    """Return the indices of `widths`, in groups as long as there is room for; one alone may be too wide."""
+    groups: list[list[int]] = [[]]
+    for k, width in enumerate(widths):
+        if groups[-1] and sum(widths[each] for each in groups[-1]) + width > room:
+            groups.append([])
+        groups[-1].append(k)
+    return groups
+
+
+def _room(comparison: Comparison, width: int) -> int:
+    """Return how much of a width the columns of axes leave."""
+    return width - sum(_axis_width(comparison, number) + GAP for number in range(len(comparison.study.table.grid)))
+
+
+def _table(title: str) -> Table:
+    return Table(title=title or None, title_justify="left", title_style="bold", box=None, padding=(0, GAP, 0, 0))
+
+
+def _add_axes(table: Table, comparison: Comparison) -> None:
+    """Add a column for each axis, as wide as its values: only what is wider than any should be is folded."""
+    for number, axis in enumerate(comparison.study.table.grid):
+        table.add_column(_broken(axis), overflow="fold", width=_axis_width(comparison, number))
+
+
+def _axis_width(comparison: Comparison, number: int) -> int:
+    axis = list(comparison.study.table.grid)[number]
+    values = [str(list(place.settings.values())[number]) for place in comparison.places]
+    return min(AXIS_WIDTH_MAX, max(map(len, [*_broken(axis).splitlines(), *values])))
+
+
+def _broken(axis: str) -> str:
+    """Return the name of an axis on several lines, broken where paths are joined, and a long one at its dots."""
+    lines = axis.replace("+", "\n+").splitlines()
+    return "\n".join(each if len(each) <= AXIS_WIDTH_MAX else each.replace(".", ".\n") for each in lines)
 
 
 def shown(sample: Sample, signed: bool = False) -> str:
