@@ -81,6 +81,45 @@ def test_nor_when_one_of_four_robots_is_moved() -> None:
     assert departures > 100
 
 
+# --- when somebody else finds who may leave ---------------------------------------------------------------------------
+
+
+class Advised(Redundancy):
+    """Relies on lists upon which it was told at some time that it may leave, whatever it has heard or seen since."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self._verdict: tuple[tuple[int, int], ...] = ()
+
+    def hear(self, sender: int, message: Message, now_s: float) -> list[Sent]:
+        sent = super().hear(sender, message, now_s)
+        if self.redundant():
+            self._verdict = tuple((node, self._lists[node].version) for node in self._listed)
+        return sent
+
+    def ask(self, now_s: float, versions: tuple[tuple[int, int], ...] | None = None) -> list[Sent]:
+        return super().ask(now_s, self._verdict)
+
+
+def test_nor_when_they_rely_on_what_they_were_told_of_lists_that_were_true_once() -> None:
+    _, departures = explore(connected_graphs(4), Advised)
+    assert departures > 100
+    _, moved = explore(connected_graphs(3, 3), Advised, ticks=1, moving=(2, (0,)))
+    assert moved > 20
+
+
+class Credulous(Advised):
+    """Grants a lock whatever list it is asked upon."""
+
+    def _answer(self, asker: int, ask: Ask, now_s: float) -> list[Sent]:
+        return super()._answer(asker, Ask(ask.number, ((self._me, self._version),)), now_s)
+
+
+def test_nor_would_it_be_so_if_neighbours_did_not_look_at_the_versions_of_their_lists() -> None:
+    with pytest.raises(Violation):
+        explore(connected_graphs(4, 4), Credulous, moving=(3, (0, 2)))
+
+
 # --- and each part of the protocol is needed ------------------------------------------------------------------------
 
 
