@@ -165,10 +165,9 @@ def _stations(
 def _wait_until_met(logs: dict[int, Path]) -> None:
     """Return when every two nodes have heard each other."""
     end_s = time.monotonic() + MEET_DEADLINE_S
-    waiting = dict(logs)
-    while waiting:
-        waiting = {node: path for node, path in waiting.items() if not any(line.what == MET for line in read_log(path))}
-        if waiting and time.monotonic() > end_s:
+    waiting = list(logs)
+    while waiting := [node for node in waiting if not any(line.what == MET for line in read_log(logs[node]))]:
+        if time.monotonic() > end_s:
             raise LinkError(
                 f"the twin on a real network: node {min(waiting)} has not met all others within {MEET_DEADLINE_S:g} s"
             )
