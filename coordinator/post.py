@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Generator, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
-from zwerm.coordinator.patience import BUSY_TICKS, Patience
+from zwerm.coordinator.patience import AGAIN_TICKS, BUSY_TICKS, Patience
 from zwerm.orders import (
     UNKNOWN,
     Answer,
@@ -75,6 +75,7 @@ class Post:
         self._number: dict[int, int] = {}
         self._mustered: tuple[Dispatch, int] | None = None
         self._hasty = False
+        self._second_tick: int | None = None
 
     @property
     def tick(self) -> int:
@@ -142,10 +143,31 @@ class Post:
 
     def muster(self, order: Muster, copies: int = 1) -> None:
         """Say to all who hear it, so often, that they shall answer, whoever they are."""
-        said = [Dispatch(self._life, 0, attempt, UNKNOWN, order) for attempt in range(1, copies + 1)]
-        self._outbox += [Transmission("uplink", write(each)) for each in said]
-        self._mustered = said[-1], self.tick
+        self._mustered = self._call(Dispatch(self._life, 0, 0, UNKNOWN, order), copies), self.tick
         self._hasty = copies > 1
+        self._second_tick = self.tick + AGAIN_TICKS if self._hasty else None
+
+    def _call(self, said: Dispatch, copies: int) -> Dispatch:
+        """Say an order to all so often, and return how it was said last."""
+        for _ in range(copies):
+            said = _again(said)
+            self._outbox.append(Transmission("uplink", write(said)))
+        return said
+
+    def _call_again(self) -> None:
+        """Say the muster again if anything was lost and nobody had time to look: who missed it must begin to look soon.
+
+        Where nothing is lost, who is expected has said by now at least that it has heard.
+        """
+        self._second_tick = None
+        if self._mustered is None or not (self.patience.lossy or any(not each.heard for each in self._open.values())):
+            return
+        said, tick = self._mustered
+        self._mustered = self._call(said, MUSTER_COPIES), tick
+        for order in self._open.values():
+            order.said = self._mustered[0]
+            order.tries += MUSTER_COPIES
+            order.due = max(order.due, self.tick + self.patience.again_ticks)
 
     def expect(self, node: int) -> None:
         """Wait for a node's answer to the muster."""
@@ -158,6 +180,7 @@ class Post:
     def _expect_seen(self, reply: Reply) -> None:
         """Wait for the answers to the muster of all whom somebody sees that has answered it: theirs should be here too."""
         if reply.number == 0 and isinstance(reply.answer, Report):
+            self._second_tick = None
             for each in reply.answer.sightings or ():
                 self.expect(each.node)
                 order = self._open.get(each.node)
@@ -183,6 +206,8 @@ class Post:
 
     def sent(self) -> tuple[Transmission, ...]:
         """Return what was said since the last time, and what is to be said again."""
+        if self._second_tick is not None and self.tick >= self._second_tick:
+            self._call_again()
         for node, order in self._open.items():
             if self.tick >= order.due and not order.ping:
                 self._utter(node, order)
@@ -199,8 +224,7 @@ class Post:
     def _utter(self, node: int, order: _Open) -> None:
         """Say an order, as often as haste wants."""
         for _ in range(1 if order.ping else self._copies):
-            said = order.said
-            order.said = Dispatch(said.life, said.number, said.attempt + 1, said.to_life, said.order)
+            order.said = _again(order.said)
             order.tries += 1
             self._outbox.append(Transmission("uplink", write(order.said), node))
 
@@ -253,6 +277,11 @@ class Post:
         until_s = self.now_s + ticks * self._dt_s
         while self.now_s < until_s - 1e-9:
             yield Wake(at_s=until_s)
+
+
+def _again(said: Dispatch) -> Dispatch:
+    """Return an order as it is said the next time."""
+    return Dispatch(said.life, said.number, said.attempt + 1, said.to_life, said.order)
 
 
 def together(stories: Sequence[Story[T]]) -> Story[list[T]]:

@@ -195,6 +195,17 @@ def test_where_nothing_is_lost_no_order_after_a_muster_has_copies() -> None:
     assert [desk.turn() for _ in range(18)] == [[]] * 18
 
 
+def test_a_muster_is_called_again_where_somebody_missed_it_and_nobody_had_time_to_look() -> None:
+    again = [(None, 0, MUSTER_COPIES + copy) for copy in range(1, MUSTER_COPIES + 1)]
+    some = answered(0, Heard(), attempt=MUSTER_COPIES, heard=5)
+    for heard in ([], [(9, some)], [(0, some)]):
+        desk = mustered()
+        assert desk.turn(*heard) == again
+        assert desk.turn() == [], "once"
+    later = desk.turn((0, answered(0, SEES_4, attempt=2 * MUSTER_COPIES, heard=9)))
+    assert later == [(4, 0, 2 * MUSTER_COPIES + copy) for copy in (1, 2, 3)]
+
+
 def test_to_have_heard_a_muster_is_no_answer_to_it() -> None:
     desk = mustered()
     heard = [(node, answered(0, Heard(), attempt=MUSTER_COPIES, heard=MUSTER_COPIES)) for node in (0, 9)]
