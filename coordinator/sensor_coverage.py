@@ -10,6 +10,7 @@ from typing import Any, Final, Protocol
 
 import msgspec
 
+from zwerm.coordinator.conference import Conference
 from zwerm.coordinator.post import MUSTER_COPIES, Post, Story, together
 from zwerm.coordinator.pushing import Moved, Pushing
 from zwerm.coordinator.sources import Sources
@@ -95,7 +96,8 @@ class SensorCoverage:
         self.outcome = ""
         self.cycle = 0
         self._anew = setup.incarnation > 1
-        self._spares = setup.services.get("redundancy", "coordinator") == "coordinator"
+        self._conference = Conference(rules.corner_margin_rad, self.places, self.post)
+        self._spares = setup.services.get("redundancy", "coordinator")
         self._spared_at = 0
         self._silent: dict[int, None] = {}
         self._told: dict[str, Any] = {}
@@ -133,7 +135,7 @@ class SensorCoverage:
         while self.cycle < self.parameters.cycles_max and not self.outcome:
             self.cycle += 1
             yield from self._survey(moved)
-            stories, plans = self._next()
+            stories, plans = yield from self._next()
             self._tell_complex(plans)
             self.outcome = self._judge(bool(stories))
             moved = [robot for each in (yield from together(stories)) for robot in each]
@@ -141,7 +143,8 @@ class SensorCoverage:
                 self.outcome = ""
                 yield from self.post.pause(WATCH_TICKS)
         self.outcome = self.outcome or "no-end"
-        self._spare()
+        if self._spares == "coordinator":
+            yield from self._spare()
         self._tell_numbers()
         yield Wake()
 
@@ -167,36 +170,44 @@ class SensorCoverage:
 
     # --- what to do next --------------------------------------------------------------------------------------------
 
-    def _next(self) -> tuple[list[Story[Moved]], Sequence[Plan]]:
+    def _next(self) -> Story[tuple[list[Story[Moved]], Sequence[Plan]]]:
         """Return what to do in this cycle: pushes, or the first ones of stations that see no robot but stations."""
         seen, stations = self.picture.complex_.neighbours, self.sources.alive()
         lonely = [place for place in self.sources.open() if all(each in stations for each in seen[place])]
         if lonely:
             return [self.pushing.first(place) for place in lonely], ()
         pushes, every = self.pushing.pushes, self.parameters.redundancy_every
-        if every and pushes and (pushes // every > self._spared_at // every or pushes == self._spared_at):
-            self._spare()
+        again = pushes == self._spared_at and self._spares == "coordinator"
+        if every and pushes and (pushes // every > self._spared_at // every or again):
+            yield from self._spare()
         plans = self._assign()
         if not plans and self.sources.dry:
-            self._spare()
+            yield from self._spare()
             plans = self._assign()
         return [self.pushing.push(plan) for plan in plans], plans
 
     def _assign(self) -> tuple[Plan, ...]:
         services = self.services
         self.redundant = tuple(place for place in self.redundant if place in self.places.occupant)
+        shut = self.picture.bases if self._spares == "link" else ()  # a station does not move
         sources = dict.fromkeys(self.sources.open(), 0.0) | dict.fromkeys(self.redundant, SPARED_COST)
 
         def ways(complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
-            return services.paths.ways(complex_, sources, services.frontier.obstacle)
+            return services.paths.ways(complex_, sources, services.frontier.obstacle, shut)
 
-        return services.assignment.assign(services.frontier.plans(), self.picture, sources, ways)
+        return services.assignment.assign(services.frontier.plans(), self.pushing.picture, sources, ways)
 
-    def _spare(self) -> None:
-        if not self._spares:
+    def _spare(self) -> Story[None]:
+        """Find out who can be spared, or have the robots find out."""
+        if self._spares == "none":
             return
         self._spared_at = self.pushing.pushes
-        self.redundant = self.services.redundancy.redundant(self.picture, self.services.frontier.rim())
+        rim = self.services.frontier.rim()
+        if self._spares == "coordinator":
+            self.redundant = self.services.redundancy.redundant(self.picture, rim)
+        else:
+            yield from self._conference.hold(self.picture, rim, self._silent, self.cycle)
+            self._draw(self.pushing.picture)
 
     # --- the survey -------------------------------------------------------------------------------------------------
 
@@ -232,8 +243,17 @@ class SensorCoverage:
         places.learn_references(views)
         for robot, (door, report) in at_door.items():
             self.sources.adopt(robot, door, report.sightings or (), views[door])
-        self.picture = self.pushing.picture = Picture(views, FlagComplex(views), tuple(self.sources.alive()))
+        self._conference.note(reports)
+        self._draw(Picture(views, FlagComplex(views), tuple(self.sources.alive())))
         self.pushing.cycle = self.cycle
+
+    def _draw(self, whole: Picture) -> None:
+        """Take what the survey found for the picture, but for robots that have left: these are where pushes begin."""
+        self.picture = self.pushing.picture = whole
+        if self._spares == "link":
+            self.redundant = self._conference.spare(whole)
+        if self._spares == "link" and self.redundant:
+            self.picture = whole._replace(complex_=whole.complex_.without(self.redundant))
         self.services.frontier.look(self.picture)
 
     def _look(self, reports: Mapping[int, Report]) -> None:

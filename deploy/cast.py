@@ -27,6 +27,12 @@ ALONE: Final = {
     (COORDINATOR, "sensor-coverage"): "zwerm.coordinator.sparing:Sparing",
 }
 
+# The same where a coordinator finds the path, and robots among themselves who can be spared.
+AGREED: Final = {
+    (ROBOT, "sensor-coverage"): "zwerm.agents.sensor_coverage.conferee:Conferee",
+    (BASE, "sensor-coverage"): "zwerm.agents.sensor_coverage.conferee:ConfereeBase",
+}
+
 
 def player(role: str, name: str, services: ServicesTable | None = None) -> str:
     """Return the controller that plays a role under the name that a scenario gives it, with these services.
@@ -36,9 +42,12 @@ def player(role: str, name: str, services: ServicesTable | None = None) -> str:
     if role == COORDINATOR and (role, name) not in PARTS and ":" not in name:
         known = ", ".join(each for part, each in PARTS if part == role)
         raise ControllerError(f"expected a built-in coordinator ({known}) or module:Class, got {name!r}")
-    if services is not None and services.path == "gradient" and (role, name) in ALONE:
-        return ALONE[role, name]
-    return PARTS.get((role, name), name)
+    players = PARTS
+    if services is not None and services.path == "gradient":
+        players = PARTS | ALONE
+    elif services is not None and services.spares == "link":
+        players = PARTS | AGREED
+    return players.get((role, name), name)
 
 
 def recast(scenario: Scenario, seed: int, node: int, incarnation: int) -> tuple[str, Setup]:

@@ -12,7 +12,6 @@ from zwerm.agents.sensor_coverage.local import LocalRobot
 from zwerm.agents.sensor_coverage.words import NOWHERE, Enquire, Word, read, write
 from zwerm.assembly import assemble
 from zwerm.deploy.cast import cast
-from zwerm.errors import ScenarioError
 from zwerm.link.memory import MemoryLink
 from zwerm.protocol import Command
 from zwerm.running import run
@@ -145,13 +144,3 @@ def test_the_checker_finds_a_removal_that_opens_a_hole() -> None:
     world.audience.hear(world.scene, 2, Command(told={"removal": {"in": 2}}), decides=False)
     world.audience.hear(world.scene, 2, Command(told={"removal": {"out": 2}}), decides=False)
     assert removals(world, 1.0) == {"removals": 3.0, "unsafe_removals": 2.0}
-
-
-def test_robots_that_are_told_their_way_do_not_find_out_by_themselves_who_can_be_spared() -> None:
-    line = (
-        "services.redundancy: 'link' with path 'coordinator': robots that are told their way are not told who sees whom"
-    )
-    with pytest.raises(ScenarioError) as caught:
-        load("sensor-coverage", ("services.redundancy=link",))
-    assert len(caught.value.mistakes) == 1
-    assert line in caught.value.mistakes[0]

@@ -182,7 +182,7 @@ def test_a_mistake_in_the_services_is_one_clear_line(settings: tuple[str, ...], 
     [
         {"path": path, "redundancy": redundancy, "fence": side, "termination": side}
         for path, side, redundancies in (
-            ("coordinator", "coordinator", ("coordinator", "none")),
+            ("coordinator", "coordinator", ("coordinator", "link", "none")),
             ("gradient", "local", ("coordinator", "link", "none")),
         )
         for redundancy in redundancies

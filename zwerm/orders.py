@@ -61,6 +61,12 @@ class Survey(_Message, frozen=True):
     moved: tuple[int, ...]
 
 
+class Confer(_Message, frozen=True):
+    """To a robot that is not on the fence: leave the complex, if your neighbours agree, and report."""
+
+    cycle: int
+
+
 class Release(_Message, frozen=True):
     """To the base: let a robot out."""
 
@@ -113,6 +119,10 @@ class Report(_Message, frozen=True):
     home: bool = False
 
 
+class Aside(Report, frozen=True):
+    """The same from a robot that has left the complex by agreement with its neighbours, and stands there in body."""
+
+
 class Released(_Message, frozen=True):
     """The base's answer to a release: the robot that came out, if one did."""
 
@@ -151,8 +161,8 @@ class Heard(_Message, frozen=True):
     """The order has come, and is being carried out."""
 
 
-Order = Muster | Survey | Release | Deploy | Move | Correct
-Answer = Report | Released | Emerged | Cleared | Arrived | Heard
+Order = Muster | Survey | Confer | Release | Deploy | Move | Correct
+Answer = Report | Aside | Released | Emerged | Cleared | Arrived | Heard
 
 # --- how they cross the radio ---------------------------------------------------------------------------------------
 

@@ -282,6 +282,8 @@ class Scenario(Table):
                 raise ValueError("services.path: robots that find the path need the table [radio]")
             if self.base is None or self.base.stations > 1:
                 raise ValueError("services.path: robots find the path from one base station")
+        elif services.spares == "link" and self.radio is None:
+            raise ValueError("services.redundancy: robots that agree among themselves need the table [radio]")
         services.check()
         return self
 

@@ -44,6 +44,3 @@ class ServicesTable(BaseModel):
             if provider not in (None, GOES_WITH[self.path]):
                 why = "a way is known to whoever knows where it ends"
                 raise ValueError(f"services.{name}: {provider!r} with path {self.path!r}: {why}")
-        if (self.path, self.spares) == ("coordinator", "link"):
-            why = "robots that are told their way are not told who sees whom"
-            raise ValueError(f"services.redundancy: {self.spares!r} with path {self.path!r}: {why}")

@@ -40,7 +40,7 @@ class Leaving:
         self._again: list[int] = []
         self._try_at: int | None = None  # None as long as there never was anything to try
         self._redundant = False
-        self._tries = 0
+        self.tries = 0
         self._enquiries = 0
         self._unanswered: tuple[int, ...] = ()
         self._wanted = False
@@ -86,6 +86,17 @@ class Leaving:
             self._send(agreement.hear(sender, word, self._now_s))
         elif self._node in word.nodes:
             self._outbox.append((sender, agreement.tell()))
+
+    def begin(self) -> None:
+        """Try anew, as if for the first time; `tries` is how often that has come to nothing since."""
+        self.tries = 0
+        self._try_at = None
+
+    @property
+    def stays(self) -> bool:
+        """Whether, by lists that are all new, the robot cannot leave."""
+        agreement = self._agreement
+        return agreement is not None and self._enquiries > 0 and not self._unanswered and not agreement.redundant()
 
     def turn(self, redundant: bool, versions: tuple[tuple[int, int], ...] | None = None) -> bool:
         """Go on; tell whether the robot leaves now.
@@ -154,13 +165,13 @@ class Leaving:
 
     def _wait(self) -> None:
         if self._try_at is None or self._try_at <= self._tick + ASK_TICKS:
-            self._tries += 1
+            self.tries += 1
             self._try_at = self._tick + self._patience()
             self._enquiries = 0
 
     def _patience(self) -> int:
         """Return how long to wait: longer after every wish that came to nothing, and by chance."""
-        return int(min(WAIT_TICKS * 2.0**self._tries, WAIT_TICKS_MAX) * (0.5 + float(self._random.random())))
+        return int(min(WAIT_TICKS * 2.0**self.tries, WAIT_TICKS_MAX) * (0.5 + float(self._random.random())))
 
     def _send(self, sent: list[Sent]) -> list[Sent]:
         self._outbox += [(each.to, each.message) for each in sent]

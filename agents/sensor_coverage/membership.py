@@ -5,7 +5,7 @@ be the rear of a push, which brings it to the next place ahead, and a robot into
 nobody is lost or counted twice: it has its place until it leaves, none until it is called, and then that of the robot ahead.
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,11 +19,11 @@ from zwerm.agents.sensor_coverage.reserve import Caller, Reserve
 from zwerm.agents.sensor_coverage.words import NOWHERE, Body, Call, End, Enquire, Errand, Offer, Word
 from zwerm.counsel import CHANNEL as UPLINK
 from zwerm.counsel import Standing
-from zwerm.frontier.fence import Views, fence, wedges
-from zwerm.frontier.planner import VERTEX_BESIDE_RAD
+from zwerm.frontier.fence import wedges
+from zwerm.frontier.opening import opens
 from zwerm.frontier.services import Picture
 from zwerm.protocol import Packet, Transmission
-from zwerm.simplicial import Edge, FlagComplex, may_leave
+from zwerm.simplicial import may_leave
 
 
 class Member(Caller, Protocol):
@@ -165,37 +165,15 @@ class Membership:
 def can_be_spared(picture: Picture, place: int, corner_margin_rad: float) -> bool:
     """Tell whether a place can be left: it is within what is covered, and the link criterion holds."""
     linked = _surrounded(picture, place) and may_leave(place, picture.complex_.neighbours)
-    return linked and _opens_nothing(picture, place, corner_margin_rad)
+    return linked and not opens(picture, place, corner_margin_rad)
 
 
 def is_within(picture: Picture, place: int, corner_margin_rad: float) -> bool:
     """Tell whether a place is within what is covered, and would be if it were left."""
-    return _surrounded(picture, place) and _opens_nothing(picture, place, corner_margin_rad)
+    return _surrounded(picture, place) and not opens(picture, place, corner_margin_rad)
 
 
 def _surrounded(picture: Picture, place: int) -> bool:
     """Tell whether a place has triangles all around."""
     views, complex_, _ = picture
     return bool(complex_.neighbours[place]) and not any(True for _ in wedges(views, complex_, [place]))
-
-
-def _opens_nothing(picture: Picture, place: int, corner_margin_rad: float) -> bool:
-    """Tell whether nobody would be sent to a place again.
-
-    Somebody would be where a side of an edge comes open, or a gap beside a neighbour so wide that one expands there.
-    """
-    views, complex_, _ = picture
-    around = complex_.neighbours[place]
-    edges = [each for each in complex_.edges if each[0] in around and each[1] in around]
-    now, then = (_open(views, each, edges, around, corner_margin_rad) for each in (complex_, complex_.without([place])))
-    return all(each in now for each in then)
-
-
-def _open(
-    views: Views, complex_: FlagComplex, edges: Iterable[Edge], around: Iterable[int], corner_margin_rad: float
-) -> list[tuple[int, int, int]]:
-    """Return the open sides of edges, and the wide gaps around vertices."""
-    sides = fence(views, complex_, corner_margin_rad, edges).sides
-    gaps = wedges(views, complex_, around)
-    wide = [(i, a, b) for i, a, b, gap_rad in gaps if gap_rad >= 2.0 * VERTEX_BESIDE_RAD]
-    return [*((each.i, each.j, each.sign) for each in sides), *wide]

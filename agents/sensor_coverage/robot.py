@@ -21,6 +21,7 @@ from zwerm.orders import (
     Answer,
     Arrived,
     Cleared,
+    Confer,
     Correct,
     Deploy,
     Emerged,
@@ -138,7 +139,7 @@ class Robot(Controller):
                 return self._move(order)
             case Correct():
                 return self._correct(order)
-            case Release():
+            case Release() | Confer():
                 return None
 
     # --- standing still ---------------------------------------------------------------------------------------------

@@ -65,7 +65,7 @@ def is_exception(views: Views, complex_: FlagComplex, i: int, j: int) -> bool:
     """
     for k in complex_.common(i, j):
         whole = relative(views[k], i, j)
-        if whole == 0.0:  # all three stand along a wall
+        if whole == 0.0:  # all three stand along a wall, or two at one spot
             continue
         side = side_of(views, i, j, k)
         between = [

@@ -26,9 +26,16 @@ class Reach(NamedTuple):
 
 
 def reach(
-    complex_: FlagComplex, sources: Mapping[int, float], obstacle: Collection[Edge], obstacle_cost: float
+    complex_: FlagComplex,
+    sources: Mapping[int, float],
+    obstacle: Collection[Edge],
+    obstacle_cost: float,
+    shut: Collection[int] = (),
 ) -> Reach:
-    """Return the cheapest ways from `sources` (vertex: cost to start there). An edge costs 1, one of `obstacle` more."""
+    """Return the cheapest ways from `sources` (vertex: cost to start there). An edge costs 1, one of `obstacle` more.
+
+    Ways may begin at vertices that are `shut`, but none leads there.
+    """
     cost: dict[int, float] = {}
     before: dict[int, int | None] = {}
     heap: list[tuple[float, int, int]] = [(start, vertex, -1) for vertex, start in sorted(sources.items())]
@@ -39,7 +46,7 @@ def reach(
             continue
         cost[vertex], before[vertex] = spent, previous if previous >= 0 else None
         for each in complex_.neighbours[vertex]:
-            if each not in cost:
+            if each not in cost and each not in shut:
                 step = obstacle_cost if edge(vertex, each) in obstacle else 1.0
                 heapq.heappush(heap, (spent + step, each, vertex))
     return Reach(cost, before)
@@ -51,6 +58,12 @@ class Dijkstra:
     def __init__(self, obstacle_cost: float) -> None:
         self._obstacle_cost = obstacle_cost
 
-    def ways(self, complex_: FlagComplex, sources: Mapping[int, float], obstacle: Collection[Edge]) -> Reach:
-        """Return the cheapest ways from `sources` (place: cost to start there); obstacle edges are dear."""
-        return reach(complex_, sources, obstacle, self._obstacle_cost)
+    def ways(
+        self,
+        complex_: FlagComplex,
+        sources: Mapping[int, float],
+        obstacle: Collection[Edge],
+        shut: Collection[int] = (),
+    ) -> Reach:
+        """Return the cheapest ways from `sources` (place: cost to start there), and to none that is `shut`."""
+        return reach(complex_, sources, obstacle, self._obstacle_cost, shut)

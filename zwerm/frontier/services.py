@@ -70,8 +70,17 @@ class FrontierService(Protocol):
 class PathService(Protocol):
     """By which way do robots come?"""
 
-    def ways(self, complex_: FlagComplex, sources: Mapping[int, float], obstacle: Collection[Edge]) -> Reach:
-        """Return the cheapest ways from `sources` (place: cost to start there); obstacle edges are dear."""
+    def ways(
+        self,
+        complex_: FlagComplex,
+        sources: Mapping[int, float],
+        obstacle: Collection[Edge],
+        shut: Collection[int] = (),
+    ) -> Reach:
+        """Return the cheapest ways from `sources` (place: cost to start there); obstacle edges are dear.
+
+        Ways may begin at places that are `shut`, but none leads there.
+        """
 
 
 class RedundancyService(Protocol):
