@@ -151,22 +151,23 @@ class World:
         # Ids ascend, and the coordinator's, which has no sensors, is the largest.
         robots = awake[:-1] if nodes and nodes[-1] == self.coordinator else awake
         readings = self._readings(robots)
-        for field in SIGNATURES:
-            if field in readings:
-                self._wakes.remember(field, nodes[: len(robots)], readings[field])
         inboxes: Any = self.medium.deliver(nodes, tick) if receivers else repeat(())
         columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]
         ticks, times = repeat(tick, len(robots)), repeat(scene.time_s)
         made: Iterator[Observation] = map(Observation, ticks, times, inboxes, *columns)
         if len(robots) < len(nodes):
             made = chain(made, (Observation(tick, scene.time_s, inboxes[-1] if receivers else ()),))
-        self.answers.ask(nodes, tick)
-        self.robot_ticks += len(nodes)
         self._nodes, self._observations = nodes, []
         for node, observation in zip(nodes, map(encode, made), strict=True):
             self._observations.append(observation)
             if send is not None:
                 send(node, observation)
+        # What nobody waits for comes last.
+        self.answers.ask(nodes, tick)
+        self.robot_ticks += len(nodes)
+        for field in SIGNATURES:
+            if field in readings:
+                self._wakes.remember(field, nodes[: len(robots)], readings[field])
         return nodes, self._observations
 
     def foresee(self) -> None:
