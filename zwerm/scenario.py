@@ -284,7 +284,6 @@ class Scenario(Table):
                 raise ValueError("services.path: robots find the path from one base station")
         elif services.spares == "link" and self.radio is None:
             raise ValueError("services.redundancy: robots that agree among themselves need the table [radio]")
-        services.check()
         return self
 
     @property
