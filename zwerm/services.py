@@ -8,10 +8,9 @@ from pydantic import BaseModel, ConfigDict
 class ServicesTable(BaseModel):
     """Who provides what: the `coordinator`, or the robots among themselves. Every combination can be run.
 
-    With `path` `gradient` robots find the way to the frontier by themselves, and with it fence and frontier, where it begins and
-    ends, and that all is over, when there is none. By `redundancy`, who can be spared is found by the coordinator, by relative
-    homology; with `link` by robots, by agreement among neighbours; or not at all. A coordinator may find that alone, where
-    robots find the path.
+    With `path` `gradient` robots find the way to the frontier by themselves, and with it fence and frontier, where it ends, and
+    that all is over, when there is none. By `redundancy`, who can be spared is found by the coordinator, by relative
+    homology; with `link` by robots, by agreement among neighbours; or not at all. A coordinator may find that alone.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
