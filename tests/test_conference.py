@@ -258,6 +258,17 @@ def test_a_coordinator_that_begins_anew_learns_from_the_robots_who_has_left() ->
     assert result.metrics["unsafe_removals"] == 0
 
 
+def test_robots_are_spared_also_while_the_swarms_of_two_stations_have_not_met() -> None:
+    hall = ["arena.size_m=[3.4,2.4]", "robots.count=60", "base.poses=[[0.2,1.3,0.0],[3.2,1.3,3.0]]"]
+    close = [f"{each}.parameters.margin_m=0.5" for each in ("robots", "base", "coordinator")]
+    often = ["coordinator.parameters.redundancy_every=4", "services.redundancy=link", "time.duration_s=70.0"]
+    result = run("sensor-coverage-multi-source", runner="inline", overrides=[*hall, *close, *often, *LOSS])
+    assert result.outcome == "time-limit"
+    assert result.metrics["removals"] >= 1
+    assert result.metrics["unsafe_removals"] == 0
+    assert max(each.told["complex"]["cycle"] for each in result.told if "complex" in each.told) > 5
+
+
 def test_what_is_agreed_upon_in_processes_is_what_is_agreed_upon_inline() -> None:
     small = ["arena.size_m=[1.8,1.4]", "base.pose=[0.2,0.7,0.0]", "coordinator.parameters.redundancy_every=1"]
     settings = [*HALL, *CLOSE, *small, "time.duration_s=40.0"]

@@ -117,7 +117,8 @@ class Planner:
         for mover in self._complex.vertices if len(pieces) > 1 else ():
             for other, direction in self._places.known_from(mover):
                 key = (mover, other, 0, BRIDGE)
-                if mover not in self._bases and piece[other] != piece[mover] and key not in self.tried.closed:
+                elsewhere = other in piece and piece[other] != piece[mover]  # who has left the complex is in no piece
+                if mover not in self._bases and elsewhere and key not in self.tried.closed:
                     hop, clear = self._rules.link_m - self._rules.margin_m, self._rules.near_wall_m
                     yield Plan(key, mover, direction, hop, clear, (mover,))
 
