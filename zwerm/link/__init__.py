@@ -4,8 +4,9 @@ A link knows nothing of what the bytes mean and makes no promise on order betwee
 in the order they were sent, each exactly once, until the node is lost.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any, Final, NamedTuple, Protocol
 
 
 class Arrival(NamedTuple):
@@ -13,6 +14,10 @@ class Arrival(NamedTuple):
 
     node: int
     payload: bytes | None
+
+
+# An Arrival of a pair, without the call of a Python function that its own constructor is.
+arrival: Final[Callable[[Iterable[Any]], Arrival]] = partial(tuple.__new__, Arrival)
 
 
 class WorldLink(Protocol):

@@ -2,13 +2,9 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from zwerm.errors import LinkError
-from zwerm.link import Answer, Arrival
-
-# An Arrival of a pair, without the call of a Python function that its own constructor is.
-_arrival = partial(tuple.__new__, Arrival)
+from zwerm.link import Answer, Arrival, arrival
 
 
 class MemoryLink:
@@ -28,7 +24,7 @@ class MemoryLink:
 
     def send(self, node: int, payload: bytes) -> None:
         """Hand the message to the node, and queue its answer."""
-        self._arrivals.append(_arrival((node, self._nodes[node](payload))))
+        self._arrivals.append(arrival((node, self._nodes[node](payload))))
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """Return the next answer, or None at once: nothing can come later than it was asked for."""

@@ -22,7 +22,7 @@ from zenoh.handlers import Callback
 
 from zwerm.errors import LinkError
 from zwerm.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
-from zwerm.link import Arrival
+from zwerm.link import Arrival, arrival
 from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threads
 from zwerm.protocol import REFUSABLE, Goodbye, Welcome, decode_hello, encode, refusal
 
@@ -136,7 +136,8 @@ class ZenohWorldLink:
 
     def _taken(self, count: int) -> list[Arrival]:
         full = len(self._arrivals) >= CAPACITY
-        arrivals = [self._arrivals.popleft() for _ in range(count)]
+        pop = self._arrivals.popleft
+        arrivals = [pop() for _ in range(count)]
         if full or self._losses:
             with self._changed:
                 self._losses -= sum(arrival.payload is None for arrival in arrivals)
@@ -159,7 +160,7 @@ class ZenohWorldLink:
             with self._changed:
                 self.refused["not-joined"] += 1
             return
-        self._arrivals.append(Arrival(node, sample.payload.to_bytes()))
+        self._arrivals.append(arrival((node, sample.payload.to_bytes())))
         if len(self._arrivals) >= self._wanted:
             with self._changed:
                 self._changed.notify_all()
