@@ -189,7 +189,7 @@ class SensorCoverage:
     def _assign(self) -> tuple[Plan, ...]:
         services = self.services
         self.redundant = tuple(place for place in self.redundant if place in self.places.occupant)
-        shut = self.picture.bases if self._spares == "link" else ()  # a station does not move
+        shut = self.picture.bases  # a station does not move
         sources = dict.fromkeys(self.sources.open(), 0.0) | dict.fromkeys(self.redundant, SPARED_COST)
 
         def ways(complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
