@@ -272,6 +272,12 @@ class Post:
                 return None
             yield Wake(at_s=until_s, on_packet=True)
 
+    def suspect(self) -> bool:
+        """Take a silence for the first loss, and be more patient from now on; tell whether nothing had been lost before."""
+        news = not self.patience.lossy
+        self.patience.lossy = True
+        return news
+
     def pause(self, ticks: int = 1) -> Story[None]:
         """Wait for so many ticks."""
         until_s = self.now_s + ticks * self._dt_s

@@ -139,6 +139,9 @@ class SensorCoverage:
             self._tell_complex(plans)
             self.outcome = self._judge(bool(stories))
             moved = [robot for each in (yield from together(stories)) for robot in each]
+            if self.outcome == "source-lost" and self.post.suspect():
+                self.outcome = ""
+                self._ask_stations_again()
             if self.outcome == COVERED and self.post.now_s < self.parameters.watch_until_s:
                 self.outcome = ""
                 yield from self.post.pause(WATCH_TICKS)
@@ -147,6 +150,11 @@ class SensorCoverage:
             yield from self._spare()
         self._tell_numbers()
         yield Wake()
+
+    def _ask_stations_again(self) -> None:
+        for place, base in self.sources.stations.items():
+            self.places.occupant[place] = base
+            self._silent.pop(base, None)
 
     def _judge(self, busy: bool) -> str:
         """Return the outcome, or nothing while it goes on.

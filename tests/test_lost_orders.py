@@ -299,6 +299,14 @@ def test_a_coordinator_that_is_gone_for_good_ends_the_run_and_the_base_says_why(
     assert at_s + 90.0 < result.sim_s < at_s + 123.0
 
 
+@pytest.mark.parametrize("at_s", [0.5, 8.0])
+def test_a_base_that_is_out_of_reach_for_twenty_seconds_before_anything_was_lost_is_waited_for(at_s: float) -> None:
+    fault = f"faults=[{{kind='partition', groups=[[0]], at_s={at_s}, for_s=20.0}}]"
+    result = run("sensor-coverage", runner="inline", overrides=[*HALL, fault])
+    assert result.outcome == "completed", result.reason
+    assert result.metrics["coverage_fraction"] > 0.99
+
+
 def test_a_coordinator_that_is_away_for_long_is_waited_for() -> None:
     result = run("sensor-coverage", runner="inline", overrides=[*HALL, crash(20.0, ", for_s=300.0")])
     assert result.outcome == "completed"
