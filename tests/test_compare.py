@@ -350,6 +350,14 @@ def test_there_is_one_figure_for_every_setting_of_the_further_sweeps(gossip: Pat
         assert all(path.read_bytes().startswith(start) for path in drawn)
 
 
+def test_a_line_goes_through_numbers_as_they_ascend_however_they_were_given(gossip: Path, tmp_path: Path) -> None:
+    drawn = []
+    for sweep in ("radio.loss=0.0,0.3,0.6", "radio.loss=0.3,0.6,0.0"):
+        result = run_study(planned(gossip, (sweep,)), tmp_path / "out.parquet", seeds=[1], jobs=1)
+        drawn += draw_comparison(tmp_path / f"{len(drawn)}.png", Comparison(result.results))
+    assert drawn[0].read_bytes() == drawn[1].read_bytes()
+
+
 @pytest.mark.parametrize("width", [80, 140])
 def test_tables_are_readable_on_a_narrow_terminal_and_no_wider_than_it(
     gossip: Path, tmp_path: Path, width: int

@@ -68,7 +68,7 @@ def draw_comparison(path: Path, comparison: Comparison, metrics: Sequence[str] =
         words = ", ".join(f"{axis} = {value}" for axis, value in rest)
         suffix = re.sub(r"[^A-Za-z0-9.=_-]+", "-", "".join(f"-{axis}={value}" for axis, value in rest))[:100]
         drawn.append(path.with_name(f"{path.stem}{suffix}{path.suffix}"))
-        _draw(comparison, places, [*chosen, COMPLETED], words).savefig(drawn[-1], dpi=DPI)
+        _draw(comparison, _in_order(places), [*chosen, COMPLETED], words).savefig(drawn[-1], dpi=DPI)
     return drawn
 
 
@@ -170,10 +170,23 @@ def _bars(axes: "Axes", x: Any, samples: Sequence[Sample], whole: Sequence[bool]
 
 def _axis(places: Sequence[Place]) -> tuple[Any, list[str]]:
     """Return where the places lie on the first sweep, and their names where it is not one of numbers."""
-    values = [next(iter(place.settings.values()), "") for place in places]
-    if all(isinstance(each, int | float) and not isinstance(each, bool) for each in values):
+    values = [_first(place) for place in places]
+    if _numeric(values):
         return np.array(values, dtype=np.float64), []
     return np.arange(len(values), dtype=np.float64), [str(each) for each in values]
+
+
+def _in_order(places: Sequence[Place]) -> list[Place]:
+    """Return the places as a line goes through them: numbers ascend, whatever order they were given in."""
+    return sorted(places, key=_first) if _numeric([_first(place) for place in places]) else list(places)
+
+
+def _first(place: Place) -> Any:
+    return next(iter(place.settings.values()), "")
+
+
+def _numeric(values: Sequence[Setting]) -> bool:
+    return all(isinstance(each, int | float) and not isinstance(each, bool) for each in values)
 
 
 def _whole(comparison: Comparison, point: Point, metric: str) -> bool:
