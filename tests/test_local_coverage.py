@@ -5,10 +5,12 @@ import pytest
 from zwerm.agents.node import Node
 from zwerm.agents.sensor_coverage.local import LocalRobot
 from zwerm.agents.sensor_coverage.post import TRIES_MAX, Post
-from zwerm.agents.sensor_coverage.words import NOWHERE, Done, Letter, State, Token, read, write
+from zwerm.agents.sensor_coverage.vicinity import Vicinity
+from zwerm.agents.sensor_coverage.words import NOWHERE, UNSAID, Done, Letter, State, Token, read, write
 from zwerm.assembly import assemble
 from zwerm.deploy.cast import cast
 from zwerm.errors import ScenarioError
+from zwerm.frontier.planner import Parameters
 from zwerm.link.memory import MemoryLink
 from zwerm.running import run
 from zwerm.scenario import Scenario, load
@@ -149,6 +151,31 @@ def test_an_empty_depot_is_noticed_by_the_base() -> None:
     result = run("sensor-coverage", runner="inline", overrides=[*ALONE, "robots.count=4"])
     assert result.outcome == "failed"
     assert "depot-dry: the depot is empty" in result.reason
+
+
+# --- places ---------------------------------------------------------------------------------------------------------
+
+
+def at(place: int) -> State:
+    return State(1, place, 3, False, False, 1, (), (), (), UNSAID)
+
+
+@pytest.mark.parametrize(
+    ("sender", "place", "name"),
+    [(8, 4, 17), (8, 3, 4), (9, 4, 4)],
+    ids=["the follower took its place", "the follower stayed", "somebody else was there before"],
+)
+def test_a_leader_that_stays_takes_the_new_name_if_its_follower_came_after_all(
+    sender: int, place: int, name: int
+) -> None:
+    leader = Vicinity(7, Parameters())
+    leader.found(4)
+    leader.stay(17, 8)
+    leader.part()
+    assert leader.place == 4
+    leader.hear(sender, at(place), 10)
+    leader.part()
+    assert leader.place == name
 
 
 # --- who provides what ----------------------------------------------------------------------------------------------

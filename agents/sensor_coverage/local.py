@@ -298,6 +298,7 @@ class LocalRobot(Robot):
         timers = [each for each in times if each is not None]
         if watched != self._watched or self.tick >= min(timers):
             self._watched = watched
+            vicinity.part()
             vicinity.find_heading()
             vicinity.learn_references()
             # Places outlive who stands there: while they change hands the frontier and the way to it stay as they were.

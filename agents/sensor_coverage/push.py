@@ -10,7 +10,7 @@
     done        front to rear, and the base
 
 Letters are sent again until they are acknowledged. Who hears nothing for too long goes on alone: that may leave a hole, which
-becomes frontier again, but no two robots ever take one place.
+becomes frontier again; and a leader that is back, and its follower beside it after all, take the two names that the push has.
 """
 
 import math
@@ -55,7 +55,7 @@ FIRST_RAD: Final = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
 
 
 class Push:
-    """One robot's part in one push. `over` once it is done with; `tried` and `moved` say what came of it."""
+    """One robot's part in one push. `over` once it is done with; `end` is how it ended, as far as this robot knows."""
 
     def __init__(self, host: Host, push: int, fresh: int, chain: Chain, back: int | None, first: bool = False) -> None:
         self.id = push
@@ -73,13 +73,8 @@ class Push:
         self._gone = False
         self._ahead_stands = self._behind_settled = False
         self._loose = self._leaned = False
-        self._end: Body | None = None
+        self.end: Body | None = None
         self._epoch = -1
-
-    @property
-    def end(self) -> Body | None:
-        """How it ended, as far as this robot knows."""
-        return self._end
 
     # --- what comes -------------------------------------------------------------------------------------------------
 
@@ -374,16 +369,18 @@ class Push:
 
     def _close(self, end: Body) -> None:
         """Tell who is behind how it ended, once this robot's word of its neighbours is good again."""
-        self._end = end
+        if self._index == len(self._chain) - 1 and isinstance(end, Abort):
+            self._host.vicinity.stay(self._fresh, self._back)
+        self.end = end
         self._enter("closing")
 
     def _finish(self) -> None:
         """Tell it, and stay out of other pushes until that was heard."""
         if self._host.vicinity.moving:
             self._host.rest()
-        self.over = self._end is None or self._back is None
-        if self._end is not None:
-            self._write(self._end)
+        self.over = self.end is None or self._back is None
+        if self.end is not None:
+            self._write(self.end)
         self._enter("telling")
 
     # --- means ------------------------------------------------------------------------------------------------------

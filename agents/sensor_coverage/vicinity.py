@@ -40,6 +40,7 @@ class Vicinity(Sight):
         self._places = Places()
         self._planner = Planner(rules, self._places)
         self._looked: object = None
+        self._apart: tuple[int, int | None] | None = None
 
     # --- what is remembered of a place ------------------------------------------------------------------------------
 
@@ -145,6 +146,17 @@ class Vicinity(Sight):
         self._looked = None
         self.change()
 
+    def stay(self, fresh: int, follower: int | None) -> None:
+        """Take note that this robot led a push and stays: the place `fresh` is nobody's, and `follower` should not come."""
+        self._apart = fresh, follower
+
+    def part(self) -> None:
+        """Take the name that is nobody's, if the follower came all the same: no two hold one place for long."""
+        if self._apart is not None:
+            fresh, follower = self._apart
+            if any(node == follower and each.place == self.place for node, each in self.states.items()):
+                self.found(fresh)
+
     def best(self) -> Plan | None:
         """Return the plan to carry out here."""
         wanted = self.plans or self.gaps
@@ -236,6 +248,7 @@ class Vicinity(Sight):
         self._planner = Planner(self.rules, self._places)
         self.plans, self.gaps, self.obstacle = [], [], {}
         self._looked = None
+        self._apart = None
         self._awaited = {}
         self.change()
 
