@@ -114,7 +114,6 @@ class Visibility:
     """The visible pairs of one run, remembered from scene to scene."""
 
     def __init__(self) -> None:
-        self._scene: Scene | None = None
         self._position: Floats = np.empty((0, 2))
         self._present: Bools = np.empty(0, dtype=np.bool_)
         self._verdicts = WallVerdicts()
@@ -169,9 +168,6 @@ class Visibility:
 
     def _advance(self, scene: Scene) -> None:
         """Forget what no longer holds. Positions are compared, so it does not matter which scenes were asked about."""
-        if scene is self._scene:
-            return
-        self._scene = scene
         if len(self._present) != len(scene.present):
             changed = np.ones(len(scene.present), dtype=np.bool_)
             self._verdicts = WallVerdicts()
