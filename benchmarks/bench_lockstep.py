@@ -50,7 +50,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--robots", type=int, default=100)
     parser.add_argument("--seconds", type=float, default=30.0, help="virtual time of each run")
-    parser.add_argument("--repeats", type=int, default=11, help="at least 2")
+    parser.add_argument("--repeats", type=int, default=21, help="at least 2")
     options = parser.parse_args()
     base = (f"robots.count={options.robots}", f"time.duration_s={options.seconds}")
     cases = {"line of sight": base, "five sensors": (*base, *SENSORS)}
