@@ -8,12 +8,9 @@ still true or is found out by those whose lists it names; nobody needs to know w
 from collections.abc import Callable
 from typing import Annotated, Final
 
-import msgspec
 from msgspec import Meta, Struct
 
-from zwerm.errors import ProtocolError
-from zwerm.frame import seal, unseal
-from zwerm.protocol import REFUSABLE
+from zwerm.frame import Sealed
 
 CHANNEL: Final = "uplink"
 
@@ -62,18 +59,6 @@ class Spare(_Message, frozen=True):
 
 Word = Standing | Noted | Collect | Spare
 
-_encode: Final[Callable[[Word], bytes]] = msgspec.msgpack.Encoder().encode
-_decode: Final[Callable[[bytes], Word]] = msgspec.msgpack.Decoder(Word).decode
-
-
-def write(word: Word) -> bytes:
-    """Return the payload of a packet that says this."""
-    return seal(_encode(word))
-
-
-def read(payload: bytes) -> Word | None:
-    """Return what a packet says, or None where that is nothing: it was damaged on its way, or is somebody else's."""
-    try:
-        return _decode(unseal(payload))
-    except (ProtocolError, *REFUSABLE):
-        return None
+_sealed: Final = Sealed(Word)
+write: Final[Callable[[Word], bytes]] = _sealed.write
+read: Final[Callable[[bytes], Word | None]] = _sealed.read

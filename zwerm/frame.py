@@ -5,10 +5,13 @@ up to 3 bits in payloads of this length, and all but one in 4e9 of the others. I
 """
 
 from struct import pack, unpack_from
-from typing import Final
+from typing import Any, Final
 from zlib import crc32
 
+import msgspec
+
 from zwerm.errors import ProtocolError
+from zwerm.protocol import REFUSABLE
 
 HEAD_BYTES: Final = 4
 
@@ -26,3 +29,22 @@ def unseal(frame: bytes) -> bytes:
     if unpack_from(">I", frame)[0] != crc32(payload):
         raise ProtocolError("damaged", "the checksum does not fit")
     return payload
+
+
+class Sealed:
+    """How messages of the types `messages`, structs or a union of them, cross a radio that damages bits."""
+
+    def __init__(self, messages: Any) -> None:
+        self._encode = msgspec.msgpack.Encoder().encode
+        self._decode = msgspec.msgpack.Decoder(messages).decode
+
+    def write(self, message: Any) -> bytes:
+        """Return the payload of a packet that says this."""
+        return seal(self._encode(message))
+
+    def read(self, payload: bytes) -> Any:
+        """Return what a packet says, or None where that is nothing: it was damaged on its way, or is somebody else's."""
+        try:
+            return self._decode(unseal(payload))
+        except (ProtocolError, *REFUSABLE):
+            return None

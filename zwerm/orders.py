@@ -10,12 +10,9 @@ it is answered, and an answer as a `Reply` to that number; both under a checksum
 from collections.abc import Callable
 from typing import Final
 
-import msgspec
 from msgspec import Struct
 
-from zwerm.errors import ProtocolError
-from zwerm.frame import seal, unseal
-from zwerm.protocol import REFUSABLE
+from zwerm.frame import Sealed
 
 
 def _tag(class_name: str) -> str:
@@ -198,27 +195,8 @@ class Reply(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     answer: Answer
 
 
-_encode: Final[Callable[[Dispatch | Reply], bytes]] = msgspec.msgpack.Encoder().encode
-_decode_dispatch: Final[Callable[[bytes], Dispatch]] = msgspec.msgpack.Decoder(Dispatch).decode
-_decode_reply: Final[Callable[[bytes], Reply]] = msgspec.msgpack.Decoder(Reply).decode
-
-
-def write(message: Dispatch | Reply) -> bytes:
-    """Return the payload of a packet that says this."""
-    return seal(_encode(message))
-
-
-def read_dispatch(payload: bytes) -> Dispatch | None:
-    """Return the order in a packet, or None where there is none: a packet damaged on its way says nothing."""
-    try:
-        return _decode_dispatch(unseal(payload))
-    except (ProtocolError, *REFUSABLE):
-        return None
-
-
-def read_reply(payload: bytes) -> Reply | None:
-    """Return the answer in a packet, or None where there is none."""
-    try:
-        return _decode_reply(unseal(payload))
-    except (ProtocolError, *REFUSABLE):
-        return None
+_dispatches: Final = Sealed(Dispatch)
+_replies: Final = Sealed(Reply)
+write: Final[Callable[[Dispatch | Reply], bytes]] = _dispatches.write
+read_dispatch: Final[Callable[[bytes], Dispatch | None]] = _dispatches.read
+read_reply: Final[Callable[[bytes], Reply | None]] = _replies.read

@@ -7,14 +7,11 @@ told in one frame, which every robot knows by its heading; no message tells a po
 from collections.abc import Callable
 from typing import Final
 
-import msgspec
 from msgspec import Struct
 
 from zwerm.agents.sensor_coverage import redundancy
 from zwerm.agents.sensor_coverage.termination import Tally, Wave
-from zwerm.errors import ProtocolError
-from zwerm.frame import seal, unseal
-from zwerm.protocol import REFUSABLE
+from zwerm.frame import Sealed
 
 CHANNEL: Final = "robots"
 NOWHERE: Final = -1
@@ -240,18 +237,6 @@ class Receipt(_Message, frozen=True, tag="r"):
 
 Word = Wave | Tally | State | Way | Ask | Enquire | Gone | Letter | Receipt | redundancy.Message
 
-_encode: Final[Callable[[Word], bytes]] = msgspec.msgpack.Encoder().encode
-_decode: Final[Callable[[bytes], Word]] = msgspec.msgpack.Decoder(Word).decode
-
-
-def write(word: Word) -> bytes:
-    """Return the payload of a packet that says this."""
-    return seal(_encode(word))
-
-
-def read(payload: bytes) -> Word | None:
-    """Return what a packet says, or None where that is nothing: it was damaged on its way, or is somebody else's."""
-    try:
-        return _decode(unseal(payload))
-    except (ProtocolError, *REFUSABLE):
-        return None
+_sealed: Final = Sealed(Word)
+write: Final[Callable[[Word], bytes]] = _sealed.write
+read: Final[Callable[[bytes], Word | None]] = _sealed.read
