@@ -38,7 +38,7 @@ EXIT_REFUSED: Final = 2
 EXIT_LOST: Final = 3
 
 # All robots wait for the world, so it goes first where there are more processes than cores (measured: 100 robots on two cores
-# make a tenth more ticks). Less than the most, which would leave robots next to nothing beside other work.
+# make a few per cent more ticks). Less than the most, which would leave robots next to nothing beside other work.
 NICENESS: Final = 5
 
 # How long a node whose controller failed waits for the world to have heard why.

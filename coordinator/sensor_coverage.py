@@ -260,8 +260,8 @@ class SensorCoverage:
         self.picture = self.pushing.picture = whole
         if self._spares == "link":
             self.redundant = self._conference.spare(whole)
-        if self._spares == "link" and self.redundant:
-            self.picture = whole._replace(complex_=whole.complex_.without(self.redundant))
+            if self.redundant:
+                self.picture = whole._replace(complex_=whole.complex_.without(self.redundant))
         self.services.frontier.look(self.picture)
 
     def _look(self, reports: Mapping[int, Report]) -> None:

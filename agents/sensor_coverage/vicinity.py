@@ -154,7 +154,8 @@ class Vicinity(Sight):
         """Take the name that is nobody's, if the follower came all the same: no two hold one place for long."""
         if self._apart is not None:
             fresh, follower = self._apart
-            if any(node == follower and each.place == self.place for node, each in self.states.items()):
+            state = None if follower is None else self.states.get(follower)
+            if state is not None and state.place == self.place:
                 self.found(fresh)
 
     def best(self) -> Plan | None:
