@@ -17,15 +17,11 @@ CHANNEL: Final = "uplink"
 Count = Annotated[int, Meta(ge=0, le=2**62)]
 
 
-def _tag(class_name: str) -> str:
-    return class_name.lower()
-
-
-class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=_tag):
+class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, led by its name."""
 
 
-class Standing(_Message, frozen=True):
+class Standing(_Message, frozen=True, tag="standing"):
     """How the sender stands in the complex.
 
     `number` grows with everything new that it says. It sees those in `listed`, ascending, as its list of that version has it,
@@ -41,17 +37,17 @@ class Standing(_Message, frozen=True):
     willing: bool
 
 
-class Noted(_Message, frozen=True):
+class Noted(_Message, frozen=True, tag="noted"):
     """What the receiver said under this number has been noted."""
 
     number: Count
 
 
-class Collect(_Message, frozen=True):
+class Collect(_Message, frozen=True, tag="collect"):
     """The sender lacks the receiver's word."""
 
 
-class Spare(_Message, frozen=True):
+class Spare(_Message, frozen=True, tag="spare"):
     """The receiver can be spared as long as each of its neighbours' lists is of this version; it sees nobody else."""
 
     versions: tuple[tuple[Count, Count], ...]

@@ -15,15 +15,11 @@ from msgspec import Struct
 from zwerm.frame import Sealed
 
 
-def _tag(class_name: str) -> str:
-    return class_name.lower()
-
-
 class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A part of a message that comes in numbers."""
 
 
-class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=_tag):
+class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, led by its name."""
 
 
@@ -45,32 +41,32 @@ class Landmark(_Part, frozen=True):
 # --- to a robot -----------------------------------------------------------------------------------------------------
 
 
-class Muster(_Message, frozen=True):
+class Muster(_Message, frozen=True, tag="muster"):
     """To all: stand still, look around anew, and say what you see and touch."""
 
     cycle: int
 
 
-class Survey(_Message, frozen=True):
+class Survey(_Message, frozen=True, tag="survey"):
     """Say what you see and touch. These robots have moved since the last survey."""
 
     cycle: int
     moved: tuple[int, ...]
 
 
-class Confer(_Message, frozen=True):
+class Confer(_Message, frozen=True, tag="confer"):
     """To a robot that is not on the fence: leave the complex, if your neighbours agree, and report."""
 
     cycle: int
 
 
-class Release(_Message, frozen=True):
+class Release(_Message, frozen=True, tag="release"):
     """To the base: let a robot out."""
 
     cycle: int
 
 
-class Deploy(_Message, frozen=True):
+class Deploy(_Message, frozen=True, tag="deploy"):
     """Drive into the unknown along a bearing.
 
     If a wall stops it before `clear_m`, the robot drives back; else it goes on to `hop_m`.
@@ -82,7 +78,7 @@ class Deploy(_Message, frozen=True):
     clear_m: float
 
 
-class Move(_Message, frozen=True):
+class Move(_Message, frozen=True, tag="move"):
     """Take the place about `hop_m` away along a bearing, from which the landmarks are seen as told."""
 
     cycle: int
@@ -91,7 +87,7 @@ class Move(_Message, frozen=True):
     landmarks: tuple[Landmark, ...]
 
 
-class Correct(_Message, frozen=True):
+class Correct(_Message, frozen=True, tag="correct"):
     """Correct the scale: break and re-establish the visual link to each anchor, one after the other.
 
     `anchors` give the bearing at which each should about be.
@@ -104,7 +100,7 @@ class Correct(_Message, frozen=True):
 # --- from a robot ---------------------------------------------------------------------------------------------------
 
 
-class Report(_Message, frozen=True):
+class Report(_Message, frozen=True, tag="report"):
     """The answer to a survey or a muster.
 
     `sightings` None: nothing has changed. `touched` are bearings of walls touched. `home`: it still stands where it came out.
@@ -116,29 +112,29 @@ class Report(_Message, frozen=True):
     home: bool = False
 
 
-class Aside(Report, frozen=True):
+class Aside(Report, frozen=True, tag="aside"):
     """The same from a robot that has left the complex by agreement with its neighbours, and stands there in body."""
 
 
-class Released(_Message, frozen=True):
+class Released(_Message, frozen=True, tag="released"):
     """The base's answer to a release: the robot that came out, if one did."""
 
     robot: int | None
 
 
-class Emerged(_Message, frozen=True):
+class Emerged(_Message, frozen=True, tag="emerged"):
     """A robot came out of the depot and sees this."""
 
     sightings: tuple[Sighting, ...]
 
 
-class Cleared(_Message, frozen=True):
+class Cleared(_Message, frozen=True, tag="cleared"):
     """The robot that deploys has gone far enough to be replaced."""
 
     cycle: int
 
 
-class Arrived(_Message, frozen=True):
+class Arrived(_Message, frozen=True, tag="arrived"):
     """The end of a drive.
 
     `ok` False: the robot is back where it was, or never got to its place. `loose`: bearings did not tell how far to go,
@@ -154,7 +150,7 @@ class Arrived(_Message, frozen=True):
     touched: tuple[float, ...]
 
 
-class Heard(_Message, frozen=True):
+class Heard(_Message, frozen=True, tag="heard"):
     """The order has come, and is being carried out."""
 
 

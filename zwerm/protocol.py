@@ -32,13 +32,7 @@ class _Part(Struct, frozen=True, gc=False, array_like=True, forbid_unknown_field
     """A part of a message that may come in numbers: an array on the wire."""
 
 
-def _type_tag(class_name: str) -> str:
-    return f"{class_name.lower()}/{PROTOCOL_VERSION}"
-
-
-class _Message(
-    Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True, tag_field="type", tag=_type_tag
-):
+class _Message(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True, tag_field="type"):
     """A whole message: a map on the wire, led by its type and the protocol version."""
 
 
@@ -106,7 +100,7 @@ class Packet(_Part, frozen=True):
     sender: int | None = None
 
 
-class Observation(_Message, frozen=True):
+class Observation(_Message, frozen=True, tag=f"observation/{PROTOCOL_VERSION}"):
     """All that a node learns at one tick. A sensor the scenario does not give the node is None, and not on the wire."""
 
     tick: int
@@ -170,7 +164,14 @@ class Wake(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defau
     on_visible: bool = False
 
 
-class Command(Struct, gc=False, forbid_unknown_fields=True, omit_defaults=True, tag_field="type", tag=_type_tag):
+class Command(
+    Struct,
+    gc=False,
+    forbid_unknown_fields=True,
+    omit_defaults=True,
+    tag_field="type",
+    tag=f"command/{PROTOCOL_VERSION}",
+):
     """A node's answer to one observation.
 
     `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation
@@ -190,7 +191,7 @@ class Command(Struct, gc=False, forbid_unknown_fields=True, omit_defaults=True, 
     told: dict[str, Any] = {}
 
 
-class Failure(_Message, frozen=True):
+class Failure(_Message, frozen=True, tag=f"failure/{PROTOCOL_VERSION}"):
     """A controller raised: the last message of a node, in place of its command."""
 
     tick: int
@@ -201,14 +202,14 @@ class Failure(_Message, frozen=True):
 # --- how a node joins and leaves ------------------------------------------------------------------------------------
 
 
-class Hello(_Message, frozen=True):
+class Hello(_Message, frozen=True, tag=f"hello/{PROTOCOL_VERSION}"):
     """A node asks to join under the incarnation it was started with."""
 
     node: int
     incarnation: int
 
 
-class Welcome(_Message, frozen=True):
+class Welcome(_Message, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
     """The world's answer to `Hello`: what the node is and what it may know of itself, or why it is refused.
 
     In a `paced` run, one in real time, observations come whether or not the node has answered the one before.
@@ -220,7 +221,7 @@ class Welcome(_Message, frozen=True):
     paced: bool = False
 
 
-class Goodbye(_Message, frozen=True):
+class Goodbye(_Message, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
     """The world tells a node that its life is over, and why; the node closes and exits. Or a node says that it leaves."""
 
     reason: str

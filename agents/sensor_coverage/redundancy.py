@@ -28,15 +28,11 @@ Count = Annotated[int, Meta(ge=0, le=2**62)]
 TICKS_PER_S: Final = 1_000
 
 
-def _tag(class_name: str) -> str:
-    return class_name.lower()
-
-
-class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=_tag):
+class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, led by its name."""
 
 
-class Neighbours(_Message, frozen=True):
+class Neighbours(_Message, frozen=True, tag="neighbours"):
     """Whom the sender sees, ascending; the version is another one whenever that is another list.
 
     `over` says what `Over` says, in case that was lost.
@@ -47,26 +43,26 @@ class Neighbours(_Message, frozen=True):
     over: Count = 0
 
 
-class Ask(_Message, frozen=True):
+class Ask(_Message, frozen=True, tag="ask"):
     """To all neighbours: the sender wants to leave, relying on these (neighbour, version of its list)."""
 
     number: Count
     versions: tuple[tuple[Count, Count], ...]
 
 
-class Grant(_Message, frozen=True):
+class Grant(_Message, frozen=True, tag="grant"):
     """The sender will stand still for the one who asked."""
 
     number: Count
 
 
-class Deny(_Message, frozen=True):
+class Deny(_Message, frozen=True, tag="deny"):
     """The sender will not."""
 
     number: Count
 
 
-class Over(_Message, frozen=True):
+class Over(_Message, frozen=True, tag="over"):
     """To all neighbours: the sender has left, or never will upon this or an earlier number."""
 
     number: Count
