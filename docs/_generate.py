@@ -24,8 +24,9 @@ from zwerm.agents.runtime import controllers
 from zwerm.cli.app import app
 from zwerm.deploy.node_specs import PARTS
 from zwerm.run.runner import run
-from zwerm.scenario.tables import OpenTable, Scenario
+from zwerm.scenario.tables import Scenario
 from zwerm.scenario.tables import tables as scenario
+from zwerm.scenario.types import OpenTable
 from zwerm.study.tables import StudyTable
 from zwerm.wire import messages as protocol
 from zwerm.world.faults import FaultTable

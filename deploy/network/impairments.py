@@ -20,7 +20,8 @@ from zwerm.deploy.network.namespaces import Namespaces, address_of, lacks_netem,
 from zwerm.errors import ScenarioError
 from zwerm.link.peer_radio import HEAD_BYTES, Transport
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.tables import OpenTable, Scenario
+from zwerm.scenario.tables import Scenario
+from zwerm.scenario.types import OpenTable
 from zwerm.world.radio import ROBOTS
 from zwerm.world.radio.registry import BUILT_IN, selected, tables_of
 

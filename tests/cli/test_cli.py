@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from support import ROOT, ZWERM
 
-from zwerm.scenario.tables import built_in
+from zwerm.scenario.load import built_in
 
 
 def zwerm(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:

@@ -13,7 +13,8 @@ from support import script
 import zwerm
 from zwerm.run.assembly import assemble
 from zwerm.run.result import RunResult
-from zwerm.scenario.tables import Scenario, built_in, validate
+from zwerm.scenario.load import built_in, validate
+from zwerm.scenario.tables import Scenario
 from zwerm.study.tables import StudyTable
 from zwerm.wire.messages import Observation
 from zwerm.world.sensors import registry as sensors

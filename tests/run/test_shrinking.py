@@ -15,7 +15,8 @@ from support import ROOT, ZWERM, scenario
 from zwerm.errors import ScenarioError
 from zwerm.run.runner import run
 from zwerm.run.shrinking import Shrinker, parse_failing, tables_of, with_faults
-from zwerm.scenario.tables import Scenario, load, validate
+from zwerm.scenario.load import load, validate
+from zwerm.scenario.tables import Scenario
 from zwerm.scenario.toml import write_toml
 
 # Robot 4's id reaches 0 by way of 1 or of 2, and by no other.

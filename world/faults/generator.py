@@ -10,7 +10,8 @@ import numpy as np
 
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.tables import OpenTable, Scenario
+from zwerm.scenario.tables import Scenario
+from zwerm.scenario.types import OpenTable
 from zwerm.world.arena.arena import Arena
 
 SECONDS_PER_H: Final = 3_600.0

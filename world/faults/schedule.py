@@ -14,7 +14,9 @@ from pydantic import ValidationError
 
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.tables import OpenTable, Scenario, mistakes
+from zwerm.scenario.diagnostics import mistakes
+from zwerm.scenario.tables import Scenario
+from zwerm.scenario.types import OpenTable
 from zwerm.world.faults import FaultTable, ticks
 from zwerm.world.faults.nodes import CrashTable, JoinTable, PauseTable, RestartTable, SlowTable
 from zwerm.world.faults.radio import (

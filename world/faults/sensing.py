@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import Finite, Fraction, NonNegative, Scenario
+from zwerm.scenario.tables import Scenario
+from zwerm.scenario.types import Finite, Fraction, NonNegative
 from zwerm.wire.messages import SENSOR_FIELDS, Bearing, Contact, LandmarkBearing, Neighbour
 from zwerm.world.faults import FaultTable, Robots
 from zwerm.world.scene import Bools, Floats, Ints, Scene

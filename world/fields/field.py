@@ -14,7 +14,8 @@ from pydantic import Field as Key
 from pydantic import ValidationError, ValidationInfo, field_validator
 
 from zwerm.errors import ScenarioError
-from zwerm.scenario.tables import Finite, OpenTable, Point, Positive, Size, Table, mistakes
+from zwerm.scenario.diagnostics import mistakes
+from zwerm.scenario.types import Finite, OpenTable, Point, Positive, Size, Table
 from zwerm.world.scene import Floats
 
 Box = tuple[float, float, float, float]

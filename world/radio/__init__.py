@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.tables import Table
+from zwerm.scenario.types import Table
 from zwerm.world.arena.arena import Arena
 from zwerm.world.radio.links import LinkDraws, Links
 from zwerm.world.scene import Bools, Floats, Ints, Scene

@@ -13,8 +13,10 @@ from pydantic import ValidationError
 
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.plugin_names import class_named
-from zwerm.scenario.tables import ChannelTable, OpenTable, Scenario, mistakes
+from zwerm.scenario.tables import ChannelTable, Scenario
+from zwerm.scenario.types import OpenTable
 from zwerm.world.arena.arena import Arena
 from zwerm.world.radio import ROBOTS, Air, LinkModel, LinkTable, ModelPlace, NodeName, Packets, Verdict
 from zwerm.world.radio.links import Links

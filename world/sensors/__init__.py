@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
-from zwerm.scenario.tables import Table
+from zwerm.scenario.types import Table
 from zwerm.world.arena.arena import Arena
 from zwerm.world.fields.field import Field
 from zwerm.world.geometry.visibility import Visibility

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import Finite, NonNegative, Positive, Table
+from zwerm.scenario.types import Finite, NonNegative, Positive, Table
 from zwerm.wire.messages import Bearing
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings, portions

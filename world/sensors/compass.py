@@ -6,7 +6,7 @@ The noise is Gaussian and independent for each tick and robot, plus one bias tha
 from typing import ClassVar
 
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import Finite, NonNegative, Table
+from zwerm.scenario.types import Finite, NonNegative, Table
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import NonNegative, Positive, Table
+from zwerm.scenario.types import NonNegative, Positive, Table
 from zwerm.wire.messages import LandmarkBearing
 from zwerm.world.geometry.visibility import WallVerdicts
 from zwerm.world.scene import Bools, Ints, Scene

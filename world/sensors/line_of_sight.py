@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import ValidationInfo, field_validator
 
-from zwerm.scenario.tables import Fraction, Positive, Table
+from zwerm.scenario.types import Fraction, Positive, Table
 from zwerm.world.scene import Bools, Ints, Scene
 from zwerm.world.sensors import Surroundings
 

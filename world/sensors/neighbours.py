@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.scenario.tables import NonNegative, Positive, Table
+from zwerm.scenario.types import NonNegative, Positive, Table
 from zwerm.wire.messages import Neighbour
 from zwerm.world.geometry.tessellation import Tessellation
 from zwerm.world.geometry.visibility import VisiblePairs

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import NonNegative, Table
+from zwerm.scenario.types import NonNegative, Table
 from zwerm.wire.messages import Displacement
 from zwerm.world.scene import Floats, Ints, Scene
 from zwerm.world.sensors import Surroundings, in_body_frames

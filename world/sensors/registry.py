@@ -11,8 +11,9 @@ from typing import Final
 from pydantic import ValidationError
 
 from zwerm.errors import ScenarioError
+from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.plugin_names import class_named
-from zwerm.scenario.tables import OpenTable, Table, mistakes
+from zwerm.scenario.types import OpenTable, Table
 from zwerm.wire.messages import SENSOR_FIELDS, Observation
 from zwerm.world.sensors import Sensor, Surroundings
 from zwerm.world.sensors.bearings import Bearings

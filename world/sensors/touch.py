@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import Fraction, Positive, Table
+from zwerm.scenario.types import Fraction, Positive, Table
 from zwerm.wire.messages import Contact
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings, portions

@@ -40,7 +40,7 @@ from zwerm.cli.terminal import (
 from zwerm.cli.trials import COMPARE_HELP, STUDY_HELP, compare, study
 from zwerm.errors import PictureError, ScenarioError
 from zwerm.run.result import RunResult
-from zwerm.scenario.tables import built_in, load, locate
+from zwerm.scenario.load import built_in, load, locate
 
 app = typer.Typer(
     name="zwerm",

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from zwerm.agents.runtime.controllers import find, parameters_of
-from zwerm.deploy.node_specs import BASE, COORDINATOR, ROBOT, player
+from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role
+from zwerm.deploy.node_specs import controller_for
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
 from zwerm.scenario.tables import Scenario
@@ -100,10 +101,10 @@ def check_controllers(scenario: Scenario) -> None:
 
 
 def _controller_mistakes(
-    scenario: Scenario, table: str, role: str, controller: str, parameters: dict[str, Any], sensors: Sequence[str]
+    scenario: Scenario, table: str, role: Role, controller: str, parameters: dict[str, Any], sensors: Sequence[str]
 ) -> list[str]:
     try:
-        found = find(player(role, controller, scenario.services))
+        found = find(controller_for(scenario, role, controller))
     except ControllerError as error:
         return [f"{table}.controller: {error}"]
     mistakes = [

@@ -24,7 +24,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
 )
 from zwerm.agents.sensor_coverage.motion.homing import offset, slid, unit
 from zwerm.run.runner import run
-from zwerm.scenario.tables import load
+from zwerm.scenario.load import load
 from zwerm.wire.messages import (
     Bearing,
     BodyVelocity,

@@ -8,7 +8,7 @@ import shapely
 
 from zwerm.errors import ScenarioError
 from zwerm.run.runner import run
-from zwerm.scenario.tables import built_in
+from zwerm.scenario.load import built_in
 from zwerm.study.plan import make_points, make_trials
 from zwerm.study.tables import built_in as built_in_studies
 from zwerm.study.tables import load_study

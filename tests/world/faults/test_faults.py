@@ -11,7 +11,7 @@ from support import scenario
 
 from zwerm.agents.runtime.node import Node
 from zwerm.cli.console import print_result
-from zwerm.deploy.node_specs import cast, recast
+from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import LinkError, ScenarioError
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
@@ -45,9 +45,9 @@ class Life:
         self.world = assemble(chosen, seed)
         self.observed: list[dict[int, Observation]] = []
         self.orders: list[list[ProcessAction]] = []
-        nodes = {node: Node(*played).answer for node, played in cast(chosen, seed).items()}
+        nodes = {node: Node(*spec).answer for node, spec in node_specs(chosen, seed).items()}
         link = MemoryLink(
-            nodes, lambda node, life: Node(*recast(chosen, seed, node, life)).answer, self.world.schedule.unborn
+            nodes, lambda node, life: Node(*restart_spec(chosen, seed, node, life)).answer, self.world.schedule.unborn
         )
         self._spy()
         self.outcome = LockStep(self.world, link, programs=link).run()

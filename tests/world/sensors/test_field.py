@@ -11,7 +11,7 @@ from PIL import Image
 from scipy.interpolate import RegularGridInterpolator
 
 from zwerm.errors import ScenarioError
-from zwerm.scenario.tables import OpenTable
+from zwerm.scenario.types import OpenTable
 from zwerm.world.fields.field import Bitmap, make_field
 
 BOUNDS_M = (0.0, 0.0, 3.0, 2.0)

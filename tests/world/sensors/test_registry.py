@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from zwerm.errors import ScenarioError
-from zwerm.scenario.tables import OpenTable
+from zwerm.scenario.types import OpenTable
 from zwerm.wire.messages import SENSOR_FIELDS, Observation, decode_observation, encode
 from zwerm.world.fields.field import Linear
 from zwerm.world.sensors import Surroundings

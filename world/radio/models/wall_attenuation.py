@@ -13,7 +13,7 @@ from typing import ClassVar, Final, Literal
 import numpy as np
 from pydantic import Field
 
-from zwerm.scenario.tables import NonNegative, Rectangle, Table
+from zwerm.scenario.types import NonNegative, Rectangle, Table
 from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 from zwerm.world.radio.static_links import StaticLinkValues
 from zwerm.world.scene import Floats
