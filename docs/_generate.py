@@ -20,18 +20,17 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from pydantic import BaseModel
 
-from zwerm.agents.runtime import controllers
+from zwerm.catalogue import ROBOT, names
 from zwerm.cli.app import app
-from zwerm.deploy.node_specs import PARTS
 from zwerm.run.runner import run
+from zwerm.scenario import tables as scenario
 from zwerm.scenario.tables import Scenario
-from zwerm.scenario.tables import tables as scenario
 from zwerm.scenario.types import OpenTable
 from zwerm.study.tables import StudyTable
 from zwerm.wire import messages as protocol
 from zwerm.world.faults import FaultTable
 from zwerm.world.faults import schedule as faults
-from zwerm.world.fields.field import field as fields
+from zwerm.world.fields import field as fields
 from zwerm.world.radio import LinkTable
 from zwerm.world.radio import registry as radio
 from zwerm.world.sensors import registry as sensors
@@ -217,13 +216,16 @@ def field_list() -> str:
 
 def controller_list() -> str:
     """Return every built-in controller and what it takes."""
-    return "\n\n".join(_controller(f"`{name}`", f"controller-{name}", name) for name in controllers.BUILT_IN)
+    return "\n\n".join(_controller(f"`{name}`", f"controller-{name}", name) for name in names(ROBOT))
 
 
 def part_list() -> str:
     """Return every built-in base station and coordinator and what it takes."""
     return "\n\n".join(
-        _controller(f"`{name}`, {role}", f"{role}-{name}", where) for (role, name), where in PARTS.items()
+        _controller(f"`{name}`, {role}", f"{role}-{name}", where)
+        for role in (BASE, COORDINATOR)
+        for row in ALGORITHMS
+        for name, where in row.controllers.get(role, {}).items()
     )
 
 

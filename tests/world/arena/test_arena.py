@@ -15,8 +15,8 @@ from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
 
 from zwerm.errors import ScenarioError
 from zwerm.scenario.tables import ArenaTable
+from zwerm.world.arena import arena as module
 from zwerm.world.arena.arena import Arena
-from zwerm.world.arena.arena import arena as module
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 
