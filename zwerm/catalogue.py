@@ -73,8 +73,8 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         paper="Ramaithitima, Whitzer, Bhattacharya, Kumar 2015",
         page="papers/sensor-coverage.md",
         controllers={
-            ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}:CentralRobot"},
-            BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}:CentralBase"},
+            ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}.central_robot:CentralRobot"},
+            BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}.central_base:CentralBase"},
             COORDINATOR: {"sensor-coverage": f"{_SENSOR_COVERAGE_COORDINATOR}.coordinator:SensorCoverageCoordinator"},
         },
         variants=(

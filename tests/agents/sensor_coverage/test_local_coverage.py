@@ -3,20 +3,13 @@
 import pytest
 
 from zwerm.agents.runtime.node import Node
-from zwerm.agents.sensor_coverage.frontier.planner import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
-from zwerm.agents.sensor_coverage.messages.peers import (
-    NOWHERE,
-    UNSAID,
-    PushDone,
-    PushToken,
-    Segment,
-    StateBeacon,
-    read,
-    write,
-)
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, UNSAID, StateBeacon
+from zwerm.agents.sensor_coverage.messages.peers import read, write
+from zwerm.agents.sensor_coverage.messages.pushes import PushDone, PushToken, Segment
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
-from zwerm.agents.sensor_coverage.protocols.mailbox import TRIES_MAX, ReliableMailbox
+from zwerm.agents.sensor_coverage.protocols.transport.mailbox import TRIES_MAX, ReliableMailbox
 from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.link.memory import MemoryLink
@@ -50,7 +43,7 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
         robots = out()
         seen.update(dict.fromkeys(each.node for each in robots))
         assert len(seen) == len(robots), "nobody that was let out is lost"
-        held = [each.vicinity.place for each in robots if each.push is None and each.vicinity.place != NOWHERE]
+        held = [each.local_map.slot for each in robots if each.push is None and each.local_map.slot != NOWHERE]
         assert len(held) == len(set(held)), f"tick {world.tick}: each has a place of its own, but {sorted(held)}"
 
     driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), watch)
@@ -63,9 +56,9 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
 def test_a_damaged_word_says_nothing() -> None:
     payload = write(Segment(1, PushDone(7)))
     assert read(payload) == Segment(1, PushDone(7))
-    for place in range(len(payload)):
+    for slot in range(len(payload)):
         damaged = bytearray(payload)
-        damaged[place] ^= 4
+        damaged[slot] ^= 4
         assert read(bytes(damaged)) is None
     assert read(payload[:-1]) is None
 
@@ -133,12 +126,12 @@ def test_nobody_is_lost_or_counted_twice_whatever_the_radio_does(air: tuple[str,
     scenario = load("sensor-coverage", (*ALONE, *air))
     outcome, world, robots = drive(scenario)
     found = measure(world, scenario.metrics)
-    places = [robot.vicinity.place for robot in robots if not robot._waiting]
+    slots = [robot.local_map.slot for robot in robots if not robot._waiting]
     assert outcome == "completed"
     assert found["coverage_fraction"] >= 0.98
     assert found["concluded_early"] == 0.0
-    assert len(places) == len(set(places)) >= len(robots) - 1, "each holds a place of its own, but for one at the base"
-    assert found["robots_released"] == len(robots) == found["pushes"] + len(robots) - len(places)
+    assert len(slots) == len(set(slots)) >= len(robots) - 1, "each holds a place of its own, but for one at the base"
+    assert found["robots_released"] == len(robots) == found["pushes"] + len(robots) - len(slots)
 
 
 def test_a_coordinator_that_is_killed_changes_nothing_where_there_is_none() -> None:
@@ -166,8 +159,8 @@ def test_an_empty_depot_is_noticed_by_the_base() -> None:
 # --- places ---------------------------------------------------------------------------------------------------------
 
 
-def at(place: int) -> StateBeacon:
-    return StateBeacon(1, place, 3, False, False, 1, (), (), (), UNSAID)
+def at(slot: int) -> StateBeacon:
+    return StateBeacon(1, slot, 3, False, False, 1, (), (), (), UNSAID)
 
 
 @pytest.mark.parametrize(
@@ -176,16 +169,16 @@ def at(place: int) -> StateBeacon:
     ids=["the follower took its place", "the follower stayed", "somebody else was there before"],
 )
 def test_a_leader_that_stays_takes_the_new_name_if_its_follower_came_after_all(
-    sender: int, place: int, name: int
+    sender: int, slot: int, name: int
 ) -> None:
     leader = LocalMap(7, PlannerParameters())
     leader.found(4)
     leader.stay(17, 8)
     leader.part()
-    assert leader.place == 4
-    leader.hear(sender, at(place), 10)
+    assert leader.slot == 4
+    leader.hear(sender, at(slot), 10)
     leader.part()
-    assert leader.place == name
+    assert leader.slot == name
 
 
 # --- who provides what ----------------------------------------------------------------------------------------------

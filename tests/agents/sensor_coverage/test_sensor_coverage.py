@@ -8,7 +8,7 @@ import pytest
 from halls import HALL, NOISE, OBSTACLE, Link, drive
 
 from zwerm.agents.runtime.contract import Body, Setup
-from zwerm.agents.sensor_coverage import CentralRobot
+from zwerm.agents.sensor_coverage.central_robot import CentralRobot
 from zwerm.agents.sensor_coverage.messages.commands import (
     Answer,
     Arrived,
@@ -246,8 +246,8 @@ def test_scrambling_the_frames_of_robots_and_stations_gives_the_same_places(
     unturned, *turned = [world.scene.position[world.scene.present] for world in worlds]
     for there in turned:
         assert len(there) == len(unturned) > 8
-        for place in unturned:
-            assert np.hypot(*(there - place).T).min() < 0.01
+        for slot in unturned:
+            assert np.hypot(*(there - slot).T).min() < 0.01
 
 
 def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from zwerm.agents.runtime.contract import Body, Setup
-from zwerm.agents.sensor_coverage.frontier.services import ScanResult
+from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import (
     Ack,
@@ -22,7 +22,8 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     read_reply,
     write,
 )
-from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, ListRequest, Word, read
+from zwerm.agents.sensor_coverage.messages.locks import ListRequest
+from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, read
 from zwerm.agents.sensor_coverage.messages.peers import write as write_word
 from zwerm.agents.sensor_coverage.negotiating_robot import NegotiatingRobot
 from zwerm.agents.sensor_coverage.protocols import leave_lock as redundancy
@@ -183,15 +184,15 @@ def test_a_robot_without_memory_is_one_of_the_complex_and_stands_still_for_a_lea
 
 
 def test_who_has_left_is_taken_back_where_it_is_missed() -> None:
-    places = Slots()
+    slots = Slots()
     turns = [n * math.pi / 3.0 for n in range(6)]
     spots = [(0.0, 0.0), *((0.55 * math.cos(each), 0.55 * math.sin(each)) for each in turns)]
     for robot in range(7):
-        places.found(robot)
-    conference = LeaveRequests(0.15, places, CommandMailbox(0.1))
+        slots.found(robot)
+    conference = LeaveRequests(0.15, slots, CommandMailbox(0.1))
     conference.note({0: LeftComplex(1, None, ()), 1: Report(1, None, ())})
 
-    def picture(there: list[int]) -> ScanResult:
+    def scan(there: list[int]) -> ScanResult:
         views = {
             i: {
                 j: math.atan2(spots[j][1] - spots[i][1], spots[j][0] - spots[i][0])
@@ -202,9 +203,9 @@ def test_who_has_left_is_taken_back_where_it_is_missed() -> None:
         }
         return ScanResult(views, FlagComplex(views), ())
 
-    assert conference.spare(picture([0, 1, 2, 3, 4, 5, 6])) == (0,)
-    assert conference.spare(picture([0, 1, 2, 3])) == (), "a side would be open that it covers"
-    assert conference.spare(picture([0, 1, 4])) == (), "the others would not see each other"
+    assert conference.redundant(scan([0, 1, 2, 3, 4, 5, 6])) == (0,)
+    assert conference.redundant(scan([0, 1, 2, 3])) == (), "a side would be open that it covers"
+    assert conference.redundant(scan([0, 1, 4])) == (), "the others would not see each other"
 
 
 # --- the whole swarm ------------------------------------------------------------------------------------------------

@@ -25,8 +25,8 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     read_reply,
     write,
 )
-from zwerm.agents.sensor_coverage.protocols.deduplication import COPIES_MAX, RequestDeduplicator
-from zwerm.coordinator.sensor_coverage.command_mailbox import HASTE_COPIES, MUSTER_COPIES, CommandMailbox
+from zwerm.agents.sensor_coverage.protocols.transport.deduplication import COPIES_MAX, RequestDeduplicator
+from zwerm.coordinator.sensor_coverage.command_mailbox import RECOVERY_COPIES, ROLL_CALL_COPIES, CommandMailbox
 from zwerm.coordinator.sensor_coverage.coordinator import SensorCoverageCoordinator
 from zwerm.coordinator.sensor_coverage.retry_policy import BURST_TRIES, RetryPolicy
 from zwerm.deploy.node_specs import node_specs, restart_spec
@@ -168,9 +168,9 @@ def test_without_a_loss_an_order_is_said_once_until_it_is_overdue_and_after_the_
 def mustered() -> Desk:
     """Return the desk of a coordinator that has begun anew, a tick after its muster, with one station."""
     desk = Desk()
-    desk.post.muster(RollCall(1), MUSTER_COPIES)
+    desk.post.muster(RollCall(1), ROLL_CALL_COPIES)
     desk.post.expect(0)
-    assert desk.turn() == [(None, 0, attempt) for attempt in range(1, MUSTER_COPIES + 1)]
+    assert desk.turn() == [(None, 0, attempt) for attempt in range(1, ROLL_CALL_COPIES + 1)]
     return desk
 
 
@@ -179,41 +179,41 @@ SEES_4 = Report(1, (Sighting(4, 0.0),), ())
 
 def test_after_a_muster_whoever_is_seen_is_asked_at_once_and_in_copies_where_something_was_lost() -> None:
     desk = mustered()
-    asked = desk.turn((9, answered(0, SEES_4, attempt=MUSTER_COPIES, heard=5)))
-    assert asked == [(node, 0, MUSTER_COPIES + copy) for node in (0, 4) for copy in (1, 2, 3)]
+    asked = desk.turn((9, answered(0, SEES_4, attempt=ROLL_CALL_COPIES, heard=5)))
+    assert asked == [(node, 0, ROLL_CALL_COPIES + copy) for node in (0, 4) for copy in (1, 2, 3)]
     assert desk.turn((0, answered(0, REPORT, heard=1)), (4, answered(0, REPORT, heard=1))) == []
     desk.post.say(9, AHEAD, drive=True)
-    assert desk.turn() == [(9, 1, attempt) for attempt in range(1, 2 * HASTE_COPIES + 1)]
+    assert desk.turn() == [(9, 1, attempt) for attempt in range(1, 2 * RECOVERY_COPIES + 1)]
     assert desk.turn((9, answered(1, Ack(), attempt=6, heard=2))) == []
     desk.say(4, AHEAD)  # once: there is no haste any more
 
 
 def test_where_nothing_is_lost_no_order_after_a_muster_has_copies() -> None:
     desk = mustered()
-    every = answered(0, SEES_4, attempt=MUSTER_COPIES, heard=MUSTER_COPIES)
+    every = answered(0, SEES_4, attempt=ROLL_CALL_COPIES, heard=ROLL_CALL_COPIES)
     assert desk.turn(*((node, every) for node in (9, 0, 4))) == []
     desk.say(9, AHEAD)
     assert [desk.turn() for _ in range(18)] == [[]] * 18
 
 
 def test_a_muster_is_called_again_where_somebody_missed_it_and_nobody_had_time_to_look() -> None:
-    again = [(None, 0, MUSTER_COPIES + copy) for copy in range(1, MUSTER_COPIES + 1)]
-    some = answered(0, Ack(), attempt=MUSTER_COPIES, heard=5)
+    again = [(None, 0, ROLL_CALL_COPIES + copy) for copy in range(1, ROLL_CALL_COPIES + 1)]
+    some = answered(0, Ack(), attempt=ROLL_CALL_COPIES, heard=5)
     for heard in ([], [(9, some)], [(0, some)]):
         desk = mustered()
         assert desk.turn(*heard) == again
         assert desk.turn() == [], "once"
-    later = desk.turn((0, answered(0, SEES_4, attempt=2 * MUSTER_COPIES, heard=9)))
-    assert later == [(4, 0, 2 * MUSTER_COPIES + copy) for copy in (1, 2, 3)]
+    later = desk.turn((0, answered(0, SEES_4, attempt=2 * ROLL_CALL_COPIES, heard=9)))
+    assert later == [(4, 0, 2 * ROLL_CALL_COPIES + copy) for copy in (1, 2, 3)]
 
 
 def test_to_have_heard_a_muster_is_no_answer_to_it() -> None:
     desk = mustered()
-    heard = [(node, answered(0, Ack(), attempt=MUSTER_COPIES, heard=MUSTER_COPIES)) for node in (0, 9)]
+    heard = [(node, answered(0, Ack(), attempt=ROLL_CALL_COPIES, heard=ROLL_CALL_COPIES)) for node in (0, 9)]
     assert desk.turn(*heard) == []
     assert desk.post.rest() == []
     assert desk.post.waits_for(9)
-    desk.turn((9, answered(0, REPORT, attempt=MUSTER_COPIES, heard=MUSTER_COPIES)))
+    desk.turn((9, answered(0, REPORT, attempt=ROLL_CALL_COPIES, heard=ROLL_CALL_COPIES)))
     assert desk.post.rest() == [(9, REPORT)]
 
 
@@ -267,7 +267,7 @@ def test_nobody_is_lost_or_counted_twice_whatever_the_uplink_does(air: str) -> N
     scenario = load("sensor-coverage", (*HALL, air))
     outcome, world, coordinator = drive(scenario)
     found: dict[str, Any] = measure(world, scenario.metrics)
-    placed = [robot for robot in coordinator.places.occupant.values() if robot]
+    placed = [robot for robot in coordinator.slots.occupant.values() if robot]
     waiting = list(coordinator.sources.waiting.values())
     out = [robot for robot in world.scene.present_ids().tolist() if robot]
     assert outcome == "completed"

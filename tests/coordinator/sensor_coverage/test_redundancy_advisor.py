@@ -17,14 +17,14 @@ from zwerm.agents.sensor_coverage.messages.advice import (
     read,
     write,
 )
-from zwerm.agents.sensor_coverage.messages.peers import Word
+from zwerm.agents.sensor_coverage.messages.locks import LockDenial, LockGrant
 from zwerm.agents.sensor_coverage.protocols.advice_client import (
     AGAIN_TICKS,
     BELIEVED_TICKS,
     SETTLED_TICKS,
     AdviceClient,
 )
-from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, LockDenial, LockGrant, LockMessage
+from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, LockMessage
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 from zwerm.coordinator.sensor_coverage.redundancy_advisor import AGAIN_TICKS as AGAIN_AT_CENTRE
 from zwerm.coordinator.sensor_coverage.redundancy_advisor import ASK_TICKS, QUIET_TICKS, RedundancyAdvisor
@@ -41,8 +41,8 @@ def wheel(steps: tuple[int, ...] = (1, 2, 4, 5)) -> dict[int, StandingReport]:
     """A hub, and six around it that see those so many steps on, or all but the one opposite: all of these are at the fence."""
     around = {n: tuple(sorted(1 + (n - 1 + step) % 6 for step in steps)) for n in range(1, 7)}
     fenced = {n: tuple(sorted(1 + (n - 1 + d) % 6 for d in (1, 5))) for n in range(1, 7)}
-    rim = {n: StandingReport(5, 10 + n, (0, *around[n]), fenced[n], True, False) for n in around}
-    return {0: StandingReport(5, 10, tuple(around), (), True, True), **rim}
+    boundary_edges = {n: StandingReport(5, 10 + n, (0, *around[n]), fenced[n], True, False) for n in around}
+    return {0: StandingReport(5, 10, tuple(around), (), True, True), **boundary_edges}
 
 
 class Centre:
@@ -77,8 +77,8 @@ def spared(said: Said) -> dict[int | None, RedundantAdvice]:
 def test_every_word_crosses_the_uplink_and_a_damaged_one_says_nothing(word: counsel.Word) -> None:
     payload = write(word)
     assert read(payload) == word
-    for place in range(len(payload)):
-        assert read(payload[:place] + bytes([payload[place] ^ 4]) + payload[place + 1 :]) is None
+    for slot in range(len(payload)):
+        assert read(payload[:slot] + bytes([payload[slot] ^ 4]) + payload[slot + 1 :]) is None
     assert read(payload[:-1]) is None
 
 
@@ -215,13 +215,13 @@ class Swarm:
         ring = [(0.9 * math.cos(n * math.tau / 10), 0.9 * math.sin(n * math.tau / 10)) for n in range(10)]
         grid = [0.35 * n - 0.525 for n in range(4)]
         inner = [(x + self.luck.uniform(-0.12, 0.12), y + self.luck.uniform(-0.12, 0.12)) for x in grid for y in grid]
-        self.places = dict(enumerate([*ring, *inner]))
-        self.rim = {n: ((n - 1) % 10, (n + 1) % 10) if n < 10 else () for n in self.places}
+        self.slots = dict(enumerate([*ring, *inner]))
+        self.boundary_edges = {n: ((n - 1) % 10, (n + 1) % 10) if n < 10 else () for n in self.slots}
         self.centre = Centre()
         self.leaving = {
-            n: LeaveNegotiation(n, DT_S, np.random.Generator(np.random.Philox(seed + n)), True) for n in self.places
+            n: LeaveNegotiation(n, DT_S, np.random.Generator(np.random.Philox(seed + n)), True) for n in self.slots
         }
-        self.counsel = {n: AdviceClient(DT_S) for n in self.places}
+        self.counsel = {n: AdviceClient(DT_S) for n in self.slots}
         self.gone_at: dict[int, int] = {}
         self.uplink: dict[int, list[tuple[int | None, int | None, bytes]]] = {}
         self.air: list[tuple[int, int, Word]] = []
@@ -229,9 +229,9 @@ class Swarm:
         self.left = self.changed = 0
 
     def sees(self, node: int, tick: int) -> tuple[int, ...]:
-        here = self.places[node]
-        bodies = [n for n in self.places if n != node and self.gone_at.get(n, tick) + 40 > tick]
-        return tuple(n for n in bodies if math.dist(here, self.places[n]) < 0.75)
+        here = self.slots[node]
+        bodies = [n for n in self.slots if n != node and self.gone_at.get(n, tick) + 40 > tick]
+        return tuple(n for n in bodies if math.dist(here, self.slots[n]) < 0.75)
 
     def send(self, tick: int, sender: int | None, to: int | None, payload: bytes) -> None:
         for _ in range(self.luck.choice((0, 1, 1, 2))):
@@ -242,7 +242,7 @@ class Swarm:
         arrived = self.uplink.pop(tick, [])
         words = [(sender, read(payload)) for sender, _, payload in arrived if sender is not None]
         for to, word in self.centre.hear([(sender, word) for sender, word in words if word is not None]):
-            for each in self.places if to is None else [to]:
+            for each in self.slots if to is None else [to]:
                 self.send(tick, None, each, write(word))
         heard, self.air = self.air, []
         for node, leaving in self.leaving.items():
@@ -262,7 +262,9 @@ class Swarm:
                 leaving.note(stands=False)
             there = leaving.told
             assert there is not None
-            standing = StandingReport(0, there.version, sight, self.rim[node], node not in self.gone_at, node >= 10)
+            standing = StandingReport(
+                0, there.version, sight, self.boundary_edges[node], node not in self.gone_at, node >= 10
+            )
             advice.note(tick, standing)
             for payload in advice.letters():
                 self.send(tick, node, None, payload)
@@ -271,7 +273,7 @@ class Swarm:
 
     def leave(self, node: int, tick: int) -> None:
         there = {
-            n: [m for m in self.sees(n, tick) if m not in self.gone_at] for n in self.places if n not in self.gone_at
+            n: [m for m in self.sees(n, tick) if m not in self.gone_at] for n in self.slots if n not in self.gone_at
         }
         whole = FlagComplex(there)
         self.changed += betti(whole) != betti(whole.without([node]))

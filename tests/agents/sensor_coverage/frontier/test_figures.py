@@ -10,11 +10,10 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.assignment import CheapestFirst
+from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
-from zwerm.agents.sensor_coverage.frontier.planner import Planner, PlannerParameters
-from zwerm.agents.sensor_coverage.frontier.relative_homology import RelativeHomology
-from zwerm.agents.sensor_coverage.frontier.services import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import (
     Answer,
@@ -32,8 +31,10 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     read_dispatch,
     write,
 )
+from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox
 from zwerm.coordinator.sensor_coverage.push_execution import PushExecution
+from zwerm.coordinator.sensor_coverage.relative_homology import RelativeHomology
 from zwerm.coordinator.sensor_coverage.sources import Sources
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.wire.messages import Packet
@@ -56,42 +57,42 @@ class Swarm:
         self.position = dict(position)
         random = np.random.default_rng(turned_seed)
         self.turned = {robot: float(random.uniform(-3.0, 3.0)) for robot in position}
-        self.places = Slots()
+        self.slots = Slots()
         for robot in self.position:
-            self.places.found(robot)
+            self.slots.found(robot)
         for robot, here in self.position.items():
             seen = [
                 Sighting(other, math.remainder(direction(here, there) - self.turned[robot], math.tau))
                 for other, there in self.position.items()
                 if other != robot and math.dist(here, there) <= range_m
             ]
-            self.places.take(robot, seen)
-        self.places.learn_headings(self.position)
-        views = self.places.views()
-        self.places.learn_references(views)
-        self.place = self.places.place_of()
-        bases = () if base is None else (self.place[base],)
-        self.picture = ScanResult(views, FlagComplex(views), bases)
-        self.planner = Planner(PlannerParameters(), self.places)
+            self.slots.take(robot, seen)
+        self.slots.learn_headings(self.position)
+        views = self.slots.views()
+        self.slots.learn_references(views)
+        self.slot = self.slots.slot_of()
+        bases = () if base is None else (self.slot[base],)
+        self.scan = ScanResult(views, FlagComplex(views), bases)
+        self.planner = Planner(PlannerParameters(), self.slots)
 
     def look(self) -> "Swarm":
-        self.planner.look(self.picture)
+        self.planner.look(self.scan)
         return self
 
     def touch(self, robot: int, *towards_deg: float) -> None:
         """Let a robot touch walls in these directions of the truth."""
-        self.places.walls[self.place[robot]] = [math.radians(each) + self.off(robot) for each in towards_deg]
+        self.slots.walls[self.slot[robot]] = [math.radians(each) + self.off(robot) for each in towards_deg]
 
     def off(self, robot: int) -> float:
-        return self.places.heading[robot] - self.turned[robot]
+        return self.slots.heading[robot] - self.turned[robot]
 
     def robots(self, edges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-        occupant = self.places.occupant
+        occupant = self.slots.occupant
         return sorted((min(occupant[i], occupant[j]), max(occupant[i], occupant[j])) for i, j in edges)
 
     def goal(self, plan: Plan) -> Point:
         """Where a plan leads, in truth."""
-        robot = self.places.occupant[plan.mover]
+        robot = self.slots.occupant[plan.mover]
         return at(math.degrees(plan.direction - self.off(robot)), plan.hop_m, self.position[robot])
 
     def plans(self, *pair: int) -> list[Plan]:
@@ -117,14 +118,14 @@ def figure_5() -> Swarm:
 
 def test_figure_5_robot_10_is_redundant_and_no_other() -> None:
     swarm = figure_5()
-    found = RelativeHomology().redundant(swarm.picture, swarm.planner.rim())
-    assert [swarm.places.occupant[place] for place in found] == [10]
+    found = RelativeHomology().redundant(swarm.scan, swarm.planner.boundary_edges())
+    assert [swarm.slots.occupant[slot] for slot in found] == [10]
 
 
 def test_figure_5_without_robot_10_nobody_is_redundant() -> None:
     position = figure_5().position
     swarm = Swarm({robot: there for robot, there in position.items() if robot != 10}).look()
-    assert RelativeHomology().redundant(swarm.picture, swarm.planner.rim()) == ()
+    assert RelativeHomology().redundant(swarm.scan, swarm.planner.boundary_edges()) == ()
 
 
 # --- figure 6 -------------------------------------------------------------------------------------------------------
@@ -163,16 +164,16 @@ def test_figure_6b_where_one_end_touches_a_wall_the_other_goes_and_a_wall_elsewh
     swarm = triangle()
     swarm.touch(_I, wall_deg)
     swarm.look()
-    assert sorted(swarm.places.occupant[plan.mover] for plan in swarm.plans(_I, _J)) == movers
+    assert sorted(swarm.slots.occupant[plan.mover] for plan in swarm.plans(_I, _J)) == movers
     assert (_I, _J) in swarm.robots(swarm.planner.frontier)
 
 
 def test_figure_6c_a_convex_corner_makes_both_of_its_edges_an_obstacles() -> None:
     """They are 0.9 apart as they stand, and a pillar keeps them from seeing each other."""
     swarm = Swarm({_I: (0.0, 0.0), _J: (0.95, 0.0), _K: at(56.0)})
-    views = {place: dict(view) for place, view in swarm.picture.views.items()}
-    del views[swarm.place[_J]][swarm.place[_K]], views[swarm.place[_K]][swarm.place[_J]]
-    swarm.picture = ScanResult(views, FlagComplex(views), ())
+    views = {slot: dict(view) for slot, view in swarm.scan.views.items()}
+    del views[swarm.slot[_J]][swarm.slot[_K]], views[swarm.slot[_K]][swarm.slot[_J]]
+    swarm.scan = ScanResult(views, FlagComplex(views), ())
     swarm.look()
     assert swarm.robots(swarm.planner.fence.corners) == [(_I, _J), (_I, _K)]
     goals = [swarm.goal(plan) for plan in (*swarm.plans(_I, _J), *swarm.plans(_I, _K))]
@@ -198,10 +199,10 @@ def test_figure_8a_both_ends_send_the_new_robot_to_the_same_place_60_degrees_off
     position = {_I: (0.2, 0.1), _J: at(20.0, of=(0.2, 0.1)), _K: at(-40.0, of=(0.2, 0.1))}
     swarm = Swarm(position, turned_seed=turned_seed).look()
     plans = swarm.plans(_I, _J)
-    assert sorted(swarm.places.occupant[plan.mover] for plan in plans) == [_I, _J]
+    assert sorted(swarm.slots.occupant[plan.mover] for plan in plans) == [_I, _J]
     for plan in plans:
         assert swarm.goal(plan) == pytest.approx(at(80.0, of=(0.2, 0.1)))
-        assert {swarm.places.occupant[each] for each in plan.anchors} == {_I, _J}
+        assert {swarm.slots.occupant[each] for each in plan.anchors} == {_I, _J}
 
 
 def test_figure_8b_a_gap_of_100_degrees_is_bisected_from_either_end() -> None:
@@ -229,8 +230,8 @@ def figure_9() -> Swarm:
 
 
 def assigned(swarm: Swarm) -> Plan:
-    sources = dict.fromkeys(swarm.picture.bases, 0.0)
-    (plan,) = CheapestFirst(swarm.places, 9).assign(swarm.planner.plans(), swarm.picture, sources, swarm.ways)
+    sources = dict.fromkeys(swarm.scan.bases, 0.0)
+    (plan,) = CheapestFirst(swarm.slots, 9).assign(swarm.planner.plans(), swarm.scan, sources, swarm.ways)
     return plan
 
 
@@ -241,27 +242,27 @@ def test_figure_9a_the_path_from_the_source_to_a_frontier_robot_is_12_10_6_2() -
         swarm.touch(robot, *range(0, 360, 30))
     swarm.look()
     plan = assigned(swarm)
-    assert [swarm.places.occupant[place] for place in plan.path] == [12, 10, 6, 2]
+    assert [swarm.slots.occupant[slot] for slot in plan.path] == [12, 10, 6, 2]
     assert swarm.goal(plan)[1] > swarm.position[2][1] - 1e-9
     edges = {frozenset(each) for each in swarm.robots(swarm.planner.obstacle)}
     assert {frozenset((12, 11)), frozenset((11, 8)), frozenset((8, 9))} <= edges
 
 
-def pushed(swarm: Swarm, plan: Plan, loose: bool = False) -> list[tuple[int, Order]]:
+def pushed(swarm: Swarm, plan: Plan, used_odometry: bool = False) -> list[tuple[int, Order]]:
     """Tell a push to its end with robots that do as they are told, robot 13 waiting in the depot; return all orders.
 
     `loose`: odometry had to say how far to go.
     """
     post = CommandMailbox(0.1)
-    base = swarm.picture.bases[0]
-    station = swarm.places.occupant[base]
-    sources = Sources((), swarm.places, post)
+    base = swarm.scan.bases[0]
+    station = swarm.slots.occupant[base]
+    sources = Sources((), swarm.slots, post)
     sources.stations[base] = station
-    pushing = PushExecution(PlannerParameters(), swarm.places, post, sources, swarm.planner)
-    pushing.picture = swarm.picture
+    pushing = PushExecution(PlannerParameters(), swarm.slots, post, sources, swarm.planner)
+    pushing.scan = swarm.scan
     said: list[tuple[int, Order]] = []
     story = pushing.push(plan)
-    done = Arrived(0, True, loose, False, 0.95, ())
+    done = Arrived(0, True, used_odometry, False, 0.95, ())
     for tick in range(50):
         try:
             next(story)
@@ -298,21 +299,19 @@ def sightings_of(swarm: Swarm, robot: int, turned: float) -> tuple[Sighting, ...
     )
 
 
-def push_of_figure_9(loose: bool = False) -> tuple[Swarm, list[tuple[int, Order]]]:
+def push_of_figure_9(used_odometry: bool = False) -> tuple[Swarm, list[tuple[int, Order]]]:
     swarm = figure_9()
-    place = swarm.place
+    slot = swarm.slot
     upwards = math.pi / 2.0 + swarm.off(2)
-    plan = Plan(
-        (place[2], place[1], 1), place[2], upwards, HOP_M, 0.8, (place[2],), tuple(place[n] for n in (12, 10, 6, 2))
-    )
-    return swarm, pushed(swarm.look(), plan, loose)
+    plan = Plan((slot[2], slot[1], 1), slot[2], upwards, HOP_M, 0.8, (slot[2],), tuple(slot[n] for n in (12, 10, 6, 2)))
+    return swarm, pushed(swarm.look(), plan, used_odometry)
 
 
 def test_figure_9b_robots_take_each_others_places_and_robot_13_appears_beside_the_source() -> None:
     swarm, _ = push_of_figure_9()
-    now = {swarm.places.occupant[swarm.place[n]]: n for n in swarm.position}
+    now = {swarm.slots.occupant[swarm.slot[n]]: n for n in swarm.position}
     assert {robot: now[robot] for robot in (12, 13, 10, 6)} == {12: 12, 13: 10, 10: 6, 6: 2}
-    assert [swarm.places.occupant[max(swarm.places.occupant)]] == [2], "robot 2 has a new place"
+    assert [swarm.slots.occupant[max(swarm.slots.occupant)]] == [2], "robot 2 has a new place"
     assert all(now[robot] == robot for robot in (1, 3, 4, 5, 7, 8, 9, 11))
 
 
@@ -341,14 +340,14 @@ def test_figure_9b_the_new_robot_corrects_its_distance_to_who_then_stands_at_the
 
 def test_who_went_by_odometry_corrects_its_distance_to_who_is_behind_and_is_told_where_that_is() -> None:
     """It may have gone so far that it sees nobody behind it."""
-    swarm, said = push_of_figure_9(loose=True)
+    swarm, said = push_of_figure_9(used_odometry=True)
     orders = [(robot, order) for robot, order in said if isinstance(order, Correct)]
     assert [(robot, order.anchors[0].node) for robot, order in orders] == [(13, 12), (10, 13), (6, 10), (2, 6)]
     turned = {**swarm.turned, 13: 0.4}
     behind = {13: (10, 12), 10: (6, 10), 6: (2, 6)}  # robot: its place and the one behind, by who was there
     for robot, order in orders[:-1]:
-        place, rear = (swarm.position[each] for each in behind[robot])
-        there = math.remainder(direction(place, rear) - turned[robot], math.tau)
+        slot, rear = (swarm.position[each] for each in behind[robot])
+        there = math.remainder(direction(slot, rear) - turned[robot], math.tau)
         assert order.anchors[0].bearing_rad == pytest.approx(there)
 
 
@@ -358,11 +357,11 @@ def test_who_went_by_odometry_corrects_its_distance_to_who_is_behind_and_is_told
 def test_the_fence_opens_where_two_robots_do_not_both_see_each_other() -> None:
     """Four around a hub, 90 degrees apart and near enough to see each other: where one is blind to the next, a side is open."""
     swarm = Swarm({n: at(90.0 * n, 0.65) for n in range(1, 5)} | {9: (0.0, 0.0)})
-    rim = [(1, 2), (1, 4), (2, 3), (3, 4)]
-    assert swarm.look().robots(side.edge for side in swarm.planner.fence.sides) == rim
-    views = {place: dict(view) for place, view in swarm.picture.views.items()}
-    del views[swarm.place[1]][swarm.place[2]]
-    swarm.picture = ScanResult(views, FlagComplex(views), ())
+    boundary_edges = [(1, 2), (1, 4), (2, 3), (3, 4)]
+    assert swarm.look().robots(side.edge for side in swarm.planner.fence.sides) == boundary_edges
+    views = {slot: dict(view) for slot, view in swarm.scan.views.items()}
+    del views[swarm.slot[1]][swarm.slot[2]]
+    swarm.scan = ScanResult(views, FlagComplex(views), ())
     sides = swarm.look().robots(side.edge for side in swarm.planner.fence.sides)
     assert sides == [(1, 4), (1, 9), (2, 3), (2, 9), (3, 4)]
     inward = [swarm.goal(plan) for plan in (*swarm.plans(1, 9), *swarm.plans(2, 9))]

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from zwerm.agents.runtime.contract import Setup
-from zwerm.agents.sensor_coverage.protocols.census import Census, CensusTally, CensusWave, Message
+from zwerm.agents.sensor_coverage.messages.waves import CensusTally, CensusWave
+from zwerm.agents.sensor_coverage.protocols.census import Census
 from zwerm.agents.sensor_coverage.protocols.completion import CompletionProtocol
 
 POLL_S = 1.0

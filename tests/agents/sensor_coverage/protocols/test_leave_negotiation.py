@@ -8,7 +8,9 @@ import pytest
 
 from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
-from zwerm.agents.sensor_coverage.messages.peers import NOWHERE, ListRequest, Word, read, write
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.locks import ListRequest
+from zwerm.agents.sensor_coverage.messages.peers import read, write
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 from zwerm.deploy.node_specs import node_specs
 from zwerm.link.memory import MemoryLink
@@ -109,7 +111,7 @@ def drive(scenario: Scenario, seed: int) -> tuple[World, list[LocalRobot]]:
         return [each for each in out if isinstance(each, LocalRobot)]
 
     def look(world: World) -> None:
-        held = [each.vicinity.place for each in robots() if each.push is None and each.vicinity.place != NOWHERE]
+        held = [each.local_map.slot for each in robots() if each.push is None and each.local_map.slot != NOWHERE]
         assert len(held) == len(set(held))
 
     LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), look).run()
@@ -121,9 +123,9 @@ def test_robots_are_freed_and_pushed_again_while_words_are_lost_and_nobody_is_lo
     for seed in range(1, 9):  # not in every run there is anybody to spare
         world, robots = drive(load("sensor-coverage", settings), seed)
         told = [each.told["removal"] for each in world.audience.told if "removal" in each.told]
-        spare = [each.node for each in robots if each.vicinity.spare]
-        assert len(spare) == sum("out" in each for each in told) - sum("in" in each for each in told)
-        homeless = [each.node for each in robots if each.vicinity.place == NOWHERE]
+        redundant = [each.node for each in robots if each.local_map.redundant]
+        assert len(redundant) == sum("out" in each for each in told) - sum("in" in each for each in told)
+        homeless = [each.node for each in robots if each.local_map.slot == NOWHERE]
         assert len(homeless) <= 2, "one waits at the base, and one may be on its way"
         if any("in" in each for each in told):
             break
