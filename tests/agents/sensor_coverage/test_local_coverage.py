@@ -4,10 +4,11 @@ import pytest
 
 from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, UNSAID, StateBeacon
 from zwerm.agents.sensor_coverage.messages.peers import read, write
-from zwerm.agents.sensor_coverage.messages.pushes import PushDone, PushToken, Segment
+from zwerm.agents.sensor_coverage.messages.pushes import PushDone, PushToken, Segment, SegmentAck
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.transport.mailbox import TRIES_MAX, ReliableMailbox
 from zwerm.deploy.node_specs import node_specs
@@ -56,9 +57,9 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
 def test_a_damaged_word_says_nothing() -> None:
     payload = write(Segment(1, PushDone(7)))
     assert read(payload) == Segment(1, PushDone(7))
-    for slot in range(len(payload)):
+    for position in range(len(payload)):
         damaged = bytearray(payload)
-        damaged[slot] ^= 4
+        damaged[position] ^= 4
         assert read(bytes(damaged)) is None
     assert read(payload[:-1]) is None
 
@@ -73,13 +74,14 @@ def test_letters_arrive_once_and_in_order_whatever_is_lost(lost: float) -> None:
         here.write(2, PushToken(number, 0, (), 0))
     told: list[int] = []
     for tick in range(12_000):
-        for _, word in here.due(tick):
-            assert isinstance(word, Segment)
+        here.poll(tick)
+        for _, segment in here.outgoing():
+            assert isinstance(segment, Segment)
             if luck.random() >= lost:
-                receipt, body = there.take(1, word)
+                body = there.accept(1, segment)
                 told += [] if body is None else [body.push]
                 if luck.random() >= lost:
-                    here.acknowledge(2, receipt)
+                    here.receive(2, SegmentAck(segment.number), tick)
     assert told == sorted(set(told))
     assert {body.push for _, body in here.sent} <= set(told)
     assert len(here.sent) + len(here.lost) == 20
@@ -87,11 +89,14 @@ def test_letters_arrive_once_and_in_order_whatever_is_lost(lost: float) -> None:
 
 
 def test_a_letter_that_nobody_acknowledges_is_given_up() -> None:
-    post = ReliableMailbox()
-    post.write(2, PushDone(1))
-    tries = sum(len(post.due(tick)) for tick in range(10 * TRIES_MAX))
+    mailbox = ReliableMailbox()
+    mailbox.write(2, PushDone(1))
+    tries = 0
+    for tick in range(10 * TRIES_MAX):
+        mailbox.poll(tick)
+        tries += len(mailbox.outgoing())
     assert tries == TRIES_MAX
-    assert post.lost == [(2, PushDone(1))]
+    assert mailbox.lost == [(2, PushDone(1))]
 
 
 # --- the whole swarm ------------------------------------------------------------------------------------------------
@@ -126,7 +131,7 @@ def test_nobody_is_lost_or_counted_twice_whatever_the_radio_does(air: tuple[str,
     scenario = load("sensor-coverage", (*ALONE, *air))
     outcome, world, robots = drive(scenario)
     found = measure(world, scenario.metrics)
-    slots = [robot.local_map.slot for robot in robots if not robot._waiting]
+    slots = [robot.local_map.slot for robot in robots if not robot.situation.waiting]
     assert outcome == "completed"
     assert found["coverage_fraction"] >= 0.98
     assert found["concluded_early"] == 0.0
@@ -171,13 +176,13 @@ def at(slot: int) -> StateBeacon:
 def test_a_leader_that_stays_takes_the_new_name_if_its_follower_came_after_all(
     sender: int, slot: int, name: int
 ) -> None:
-    leader = LocalMap(7, PlannerParameters())
-    leader.found(4)
-    leader.stay(17, 8)
-    leader.part()
+    leader = LocalMap(7, PlannerParameters(), Planner)
+    leader.occupy(4)
+    leader.abandon_push(17, 8)
+    leader.resolve_duplicate()
     assert leader.slot == 4
-    leader.hear(sender, at(slot), 10)
-    leader.part()
+    leader.receive(sender, at(slot), 10)
+    leader.resolve_duplicate()
     assert leader.slot == name
 
 

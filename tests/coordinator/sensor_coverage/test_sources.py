@@ -11,7 +11,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
-from zwerm.coordinator.sensor_coverage.command_mailbox import together
+from zwerm.coordinator.sensor_coverage.command_mailbox import run_concurrently
 from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.maths.simplicial import FlagComplex
@@ -93,7 +93,7 @@ class Truth:
     turned: dict[int, float]
     slots: Slots = field(default_factory=Slots)
 
-    def look(self, *pairs: tuple[int, int]) -> None:
+    def update(self, *pairs: tuple[int, int]) -> None:
         sees: dict[int, list[int]] = {robot: [] for robot in self.position}
         for a, b in pairs:
             sees[a].append(b)
@@ -117,13 +117,13 @@ def two_swarms() -> Truth:
     position = {0: (0.0, 0.0), 1: (3.0, 0.0), 2: (0.9, 0.1), 3: (0.5, 0.8), 4: (2.1, 0.0), 5: (2.5, 0.8)}
     truth = Truth(position, {0: 0.3, 1: 2.0, 2: -1.0, 3: 3.0, 4: 0.7, 5: -2.2})
     for robot in position:
-        truth.slots.found(robot)
+        truth.slots.add(robot)
     return truth
 
 
 def test_a_swarms_directions_are_in_the_frame_of_its_station() -> None:
     truth = two_swarms()
-    truth.look((0, 2), (0, 3), (2, 3), (1, 4), (1, 5), (4, 5))
+    truth.update((0, 2), (0, 3), (2, 3), (1, 4), (1, 5), (4, 5))
     assert [truth.slots.frame[robot] for robot in range(6)] == [0, 1, 0, 0, 1, 1]
     assert [truth.off(robot) for robot in (0, 2, 3)] == pytest.approx([-0.3] * 3)
     assert [truth.off(robot) for robot in (1, 4, 5)] == pytest.approx([-2.0] * 3)
@@ -132,11 +132,11 @@ def test_a_swarms_directions_are_in_the_frame_of_its_station() -> None:
 def test_where_two_swarms_see_each_other_their_frames_become_one_and_all_that_is_remembered_turns() -> None:
     truth = two_swarms()
     apart = ((0, 2), (0, 3), (2, 3), (1, 4), (1, 5), (4, 5))
-    truth.look(*apart)
+    truth.update(*apart)
     truth.slots.walls[4] = [truth.bearing(4, 5) + truth.off(4)]
     truth.slots.blocked[5] = [truth.bearing(5, 1) + truth.off(5)]
     truth.slots.walls[2] = [0.25]
-    truth.look(*apart, (2, 4), (3, 4))
+    truth.update(*apart, (2, 4), (3, 4))
     assert set(truth.slots.frame.values()) == {0}
     assert [truth.off(robot) for robot in range(6)] == pytest.approx([-0.3] * 6)
     assert truth.slots.walls[4] == pytest.approx([truth.bearing(4, 5) - 0.3])
@@ -144,16 +144,16 @@ def test_where_two_swarms_see_each_other_their_frames_become_one_and_all_that_is
     assert truth.slots.walls[2] == [0.25]
     for a, b in (*apart, (2, 4), (3, 4)):
         for one, other in ((a, b), (b, a)):
-            found = truth.slots.direction(one, other)
-            assert found is not None
-            assert math.remainder(found - truth.bearing(one, other) + 0.3, math.tau) == pytest.approx(0.0, abs=1e-9)
+            add = truth.slots.direction(one, other)
+            assert add is not None
+            assert math.remainder(add - truth.bearing(one, other) + 0.3, math.tau) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_three_frames_become_one_in_a_single_look() -> None:
     truth = Truth({n: (0.9 * n, 0.1 * (n % 2)) for n in range(3)}, {0: 1.0, 1: -1.0, 2: 2.5})
     for robot in range(3):
-        truth.slots.found(robot)
-    truth.look((0, 1), (1, 2))
+        truth.slots.add(robot)
+    truth.update((0, 1), (1, 2))
     assert [truth.off(robot) for robot in range(3)] == pytest.approx([-1.0] * 3)
 
 
@@ -171,11 +171,11 @@ def plan(mover: int, *key: int) -> Plan:
 def assigned(
     complex_: FlagComplex, sources: dict[int, float], *tiers: list[Plan], pushes_max: int = 9
 ) -> list[tuple[int, ...]]:
-    def ways(part: FlagComplex, starts: dict[int, float]) -> Reach:
-        return Dijkstra(3.0).ways(part, starts, ())
+    def routes(part: FlagComplex, starts: dict[int, float]) -> Reach:
+        return Dijkstra(3.0).routes(part, starts, ())
 
-    found = CheapestFirst(Slots(), pushes_max).assign(tiers, ScanResult({}, complex_, ()), sources, ways)  # type: ignore[arg-type]
-    return [each.path for each in found]
+    add = CheapestFirst(Slots(), pushes_max).assign(tiers, ScanResult({}, complex_, ()), sources, routes)  # type: ignore[arg-type]
+    return [each.path for each in add]
 
 
 def test_pushes_from_two_stations_go_at_once_where_their_paths_have_no_landmark_in_common() -> None:
@@ -224,7 +224,7 @@ def test_stories_told_at_once_end_when_the_last_does_and_wake_for_the_first() ->
             yield Wake(at_s=at_s, on_packet=at_s > 2.0)
         return times
 
-    both = together([story([1.0, 3.0]), story([2.0]), story([])])
+    both = run_concurrently([story([1.0, 3.0]), story([2.0]), story([])])
     assert [next(both), next(both)] == [Wake(at_s=1.0), Wake(at_s=3.0, on_packet=True)]
     with pytest.raises(StopIteration) as end:
         next(both)

@@ -23,12 +23,12 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Deploy,
     Emerged,
     Move,
-    Order,
     Release,
     Request,
     Response,
+    RobotCommand,
     Sighting,
-    read_dispatch,
+    read_request,
     write,
 )
 from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
@@ -59,7 +59,7 @@ class Swarm:
         self.turned = {robot: float(random.uniform(-3.0, 3.0)) for robot in position}
         self.slots = Slots()
         for robot in self.position:
-            self.slots.found(robot)
+            self.slots.add(robot)
         for robot, here in self.position.items():
             seen = [
                 Sighting(other, math.remainder(direction(here, there) - self.turned[robot], math.tau))
@@ -75,8 +75,8 @@ class Swarm:
         self.scan = ScanResult(views, FlagComplex(views), bases)
         self.planner = Planner(PlannerParameters(), self.slots)
 
-    def look(self) -> "Swarm":
-        self.planner.look(self.scan)
+    def update(self) -> "Swarm":
+        self.planner.update(self.scan)
         return self
 
     def touch(self, robot: int, *towards_deg: float) -> None:
@@ -99,8 +99,8 @@ class Swarm:
         first = next(iter(self.planner.plans()))
         return [each for each in first if self.robots([each.key[:2]])[0] == pair]
 
-    def ways(self, complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
-        return Dijkstra(3.0).ways(complex_, sources, self.planner.obstacle)
+    def routes(self, complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
+        return Dijkstra(3.0).routes(complex_, sources, self.planner.obstacle)
 
 
 def direction(here: Point, there: Point) -> float:
@@ -113,18 +113,18 @@ def direction(here: Point, there: Point) -> float:
 def figure_5() -> Swarm:
     """Nine robots in a hexagonal packing, and robot 10 among them."""
     ring = {n + 1: at(60.0 * n) for n in range(6)}
-    return Swarm({**ring, 7: (0.0, 0.0), 8: at(30.0, 1.645), 9: at(90.0, 1.645), 10: (0.25, 0.1)}).look()
+    return Swarm({**ring, 7: (0.0, 0.0), 8: at(30.0, 1.645), 9: at(90.0, 1.645), 10: (0.25, 0.1)}).update()
 
 
 def test_figure_5_robot_10_is_redundant_and_no_other() -> None:
     swarm = figure_5()
-    found = RelativeHomology().redundant(swarm.scan, swarm.planner.boundary_edges())
-    assert [swarm.slots.occupant[slot] for slot in found] == [10]
+    add = RelativeHomology().redundant(swarm.scan, swarm.planner.boundary_edges())
+    assert [swarm.slots.occupant[slot] for slot in add] == [10]
 
 
 def test_figure_5_without_robot_10_nobody_is_redundant() -> None:
     position = figure_5().position
-    swarm = Swarm({robot: there for robot, there in position.items() if robot != 10}).look()
+    swarm = Swarm({robot: there for robot, there in position.items() if robot != 10}).update()
     assert RelativeHomology().redundant(swarm.scan, swarm.planner.boundary_edges()) == ()
 
 
@@ -135,10 +135,10 @@ _I, _J, _K = 1, 2, 3
 
 def test_figure_6a_an_edge_within_other_triangles_of_k_is_an_exception() -> None:
     k1, k2 = 4, 5
-    swarm = Swarm({_I: (0.7, -0.4), _J: (0.7, 0.4), _K: (0.0, 0.0), k1: (0.9, -0.2), k2: (0.9, 0.2)}).look()
+    swarm = Swarm({_I: (0.7, -0.4), _J: (0.7, 0.4), _K: (0.0, 0.0), k1: (0.9, -0.2), k2: (0.9, 0.2)}).update()
     assert (_I, _J) not in swarm.robots(side.edge for side in swarm.planner.fence.sides)
     assert (_I, _J) not in swarm.robots([*swarm.planner.frontier, *swarm.planner.obstacle])
-    alone = Swarm({_I: (0.7, -0.4), _J: (0.7, 0.4), _K: (0.0, 0.0)}).look()
+    alone = Swarm({_I: (0.7, -0.4), _J: (0.7, 0.4), _K: (0.0, 0.0)}).update()
     assert (_I, _J) in alone.robots(alone.planner.frontier)
 
 
@@ -151,7 +151,7 @@ def test_figure_6b_an_edge_whose_ends_touch_a_wall_ahead_is_an_obstacles() -> No
     swarm = triangle()
     swarm.touch(_I, 80.0)
     swarm.touch(_J, 100.0)
-    swarm.look()
+    swarm.update()
     assert (_I, _J) in swarm.robots(swarm.planner.obstacle)
     assert (_I, _J) not in swarm.robots(swarm.planner.frontier)
     assert swarm.plans(_I, _J) == []
@@ -163,7 +163,7 @@ def test_figure_6b_where_one_end_touches_a_wall_the_other_goes_and_a_wall_elsewh
 ) -> None:
     swarm = triangle()
     swarm.touch(_I, wall_deg)
-    swarm.look()
+    swarm.update()
     assert sorted(swarm.slots.occupant[plan.mover] for plan in swarm.plans(_I, _J)) == movers
     assert (_I, _J) in swarm.robots(swarm.planner.frontier)
 
@@ -174,7 +174,7 @@ def test_figure_6c_a_convex_corner_makes_both_of_its_edges_an_obstacles() -> Non
     views = {slot: dict(view) for slot, view in swarm.scan.views.items()}
     del views[swarm.slot[_J]][swarm.slot[_K]], views[swarm.slot[_K]][swarm.slot[_J]]
     swarm.scan = ScanResult(views, FlagComplex(views), ())
-    swarm.look()
+    swarm.update()
     assert swarm.robots(swarm.planner.fence.corners) == [(_I, _J), (_I, _K)]
     goals = [swarm.goal(plan) for plan in (*swarm.plans(_I, _J), *swarm.plans(_I, _K))]
     assert goals, "what is not in the corner is frontier"
@@ -186,9 +186,9 @@ def test_figure_6c_a_convex_corner_makes_both_of_its_edges_an_obstacles() -> Non
 
 @pytest.mark.parametrize(("k2", "sides"), [((0.6, 0.65), [-1]), ((0.5, -0.6), [])])
 def test_figure_7_an_edge_is_fence_where_all_its_triangles_are_on_one_side(k2: Point, sides: list[int]) -> None:
-    swarm = Swarm({_I: (0.0, 0.0), _J: (0.95, 0.0), 11: (0.4, 0.6), 12: k2}).look()
-    found = [side for side in swarm.planner.fence.sides if swarm.robots([side.edge]) == [(_I, _J)]]
-    assert [side.sign for side in found] == sides
+    swarm = Swarm({_I: (0.0, 0.0), _J: (0.95, 0.0), 11: (0.4, 0.6), 12: k2}).update()
+    add = [side for side in swarm.planner.fence.sides if swarm.robots([side.edge]) == [(_I, _J)]]
+    assert [side.sign for side in add] == sides
 
 
 @pytest.mark.parametrize("turned_seed", [1, 2, 3])
@@ -197,7 +197,7 @@ def test_figure_8a_both_ends_send_the_new_robot_to_the_same_place_60_degrees_off
 ) -> None:
     """The sign conventions, end to end: left of the way from i to j is right of the way from j to i."""
     position = {_I: (0.2, 0.1), _J: at(20.0, of=(0.2, 0.1)), _K: at(-40.0, of=(0.2, 0.1))}
-    swarm = Swarm(position, turned_seed=turned_seed).look()
+    swarm = Swarm(position, turned_seed=turned_seed).update()
     plans = swarm.plans(_I, _J)
     assert sorted(swarm.slots.occupant[plan.mover] for plan in plans) == [_I, _J]
     for plan in plans:
@@ -206,7 +206,7 @@ def test_figure_8a_both_ends_send_the_new_robot_to_the_same_place_60_degrees_off
 
 
 def test_figure_8b_a_gap_of_100_degrees_is_bisected_from_either_end() -> None:
-    swarm = Swarm({_I: (0.0, 0.0), _J: at(0.0), _K: at(100.0)}).look()
+    swarm = Swarm({_I: (0.0, 0.0), _J: at(0.0), _K: at(100.0)}).update()
     for pair in ((_I, _J), (_I, _K)):
         inward = [plan for plan in swarm.plans(*pair) if swarm.goal(plan)[0] > 0 and swarm.goal(plan)[1] > 0]
         assert len(inward) == 2
@@ -231,7 +231,7 @@ def figure_9() -> Swarm:
 
 def assigned(swarm: Swarm) -> Plan:
     sources = dict.fromkeys(swarm.scan.bases, 0.0)
-    (plan,) = CheapestFirst(swarm.slots, 9).assign(swarm.planner.plans(), swarm.scan, sources, swarm.ways)
+    (plan,) = CheapestFirst(swarm.slots, 9).assign(swarm.planner.plans(), swarm.scan, sources, swarm.routes)
     return plan
 
 
@@ -240,7 +240,7 @@ def test_figure_9a_the_path_from_the_source_to_a_frontier_robot_is_12_10_6_2() -
     swarm = figure_9()
     for robot in (12, 11, 8, 9, 10, 7, 5, 4, 6, 3, 1):
         swarm.touch(robot, *range(0, 360, 30))
-    swarm.look()
+    swarm.update()
     plan = assigned(swarm)
     assert [swarm.slots.occupant[slot] for slot in plan.path] == [12, 10, 6, 2]
     assert swarm.goal(plan)[1] > swarm.position[2][1] - 1e-9
@@ -248,46 +248,43 @@ def test_figure_9a_the_path_from_the_source_to_a_frontier_robot_is_12_10_6_2() -
     assert {frozenset((12, 11)), frozenset((11, 8)), frozenset((8, 9))} <= edges
 
 
-def pushed(swarm: Swarm, plan: Plan, used_odometry: bool = False) -> list[tuple[int, Order]]:
-    """Tell a push to its end with robots that do as they are told, robot 13 waiting in the depot; return all orders.
-
-    `loose`: odometry had to say how far to go.
-    """
-    post = CommandMailbox(0.1)
+def pushed(swarm: Swarm, plan: Plan, used_odometry: bool = False) -> list[tuple[int, RobotCommand]]:
+    """Run a push to its end with obedient robots, robot 13 waiting in the depot; return all commands."""
+    mailbox = CommandMailbox(0.1)
     base = swarm.scan.bases[0]
     station = swarm.slots.occupant[base]
-    sources = Sources((), swarm.slots, post)
+    sources = Sources((), swarm.slots, mailbox)
     sources.stations[base] = station
-    pushing = PushExecution(PlannerParameters(), swarm.slots, post, sources, swarm.planner)
+    pushing = PushExecution(PlannerParameters(), swarm.slots, mailbox, sources, swarm.planner)
     pushing.scan = swarm.scan
-    said: list[tuple[int, Order]] = []
-    story = pushing.push(plan)
+    said: list[tuple[int, RobotCommand]] = []
+    routine = pushing.push(plan)
     done = Arrived(0, True, used_odometry, False, 0.95, ())
     for tick in range(50):
         try:
-            next(story)
+            next(routine)
         except StopIteration:
             return said
         answers: list[tuple[int, Response]] = []
-        for sent in post.sent():
-            dispatch = read_dispatch(sent.payload)
-            assert dispatch is not None
+        for sent in mailbox.outgoing():
+            request = read_request(sent.payload)
+            assert request is not None
             assert sent.to is not None
-            order = dispatch.order
-            said.append((sent.to, order))
-            if isinstance(order, Release):
+            command = request.command
+            said.append((sent.to, command))
+            if isinstance(command, Release):
                 emerged = Emerged(sightings_of(swarm, station, turned=0.4))
                 answers.append((13, Response(1, 0, 0, 0, 0, emerged)))
-            elif isinstance(order, Deploy):
-                answers += [(sent.to, reply(dispatch, each)) for each in (Cleared(0), done)]
-            elif isinstance(order, Move | Correct):
-                answers.append((sent.to, reply(dispatch, done)))
-        post.take(0.1 * tick, [Packet("uplink", write(each), sender) for sender, each in answers])
+            elif isinstance(command, Deploy):
+                answers += [(sent.to, reply(request, each)) for each in (Cleared(0), done)]
+            elif isinstance(command, Move | Correct):
+                answers.append((sent.to, reply(request, done)))
+        mailbox.receive(0.1 * tick, [Packet("uplink", write(each), sender) for sender, each in answers])
     raise AssertionError("the push never ends")
 
 
 def reply(to: Request, answer: Answer) -> Response:
-    return Response(1, to.life, to.number, to.attempt, 1, answer)
+    return Response(1, to.incarnation, to.number, to.attempt, 1, answer)
 
 
 def sightings_of(swarm: Swarm, robot: int, turned: float) -> tuple[Sighting, ...]:
@@ -299,12 +296,12 @@ def sightings_of(swarm: Swarm, robot: int, turned: float) -> tuple[Sighting, ...
     )
 
 
-def push_of_figure_9(used_odometry: bool = False) -> tuple[Swarm, list[tuple[int, Order]]]:
+def push_of_figure_9(used_odometry: bool = False) -> tuple[Swarm, list[tuple[int, RobotCommand]]]:
     swarm = figure_9()
     slot = swarm.slot
     upwards = math.pi / 2.0 + swarm.off(2)
     plan = Plan((slot[2], slot[1], 1), slot[2], upwards, HOP_M, 0.8, (slot[2],), tuple(slot[n] for n in (12, 10, 6, 2)))
-    return swarm, pushed(swarm.look(), plan, used_odometry)
+    return swarm, pushed(swarm.update(), plan, used_odometry)
 
 
 def test_figure_9b_robots_take_each_others_places_and_robot_13_appears_beside_the_source() -> None:
@@ -317,14 +314,14 @@ def test_figure_9b_robots_take_each_others_places_and_robot_13_appears_beside_th
 
 def test_figure_9b_every_landmark_is_the_robot_that_will_be_there_seen_from_the_place_to_go_to() -> None:
     swarm, said = push_of_figure_9()
-    moves = {robot: order for robot, order in said if isinstance(order, Move)}
+    moves = {robot: command for robot, command in said if isinstance(command, Move)}
     assert sorted(moves) == [6, 10, 13]
     at_place = {13: 10, 10: 6, 6: 2}  # robot: the place where it goes, by the id of who was there
     turned = {**swarm.turned, 13: 0.4}
-    for robot, order in moves.items():
+    for robot, command in moves.items():
         goal = swarm.position[at_place[robot]]
-        assert {each.node for each in order.landmarks} & {2} == set(), "nobody refers to who goes into the unknown"
-        for each in order.landmarks:
+        assert {each.node for each in command.landmarks} & {2} == set(), "nobody refers to who goes into the unknown"
+        for each in command.landmarks:
             there = swarm.position[at_place.get(each.node, each.node)]
             assert each.bearing_rad == pytest.approx(math.remainder(direction(goal, there) - turned[robot], math.tau))
             assert each.still == (each.node not in at_place)
@@ -332,23 +329,23 @@ def test_figure_9b_every_landmark_is_the_robot_that_will_be_there_seen_from_the_
 
 def test_figure_9b_the_new_robot_corrects_its_distance_to_who_then_stands_at_the_anchor() -> None:
     _, said = push_of_figure_9()
-    ((robot, order),) = [(robot, order) for robot, order in said if isinstance(order, Correct)]
+    ((robot, command),) = [(robot, command) for robot, command in said if isinstance(command, Correct)]
     assert robot == 2
-    assert isinstance(order, Correct)
-    assert [each.node for each in order.anchors] == [6]
+    assert isinstance(command, Correct)
+    assert [each.node for each in command.anchors] == [6]
 
 
 def test_who_went_by_odometry_corrects_its_distance_to_who_is_behind_and_is_told_where_that_is() -> None:
     """It may have gone so far that it sees nobody behind it."""
     swarm, said = push_of_figure_9(used_odometry=True)
-    orders = [(robot, order) for robot, order in said if isinstance(order, Correct)]
-    assert [(robot, order.anchors[0].node) for robot, order in orders] == [(13, 12), (10, 13), (6, 10), (2, 6)]
+    commands = [(robot, command) for robot, command in said if isinstance(command, Correct)]
+    assert [(robot, command.anchors[0].node) for robot, command in commands] == [(13, 12), (10, 13), (6, 10), (2, 6)]
     turned = {**swarm.turned, 13: 0.4}
     behind = {13: (10, 12), 10: (6, 10), 6: (2, 6)}  # robot: its place and the one behind, by who was there
-    for robot, order in orders[:-1]:
+    for robot, command in commands[:-1]:
         slot, rear = (swarm.position[each] for each in behind[robot])
         there = math.remainder(direction(slot, rear) - turned[robot], math.tau)
-        assert order.anchors[0].bearing_rad == pytest.approx(there)
+        assert command.anchors[0].bearing_rad == pytest.approx(there)
 
 
 # --- one-sided sight, and frames ------------------------------------------------------------------------------------
@@ -358,11 +355,11 @@ def test_the_fence_opens_where_two_robots_do_not_both_see_each_other() -> None:
     """Four around a hub, 90 degrees apart and near enough to see each other: where one is blind to the next, a side is open."""
     swarm = Swarm({n: at(90.0 * n, 0.65) for n in range(1, 5)} | {9: (0.0, 0.0)})
     boundary_edges = [(1, 2), (1, 4), (2, 3), (3, 4)]
-    assert swarm.look().robots(side.edge for side in swarm.planner.fence.sides) == boundary_edges
+    assert swarm.update().robots(side.edge for side in swarm.planner.fence.sides) == boundary_edges
     views = {slot: dict(view) for slot, view in swarm.scan.views.items()}
     del views[swarm.slot[1]][swarm.slot[2]]
     swarm.scan = ScanResult(views, FlagComplex(views), ())
-    sides = swarm.look().robots(side.edge for side in swarm.planner.fence.sides)
+    sides = swarm.update().robots(side.edge for side in swarm.planner.fence.sides)
     assert sides == [(1, 4), (1, 9), (2, 3), (2, 9), (3, 4)]
     inward = [swarm.goal(plan) for plan in (*swarm.plans(1, 9), *swarm.plans(2, 9))]
     assert all(math.dist(each, at(135.0, 0.65)) < 0.5 for each in inward), "the open sides are those of the gap"
@@ -371,7 +368,7 @@ def test_the_fence_opens_where_two_robots_do_not_both_see_each_other() -> None:
 def test_turning_any_robots_frame_changes_no_plan() -> None:
     random = np.random.default_rng(3)
     position = {n: (float(x), float(y)) for n, (x, y) in enumerate(random.uniform(0.0, 2.2, (22, 2)))}
-    one, other = (Swarm(position, base=0, turned_seed=seed).look() for seed in (1, 2))
+    one, other = (Swarm(position, base=0, turned_seed=seed).update() for seed in (1, 2))
     for mine, theirs in zip(one.planner.plans(), other.planner.plans(), strict=True):
         assert [(each.key, each.mover, each.anchors) for each in mine] == [
             (each.key, each.mover, each.anchors) for each in theirs

@@ -36,8 +36,8 @@ def rhombus(angle_rad: float) -> Positions:
 
 
 def the_hole(slots: Positions) -> Hole:
-    (found,) = holes(*seen(slots))
-    return found
+    (add,) = holes(*seen(slots))
+    return add
 
 
 @pytest.mark.parametrize("order", [(1, 2, 3, 4), (4, 2, 1, 3), (2, 1, 4, 3)])
@@ -92,18 +92,18 @@ def test_what_a_robot_met_that_two_see_in_a_hole_counts_whatever_its_direction()
 
 def test_a_robot_that_goes_in_halves_the_narrow_corners() -> None:
     hole = the_hole(rhombus(math.radians(66.0)))
-    found = {side.edge: side for side in sides(hole)}
-    assert sorted(found) == [(1, 2), (1, 4), (2, 3), (3, 4)]
-    assert math.degrees(found[1, 2].angle_i_rad) == pytest.approx(33.0)
-    assert math.degrees(found[1, 2].angle_j_rad) == pytest.approx(57.0)
-    assert found[1, 2].sign == 1, "the hole is on the left of the way from 1 to 2"
-    assert found[1, 4].sign == -1
+    add = {side.edge: side for side in sides(hole)}
+    assert sorted(add) == [(1, 2), (1, 4), (2, 3), (3, 4)]
+    assert math.degrees(add[1, 2].angle_i_rad) == pytest.approx(33.0)
+    assert math.degrees(add[1, 2].angle_j_rad) == pytest.approx(57.0)
+    assert add[1, 2].sign == 1, "the hole is on the left of the way from 1 to 2"
+    assert add[1, 4].sign == -1
 
 
 def planner(slots: Positions, wall_at: int | None = None) -> Planner:
     known = Slots()
     for node in sorted(slots):
-        assert known.found(node) == node
+        assert known.add(node) == node
     views, complex_ = seen(slots)
     for node, view in views.items():
         known.take(node, [Sighting(other, bearing) for other, bearing in view.items()])
@@ -111,9 +111,9 @@ def planner(slots: Positions, wall_at: int | None = None) -> Planner:
     if wall_at is not None:
         x, y = slots[wall_at]
         known.walls[wall_at] = [math.atan2(-y, -x)]
-    found = Planner(PlannerParameters(), known)
-    found.look(ScanResult(views, complex_, (0,)))
-    return found
+    add = Planner(PlannerParameters(), known)
+    add.update(ScanResult(views, complex_, (0,)))
+    return add
 
 
 @pytest.mark.parametrize("wall_at", [None, 2])
@@ -141,17 +141,17 @@ def _inward(pair: tuple[int, int], sign: int) -> bool:
 
 def test_a_piece_of_the_swarm_that_is_out_of_sight_is_somewhere_to_go() -> None:
     """Four in single file; the last two have drifted out of sight of the second, whose place is still known."""
-    together = {0: (0.0, 0.0), 1: (0.95, 0.0), 2: (1.9, 0.1), 3: (2.8, 0.1)}
-    mine = planner(together)
+    run_concurrently = {0: (0.0, 0.0), 1: (0.95, 0.0), 2: (1.9, 0.1), 3: (2.8, 0.1)}
+    mine = planner(run_concurrently)
     assert bridges(mine) == {}
-    apart = {slot: (x + 0.1 * (slot > 1), y) for slot, (x, y) in together.items()}
-    mine.look(ScanResult(*seen(apart), (0,)))
-    found = bridges(mine)
-    assert sorted(found) == [1, 2], "either may go; only one of them can be reached"
-    assert found[1].direction == pytest.approx(math.atan2(0.1, 0.95))
-    assert found[1].anchors == (1,)
+    apart = {slot: (x + 0.1 * (slot > 1), y) for slot, (x, y) in run_concurrently.items()}
+    mine.update(ScanResult(*seen(apart), (0,)))
+    add = bridges(mine)
+    assert sorted(add) == [1, 2], "either may go; only one of them can be reached"
+    assert add[1].direction == pytest.approx(math.atan2(0.1, 0.95))
+    assert add[1].anchors == (1,)
     for _ in range(PlannerParameters().attempts_max):
-        mine.note_attempt(found[1])
+        mine.note_attempt(add[1])
     assert sorted(bridges(mine)) == [2], "not for ever"
 
 

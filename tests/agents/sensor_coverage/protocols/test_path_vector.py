@@ -44,7 +44,7 @@ class Network:
 
     def deliver(self, sender: int, receiver: int, way: PathVector) -> None:
         if edge(sender, receiver) in self.weights:
-            self.robots[receiver].hear(sender, way)
+            self.robots[receiver].receive(sender, way)
 
     def round(self, slots: Iterable[int]) -> None:
         """Let everyone tell its way, and all hear it: nothing is lost."""
@@ -168,7 +168,7 @@ class Gullible(PathVectorProtocol):
     def choose(self, slot: int, cost: float | None, weights: dict[int, float], tick: int) -> None:  # type: ignore[override]
         best = None if cost is None else Route(cost, (slot,))
         for beside, weight in weights.items():
-            way = self._ways.get(beside)
+            way = self._routes.get(beside)
             if way is not None and way.cost < 99.0 and (best is None or way.cost + weight < best.cost):
                 best = Route(way.cost + weight, (slot, *way.slots))
         self.route = best
@@ -236,14 +236,14 @@ def test_a_way_along_an_obstacle_costs_more() -> None:
 def test_of_equal_ways_that_to_the_smallest_place_at_the_frontier_wins_and_then_that_by_the_smallest() -> None:
     robot = PathVectorProtocol()
     for slot, root in ((5, 4), (3, 4), (2, 7), (1, 8)):
-        robot.hear(slot, PathVector(1, slot, Route(1.0, (slot, root), 5)))
+        robot.receive(slot, PathVector(1, slot, Route(1.0, (slot, root), 5)))
     robot.choose(9, None, dict.fromkeys((5, 3, 2, 1), 1.0), 9)
     assert robot.route == Route(2.0, (9, 3, 4), 5)
 
 
 def test_the_base_is_where_ways_begin_and_none_leads_through_it() -> None:
     robot = PathVectorProtocol()
-    robot.hear(0, PathVector(1, 0, Route(1.0, (0, 7), 5)))
+    robot.receive(0, PathVector(1, 0, Route(1.0, (0, 7), 5)))
     robot.choose(9, None, {0: 1.0}, 9)
     assert robot.route is None
 
@@ -260,10 +260,10 @@ def test_the_nearest_of_two_roots_is_told_and_who_stops_being_one_tells_the_othe
 
 def test_an_older_word_that_comes_late_and_a_copy_change_nothing() -> None:
     robot = PathVectorProtocol()
-    robot.hear(4, PathVector(7, 1, Route(0.0, (1,), 5)))
+    robot.receive(4, PathVector(7, 1, Route(0.0, (1,), 5)))
     version = robot.version
-    robot.hear(4, PathVector(6, 1, None))
-    robot.hear(4, PathVector(7, 1, None))
+    robot.receive(4, PathVector(6, 1, None))
+    robot.receive(4, PathVector(7, 1, None))
     robot.choose(2, None, {1: 1.0}, 9)
     assert robot.route == Route(1.0, (2, 1), 5)
     assert robot.version == version
@@ -271,26 +271,26 @@ def test_an_older_word_that_comes_late_and_a_copy_change_nothing() -> None:
 
 def test_a_way_belongs_to_a_place_and_outlives_who_told_it() -> None:
     robot = PathVectorProtocol()
-    robot.hear(4, PathVector(7, 1, Route(1.0, (1, 5), 5)))
-    robot.hear(4, PathVector(8, 6, None))  # it has gone on, and tells of another place
+    robot.receive(4, PathVector(7, 1, Route(1.0, (1, 5), 5)))
+    robot.receive(4, PathVector(8, 6, None))  # it has gone on, and tells of another place
     robot.choose(2, None, {1: 1.0, 6: 1.0}, 9)
     assert robot.route == Route(2.0, (2, 1, 5), 5)
     robot.take_over(1, None)
     assert robot.route == Route(1.0, (1, 5), 5)
-    robot.hear(9, PathVector(1, 1, None))  # whoever stands there now
+    robot.receive(9, PathVector(1, 1, None))  # whoever stands there now
     robot.choose(2, None, {1: 1.0, 6: 1.0}, 9)
     assert robot.route is None
 
 
 def test_all_ways_to_a_place_end_with_the_word_that_it_is_not_at_the_frontier_any_more() -> None:
     robot = PathVectorProtocol()
-    robot.hear(4, PathVector(1, 4, Route(1.0, (4, 7), 5)))
-    robot.hear(3, PathVector(1, 3, Route(2.0, (3, 5, 7), 5)))
-    robot.hear(4, PathVector(2, 4, None, ended=((7, 8),)))
+    robot.receive(4, PathVector(1, 4, Route(1.0, (4, 7), 5)))
+    robot.receive(3, PathVector(1, 3, Route(2.0, (3, 5, 7), 5)))
+    robot.receive(4, PathVector(2, 4, None, ended=((7, 8),)))
     robot.choose(2, None, {3: 1.0, 4: 1.0}, 9)
     assert robot.route is None
     assert robot.ended == ((7, 8),)
-    robot.hear(3, PathVector(2, 3, Route(2.0, (3, 5, 7), 10)))  # it is again
+    robot.receive(3, PathVector(2, 3, Route(2.0, (3, 5, 7), 10)))  # it is again
     robot.choose(2, None, {3: 1.0, 4: 1.0}, 11)
     assert robot.route == Route(3.0, (2, 3, 5, 7), 10)
 
@@ -308,12 +308,12 @@ def test_who_claims_something_else_ends_what_it_claimed_before() -> None:
 
 def test_who_took_a_place_over_and_missed_the_end_of_its_way_is_believed_after_a_while() -> None:
     follower, other = PathVectorProtocol(), PathVectorProtocol()
-    follower.hear(4, PathVector(1, 2, Route(0.0, (2,), 5)))
-    other.hear(4, PathVector(2, 2, None, ended=((2, 8),)))  # the follower has not heard that
+    follower.receive(4, PathVector(1, 2, Route(0.0, (2,), 5)))
+    other.receive(4, PathVector(2, 2, None, ended=((2, 8),)))  # the follower has not heard that
     follower.take_over(2, None)
     for number, tick in ((1, 9), (2, 9 + RENEW_TICKS)):
         follower.choose(2, 0.0, {}, tick)
-        other.hear(6, PathVector(number, 2, follower.route))
+        other.receive(6, PathVector(number, 2, follower.route))
         other.choose(3, None, {2: 1.0}, tick)
         assert (other.route is not None) == (number == 2)
 
