@@ -20,7 +20,8 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from pydantic import BaseModel
 
-from zwerm.catalogue import ROBOT, names
+from zwerm.agents.runtime import controllers
+from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, ROBOT, names
 from zwerm.cli.app import app
 from zwerm.run.runner import run
 from zwerm.scenario import tables as scenario
