@@ -21,7 +21,7 @@ from mkdocs.structure.files import File, Files
 from pydantic import BaseModel
 
 from zwerm.agents.runtime import controllers
-from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, ROBOT, names
+from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, ROBOT, SENSORS, names
 from zwerm.cli.app import app
 from zwerm.run.runner import run
 from zwerm.scenario import tables as scenario
@@ -175,7 +175,7 @@ def built_in_scenarios() -> str:
 def sensor_list() -> str:
     """Return every built-in sensor: what it is, what it fills and what it takes."""
     parts = []
-    for kind, found in sensors.BUILT_IN.items():
+    for kind, found in ((kind, sensors.find(kind)) for kind in SENSORS):
         module = inspect.getmodule(found)
         text = module.__doc__ if module else found.__doc__
         parts.append(f"### `{kind}` {{ #sensor-{kind.replace('_', '-')} }}\n\n{paragraphs(text)}")
