@@ -118,7 +118,7 @@ def test_every_built_in_sensor_reads_nobody_where_nobody_is_asked(make, scene):
             {"kind": "other_peoples:Untyped"},
             [
                 "robots.sensors.0.kind: other_peoples:Untyped is no sensor: its `Parameters` must be a subclass of "
-                "zwerm.scenario.tables.Table"
+                "zwerm.scenario.types.Table"
             ],
         ),
         (
