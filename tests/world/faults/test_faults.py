@@ -397,6 +397,18 @@ def test_a_random_schedule_depends_on_its_seed_and_no_kind_on_another() -> None:
     assert drawn(1, jam_per_h=0.0) == fewer
 
 
+@pytest.mark.parametrize("touch", [{"switches": 4}, {}, {"switches": 12}])
+def test_random_stuck_switches_are_drawn_among_those_that_the_sensor_has(touch: dict[str, int]) -> None:
+    robots = {"sensors": [{"kind": "touch", **touch}]}
+    chosen = faulty(random_faults={"stuck_touch_per_h": 4_000.0}, robots=robots)
+    arena = assemble(faulty(robots=robots), 1).arena
+    tables = [table for seed in range(100) for table in draw(chosen, seed, arena)]
+    # About 220 faults: the chance that one switch of 12 is never drawn is below 1e-7.
+    assert {table.parameters["switch"] for table in tables} == set(range(touch.get("switches", 8)))
+    for seed in range(10):
+        assemble(chosen, seed)
+
+
 def test_random_faults_that_cannot_be_are_mistakes() -> None:
     chosen = scenario(random_faults={"jam_per_h": 1.0, "stuck_touch_per_h": 2.0})
     with pytest.raises(ScenarioError) as caught:
