@@ -67,7 +67,9 @@ class Node:
                 if len(said) > MESSAGE_BYTES_MAX:
                     raise ValueError(f"the command takes {len(said)} bytes, at most {MESSAGE_BYTES_MAX} are allowed")
                 return said
-            except (Exception, SystemExit) as error:
+            except KeyboardInterrupt:  # Ctrl-C, for whoever runs nodes inline
+                raise
+            except BaseException as error:
                 return fail(tick, error)
 
         return answer
