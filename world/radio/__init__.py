@@ -147,7 +147,11 @@ class ModelPlace:
 
 
 class LinkModel(Protocol):
-    """One reason why a packet may not arrive; `needs_positions` means that it makes sense between bodies only."""
+    """One reason why a packet may not arrive; `needs_positions` means that it makes sense between bodies only.
+
+    A model with an attribute `out_of_reach` that is true drops packets to receivers that are out of reach, by no chance. The
+    others lose packets to receivers in reach.
+    """
 
     kind: ClassVar[str]
     cause: ClassVar[str]
