@@ -101,10 +101,6 @@ class Packets:
             part(self.attenuation_db),
         )
 
-    def delays_s(self) -> Floats:
-        """Return (k,) how long after sending each packet gets here [s]."""
-        return np.zeros(len(self)) if self.delay_s is None else self.delay_s
-
     def layers(self, air: Air) -> Iterator[Ints]:
         """Yield rows in the order of sending, such that no link appears twice in one array."""
         order = air.rank[self.transmission]
@@ -125,9 +121,6 @@ class Verdict(NamedTuple):
     copies: Ints | None = None  # (k,) how many copies arrive besides it
     payload: Ints | None = None  # (k,) which of Air.payloads it carries now
     attenuation_db: Floats | None = None  # (k,) added attenuation [dB]
-
-
-PASSED: Final = Verdict()
 
 
 @dataclass(frozen=True, slots=True)
