@@ -185,8 +185,8 @@ def test_robots_started_elsewhere_join_over_tcp_and_give_the_same_trace(tmp_path
         ("import zwerm.agents.runtime.node", False),
         ("import zwerm\n    zwerm.run('beacon', runner='inline', overrides=['time.duration_s=0.5'])", False),
         (
-            "import zwerm.cli.app\n    zwerm.cli.app.app(['run', 'beacon', '--inline', '--json', '--set', 'time.duration_s=0.5'],"
-            " standalone_mode=False)",
+            "from zwerm.cli.app import app\n"
+            "    app(['run', 'beacon', '--inline', '--json', '--set', 'time.duration_s=0.5'], standalone_mode=False)",
             False,
         ),
         ("import zwerm.agents.runtime.process", True),  # a robot's process does, so the test can tell
