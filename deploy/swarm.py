@@ -29,7 +29,7 @@ from zwerm.deploy.supervisor import (
 from zwerm.errors import LinkError
 from zwerm.link.peer_radio import Station
 from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials
-from zwerm.link.world import ExpectedNode, ZenohWorldLink
+from zwerm.link.world_link import ExpectedNode, ZenohWorldLink
 from zwerm.wire.messages import encode
 
 Members = Mapping[int, tuple[str, Setup]]

@@ -27,7 +27,7 @@ from zwerm.run.runner import run
 from zwerm.scenario import tables as scenario
 from zwerm.scenario.tables import Scenario
 from zwerm.scenario.types import OpenTable
-from zwerm.study.tables import StudyTable
+from zwerm.study.study_tables import StudyTable
 from zwerm.wire import messages as protocol
 from zwerm.world.faults import FaultTable
 from zwerm.world.faults import schedule as faults

@@ -29,7 +29,7 @@ import uvloop
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.node import Node
 from zwerm.errors import ControllerError, ZwermError
-from zwerm.link.node import ZenohNodeLink
+from zwerm.link.node_link import ZenohNodeLink
 from zwerm.link.peer_radio import PeerRadio, Station, enter_namespace
 from zwerm.link.session import ONE_THREAD, TWO_THREADS, Credential, is_local, set_threads
 from zwerm.wire.messages import REFUSABLE, Failure, Goodbye, Welcome, decode_to_node, encode

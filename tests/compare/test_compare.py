@@ -23,8 +23,8 @@ from zwerm.run.runner import run
 from zwerm.study.plan import make_points
 from zwerm.study.rows import read_rows
 from zwerm.study.study_runner import run_study
+from zwerm.study.study_tables import Study, load_study
 from zwerm.study.summary import Results
-from zwerm.study.tables import Study, load_study
 
 # Ten robots in reach of each other, for two seconds; how often they speak is what the variants differ in.
 GOSSIP = """

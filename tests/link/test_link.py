@@ -16,7 +16,7 @@ from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError
 from zwerm.link import Answer, Arrival, WorldLink
 from zwerm.link.memory import MemoryLink
-from zwerm.link.world import ExpectedNode
+from zwerm.link.world_link import ExpectedNode
 from zwerm.wire.keys import command_key
 from zwerm.wire.messages import (
     MESSAGE_BYTES_MAX,
@@ -143,7 +143,7 @@ def test_many_are_received_once_enough_have_arrived_or_a_node_is_lost(net: Netwo
 def test_a_node_that_sends_more_than_anybody_takes_is_held_back(
     private_tmp: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("zwerm.link.world.CAPACITY", 10)
+    monkeypatch.setattr("zwerm.link.world_link.CAPACITY", 10)
     sent = [str(number).encode() for number in range(100)]
     with network(private_tmp) as net:
         node = net.node(0)

@@ -21,8 +21,8 @@ from zwerm.study.plan import make_points, make_trials
 from zwerm.study.rows import Rows, read_rows
 from zwerm.study.study_figure import draw_study
 from zwerm.study.study_runner import StudyResult, run_study
+from zwerm.study.study_tables import Published, Study, built_in, load_study, parse_seeds
 from zwerm.study.summary import SummaryLine
-from zwerm.study.tables import Published, Study, built_in, load_study, parse_seeds
 
 ROOT = Path(__file__).parents[2]
 DEADLINE_S = 60.0
@@ -308,7 +308,7 @@ def test_a_row_is_safe_as_soon_as_its_trial_has_ended(write: Callable[..., Study
                 raise MemoryError
 
     with pytest.raises(MemoryError):
-        run_here(study, out, watcher=Stop())
+        run_here(study, out, listener=Stop())
     journal = tmp_path / "out.parquet.journal"
     assert not out.exists()
     with journal.open("ab") as file:

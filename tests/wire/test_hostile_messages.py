@@ -15,7 +15,7 @@ from zwerm.deploy.identity import load
 from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import RemoteSwarm
 from zwerm.errors import ProtocolError
-from zwerm.link.node import ZenohNodeLink
+from zwerm.link.node_link import ZenohNodeLink
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import drive, new_run_id, run
 from zwerm.wire.messages import (

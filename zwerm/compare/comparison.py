@@ -19,8 +19,8 @@ from zwerm.errors import ScenarioError
 from zwerm.maths.statistics import Sample, condense
 from zwerm.scenario.load import built_in
 from zwerm.study.plan import Point
+from zwerm.study.study_tables import Setting, Study, VariantTable, check_study
 from zwerm.study.summary import Results
-from zwerm.study.tables import Setting, Study, VariantTable, check_study
 from zwerm.study.trial import Row
 from zwerm.world.drivers.lockstep import FAILED
 

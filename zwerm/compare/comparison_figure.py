@@ -16,7 +16,7 @@ from zwerm.compare.comparison import COMPLETED, Comparison, SweepPoint
 from zwerm.errors import PictureError
 from zwerm.maths.statistics import Sample
 from zwerm.study.plan import Point
-from zwerm.study.tables import Setting
+from zwerm.study.study_tables import Setting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from decimal import Decimal, InvalidOperation
 from typing import Any, Final, NamedTuple
 
 from zwerm.errors import ScenarioError
-from zwerm.study.tables import Setting, VariantTable
+from zwerm.study.study_tables import Setting, VariantTable
 
 _OPENING, _CLOSING = "[{", "]}"
 _NAMED: Final = re.compile(r"\s*([A-Za-z0-9][A-Za-z0-9 ._-]*):\s*(?=[\[{])")

@@ -19,7 +19,7 @@ from zwerm.run.runner import Runner
 from zwerm.scenario.load import built_in as built_in_scenarios
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
-from zwerm.study.tables import Setting, Study, VariantTable
+from zwerm.study.study_tables import Setting, Study, VariantTable
 from zwerm.version import __version__
 
 # What a scenario says of itself and no run depends on.

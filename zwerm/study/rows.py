@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from zwerm.errors import ScenarioError
-from zwerm.study.tables import RESERVED
+from zwerm.study.study_tables import RESERVED
 from zwerm.study.trial import Row
 
 Key = tuple[str, str, int]

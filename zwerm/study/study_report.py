@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from zwerm.study.study_tables import Study
 from zwerm.study.summary import Results, SummaryLine
-from zwerm.study.tables import Study
 
 # Speed is estimated over this long: a study's trials are long, and of different length.
 _ESTIMATE_S = 600.0

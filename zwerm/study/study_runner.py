@@ -17,8 +17,8 @@ from zwerm.run.runner import Runner
 from zwerm.study.plan import Trial, make_points, make_trials
 from zwerm.study.pool import run_trials
 from zwerm.study.rows import Key, Rows
+from zwerm.study.study_tables import Setting, Study
 from zwerm.study.summary import Results
-from zwerm.study.tables import Setting, Study
 from zwerm.study.trial import Row
 from zwerm.world.drivers.lockstep import FAILED
 
@@ -59,7 +59,7 @@ def run_study(
     sets: Sequence[str] = (),
     retry: bool = False,
     runner: Runner = "inline",
-    watcher: StudyListener | None = None,
+    listener: StudyListener | None = None,
 ) -> StudyResult:
     """Run what `out` does not hold yet of `study`, `jobs` trials at a time, and return what is known then.
 
@@ -75,16 +75,16 @@ def run_study(
         distinct = _distinct(trials)
         todo = [trial for trial in distinct if _wanted(rows.held.get(trial.key), retry)]
         ran, interrupted = 0, False
-        if watcher is not None:
-            watcher.begin(len(todo))
+        if listener is not None:
+            listener.begin(len(todo))
         try:
             workers = 1 if runner == "processes" else min(jobs or cpu_count(), max(1, len(todo)))
             with closing(run_trials(todo, workers)) as ending:
                 for row in ending:
                     rows.add(row)
                     ran += 1
-                    if watcher is not None:
-                        watcher.ended(row["outcome"] == FAILED)
+                    if listener is not None:
+                        listener.ended(row["outcome"] == FAILED)
         except KeyboardInterrupt:
             interrupted = True
         axes = list(study.table.grid)

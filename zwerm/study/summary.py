@@ -14,7 +14,7 @@ import numpy as np
 
 from zwerm.maths.statistics import Sample, condense, half_width
 from zwerm.study.plan import Point
-from zwerm.study.tables import Published, Setting, Study
+from zwerm.study.study_tables import Published, Setting, Study
 from zwerm.study.trial import Row
 from zwerm.world.drivers.lockstep import FAILED
 from zwerm.world.scene import Floats

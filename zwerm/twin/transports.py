@@ -31,7 +31,7 @@ class Transports(StrEnum):
         return ("udp", "tcp") if self is Transports.both else ("udp",) if self is Transports.udp else ("tcp",)
 
 
-def run_and_tell(
+def run_and_report(
     scenario: Scenario,
     seed: int,
     transports: Sequence[Transport],
