@@ -351,7 +351,7 @@ def test_there_is_one_figure_for_every_setting_of_the_further_sweeps(gossip: Pat
 
 
 def test_a_line_goes_through_numbers_as_they_ascend_however_they_were_given(gossip: Path, tmp_path: Path) -> None:
-    drawn = []
+    drawn: list[Any] = []
     for sweep in ("radio.loss=0.0,0.3,0.6", "radio.loss=0.3,0.6,0.0"):
         result = run_study(planned(gossip, (sweep,)), tmp_path / "out.parquet", seeds=[1], jobs=1)
         drawn += draw_comparison(tmp_path / f"{len(drawn)}.png", Comparison(result.results))

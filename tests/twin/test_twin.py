@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 from support import ROOT, ZWERM, children_of, gone, scenario, until
 
-from zwerm.deploy.network import namespaces
 from zwerm.deploy.network.impairments import Network, possible, ruleset, translate
 from zwerm.deploy.network.namespaces import Namespaces, lacks_netem, missing
 from zwerm.errors import LinkError, ScenarioError
@@ -308,9 +307,9 @@ def test_a_delay_is_told_to_netem_before_its_receiver() -> None:
 
 
 def test_where_there_can_be_no_network_the_reason_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(namespaces.os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
     assert missing() == "needs root, to make network namespaces"
-    monkeypatch.setattr(namespaces.sys, "platform", "darwin")
+    monkeypatch.setattr(sys, "platform", "darwin")
     assert missing() == "needs Linux, this is darwin"
     with pytest.raises(LinkError, match=r"^the twin on a real network needs Linux, this is darwin$"):
         run_twin(scenario(radio={}), 1, "udp")

@@ -247,7 +247,7 @@ def test_an_odd_observation_that_it_does_not_stand_is_named(
         (Command(drive=WheelSpeeds(float("inf"), 0.0)), "step() returned what the world refuses: not-finite"),
         (Command(wake=Wake(at_s=float("nan"))), "step() returned what the world refuses: not-finite"),
         (Command(drive=WheelSpeeds("fast", 0.0)), "step() returned what the world refuses: schema"),  # type: ignore[arg-type]
-        (Command(drive=WheelSpeeds(np.float32(0.1), 0.0)), "step() returned what cannot be encoded"),
+        (Command(drive=WheelSpeeds(np.float32(0.1), 0.0)), "step() returned what cannot be encoded"),  # type: ignore[arg-type]
         (Command(outbox=(Transmission("robots", object()),)), "step() returned what cannot be encoded"),  # type: ignore[arg-type]
         (Command(outbox=(Transmission("robots", bytes(70_000)),)), "step() returned what the world refuses: oversized"),
         (Command(outbox=(Transmission("gossip", b""),)), "step() sends on channel 'gossip'; its Setup names robots"),
@@ -320,9 +320,9 @@ def test_what_a_controller_must_not_do_is_told_with_its_line(action: Callable[[]
 
 
 def test_the_global_stream_of_numpy_is_told_and_left_as_it_was() -> None:
-    before = np.random.get_state()[1].tolist()  # type: ignore[index, union-attr]  # noqa: NPY002
+    before = np.random.get_state()[1].tolist()  # type: ignore[index]  # noqa: NPY002
     assert violations(doing(lambda: np.random.rand())) == ["draws from a global random stream: numpy.random"]  # noqa: NPY002
-    assert np.random.get_state()[1].tolist() == before  # type: ignore[index, union-attr]  # noqa: NPY002
+    assert np.random.get_state()[1].tolist() == before  # type: ignore[index]  # noqa: NPY002
 
 
 def test_printing_is_told() -> None:
