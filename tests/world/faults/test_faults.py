@@ -382,7 +382,8 @@ def test_a_new_optional_key_of_a_kind_of_fault_changes_no_draw(monkeypatch: pyte
 
     monkeypatch.setitem(SCHEDULE_KINDS, "crash", WiderCrash)
     monkeypatch.setitem(SCHEDULE_KINDS, "sensor_noise", WiderNoise)
-    monkeypatch.setitem(SENSING_KINDS, WiderNoise, SensorNoise)
+    sensing: Any = SENSING_KINDS
+    monkeypatch.setitem(sensing, WiderNoise, SensorNoise)
     assert drawn_now() == before
     # What a scenario writes does key the draws: the same value, given, is another fault.
     assert drawn_now(depth_m=WiderNoise.model_fields["depth_m"].default)[1] != before[1]
