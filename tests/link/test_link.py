@@ -288,7 +288,7 @@ def test_a_node_that_takes_leave_has_been_heard_out_and_its_place_is_free_again(
     for number in range(500):
         node.send(str(number).encode())
     heard = threading.Event()
-    node.take_leave("tired", heard.set)
+    node.send_goodbye("tired", heard.set)
     assert heard.wait(20.0)
     node.close()
     for number in range(500):
@@ -312,13 +312,13 @@ def test_a_node_that_takes_leave_is_not_heard_out_before_the_world_confirms_it(n
     node.send(b"last words")
     heard = threading.Event()
     with net.link._changed:  # the world can neither confirm nor take note of a loss
-        node.take_leave("tired", heard.set)
+        node.send_goodbye("tired", heard.set)
         assert not heard.wait(0.2)
     assert heard.wait(20.0)
     node.close()
     assert [net.link.receive(20.0) for _ in range(2)] == [Arrival(0, b"last words"), Arrival(0, None)]
     heard.clear()
-    node.take_leave("again", heard.set)
+    node.send_goodbye("again", heard.set)
     assert heard.is_set(), "a link that is closed has nobody to wait for"
 
 
@@ -327,7 +327,7 @@ def test_closing_ends_the_wait_for_a_world_that_does_not_confirm(net: Network) -
     node.join()
     heard = threading.Event()
     with net.link._changed:
-        node.take_leave("tired", heard.set)
+        node.send_goodbye("tired", heard.set)
         node.close()
         assert heard.wait(20.0)
 

@@ -1,10 +1,10 @@
-"""Two fates of every packet, held against each other: what the models said, and what the network did.
+"""Compare the modelled and the real result of each packet of a twin run.
 
-Compared is the fraction that got through: the models' over all packets that were sent, less those dropped; the network's over
-all that were sent, those that arrived before the end. The half width is that of a 99 % confidence interval for the difference
-of the two, both being random: a link of n modelled and m real packets adds `p (1 - p) g (n/N^2 + m/M^2)` to the variance, where
-N and M are those of all links, and g > 1 says that packets in bursts are not independent. The two agree where that difference
-is within the interval, and so is that of every single link, with an interval for all links together.
+The compared quantity is the fraction of packets that pass: for the models, sent packets less dropped ones; for the network,
+packets that arrive before the end of the run. The half width belongs to a 99 % confidence interval of the difference. A link
+with n modelled and m real packets adds `p (1 - p) g (n/N^2 + m/M^2)` to the variance. N and M are the totals over all links;
+g > 1 accounts for the correlation of packets in bursts. The two sides agree if the difference is within the interval, and
+the difference of each link is within a joint interval for all links.
 """
 
 import itertools
@@ -72,7 +72,7 @@ def compare(run: TwinRun) -> dict[str, Any]:
 
 
 def _real(run: TwinRun) -> tuple[dict[Link, list[int]], dict[Link, set[int]], list[int], list[int]]:
-    """Return by link the numbers sent and those that arrived; and of all packets the delay [ns] and ticks until heard."""
+    """Return by link the packet numbers sent and arrived; for all packets the delays [ns] and the ticks until received."""
     audience: dict[tuple[str, int], list[int]] = defaultdict(list)
     for name, pairs in run.links.items():
         for sender, receiver in pairs:
@@ -96,13 +96,13 @@ def _real(run: TwinRun) -> tuple[dict[Link, list[int]], dict[Link, set[int]], li
 
 
 def _modelled(run: TwinRun) -> dict[Link, tuple[int, int]]:
-    """Return by link the packets sent and not dropped, as the world's books have it."""
+    """Return by link the numbers of packets sent and not dropped, from the world's ledgers."""
     found: dict[Link, tuple[int, int]] = {}
     for name, channel in run.world.medium.channels.items():
-        books = channel.accounts.by_link()
-        dropped = [sum(column) for column in zip(*books["dropped"].values(), strict=True)] or [0] * len(books["sent"])
+        ledger = channel.accounts.by_link()
+        dropped = [sum(column) for column in zip(*ledger["dropped"].values(), strict=True)] or [0] * len(ledger["sent"])
         for sender, receiver, sent, lost in zip(
-            books["sender"], books["receiver"], books["sent"], dropped, strict=True
+            ledger["sender"], ledger["receiver"], ledger["sent"], dropped, strict=True
         ):
             if sent:
                 found[name, sender, receiver] = sent, sent - lost
@@ -116,7 +116,7 @@ def lost_runs(sent: list[int], arrived: set[int]) -> list[int]:
 
 
 class LinkCounts(NamedTuple):
-    """A link's packets: modelled, of them passed; real, of them passed; and how much bursts widen its variance."""
+    """Packets of a link: modelled, passed in the model, sent, arrived; `grown` is the variance factor g of bursts."""
 
     modelled: int
     passed: int
@@ -126,7 +126,7 @@ class LinkCounts(NamedTuple):
 
     @property
     def variance(self) -> float:
-        """Of one packet's fate, as both sides together have it."""
+        """Variance of one packet's result, p (1 - p) g, with p over both sides."""
         p = (self.passed + self.came) / (self.modelled + self.real)
         return p * (1.0 - p) * self.grown
 
