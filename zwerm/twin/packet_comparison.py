@@ -116,32 +116,32 @@ def lost_runs(sent: list[int], arrived: set[int]) -> list[int]:
 
 
 class LinkCounts(NamedTuple):
-    """Packets of a link: modelled, passed in the model, sent, arrived; `grown` is the variance factor g of bursts."""
+    """Packets of a link: modelled, passed in the model, sent, arrived; `variance_factor` is the variance factor g of bursts."""
 
     modelled: int
     passed: int
     real: int
-    came: int
-    grown: float
+    arrived_count: int
+    variance_factor: float
 
     @property
     def variance(self) -> float:
         """Variance of one packet's result, p (1 - p) g, with p over both sides."""
-        p = (self.passed + self.came) / (self.modelled + self.real)
-        return p * (1.0 - p) * self.grown
+        p = (self.passed + self.arrived_count) / (self.modelled + self.real)
+        return p * (1.0 - p) * self.variance_factor
 
 
 def _counts(
     run: TwinRun, modelled: dict[Link, tuple[int, int]], sent: dict[Link, list[int]], arrived: dict[Link, set[int]]
 ) -> list[LinkCounts]:
-    """Return the counts of every link."""
-    grown: dict[tuple[int, int], float] = {}
+    """Return the counts of each link."""
+    variance_factor: dict[tuple[int, int], float] = {}
     for rule in run.impairments.rules:
         if rule.bursts:
-            again = 1.0 - rule.leave - rule.enter
-            grown |= dict.fromkeys(rule.pairs, (1.0 + again) / (1.0 - again))
+            correlation = 1.0 - rule.leave - rule.enter
+            variance_factor |= dict.fromkeys(rule.pairs, (1.0 + correlation) / (1.0 - correlation))
     return [
-        LinkCounts(*modelled.get(link, (0, 0)), len(sent[link]), len(arrived[link]), grown.get(link[1:], 1.0))
+        LinkCounts(*modelled.get(link, (0, 0)), len(sent[link]), len(arrived[link]), variance_factor.get(link[1:], 1.0))
         for link in {**modelled, **sent}
     ]
 
@@ -156,14 +156,17 @@ def half_width(counts: Sequence[LinkCounts]) -> float:
 
 
 def agreeing(counts: Sequence[LinkCounts]) -> int:
-    """Return how many links agree. All do in 99 % of runs where both sides have the same chances (Bonferroni)."""
+    """Return the number of links that agree.
+
+    If both sides have the same probabilities, all links agree in 99 % of runs (Bonferroni).
+    """
     z = NormalDist().inv_cdf(1.0 - 0.005 / max(1, len(counts)))
 
     def agrees(each: LinkCounts) -> bool:
         if not each.modelled or not each.real:
             return False
         half = z * math.sqrt(each.variance * (1.0 / each.modelled + 1.0 / each.real))
-        return abs(each.passed / each.modelled - each.came / each.real) <= half
+        return abs(each.passed / each.modelled - each.arrived_count / each.real) <= half
 
     return sum(map(agrees, counts))
 
@@ -179,7 +182,7 @@ def _spread(delay_ns: list[int]) -> dict[str, float] | None:
 def _by_link(
     modelled: dict[Link, tuple[int, int]], sent: dict[Link, list[int]], arrived: dict[Link, set[int]]
 ) -> dict[str, list[Any]]:
-    """Return every link as columns, sorted."""
+    """Return all links as columns, sorted by channel, sender and receiver."""
     links = sorted({*modelled, *sent})
     counts = Counter({link: len(numbers) for link, numbers in sent.items()})
     return {
