@@ -13,7 +13,7 @@ from rich.console import Console
 from scipy import stats
 from support import ROOT, ZWERM
 
-from zwerm.compare.comparison import METRICS, Comparison, _less, make_comparison
+from zwerm.compare.comparison import METRICS, Comparison, _difference, make_comparison
 from zwerm.compare.comparison_figure import axis_label, check_figure, draw_comparison, label
 from zwerm.compare.comparison_report import print_comparison, shown
 from zwerm.compare.variants import parse_sweep, parse_variant
@@ -231,7 +231,7 @@ def test_a_difference_is_of_pairs_and_has_students_interval(gossip: Path) -> Non
     assert found.n == 3
     assert (found.mean - found.half_width, found.mean + found.half_width) == pytest.approx((low, high))
     # Rounding is no difference: its interval would be as narrow as it is, and leave out zero.
-    assert _less(0.1 + 0.2, 0.3) == 0.0
+    assert _difference(0.1 + 0.2, 0.3) == 0.0
     # The means are of all that have a value, pairs or not.
     assert comparison.sample(place.points[1], "cost").n == 4
 
