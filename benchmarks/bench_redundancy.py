@@ -83,7 +83,7 @@ class Troubled:
         self.standing = np.ones(count, dtype=bool)
         self.seen = np.ones(count, dtype=bool)
         self.down = np.zeros(count, dtype=bool)
-        self.later: dict[int, list[tuple[str, int]]] = {}  # tick: what happens to whom
+        self.later: dict[int, list[tuple[str, int]]] = {}  # by tick: (event, node)
         self.tick = 0
         self.decisions = self.departures = self.violations = 0
         self._look()

@@ -1,4 +1,4 @@
-"""What the network lets a node do: its own keys and nothing else, whoever it says it is."""
+"""Credentials and access control: a node can use its own keys and nothing else."""
 
 import contextlib
 import os
@@ -192,7 +192,7 @@ def test_each_run_has_its_own_credentials() -> None:
 
 def test_credentials_are_equal_after_saving_and_loading_a_private_file(tmp_path: Path) -> None:
     path = tmp_path / "keys"
-    path.write_text("something that everybody can read")
+    path.write_text("a file that others can read")
     path.chmod(0o644)
     some = slice_of(issue(RUN, range(9), "PEM"), [2, 5])
     save(some, path)

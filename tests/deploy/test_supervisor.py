@@ -1,4 +1,4 @@
-"""Processes come, serve and go: none outlives its swarm, however that ends."""
+"""Robot processes: start, failure and end; no process outlives its swarm."""
 
 import os
 import random
@@ -328,7 +328,7 @@ def test_a_world_that_cannot_listen_is_an_error_of_one_line(private_tmp: Path) -
 
 
 def free_port() -> int:
-    """Return a port of this machine that nobody listens on, for TCP; nearly surely for UDP."""
+    """Return a port of this machine without a TCP listener; most probably without a UDP one."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -1,4 +1,4 @@
-"""Links: one suite for every implementation, then what only a link between processes can do."""
+"""Links: tests of both implementations, then tests of the link between processes."""
 
 import contextlib
 import signal
@@ -319,7 +319,7 @@ def test_a_goodbye_is_confirmed_only_when_the_world_answers(net: Network) -> Non
     assert [net.link.receive(20.0) for _ in range(2)] == [Arrival(0, b"last words"), Arrival(0, None)]
     heard.clear()
     node.send_goodbye("again", heard.set)
-    assert heard.is_set(), "a link that is closed has nobody to wait for"
+    assert heard.is_set(), "closing the link confirms a goodbye"
 
 
 def test_closing_the_link_ends_the_wait_for_a_confirmation(net: Network) -> None:

@@ -1,4 +1,4 @@
-"""The twin: packets between robots really cross a network, which does what the models say, and nothing of it is left behind."""
+"""The twin: packets between robots cross a real network with the rules of the models; nothing remains afterwards."""
 
 import json
 import os
@@ -179,11 +179,11 @@ def descendants(pid: int) -> set[int]:
 
 @on_a_real_network
 @pytest.mark.parametrize(
-    ("who", "number", "status"),
+    ("target", "number", "status"),
     [("itself", signal.SIGINT, 130), ("itself", signal.SIGKILL, -9), ("robot", signal.SIGKILL, 1)],
 )
 def test_no_namespace_or_process_remains_after_an_interrupted_or_killed_twin(
-    who: str, number: signal.Signals, status: int, private_tmp: Path
+    target: str, number: signal.Signals, status: int, private_tmp: Path
 ) -> None:
     interfaces = sorted(Path("/sys/class/net").iterdir())
     command = [
@@ -213,7 +213,7 @@ def test_no_namespace_or_process_remains_after_an_interrupted_or_killed_twin(
         assert len(own) == 5, "one for each robot, and the bridge's"
         running_robots = [pid for pid in robots if str(Path(f"/proc/{pid}/ns/net").readlink()) in own]
         assert len(running_robots) == 4
-        os.kill(process.pid if who == "itself" else running_robots[0], number)
+        os.kill(process.pid if target == "itself" else running_robots[0], number)
         _, complaints = process.communicate(timeout=60.0)
     assert process.returncode == status, complaints
     until(lambda: gone(started), "all processes end")

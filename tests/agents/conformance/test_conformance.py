@@ -142,7 +142,7 @@ def test_an_object_that_is_no_controller_class_is_refused() -> None:
     assert violations(stepping(still, sensors="touch")) == ["sensors: expected a tuple of names, got 'touch'"]
     assert violations(stepping(still, Parameters=dict)) == ["Parameters: expected a msgspec.Struct, got <class 'dict'>"]
     assert violations(stepping(still, sensors=("touch",)), sensors=["pose"]) == [
-        "sensors: it declares 'touch', which check() was told not to give"
+        "sensors: it declares 'touch', which check() does not give"
     ]
 
 
@@ -194,7 +194,7 @@ def raises_on(condition: Callable[[Observation], object]) -> type[Controller]:
         (lambda o: o.neighbours == (), "nothing to be seen"),
         (lambda o: len(o.neighbours or ()) > 50, "everything to be seen"),
         (lambda o: o.touch and o.touch[0].half_width_rad > 3.0, "the ends of every range"),
-        (lambda o: any(packet.sender is None for packet in o.inbox), "a packet of nobody"),
+        (lambda o: any(packet.sender is None for packet in o.inbox), "a packet without a sender"),
         (lambda o: any(packet.payload == b"" for packet in o.inbox), "an empty packet"),
         (lambda o: len(o.inbox) > 50, "many packets"),
         (lambda o: o.tick > 2**31 - 1, "tick 2147483648"),

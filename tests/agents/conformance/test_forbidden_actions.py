@@ -29,7 +29,7 @@ from zwerm.wire.messages import Command, Observation, WheelSpeeds
 
 
 def doing(action: Callable[[], object]) -> type[Controller]:
-    """Return a controller whose answers are good whatever `action` gives."""
+    """Return a controller that calls `action` in each step and returns a correct command."""
 
     def step(self: Any, observation: Observation) -> Command:
         if observation.tick == 1:
