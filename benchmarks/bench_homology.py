@@ -1,8 +1,8 @@
-"""How long it takes to find whom a swarm can spare, by relative H2, and whether the certificates hold.
+"""Processor time to find redundant robots by relative H2, and correctness of the certificates.
 
-Random swarms in a square whose border is the fence, about 1.6 robots a cell of 0.4 r_v: the processor time to build the
-complex, to find the spared with their certificate, and, in the same run, what gudhi needs for the Betti numbers of the same
-pair. Then the certificates of as many random complexes as asked for, each with gudhi as the judge.
+Random swarms in a square whose border is the fence, about 1.6 robots per cell of 0.4 r_v. Prints the processor time to build
+the complex and to find the redundant robots with their certificate, and the time of gudhi for the Betti numbers of the same
+pair. Then checks the certificates of random complexes against gudhi.
 """
 
 import argparse
@@ -21,7 +21,7 @@ CELL = 0.4
 
 
 def swarm(cells: int, seed: int, blind_fraction: float = 0.0) -> tuple[dict[int, list[int]], list[Edge]]:
-    """Return the neighbour lists of a robot in each of cells x cells and of those around them, and the fence.
+    """Return the neighbour lists of one robot in each of cells x cells and of the robots of the fence, and the fence.
 
     `blind_fraction` of all pairs do not see each other, though they are near; those of the fence always do.
     """
@@ -43,7 +43,7 @@ def swarm(cells: int, seed: int, blind_fraction: float = 0.0) -> tuple[dict[int,
 
 
 def by_gudhi(complex_: FlagComplex, fence: Sequence[Edge] = ()) -> list[int]:
-    """Return the Betti numbers b0, b1, b2 of the complex, with a cone over the fence: so b2 is that of the pair."""
+    """Return the Betti numbers b0, b1, b2 of the complex with a cone over the fence: b2 is that of the pair."""
     tree, apex = gudhi.SimplexTree(), max(complex_.vertices, default=0) + 1
     for simplex in (*((v,) for v in complex_.vertices), *complex_.edges, *complex_.triangles):
         tree.insert(list(simplex))
@@ -64,7 +64,7 @@ def timed(make: Callable[[], object], repeats: int) -> float:
 
 
 def holds(complex_: FlagComplex, fence: Sequence[Edge], found: Sparing) -> bool:
-    """Tell whether a certificate is one, and gudhi agrees that removing the spared opens no hole and tears nothing."""
+    """Return whether a certificate is valid, and gudhi confirms that b0 and b1 stay without the redundant robots."""
     odd: dict[Edge, int] = {}
     for i, j, k in found.cycle:
         for each in ((i, j), (i, k), (j, k)):

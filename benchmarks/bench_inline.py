@@ -1,4 +1,4 @@
-"""How fast the inline runner is on one core, beside the physics engine alone in the same run.
+"""Speed of the inline runner on one core, compared with the physics engine alone.
 
 Prints robot-ticks per second of processor time: the whole emulator (e-pucks with the line-of-sight sensor, 10 substeps,
 wire format and trace included), and pymunk alone stepping the same bodies between the same walls.
@@ -25,7 +25,7 @@ def emulator_rate(scenario: Scenario, seed: int) -> float:
 
 
 def physics_rate(scenario: Scenario, seed: int) -> float:
-    """Return robot-ticks per second of pymunk alone, driven by the speeds of robots that see nobody."""
+    """Return robot-ticks per second of pymunk alone, with the wheel speeds of robots that see no other robot."""
     physics = assemble(scenario, seed)._physics
     count = scenario.robots.count
     forward, turn = np.full(count, 0.0725), np.full(count, -0.77)

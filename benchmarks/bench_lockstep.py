@@ -1,9 +1,9 @@
-"""Lock-step throughput with robots in processes, beside a bare Zenoh echo with as many processes and as many bytes.
+"""Lock-step throughput with robots in processes, compared with a bare Zenoh echo of as many processes and bytes.
 
-Both are measured in turn in the same run, many times, because where the scheduler puts a hundred processes moves both
-sides by a quarter; the ratio is the median of those of neighbours in that sequence, beside the range of its middle half. The
-emulator does everything: physics, sensing, encoding, decoding, controllers, trace. Its robots give way to the world, which
-those of the bare echo do not; the last column is the ratio to an echo that does so too.
+Both are measured alternately, many times, because the placement of a hundred processes on cores changes both rates by a
+quarter. The ratio is the median over adjacent pairs of measurements, with the range of its middle half. The emulator's rate
+includes physics, sensing, encoding, decoding, controllers and trace. Its robots have a higher niceness than the world; the
+last column is the ratio to an echo with the same niceness.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from zwerm.scenario.tables import Scenario
 
 TARGET = 0.7
 
-# Evenly spread, so that a robot has about eight neighbours in range, as in a swarm that covers an area.
+# Uniform placement with about eight neighbours in range of each robot, as in a swarm that covers an area.
 SENSORS = (
     "arena.size_m=[4.0, 4.0]",
     "robots.placement={kind='uniform'}",
@@ -32,7 +32,7 @@ SENSORS = (
 
 
 def lockstep_rate(scenario: Scenario, seed: int) -> float:
-    """Return robot-ticks per second of one run in processes, the start of the processes not counted."""
+    """Return robot-ticks per second of one run in processes, without the start of the processes."""
     with LocalSwarm(new_run_id(), node_specs(scenario, seed)) as swarm:
         result = drive(assemble(scenario, seed), swarm.link, seed, "processes")
     if result.middleware_lost or not result.ok:
@@ -41,7 +41,7 @@ def lockstep_rate(scenario: Scenario, seed: int) -> float:
 
 
 def mean_payload_bytes(scenario: Scenario, seed: int) -> int:
-    """Return how long an observation of the first tick is on average."""
+    """Return the mean length of the observations of the first tick [bytes]."""
     world = assemble(scenario, seed)
     _, observations = world.observe()
     return round(statistics.fmean(map(len, observations)))

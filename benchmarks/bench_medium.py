@@ -1,8 +1,8 @@
-"""What the radio's models cost: 100 robots broadcast at every tick, over a perfect radio and with five models on.
+"""Cost of the radio models: 100 robots broadcast at every tick, without models and with five models.
 
-Robots that stand, and robots that drive and so change every distance and line of sight at every tick. The kinds of run
-alternate in this one process, so that a busy machine slows all; compared are the fastest of each. The target: at most 25 % of
-the robot-ticks per second are lost to five models.
+Robots stand, or drive and so change every distance and line of sight at every tick. The kinds of run alternate in this
+process, so that other load slows all of them; the fastest run of each kind counts. Target: five models reduce the robot-ticks
+per second by at most 25 %.
 """
 
 import argparse
@@ -24,7 +24,7 @@ TARGET_LOSS = 0.25
 
 @dataclass
 class Measured:
-    """The fastest of several runs."""
+    """Result of the fastest of several runs."""
 
     rate: float = 0.0
     delivered: float = 0.0
@@ -46,7 +46,7 @@ def measure(overrides: list[str], robots: int, seconds: float, speed_m_s: float)
 
 
 def main() -> None:
-    """Print the rates and what the models take of them."""
+    """Print the rates and their reduction by the models."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--robots", type=int, default=100)
     parser.add_argument("--seconds", type=float, default=6.0)

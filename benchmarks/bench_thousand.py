@@ -1,7 +1,7 @@
-"""A thousand robot processes on one machine: how long they take to start, what each costs in memory, how fast they go.
+"""A thousand robot processes on one machine: time to start, memory of each process, and speed.
 
-With `--table1` they do what takes a while: Voronoi coverage until every robot is within 1e-7 m of its centroid, Table I of
-Schwager, McLurkin, Rus 2006; then the same run inline, whose trace has to be the same.
+With `--table1` the robots run Voronoi coverage until each is within 1e-7 m of its centroid (Table I of Schwager, McLurkin,
+Rus 2006); then the same run is repeated inline, and must have the same trace.
 """
 
 import argparse
@@ -22,13 +22,13 @@ START_S_MAX, PRIVATE_MB_MAX, RATE_MIN = 45.0, 8.0, 3_000.0
 
 
 def private_mb(pid: int) -> float:
-    """Return the memory [MB] that a process shares with no other (Linux)."""
+    """Return the private memory of a process [MB] (Linux)."""
     fields = (line.split() for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:])
     return sum(int(field[1]) for field in fields if field[0] in ("Private_Clean:", "Private_Dirty:")) / 1024
 
 
 def scenario_of(options: argparse.Namespace) -> Scenario:
-    """Return what the robots are to do."""
+    """Return the scenario of the options."""
     if options.table1:
         return load("voronoi-coverage-table1", (f"robots.count={options.robots}", *options.set))
     side_m = 0.4 * options.robots**0.5
@@ -44,7 +44,7 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
 
 def report(result: RunResult) -> None:
-    """Print what a run came to."""
+    """Print the result of a run."""
     print(f"{result.runner}: {result.ticks} ticks, outcome {result.outcome}, trace {result.trace}")
     print(f"{'wall time':<28} {result.wall_s:>8,.1f} s", flush=True)
 

@@ -1,7 +1,7 @@
-"""How fast Voronoi coverage is inline on one core: 100 robots with a control period of 0.02 s, and where the time goes.
+"""Speed of Voronoi coverage inline on one core: robots with a control period of 0.02 s.
 
-Prints the factor over real time and the microseconds of processor time of one robot's tick: the whole emulator, and the
-controller's share of it (the same observations answered by the bare controllers).
+Prints the factor over real time, and the processor time of one robot's tick [us]: of the whole emulator, and of the controller
+alone with the same observations.
 """
 
 import argparse
@@ -44,7 +44,9 @@ def controller(scenario: Scenario, seed: int) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--duration_s", type=float, default=20.0, help="virtual time of a run; its start counts")
+    parser.add_argument(
+        "--duration_s", type=float, default=20.0, help="virtual time of a run; the start of the run counts"
+    )
     arguments = parser.parse_args()
     print(
         f"best of {arguments.repeats}, the cell {'interpreted' if kept_cell.__file__.endswith('.py') else 'compiled'}"

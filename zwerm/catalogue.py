@@ -149,15 +149,15 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
 
 # Commands of the command line, in the order of `zwerm --help`, as `module:function`.
 COMMANDS: Final = {
-    "list": "zwerm.cli.list_command:list_catalogue",
-    "check": "zwerm.cli.check_command:check",
-    "run": "zwerm.cli.run_command:run",
-    "world": "zwerm.cli.world_command:world",
-    "robot": "zwerm.cli.robot_command:robot",
-    "twin": "zwerm.cli.twin_command:twin",
-    "shrink": "zwerm.cli.shrink_command:shrink",
-    "study": "zwerm.cli.study_command:study",
-    "compare": "zwerm.cli.compare_command:compare",
+    "list": "zwerm.cli.commands.list_command:list_catalogue",
+    "check": "zwerm.cli.commands.check_command:check",
+    "run": "zwerm.cli.commands.run_command:run",
+    "world": "zwerm.cli.commands.world_command:world",
+    "robot": "zwerm.cli.commands.robot_command:robot",
+    "twin": "zwerm.cli.commands.twin_command:twin",
+    "shrink": "zwerm.cli.commands.shrink_command:shrink",
+    "study": "zwerm.cli.commands.study_command:study",
+    "compare": "zwerm.cli.commands.compare_command:compare",
 }
 
 SENSORS: Final = {
