@@ -7,6 +7,8 @@ controller's share of it (the same observations answered by the bare controllers
 import argparse
 import time
 
+from csv_rows import add_csv_option, write_csv
+
 from zwerm import kept_cell
 from zwerm.agents.node import Node
 from zwerm.assembly import assemble
@@ -44,10 +46,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--duration_s", type=float, default=20.0, help="virtual time of a run; its start counts")
+    add_csv_option(parser)
     arguments = parser.parse_args()
-    print(
-        f"best of {arguments.repeats}, the cell {'interpreted' if kept_cell.__file__.endswith('.py') else 'compiled'}"
-    )
+    code = "interpreted" if kept_cell.__file__.endswith(".py") else "compiled"
+    rows = []
+    print(f"best of {arguments.repeats}, the cell {code}")
     print(f"{'robots':>6} {'x real time':>12} {'target':>7} {'us/robot-tick':>14} {'controller us':>14}")
     for count in (10, 100, 1000):
         overrides = (f"robots.count={count}", "time.dt_s=0.02", f"time.duration_s={arguments.duration_s}")
@@ -56,6 +59,17 @@ def main() -> None:
         own = min(controller(scenario, seed) for seed in range(1, arguments.repeats + 1))
         factor, spent = max(rate for rate, _ in rates), min(spent for _, spent in rates)
         print(f"{count:>6} {factor:>12.1f} {TARGET if count == 100 else '':>7} {spent:>14.1f} {own:>14.1f}")
+        rows.append(
+            {
+                "code": code,
+                "robots": f"{count}",
+                "times real time": f"{factor:.1f}",
+                "target": f"{TARGET:g}" if count == 100 else "",
+                "µs a robot and tick": f"{spent:.1f}",
+                "controller alone [µs]": f"{own:.1f}",
+            }
+        )
+    write_csv(arguments.csv, rows)
 
 
 if __name__ == "__main__":
