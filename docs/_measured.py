@@ -20,6 +20,7 @@ STATISTICS: Final = (
 )
 PROVENANCE: Final = ("source", "command", "commit", "date", "machine", "versions", "trials")
 COMMAND_LENGTH_MAX: Final = 100
+PERCENT_DIGIT_BELOW: Final = 0.01
 ROUNDING: Final = 1e-9  # an interval smaller than this share of its mean is a rounding error
 RECORDED: Final = "recorded"
 MEASURED: Final = "measured"
@@ -59,8 +60,12 @@ def origins() -> dict[str, dict[str, str]]:
 
 
 def load(name: str) -> Measurement:
-    """Return a stored measurement. Raises KeyError or OSError where a part of it is missing."""
+    """Return a stored measurement. Raises KeyError, with one line that says so, where a part of it is missing."""
     plan = plans()
+    if name not in plan["tables"]:
+        raise KeyError(f"{name}: plan.toml has no such table")
+    if name not in origins() or not (STORE / f"{name}.csv").exists():
+        raise KeyError(f"{name}: not measured yet, run: python docs/measure.py {name}")
     with (STORE / f"{name}.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     return Measurement(name, plan["tables"][name], plan["metrics"], origins()[name], rows)
@@ -95,7 +100,9 @@ def markdown(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
 def caption(found: Measurement, to_store: str) -> str:
     """Return what stands below a table: number of trials, meaning of ±, command, commit, date and machine."""
     origin = found.origin
-    parts = [f"n = {origin['trials']}." if origin.get("trials") else "", _meaning(found), found.plan.get("note", "")]
+    trials = origin["trials"]
+    counted = f"n = {trials}." if trials[:1].isdigit() else f"{trials[:1].upper()}{trials[1:]}." if trials else ""
+    parts = [counted, _meaning(found), found.plan.get("note", "")]
     where = f"commit `{origin['commit']}`, {origin['date']}, {origin['machine']}"
     if origin["source"] == RECORDED:
         where = f"recorded in the documentation at {where}"
@@ -108,7 +115,8 @@ def caption(found: Measurement, to_store: str) -> str:
 
 def _meaning(found: Measurement) -> str:
     if found.is_study and any(row["half_width"] for row in found.rows):
-        star = " `*`: the interval of the paired difference excludes zero." if _is_paired(found) else ""
+        starred = _is_paired(found) and (found.plan.get("layout") == "metrics" or found.plan.get("differences"))
+        star = " `*`: the interval of the paired difference excludes zero." if starred else ""
         return f"Mean ± half its 95 % interval.{star}"
     return ""
 
@@ -198,7 +206,7 @@ def _by_point(found: Measurement) -> tuple[list[str], list[list[str]]]:
 
     header = [_name(found, axis) for axis in axes] + ([_name(found, "variant")] if several else [])
     for metric, kind in kinds:
-        header += [kind["label"]] + (["the paper"] if metric in paper else [])
+        header += [kind["label"]] + (["the paper"] if metric in paper and is_mean(kind) else [])
         header += ["difference"] if metric in differences else []
     lines = []
     for (point, rows), counts in zip(points.items(), counted, strict=True):
@@ -206,11 +214,16 @@ def _by_point(found: Measurement) -> tuple[list[str], list[list[str]]]:
         for metric, kind in kinds:
             at = rows.get(metric)
             line.append(value(at, kind, found.plan.get("sd", False)) if at else "")
-            line += [published(at, kind) if at else ""] if metric in paper else []
+            line += [published(at, kind) if at else ""] if metric in paper and is_mean(kind) else []
             line += [difference(at, None, kind) if at else ""] if metric in differences else []
         lines.append(line + ([", ".join(dict.fromkeys(counts))] if several_counts else []))
     header = ["" if each == "variant" else each for each in header]
     return header + (["n"] if several_counts else []), lines
+
+
+def is_mean(kind: Mapping[str, Any]) -> bool:
+    """Whether the mean of a metric is shown, and not the least or most of all trials."""
+    return kind.get("show") not in ("least", "most")
 
 
 def value(row: Row, kind: Mapping[str, Any], with_sd: bool = False) -> str:
@@ -221,7 +234,7 @@ def value(row: Row, kind: Mapping[str, Any], with_sd: bool = False) -> str:
     if kind.get("show") == "count":
         return f"{round(float(row['mean']) * int(row['n']))} of {row['n']}"
     if kind.get("show") in ("least", "most"):
-        return number(float(row[kind["show"]] or row["mean"]) * scale, None, kind.get("digits")) + unit
+        return number(float(row[kind["show"]] or row["mean"]) * scale, kind.get("digits")) + unit
     text = plus_minus(row["mean"], row["half_width"], scale, kind.get("digits")) + unit
     return text + (f" (sd {number(float(row['sd']) * scale)})" if with_sd and row["sd"] else "")
 
@@ -233,10 +246,16 @@ def difference(row: Row, first: Row | None, kind: Mapping[str, Any]) -> str:
     mean, half = float(row["difference"]), row["difference_half_width"]
     star = " *" if half and abs(mean) > float(half) else ""
     text = plus_minus(row["difference"], half, kind.get("scale", 1.0), kind.get("digits"))
-    share = (
-        f" ({mean / float(first['mean']):+.0%})".replace("%", " %") if first and float(first["mean"]) and mean else ""
-    )
-    return ("+" if mean > 0 else "") + text + star + share
+    share = mean / float(first["mean"]) if first and float(first["mean"]) else 0.0
+    return ("+" if mean > 0 else "") + text + star + percent(share)
+
+
+def percent(share: float) -> str:
+    """Return a relative difference in brackets; nothing for none."""
+    if share == 0.0:
+        return ""
+    digits = 0 if abs(share) >= PERCENT_DIGIT_BELOW else 1
+    return f" ({100.0 * share:+,.{digits}f} %)"
 
 
 def published(row: Row, kind: Mapping[str, Any]) -> str:
@@ -249,20 +268,25 @@ def published(row: Row, kind: Mapping[str, Any]) -> str:
 
 
 def plus_minus(mean: str, half: str, scale: float = 1.0, digits: int | None = None) -> str:
-    """Return `mean ± half`, both to the second digit of the half, or `mean` alone where there is no half."""
+    """Return `mean ± half`, or `mean` alone where there is no half.
+
+    Both end at the second significant digit of the half, or at the first where only one is stored.
+    """
     if not half:
-        return number(float(mean) * scale, None, digits)
+        return number(float(mean) * scale, digits)
     spread = float(half) * scale
     if spread <= ROUNDING * abs(float(mean) * scale):
-        return f"{number(float(mean) * scale, None, digits)} ± 0"
-    return f"{number(float(mean) * scale, spread, digits)} ± {number(spread, spread, digits)}"
-
-
-def number(amount: float, spread: float | None = None, digits: int | None = None) -> str:
-    """Return a number with `digits` decimals, to the second digit of `spread`, or with four significant digits."""
+        return f"{number(float(mean) * scale, digits)} ± 0"
     if digits is None:
-        least = abs(spread) / 10.0 if spread else abs(amount) / 1000.0
-        digits = max(0, -math.floor(math.log10(least))) if least else 0
+        stored = len(half.replace(".", "").strip("0")) if "e" not in half else 2
+        digits = max(0, (1 if stored > 1 else 0) - math.floor(math.log10(spread)))
+    return f"{number(float(mean) * scale, digits)} ± {number(spread, digits)}"
+
+
+def number(amount: float, digits: int | None = None) -> str:
+    """Return a number with `digits` decimals, or with four significant digits."""
+    if digits is None:
+        digits = max(0, 3 - math.floor(math.log10(abs(amount)))) if amount else 0
         text = f"{amount:,.{digits}f}"
-        return text.rstrip("0").rstrip(".") if not spread and "." in text else text
+        return text.rstrip("0").rstrip(".") if "." in text else text
     return f"{amount:,.{digits}f}"

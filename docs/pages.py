@@ -52,6 +52,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Write the generated parts of the documentation into its pages.")
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 where a page is out of date")
     check = parser.parse_args().check
+    try:
+        write(check)
+    except KeyError as error:
+        sys.exit(f"pages: {error.args[0]}")
+
+
+def write(check: bool) -> None:
+    """Write every page that is out of date, or, with `check`, only name it. Exits with 1 where `check` finds one."""
     stale = [
         page for page in pages() if filled(page.read_text(encoding="utf-8"), page) != page.read_text(encoding="utf-8")
     ]

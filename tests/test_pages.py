@@ -154,7 +154,7 @@ ROW = {"n": "4", "mean": "0.5", "sd": "0.1", "half_width": "0.2", "least": "0.25
 @pytest.mark.parametrize(
     ("kind", "text"),
     [
-        ({}, "0.50 ± 0.20"),
+        ({}, "0.5 ± 0.2"),
         ({"scale": 100.0, "unit": " %"}, "50 ± 20 %"),
         ({"show": "least", "digits": 4}, "0.2500"),
         ({"show": "most"}, "0.75"),
@@ -169,7 +169,7 @@ def test_a_metric_that_no_trial_reached_is_shown_as_never(measured: ModuleType) 
     assert measured.value({"n": "0", "mean": "", "half_width": ""}, {}) == "never"
 
 
-@pytest.mark.parametrize(("half", "text"), [("0.5", "+1.00 ± 0.50 * (+50 %)"), ("1.5", "+1.0 ± 1.5 (+50 %)")])
+@pytest.mark.parametrize(("half", "text"), [("0.5", "+1.0 ± 0.5 * (+50 %)"), ("1.5", "+1.0 ± 1.5 (+50 %)")])
 def test_a_difference_has_a_star_where_its_interval_excludes_zero(measured: ModuleType, half: str, text: str) -> None:
     row = {"difference": "1", "difference_half_width": half}
     assert measured.difference(row, {"mean": "2"}, {}) == text
