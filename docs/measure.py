@@ -91,13 +91,16 @@ def shown(plan: Mapping[str, Any], seeds: str | None) -> str:
 
 
 def commit_now(*folders: str) -> str:
-    """Return the commit of the code, marked where a file of the code or in `folders` differs from it."""
+    """Return the last commit that changed the code or `folders`, marked where files differ from it.
+
+    A commit of documentation or tests alone changes no result.
+    """
 
     def git(*words: str) -> str:
         return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
 
     changed = git("status", "--porcelain", "--", *CODE, *folders)
-    return git("rev-parse", "--short=7", "HEAD") + ("+changes" if changed else "")
+    return git("log", "-1", "--format=%h", "--abbrev=7", "--", *CODE, *folders) + ("+changes" if changed else "")
 
 
 def machine() -> str:
