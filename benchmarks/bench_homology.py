@@ -15,7 +15,7 @@ import gudhi
 import numpy as np
 from csv_rows import add_csv_option, write_csv
 
-from zwerm.simplicial import Edge, FlagComplex, Sparing, edge, relative_cycles, sparing
+from zwerm.maths.simplicial import Edge, FlagComplex, Sparing, edge, relative_cycles, sparing
 
 TARGET_S = 1.0
 CELL = 0.4

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from csv_rows import add_csv_option, write_csv
 
-from zwerm.running import run
+from zwerm.run.runner import run
 
 FIVE_MODELS = (
     'radio.models=[{kind="range", range_m=9}, {kind="line_of_sight"}, {kind="loss", fraction=0.1}, '
