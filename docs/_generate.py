@@ -24,7 +24,7 @@ from zwerm.agents.runtime import controllers
 from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, ROBOT, SENSORS, names
 from zwerm.cli.app import app
 from zwerm.run.runner import run
-from zwerm.scenario import tables as scenario
+from zwerm.scenario.load import built_in, load
 from zwerm.scenario.tables import Scenario
 from zwerm.scenario.types import OpenTable
 from zwerm.study.tables import StudyTable
@@ -160,8 +160,8 @@ def anchor(path: str) -> str:
 def built_in_scenarios() -> str:
     """Return the scenarios that ship with Zwerm."""
     lines = ["| scenario | robots | lasts | what it is |", "| --- | --- | --- | --- |"]
-    for name in scenario.built_in():
-        each = scenario.load(name)
+    for name in built_in():
+        each = load(name)
         lines.append(f"| `{name}` | {each.robots.count} | {each.time.duration_s:g} s | {escaped(each.summary)} |")
     return "\n".join(lines)
 
