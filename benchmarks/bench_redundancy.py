@@ -241,12 +241,12 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1, help="of the swarms in trouble")
     parser.add_argument("--seeds", type=int, default=5, help="of the swarms beside relative H2")
-    parser.add_argument("--cost", action="store_true", help="with --csv: the rows beside relative H2 instead")
+    parser.add_argument("--cost", action="store_true", help="only the cost beside relative H2")
     add_csv_option(parser)
     chosen = parser.parse_args()
     rows: list[dict[str, str]] = []
     print(f"{'loss':>6} {'decisions':>10} {'departures':>10} {'changed b0 or b1':>17} {'messages a decision':>20}")
-    for kind in (LeaveLock, Unlocked):
+    for kind in () if chosen.cost else (LeaveLock, Unlocked):
         for loss in chosen.losses:
             each = Troubled(chosen.robots, seed=chosen.seed, loss=loss, kind=kind)
             each.run(chosen.decisions if kind is LeaveLock else chosen.decisions // 10)

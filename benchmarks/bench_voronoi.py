@@ -47,9 +47,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--duration_s", type=float, default=20.0, help="virtual time of a run; its start counts")
+    parser.add_argument("--code", choices=("interpreted", "compiled"), help="end with an error where it is the other")
     add_csv_option(parser)
     arguments = parser.parse_args()
     code = "interpreted" if kept_cell.__file__.endswith(".py") else "compiled"
+    if arguments.code not in (None, code):
+        parser.error(f"the cell is {code}; for the other run `make compile`, or remove zwerm/maths/*.so")
     rows = []
     print(f"best of {arguments.repeats}, the cell {code}")
     print(f"{'robots':>6} {'x real time':>12} {'target':>7} {'us/robot-tick':>14} {'controller us':>14}")

@@ -201,7 +201,7 @@ def _by_point(found: Measurement) -> tuple[list[str], list[list[str]]]:
         points.setdefault((*(row[axis] for axis in axes), row["variant"]), {})[row["metric"]] = row
     several = len({point[-1] for point in points}) > 1
     paper = {row["metric"] for row in found.rows if row["paper"]}
-    counted = [[row["n"] for name, _ in kinds if (row := rows.get(name))] for rows in points.values()]
+    counted = [[rows[name]["n"] for name, _ in kinds if name in rows] for rows in points.values()]
     several_counts = len({n for counts in counted for n in counts}) > 1
 
     header = [_name(found, axis) for axis in axes] + ([_name(found, "variant")] if several else [])
@@ -230,7 +230,7 @@ def value(row: Row, kind: Mapping[str, Any], with_sd: bool = False) -> str:
     """Return what is shown of a metric at a point: mean and interval, or the least or most of all trials."""
     if int(row["n"]) == 0:
         return "never"
-    scale, unit = kind.get("scale", 1.0), kind.get("unit", "")
+    scale, unit = float(kind.get("scale", 1.0)), str(kind.get("unit", ""))
     if kind.get("show") == "count":
         return f"{round(float(row['mean']) * int(row['n']))} of {row['n']}"
     if kind.get("show") in ("least", "most"):

@@ -36,35 +36,37 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="what to measure; see the list that no name prints")
     parser.add_argument("--seeds", help="N or FIRST-LAST, instead of the plan's (studies and comparisons)")
     parser.add_argument("--jobs", type=int, help="trials at a time (studies and comparisons)")
-    parser.add_argument("--benchmarks", action="store_true", help="measure every benchmark")
+    parser.add_argument("--benchmarks", action="store_true", help="measure every benchmark that is not slow")
     options = parser.parse_args()
     tables = _measured.plans()["tables"]
     names = list(options.names)
     if options.benchmarks:
-        names += [name for name, plan in tables.items() if plan.get("command", [""])[0].startswith("benchmarks/")]
+        names += [name for name, plan in tables.items() if is_benchmark(plan) and not plan.get("slow")]
     for name in names:
         if "command" not in tables.get(name, {}):
             parser.error(f"{name}: expected one of {', '.join(each for each in tables if 'command' in tables[each])}")
     if not names:
         for name, plan in tables.items():
             print(f"{name:32} {shown(plan, plan.get('seeds')) if 'command' in plan else plan['recorded_command']}")
-    for name in names:
-        measure(name, tables[name], options.seeds, options.jobs)
+    failed = [name for name in names if not measure(name, tables[name], options.seeds, options.jobs)]
     if names:
         subprocess.run([sys.executable, str(Path(__file__).with_name("pages.py"))], check=True)
+    if failed:
+        sys.exit(f"measure: not measured: {', '.join(failed)}")
 
 
-def measure(name: str, plan: Mapping[str, Any], seeds: str | None, jobs: int | None) -> None:
-    """Run a plan's command and store its CSV file and provenance."""
-    is_benchmark = plan["command"][0].startswith("benchmarks/")
-    commit = commit_now(*(["benchmarks"] if is_benchmark else []))
+def measure(name: str, plan: Mapping[str, Any], seeds: str | None, jobs: int | None) -> bool:
+    """Run a plan's command and store its CSV file and provenance; return False where the command failed."""
+    commit = commit_now(*(["benchmarks"] if is_benchmark(plan) else []))
     seeds = seeds or plan.get("seeds")
     print(f"{name}: {shown(plan, seeds)}", flush=True)
-    if is_benchmark:
+    if is_benchmark(plan):
         rows, trials = benchmark(plan), plan.get("trials", "")
     else:
         rows = study(name, plan, seeds, jobs, commit)
         trials = trials_of(rows)
+    if not rows:
+        return False
     store(name, rows)
     note_origin(
         name,
@@ -78,11 +80,17 @@ def measure(name: str, plan: Mapping[str, Any], seeds: str | None, jobs: int | N
             "trials": trials,
         },
     )
+    return True
+
+
+def is_benchmark(plan: Mapping[str, Any]) -> bool:
+    """Whether a plan runs a script in benchmarks/."""
+    return "command" in plan and plan["command"][0].startswith("benchmarks/")
 
 
 def shown(plan: Mapping[str, Any], seeds: str | None) -> str:
     """Return a plan's command as a reader would type it."""
-    if plan["command"][0].startswith("benchmarks/"):
+    if is_benchmark(plan):
         return shlex.join(["python", *plan["command"]])
     return shlex.join(["zwerm", *plan["command"], *(["--seeds", seeds] if seeds else [])])
 
@@ -118,14 +126,14 @@ def versions() -> str:
 
 
 def study(name: str, plan: Mapping[str, Any], seeds: str | None, jobs: int | None, commit: str) -> list[dict[str, Any]]:
-    """Run `zwerm study` or `zwerm compare`, and return one row for each point and metric."""
+    """Run `zwerm study` or `zwerm compare`, and return one row for each point and metric; none where it failed."""
     # Rows are reused within a commit only: the fingerprint of a trial holds Zwerm's release, and not its commit.
     parquet = RUNS / f"{name}-{commit}.parquet"
     options = [*(["--seeds", seeds] if seeds else []), *(["--jobs", str(jobs)] if jobs else [])]
     command = [sys.executable, "-m", "zwerm", *plan["command"], *options, "--out", str(parquet), "--json"]
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
     if not done.stdout:
-        sys.exit(f"{name}: the command ended with status {done.returncode} and no result")
+        return []
     found = json.loads(done.stdout)
     trials = trials_in(parquet)
     rows = []
@@ -183,11 +191,12 @@ def trials_of(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def benchmark(plan: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Run a benchmark, and return the rows that it wrote."""
+    """Run a benchmark, and return the rows that it wrote; none where it failed."""
     RUNS.mkdir(parents=True, exist_ok=True)
     path = RUNS / "benchmark.csv"
     path.unlink(missing_ok=True)
-    subprocess.run([sys.executable, *plan["command"], "--csv", str(path)], cwd=ROOT, check=True)
+    if subprocess.run([sys.executable, *plan["command"], "--csv", str(path)], cwd=ROOT, check=False).returncode:
+        return []
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 

@@ -206,6 +206,17 @@ def test_a_comparison_is_measured_and_stored_with_its_provenance(
     assert f"commit `{origin['commit']}`" in table
 
 
+def test_a_command_that_fails_stores_nothing(
+    measure: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.modules["_measured"], "STORE", tmp_path)
+    monkeypatch.setattr(measure, "RUNS", tmp_path / "runs")
+    plan = {"command": ["study", "no-such-study"]}
+    assert not measure.measure("nothing", plan, "1", 1)
+    assert list(tmp_path.glob("*.csv")) == []
+    assert not (tmp_path / "index.toml").exists()
+
+
 def test_a_plan_that_is_not_known_is_refused_by_name(
     measure: ModuleType, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
