@@ -19,6 +19,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
+import tomli_w
+
 sys.path.insert(0, str(Path(__file__).parent))
 
 import _measured
@@ -223,11 +225,9 @@ def as_text(value: Any) -> Any:
 def note_origin(name: str, origin: Mapping[str, str]) -> None:
     """Write a measurement's provenance into index.toml."""
     every = _measured.origins() | {name: dict(origin)}
-    lines = ["# Where each CSV file comes from; written by docs/measure.py.\n"]
-    for each, keys in sorted(every.items()):
-        # A JSON string is a TOML string.
-        lines += [f"[{each}]", *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in keys.items()), ""]
-    (_measured.STORE / "index.toml").write_text("\n".join(lines), encoding="utf-8")
+    text = tomli_w.dumps(dict(sorted(every.items())))
+    head = "# Where each CSV file comes from; written by docs/measure.py.\n\n"
+    (_measured.STORE / "index.toml").write_text(head + text, encoding="utf-8")
 
 
 if __name__ == "__main__":
