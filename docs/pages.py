@@ -52,22 +52,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Write the generated parts of the documentation into its pages.")
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 where a page is out of date")
     check = parser.parse_args().check
-    try:
-        write(check)
-    except KeyError as error:
-        sys.exit(f"pages: {error.args[0]}")
-
-
-def write(check: bool) -> None:
-    """Write every page that is out of date, or, with `check`, only name it. Exits with 1 where `check` finds one."""
-    stale = [
-        page for page in pages() if filled(page.read_text(encoding="utf-8"), page) != page.read_text(encoding="utf-8")
-    ]
-    for page in stale:
-        print(f"{page.relative_to(DOCS.parent)}: {'out of date, run: make pages' if check else 'written'}")
-        if not check:
-            page.write_text(filled(page.read_text(encoding="utf-8"), page), encoding="utf-8")
-    sys.exit(1 if check and stale else 0)
+    failed = False
+    for page in pages():
+        name, text = page.relative_to(DOCS.parent), page.read_text(encoding="utf-8")
+        try:
+            new = filled(text, page)
+        except KeyError as error:
+            print(f"{name}: {error.args[0]}")
+            failed = True
+            continue
+        if new != text:
+            print(f"{name}: {'out of date, run: make pages' if check else 'written'}")
+            failed |= check
+            if not check:
+                page.write_text(new, encoding="utf-8")
+    sys.exit(failed)
 
 
 if __name__ == "__main__":
