@@ -171,6 +171,7 @@ def _by_metric(found: Measurement) -> tuple[list[str], list[list[str]]]:
     """Return a table with one line for each metric, and one column for each variant and paired difference."""
     variants = list(dict.fromkeys(row["variant"] for row in found.rows))
     rows = {(row["variant"], row["metric"]): row for row in found.rows}
+    trials = {each: max(int(row["n"]) for row in found.rows if row["variant"] == each) for each in variants}
     required, paper = found.plan.get("required", {}), any(row["paper"] for row in found.rows)
     header = [""]
     for place, variant in enumerate(variants):
@@ -183,7 +184,7 @@ def _by_metric(found: Measurement) -> tuple[list[str], list[list[str]]]:
         first = rows.get((variants[0], metric))
         for place, variant in enumerate(variants):
             row = rows.get((variant, metric))
-            line.append(value(row, kind, found.plan.get("sd", False)) if row else "")
+            line.append(value(row, kind, trials[variant], found.plan.get("sd", False)) if row else "")
             if place and _is_paired(found):
                 line.append(difference(row, first, kind) if row else "")
         line += [published(first, kind) if first else ""] if paper else []
@@ -201,22 +202,22 @@ def _by_point(found: Measurement) -> tuple[list[str], list[list[str]]]:
         points.setdefault((*(row[axis] for axis in axes), row["variant"]), {})[row["metric"]] = row
     several = len({point[-1] for point in points}) > 1
     paper = {row["metric"] for row in found.rows if row["paper"]}
-    counted = [[rows[name]["n"] for name, _ in kinds if name in rows] for rows in points.values()]
-    several_counts = len({n for counts in counted for n in counts}) > 1
+    counts = [max(int(row["n"]) for row in rows.values()) for rows in points.values()]
+    several_counts = len(set(counts)) > 1
 
     header = [_name(found, axis) for axis in axes] + ([_name(found, "variant")] if several else [])
     for metric, kind in kinds:
         header += [kind["label"]] + (["the paper"] if metric in paper and is_mean(kind) else [])
         header += ["difference"] if metric in differences else []
     lines = []
-    for (point, rows), counts in zip(points.items(), counted, strict=True):
+    for (point, rows), n in zip(points.items(), counts, strict=True):
         line = [_name(found, each) for each in (point if several else point[:-1])]
         for metric, kind in kinds:
             at = rows.get(metric)
-            line.append(value(at, kind, found.plan.get("sd", False)) if at else "")
+            line.append(value(at, kind, n, found.plan.get("sd", False)) if at else "")
             line += [published(at, kind) if at else ""] if metric in paper and is_mean(kind) else []
             line += [difference(at, None, kind) if at else ""] if metric in differences else []
-        lines.append(line + ([", ".join(dict.fromkeys(counts))] if several_counts else []))
+        lines.append(line + ([str(n)] if several_counts else []))
     header = ["" if each == "variant" else each for each in header]
     return header + (["n"] if several_counts else []), lines
 
@@ -226,17 +227,22 @@ def is_mean(kind: Mapping[str, Any]) -> bool:
     return kind.get("show") not in ("least", "most")
 
 
-def value(row: Row, kind: Mapping[str, Any], with_sd: bool = False) -> str:
-    """Return what is shown of a metric at a point: mean and interval, or the least or most of all trials."""
-    if int(row["n"]) == 0:
-        return "never"
+def value(row: Row, kind: Mapping[str, Any], trials: int, with_sd: bool = False) -> str:
+    """Return what is shown of a metric at a point: mean and interval, or the least or most of all trials.
+
+    Where fewer than all `trials` have a value, their number stands behind it; a time that none reached is `never`.
+    """
+    n = int(row["n"])
+    if n == 0:
+        return "never" if row["metric"].endswith("_s") else ""
     scale, unit = float(kind.get("scale", 1.0)), str(kind.get("unit", ""))
     if kind.get("show") == "count":
-        return f"{round(float(row['mean']) * int(row['n']))} of {row['n']}"
+        return f"{round(float(row['mean']) * n)} of {n}"
     if kind.get("show") in ("least", "most"):
         return number(float(row[kind["show"]] or row["mean"]) * scale, kind.get("digits")) + unit
     text = plus_minus(row["mean"], row["half_width"], scale, kind.get("digits")) + unit
-    return text + (f" (sd {number(float(row['sd']) * scale)})" if with_sd and row["sd"] else "")
+    spread = f" (sd {number(float(row['sd']) * scale)})" if with_sd and row["sd"] else ""
+    return text + spread + (f" ({n} of {trials})" if n < trials else "")
 
 
 def difference(row: Row, first: Row | None, kind: Mapping[str, Any]) -> str:

@@ -148,7 +148,7 @@ def test_a_mean_is_shown_to_the_second_digit_of_its_interval(
     assert measured.plus_minus(mean, half) == text
 
 
-ROW = {"n": "4", "mean": "0.5", "sd": "0.1", "half_width": "0.2", "least": "0.25", "most": "0.75"}
+ROW = {"metric": "sim_s", "n": "4", "mean": "0.5", "sd": "0.1", "half_width": "0.2", "least": "0.25", "most": "0.75"}
 
 
 @pytest.mark.parametrize(
@@ -162,11 +162,14 @@ ROW = {"n": "4", "mean": "0.5", "sd": "0.1", "half_width": "0.2", "least": "0.25
     ],
 )
 def test_a_value_is_shown_as_its_metric_asks(measured: ModuleType, kind: dict[str, object], text: str) -> None:
-    assert measured.value(ROW, kind) == text
+    assert measured.value(ROW, kind, trials=4) == text
 
 
-def test_a_metric_that_no_trial_reached_is_shown_as_never(measured: ModuleType) -> None:
-    assert measured.value({"n": "0", "mean": "", "half_width": ""}, {}) == "never"
+def test_a_value_of_some_trials_says_of_how_many(measured: ModuleType) -> None:
+    assert measured.value(ROW, {}, trials=5) == "0.5 ± 0.2 (4 of 5)"
+    none = {"n": "0", "mean": "", "half_width": ""}
+    assert measured.value({"metric": "convergence_time_s", **none}, {}, trials=5) == "never"
+    assert measured.value({"metric": "unsafe_removals", **none}, {}, trials=5) == ""
 
 
 @pytest.mark.parametrize(("half", "text"), [("0.5", "+1.0 ± 0.5 * (+50 %)"), ("1.5", "+1.0 ± 1.5 (+50 %)")])
