@@ -114,6 +114,8 @@ def caption(found: Measurement, to_store: str) -> str:
 
 
 def _meaning(found: Measurement) -> str:
+    if found.plan.get("spread") == "range":
+        return "Least to most of all trials."
     if found.is_study and any(row["half_width"] for row in found.rows):
         starred = _is_paired(found) and (found.plan.get("layout") == "metrics" or found.plan.get("differences"))
         star = " `*`: the interval of the paired difference excludes zero." if starred else ""
@@ -184,7 +186,7 @@ def _by_metric(found: Measurement) -> tuple[list[str], list[list[str]]]:
         first = rows.get((variants[0], metric))
         for place, variant in enumerate(variants):
             row = rows.get((variant, metric))
-            line.append(value(row, kind, trials[variant], found.plan.get("sd", False)) if row else "")
+            line.append(value(row, kind, trials[variant], found.plan.get("spread", "")) if row else "")
             if place and _is_paired(found):
                 line.append(difference(row, first, kind) if row else "")
         line += [published(first, kind) if first else ""] if paper else []
@@ -214,7 +216,7 @@ def _by_point(found: Measurement) -> tuple[list[str], list[list[str]]]:
         line = [_name(found, each) for each in (point if several else point[:-1])]
         for metric, kind in kinds:
             at = rows.get(metric)
-            line.append(value(at, kind, n, found.plan.get("sd", False)) if at else "")
+            line.append(value(at, kind, n, found.plan.get("spread", "")) if at else "")
             line += [published(at, kind) if at else ""] if metric in paper and is_mean(kind) else []
             line += [difference(at, None, kind) if at else ""] if metric in differences else []
         lines.append(line + ([str(n)] if several_counts else []))
@@ -227,10 +229,11 @@ def is_mean(kind: Mapping[str, Any]) -> bool:
     return kind.get("show") not in ("least", "most")
 
 
-def value(row: Row, kind: Mapping[str, Any], trials: int, with_sd: bool = False) -> str:
+def value(row: Row, kind: Mapping[str, Any], trials: int, spread: str = "") -> str:
     """Return what is shown of a metric at a point: mean and interval, or the least or most of all trials.
 
-    Where fewer than all `trials` have a value, their number stands behind it; a time that none reached is `never`.
+    `spread` adds the standard deviation ("sd") to the mean, or shows the least and the most instead ("range"). Where fewer than
+    all `trials` have a value, their number stands behind it; a time that none reached is `never`.
     """
     n = int(row["n"])
     if n == 0:
@@ -240,9 +243,12 @@ def value(row: Row, kind: Mapping[str, Any], trials: int, with_sd: bool = False)
         return f"{round(float(row['mean']) * n)} of {n}"
     if kind.get("show") in ("least", "most"):
         return number(float(row[kind["show"]] or row["mean"]) * scale, kind.get("digits")) + unit
+    few = f" ({n} of {trials})" if n < trials else ""
+    if spread == "range":
+        ends = [number(float(row[end]) * scale, kind.get("digits")) for end in ("least", "most")]
+        return " to ".join(dict.fromkeys(ends)) + unit + few
     text = plus_minus(row["mean"], row["half_width"], scale, kind.get("digits")) + unit
-    spread = f" (sd {number(float(row['sd']) * scale)})" if with_sd and row["sd"] else ""
-    return text + spread + (f" ({n} of {trials})" if n < trials else "")
+    return text + (f" (sd {number(float(row['sd']) * scale)})" if spread == "sd" and row["sd"] else "") + few
 
 
 def difference(row: Row, first: Row | None, kind: Mapping[str, Any]) -> str:

@@ -165,6 +165,12 @@ def test_a_value_is_shown_as_its_metric_asks(measured: ModuleType, kind: dict[st
     assert measured.value(ROW, kind, trials=4) == text
 
 
+def test_a_value_has_the_spread_that_its_plan_asks_for(measured: ModuleType) -> None:
+    assert measured.value(ROW, {}, trials=4, spread="sd") == "0.5 ± 0.2 (sd 0.1)"
+    assert measured.value(ROW, {}, trials=4, spread="range") == "0.25 to 0.75"
+    assert measured.value(ROW | {"most": "0.25"}, {}, trials=4, spread="range") == "0.25"
+
+
 def test_a_value_of_some_trials_says_of_how_many(measured: ModuleType) -> None:
     assert measured.value(ROW, {}, trials=5) == "0.5 ± 0.2 (4 of 5)"
     none = {"n": "0", "mean": "", "half_width": ""}
