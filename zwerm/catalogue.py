@@ -159,6 +159,14 @@ SENSORS: Final = {
     "touch": "zwerm.world.sensors.touch:Touch",
 }
 
+FIELDS: Final = {
+    "bitmap": "zwerm.world.fields.bitmap:Bitmap",
+    "constant": "zwerm.world.fields.constant:Constant",
+    "gaussians": "zwerm.world.fields.gaussians:Gaussians",
+    "lamp": "zwerm.world.fields.lamp:Lamp",
+    "linear": "zwerm.world.fields.linear:Linear",
+}
+
 RADIO_MODELS: Final = {
     "range": "zwerm.world.radio.models.range:DiscRange",
     "line_of_sight": "zwerm.world.radio.models.line_of_sight:LineOfSightModel",

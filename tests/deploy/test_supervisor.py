@@ -8,7 +8,6 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +17,7 @@ from support import ROBOTS, ROOT, children_of, gone, until
 
 from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.remote import run_robots
-from zwerm.deploy.supervisor import LEAVE_PATIENCE_S, TERMINATE_PATIENCE_S, interrupts_held
+from zwerm.deploy.supervisor import interrupts_held
 from zwerm.deploy.swarm import Certificate, LocalSwarm, RemoteSwarm
 from zwerm.errors import LinkError
 from zwerm.link import Arrival, WorldLink
@@ -232,10 +231,8 @@ def test_ctrl_c_while_starting_or_running_leaves_no_process_socket_or_directory(
         read_until(running, when)
         started = below(running.pid)
         assert len(started) > 2
-        began_s = time.monotonic()
         os.killpg(running.pid, signal.SIGINT)
         _, said = running.communicate(timeout=30)
-        assert time.monotonic() - began_s < LEAVE_PATIENCE_S + TERMINATE_PATIENCE_S, "nobody had to be killed"
         assert said.splitlines()[-1] == "KeyboardInterrupt"
         assert said.count("Traceback") == 1, "only of the program itself"
         until(lambda: gone(started), "all processes ended")

@@ -16,7 +16,7 @@ from zwerm.run.assembly import assemble
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import built_in, validate
 from zwerm.scenario.tables import Scenario
-from zwerm.study.tables import StudyTable
+from zwerm.study.study_tables import StudyTable
 from zwerm.wire.messages import Observation
 from zwerm.world.sensors import registry as sensors
 
