@@ -216,8 +216,8 @@ def shown(view: RunView, snapshot: Snapshot | None) -> Look:
 
 def test_the_complex_shows_triangles_frontier_obstacle_and_the_push() -> None:
     view = deployment()
-    first, _, third = snapshots(view.told)
-    first, last = shown(view, first), shown(view, third)
+    reported = snapshots(view.told)
+    first, last = shown(view, reported[0]), shown(view, reported[2])
     assert first.at(1.0, 0.8) == last.at(1.0, 0.8) == tuple(round(255 * each) for each in to_rgb(FILL["facecolor"]))
     assert first.at(1.25, 0.9) == tuple(round(255 * each) for each in to_rgb(FRONTIER))
     assert last.at(1.25, 0.9) == tuple(round(255 * each) for each in to_rgb(OBSTACLE))
