@@ -9,6 +9,7 @@ import argparse
 import math
 
 import numpy as np
+from csv_rows import add_csv_option, write_csv
 
 from zwerm.run.assembly import assemble
 from zwerm.scenario.load import load
@@ -52,7 +53,9 @@ def main() -> None:
     parser.add_argument("--robots", type=int, nargs="+", default=[10, 100])
     parser.add_argument("--error_m", type=float, default=PAPER_ERROR_M)
     parser.add_argument("--longest_s", type=float, default=2000.0)
+    add_csv_option(parser)
     arguments = parser.parse_args()
+    rows = []
     print(
         f"{'robots':>6} {'seed':>4} {'converged s':>11} {'measured 1/s':>12} {'slowest 1/s':>11} {'paper needs 1/s':>15}"
     )
@@ -70,6 +73,17 @@ def main() -> None:
             slowest = slowest_per_s(coverage, position)
             took = (len(errors) - 1) * STEP_S
             print(f"{count:>6} {seed:>4} {took:>11.1f} {measured:>12.3f} {slowest:>11.3f} {needed:>15.2f}")
+            rows.append(
+                {
+                    "robots": f"{count}",
+                    "seed": f"{seed}",
+                    "converged after [s]": f"{took:.1f}",
+                    "rate over the last factor of 100 [1/s]": f"{measured:.3f}",
+                    "rate of the slowest mode [1/s]": f"{slowest:.3f}",
+                    "rate that the paper's time needs [1/s]": f"{needed:.2g}",
+                }
+            )
+    write_csv(arguments.csv, rows)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from air import DT_S, Radio, ring
+from csv_rows import add_csv_option, write_csv
 
 from zwerm.wire.messages import Transmission
 
@@ -169,7 +170,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--packets", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
+    add_csv_option(parser)
     chosen = parser.parse_args()
+    rows = []
     table = Table("model", "what", "expected", "found", "99 % within", "inside", box=None)
     outside = 0
     for each in measure(chosen.packets, chosen.seed):
@@ -179,7 +182,11 @@ def main() -> None:
         digits = ".5g" if half else "d"
         numbers = [f"{expected:{digits}}", f"{found:{digits}}", f"+-{half:.2g}" if half else "exact"]
         table.add_row(model, what, *numbers, "yes" if inside else "no")
+        columns = ("model", "what", "expected", "found", "99 % within", "inside")
+        cells = (f"`{model}`", what, *numbers, "yes" if inside else "no")
+        rows.append({name: cell.replace("+-", "±") for name, cell in zip(columns, cells, strict=True)})
     Console().print(table)
+    write_csv(chosen.csv, rows)
     sys.exit(outside > 1)
 
 

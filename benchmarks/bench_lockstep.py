@@ -10,6 +10,7 @@ import argparse
 import operator
 import statistics
 
+from csv_rows import add_csv_option, write_csv
 from echo import echo_rate
 
 from zwerm.agents.runtime.process import NICENESS
@@ -52,7 +53,9 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=100)
     parser.add_argument("--seconds", type=float, default=30.0, help="virtual time of each run")
     parser.add_argument("--repeats", type=int, default=21, help="at least 2")
+    add_csv_option(parser)
     options = parser.parse_args()
+    rows = []
     base = (f"robots.count={options.robots}", f"time.duration_s={options.seconds}")
     cases = {"line of sight": base, "five sensors": (*base, *SENSORS)}
     print(
@@ -74,6 +77,20 @@ def main() -> None:
             f"{name:<14} {payload_bytes:>6} {statistics.median(ours):>11,.0f} {statistics.median(bare):>9,.0f} {ratio:>6.2f}"
             f" {f'{low:.2f} to {high:.2f}':>14} {TARGET:>7} {fairest:>11.2f}"
         )
+        rows.append(
+            {
+                "observation": name,
+                "bytes": f"{payload_bytes}",
+                "pairs": f"{options.repeats}",
+                "emulator [robot-ticks/s]": f"{statistics.median(ours):.0f}",
+                "bare echo [robot-ticks/s]": f"{statistics.median(bare):.0f}",
+                "ratio, median": f"{ratio:.2f}",
+                "middle half": f"{low:.2f} to {high:.2f}",
+                "target": f"{TARGET}",
+                "ratio to an echo of low priority": f"{fairest:.2f}",
+            }
+        )
+    write_csv(options.csv, rows)
 
 
 if __name__ == "__main__":

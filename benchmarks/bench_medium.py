@@ -9,6 +9,8 @@ import argparse
 import time
 from dataclasses import dataclass
 
+from csv_rows import add_csv_option, write_csv
+
 from zwerm.run.runner import run
 
 FIVE_MODELS = (
@@ -51,7 +53,9 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=100)
     parser.add_argument("--seconds", type=float, default=6.0)
     parser.add_argument("--rounds", type=int, default=5)
+    add_csv_option(parser)
     chosen = parser.parse_args()
+    rows = []
     kinds = {"perfect": ["radio.models=[]"], "five models": [FIVE_MODELS], "five models, none lost": [SAME_DELIVERY]}
     for speed_m_s in (0.0, 0.1):
         best = {name: Measured() for name in kinds}
@@ -65,8 +69,19 @@ def main() -> None:
         for name, each in best.items():
             lost = 1.0 - each.rate / perfect
             print(f"  {name:24} {each.rate:9,.0f} robot-ticks/s, {each.delivered:5.1%} delivered, {lost:6.1%} off")
+            rows.append(
+                {
+                    "radio": name,
+                    "robots drive [m/s]": f"{speed_m_s:g}",
+                    "delivered [%]": f"{100.0 * each.delivered:.1f}",
+                    "robot-ticks/s": f"{each.rate:.0f}",
+                    "slower [%]": f"{100.0 * lost:.1f}",
+                    "at most [%]": f"{100.0 * TARGET_LOSS:g}" if name == "five models" else "",
+                }
+            )
         loss = 1.0 - best["five models"].rate / perfect
         print(f"  target: at most {TARGET_LOSS:.0%} off; {'met' if loss <= TARGET_LOSS else 'missed'}")
+    write_csv(chosen.csv, rows)
 
 
 if __name__ == "__main__":

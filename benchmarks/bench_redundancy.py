@@ -14,6 +14,7 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 from bench_homology import swarm
+from csv_rows import add_csv_option, write_csv
 
 from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, LockMessage, Message
 from zwerm.maths.simplicial import FlagComplex, betti, sparing
@@ -240,24 +241,49 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1, help="seed of the swarms of part 1")
     parser.add_argument("--seeds", type=int, default=5, help="number of swarms of part 2")
+    parser.add_argument("--cost", action="store_true", help="run part 2 only")
+    add_csv_option(parser)
     chosen = parser.parse_args()
+    rows: list[dict[str, str]] = []
     print(f"{'loss':>6} {'decisions':>10} {'departures':>10} {'changed b0 or b1':>17} {'messages a decision':>20}")
-    for kind in (LeaveLock, Unlocked):
+    for kind in () if chosen.cost else (LeaveLock, Unlocked):
         for loss in chosen.losses:
             each = Troubled(chosen.robots, seed=chosen.seed, loss=loss, kind=kind)
             each.run(chosen.decisions if kind is LeaveLock else chosen.decisions // 10)
             told = f"{loss:>6} {each.decisions:>10,} {each.departures:>10,} {each.violations:>17}"
             print(f"{told} {each.radio.sent / each.decisions:>20.1f}  {kind.__name__}", flush=True)
-    if chosen.seeds:
-        compared(range(chosen.seeds))
+            rows.append(
+                {
+                    "robots leave": "with locks" if kind is LeaveLock else "without locks (control)",
+                    "loss": f"{loss:g}",
+                    "decisions": f"{each.decisions}",
+                    "departures": f"{each.departures}",
+                    "changed b0 or b1": f"{each.violations}",
+                }
+            )
+    beside = compared(range(chosen.seeds)) if chosen.seeds else []
+    write_csv(chosen.csv, beside if chosen.cost else rows)
 
 
-def compared(seeds: range) -> None:
+def compared(seeds: range) -> list[dict[str, str]]:
+    """Print what leaving costs beside relative H2; return the rows, means over `seeds`."""
+    rows = []
     print(f"\n{'robots':>6} {'':>22} {'freed':>7} {'messages a robot':>17} {'bytes a robot':>14} {'seconds':>9}")
     for cells in (6, 10, 14):
         for name, freed, messages, size, seconds in compare(cells, seeds):
             count = len(swarm(cells, 0)[0])
             print(f"{count:>6} {name:>22} {freed:>7.1f} {messages:>17.1f} {size:>14.0f} {seconds:>9.3f}", flush=True)
+            rows.append(
+                {
+                    "robots": f"{count}",
+                    "decided by": name,
+                    "freed": f"{freed:.1f}",
+                    "messages a robot": f"{messages:.1f}",
+                    "bytes a robot": f"{size:.0f}",
+                    "until the last has left [s]": f"{seconds:.3f}",
+                }
+            )
+    return rows
 
 
 if __name__ == "__main__":

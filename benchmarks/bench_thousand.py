@@ -10,6 +10,8 @@ import statistics
 import time
 from pathlib import Path
 
+from csv_rows import add_csv_option, write_csv
+
 from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.run.assembly import assemble
@@ -56,6 +58,7 @@ def main() -> None:
     parser.add_argument("--table1", action="store_true")
     parser.add_argument("--set", action="append", default=[], help="override of Table I's scenario")
     parser.add_argument("--seed", type=int, default=1)
+    add_csv_option(parser)
     options = parser.parse_args()
     scenario, seed = scenario_of(options), options.seed
     world = assemble(scenario, seed)
@@ -73,10 +76,24 @@ def main() -> None:
     print(f"{'private memory, world':<28} {private_mb(os.getpid()):>8,.0f} MB")
     print(f"{'robot-ticks/s':<28} {rate:>8,.0f}     at least {RATE_MIN:g}")
     print(f"{'lost by the middleware':<28} {result.middleware_lost:>8}     exactly 0", flush=True)
+    rows = [
+        ("start, until all have joined [s]", f"{start_s:.1f}", f"at most {START_S_MAX:g}"),
+        ("private memory of a robot, mean [MB]", f"{statistics.fmean(memory):.2f}", f"at most {PRIVATE_MB_MAX:g}"),
+        ("private memory of a robot, largest [MB]", f"{max(memory):.2f}", f"at most {PRIVATE_MB_MAX:g}"),
+        ("private memory of all robots [MB]", f"{sum(memory):.0f}", ""),
+        ("private memory of the world [MB]", f"{private_mb(os.getpid()):.0f}", ""),
+        ("robot-ticks/s", f"{rate:.0f}", f"at least {RATE_MIN:g}"),
+        ("lost by the middleware", f"{result.middleware_lost}", "0"),
+        ("ticks", f"{result.ticks}", ""),
+        ("wall time, processes [s]", f"{result.wall_s:.0f}", ""),
+    ]
     if options.table1:
         inline = run(scenario, seed, "inline")
         report(inline)
         print("the same trace" if inline.trace == result.trace else "ANOTHER TRACE")
+        rows.append(("wall time, inline [s]", f"{inline.wall_s:.0f}", ""))
+        rows.append(("trace of both", "equal" if inline.trace == result.trace else "different", "equal"))
+    write_csv(options.csv, [{"what": what, "measured": measured, "target": target} for what, measured, target in rows])
 
 
 if __name__ == "__main__":
