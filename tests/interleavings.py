@@ -281,7 +281,8 @@ class Explorer:
             told = [] if robot.neighbour_list() == before else [Outgoing(None, robot.neighbour_list())]
             match event:
                 case "receive":
-                    told += robot.receive(*what, now)
+                    sender, message = what
+                    told += robot.receive(sender, message, now)
                 case "request" | "leave":
                     told += getattr(robot, event)(now)
                 case "give_up" | "depart":

@@ -5,9 +5,9 @@ from zwerm.agents.sensor_coverage.local_node import CODECS, LocalNode
 from zwerm.agents.sensor_coverage.neighbourhood.surveillance import Surveillance
 from zwerm.agents.sensor_coverage.protocols.component import Component
 from zwerm.agents.sensor_coverage.protocols.component_loop import ComponentLoop
-from zwerm.agents.sensor_coverage.protocols.transport.delivery import Delivery
 from zwerm.agents.sensor_coverage.protocols.membership import Membership
 from zwerm.agents.sensor_coverage.protocols.push_scheduler import COVERED, PushScheduler
+from zwerm.agents.sensor_coverage.protocols.transport.delivery import Delivery
 from zwerm.wire.messages import Command, Observation, Wake
 
 

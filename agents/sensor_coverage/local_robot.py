@@ -27,10 +27,10 @@ from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.neighbourhood.surveillance import Surveillance
 from zwerm.agents.sensor_coverage.protocols.component import Component
 from zwerm.agents.sensor_coverage.protocols.component_loop import ComponentLoop
-from zwerm.agents.sensor_coverage.protocols.transport.delivery import Delivery
 from zwerm.agents.sensor_coverage.protocols.membership import Membership
 from zwerm.agents.sensor_coverage.protocols.redundant_pool import RedundantPool
 from zwerm.agents.sensor_coverage.protocols.token_push import TokenPush
+from zwerm.agents.sensor_coverage.protocols.transport.delivery import Delivery
 from zwerm.agents.sensor_coverage.protocols.transport.vacancy import VacancyAnnouncer
 
 

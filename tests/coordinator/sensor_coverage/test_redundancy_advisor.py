@@ -26,7 +26,8 @@ from zwerm.agents.sensor_coverage.protocols.advice_client import (
     SETTLED_TICKS,
     AdviceClient,
 )
-from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, Outgoing
+from zwerm.agents.sensor_coverage.protocols.component import Outgoing
+from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 from zwerm.coordinator.sensor_coverage.redundancy_advisor import ASK_TICKS, QUIET_TICKS, RedundancyAdvisor
 from zwerm.coordinator.sensor_coverage.redundancy_advisor import REPEAT_TICKS as REPEAT_AT_COORDINATOR
@@ -110,7 +111,7 @@ def test_nobody_is_told_to_leave_who_is_not_willing_or_whose_neighbours_are_not_
 ) -> None:
     centre, words = Centre(), wheel()
     fields = {name: getattr(words[node], name) for name in words[node].__struct_fields__}
-    words[node] = StandingReport(**fields | change)  # type: ignore[arg-type]
+    words[node] = StandingReport(**fields | change)
     assert not spared(centre.hear(words.items(), ticks=1 + QUIET_TICKS))
 
 
@@ -256,9 +257,9 @@ class Swarm:
             for sender, to, payload in arrived:
                 if sender is None and to == node:
                     advice.receive(CENTRE, read(payload), tick)  # type: ignore[arg-type]
-            for sender, receiver, word in heard:
+            for sender, receiver, spoken in heard:
                 if receiver == node and self.luck.random() >= 0.2:
-                    leaving.receive(sender, word, tick)  # type: ignore[arg-type]
+                    leaving.receive(sender, spoken, tick)  # type: ignore[arg-type]
             versions = advice.advice(tick, sight)
             leaving.wanted, leaving.versions = stands and versions is not None, versions
             leaving.poll(tick)
@@ -271,10 +272,10 @@ class Swarm:
                 0, there.version, sight, self.boundary_edges[node], node not in self.gone_at, node >= 10
             )
             advice.update(tick, standing)
-            for _, word in advice.outgoing():
-                self.send(tick, node, None, write(word))
-            for to, word in leaving.outgoing():
-                self.air += [(node, each, word) for each in (sight if to is None else [to])]
+            for _, report in advice.outgoing():
+                self.send(tick, node, None, write(report))
+            for to, letter in leaving.outgoing():
+                self.air += [(node, each, letter) for each in (sight if to is None else [to])]
 
     def leave(self, node: int, tick: int) -> None:
         there = {

@@ -11,7 +11,7 @@ import networkx
 import pytest
 from interleavings import Budget, Explorer, Graph, Violation
 
-from zwerm.agents.sensor_coverage.messages.locks import LockProtocolMessage, LockRequest
+from zwerm.agents.sensor_coverage.messages.locks import LockGrant, LockProtocolMessage, LockRequest
 from zwerm.agents.sensor_coverage.protocols.component import Outgoing
 from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock
 
@@ -158,9 +158,9 @@ class Generous(LeaveLock):
     """Grants locks while it wants to leave itself, and leaves nevertheless."""
 
     def _answer(self, requester: int, request: LockRequest, now_s: float) -> list[Outgoing]:
-        request, self._request = self._request, None
+        own, self._request = self._request, None
         answer = super()._answer(requester, request, now_s)
-        self._request = request
+        self._request = own
         return answer
 
     def _free_to_act(self, now_s: float) -> bool:
@@ -171,8 +171,8 @@ class Fickle(LeaveLock):
     """Takes a grant for any number it ever asked under."""
 
     def receive(self, sender: int, message: LockProtocolMessage, now_s: float) -> list[Outgoing]:
-        if self._request is not None and type(message).__name__ == "LockGrant":
-            return super().receive(sender, type(message)(self._request.request.number), now_s)
+        if self._request is not None and isinstance(message, LockGrant):
+            return super().receive(sender, LockGrant(self._request.message.number), now_s)
         return super().receive(sender, message, now_s)
 
 
@@ -199,7 +199,7 @@ class Blind(LeaveLock):
 
     def may_leave(self, now_s: float) -> bool:
         request = self._request
-        return request is not None and not self.locked(now_s) and len(request.granted) == len(request.request.versions)
+        return request is not None and not self.locked(now_s) and len(request.granted) == len(request.message.versions)
 
 
 @pytest.mark.parametrize(

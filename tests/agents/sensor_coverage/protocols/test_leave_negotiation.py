@@ -88,7 +88,7 @@ def test_a_robot_that_has_granted_a_lock_stands_still_until_it_is_over() -> None
         for sender, receiver, at in ((first, second, 1), (second, first, 2)):
             for _, word in sender.outgoing():
                 assert not isinstance(word, ListRequest) or receiver is second
-                receiver.receive(at, word, tick)  # type: ignore[arg-type]
+                receiver.receive(at, word, tick)
         return first.left
 
     assert not second.locked
