@@ -98,9 +98,12 @@ def test_a_sweep_lists_its_values_or_counts_them(text: str, values: list[object]
 
 
 def test_a_sweep_of_tables_and_arrays_names_its_values() -> None:
-    sweep = parse_sweep("a.models+b.models=none:[],bursts:[{kind='bursts', n=3}],[1, 2]")
+    sweep = parse_sweep("a.models+b.models=none:[],bursts:[{kind='gilbert_elliott', n=3}],[1, 2]")
     assert sweep.values == ["none", "bursts", "[1, 2]"]
-    assert sweep.levels["bursts"] == ["a.models=[{kind='bursts', n=3}]", "b.models=[{kind='bursts', n=3}]"]
+    assert sweep.levels["bursts"] == [
+        "a.models=[{kind='gilbert_elliott', n=3}]",
+        "b.models=[{kind='gilbert_elliott', n=3}]",
+    ]
     assert sweep.levels["[1, 2]"] == ["a.models=[1, 2]", "b.models=[1, 2]"]
 
 

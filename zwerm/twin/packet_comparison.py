@@ -37,8 +37,8 @@ def compare(run: TwinRun) -> dict[str, Any]:
     counts = _counts(run, modelled, sent, arrived)
     half, links = half_width(counts), agreeing(counts)
     channels = run.world.medium.channels.values()
-    delivered = sum(int(each.accounts.delivered().sum()) for each in channels)
-    model_delay_s = sum(each.accounts.delay_ticks for each in channels) * dt_s / delivered if delivered else None
+    delivered = sum(int(each.ledger.delivered().sum()) for each in channels)
+    model_delay_s = sum(each.ledger.delay_ticks for each in channels) * dt_s / delivered if delivered else None
     return {
         "outcome": run.outcome,
         "ticks": run.world.tick,
@@ -99,7 +99,7 @@ def _modelled(run: TwinRun) -> dict[Link, tuple[int, int]]:
     """Return by link the packets sent and not dropped, as the world's books have it."""
     found: dict[Link, tuple[int, int]] = {}
     for name, channel in run.world.medium.channels.items():
-        books = channel.accounts.by_link()
+        books = channel.ledger.by_link()
         dropped = [sum(column) for column in zip(*books["dropped"].values(), strict=True)] or [0] * len(books["sent"])
         for sender, receiver, sent, lost in zip(
             books["sender"], books["receiver"], books["sent"], dropped, strict=True
