@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from air import DT_S, Radio, ring
 
+from zwerm.catalogue import RADIO_MODELS, RENAMED_RADIO_MODELS
 from zwerm.errors import ProtocolError, ScenarioError
 from zwerm.wire.checksum import seal, unseal
 from zwerm.wire.messages import Transmission
+from zwerm.world.radio import RadioModel, RadioModelTable, registry
 
 Z99 = 2.576
 
@@ -348,6 +350,63 @@ def test_what_one_robot_sends_changes_nobody_elses_draws() -> None:
     assert run(silent=False) == run(silent=True)
 
 
+# --- plug-ins -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", RADIO_MODELS)
+def test_the_catalogue_finds_a_documented_model_class_in_a_file_of_its_own(kind: str) -> None:
+    found = registry.find(kind)
+    assert issubclass(found, RadioModel)
+    assert issubclass(found.Parameters, RadioModelTable)
+    assert RADIO_MODELS[kind] == f"{found.__module__}:{found.__name__}"
+    assert found.__module__.rpartition(".")[2] == kind
+    assert found.__doc__
+    assert [other for other in RADIO_MODELS if RADIO_MODELS[other] == RADIO_MODELS[kind]] == [kind]
+
+
+def test_a_model_of_a_user_has_random_numbers_of_its_own_and_its_cause_in_the_ledger() -> None:
+    rain = {"kind": "own_models:Rain", "mm_per_h": 30.0}
+    summary = Radio(ring(10), [rain]).all_broadcast(100)
+    within(summary["dropped"]["rain"] / 9_000, 0.3, math.sqrt(0.3 * 0.7), 9_000)
+    assert summary["out_of_reach"] == 0
+    four = heard(Radio(ring(4), ALL_RANDOM), 60, 4)
+    assert four == heard(Radio(ring(4), [rain | {"mm_per_h": 0.0}, *ALL_RANDOM]), 60, 4)
+
+
+def test_a_model_states_its_range_and_others_have_no_bound() -> None:
+    radio = Radio(ring(2), [{"kind": "path_loss"}, {"kind": "own_models:Lossy"}], range_m=2.5)
+    models: list[Any] = radio.medium.channels["robots"].models
+    assert [model.range_max_m for model in models] == [2.5, math.inf, math.inf]
+
+
+FORMER: dict[str, dict[str, Any]] = {
+    "bursts": {"loss_fraction": 0.3, "burst_packets": 4.0},
+    "walls": {"loss_db": 1.0, "margin_db": 0.5},
+}
+
+
+@pytest.mark.parametrize("former", FORMER)
+def test_a_former_name_of_a_model_works_with_one_warning_and_the_same_random_numbers(
+    former: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry, "_warned", {})
+    walls = [[[50.0, 40.0], [50.0, 60.0]]]
+
+    def summary(kind: str) -> dict[str, Any]:
+        return Radio(ring(6), [{"kind": kind, **FORMER[former]}], walls=walls).all_broadcast(50)
+
+    current = summary(RENAMED_RADIO_MODELS[former])
+    assert capsys.readouterr().err == ""
+    assert summary(former) == summary(former) == current
+    assert current["dropped"]
+    warning = f"radio.models.0.kind: '{former}' is deprecated, use '{RENAMED_RADIO_MODELS[former]}'"
+    assert capsys.readouterr().err == f"zwerm: warning: small.toml: {warning}\n"
+
+
+def test_every_former_name_is_tried_here() -> None:
+    assert set(FORMER) == set(RENAMED_RADIO_MODELS)
+
+
 # --- mistakes -------------------------------------------------------------------------------------------------------
 
 
@@ -357,6 +416,11 @@ def test_what_one_robot_sends_changes_nobody_elses_draws() -> None:
         ({"kind": "los"}, "radio.models.0.kind: expected a built-in model (range, line_of_sight, path_loss, "
          "wall_attenuation, loss, gilbert_elliott, delay, duplication, corruption, rate_limit, collision) or module:Class, "
          "got 'los'"),
+        ({"kind": "own_models:Missing"}, "radio.models.0.kind: module 'own_models' has no class 'Missing'"),
+        ({"kind": "own_models:WithoutJudge"}, "radio.models.0.kind: own_models:WithoutJudge is no radio model: it has no "
+         "method judge(sent, packets)"),
+        ({"kind": "own_models:WithoutContext"}, "radio.models.0.kind: own_models:WithoutContext is no radio model: its "
+         "constructor must take (parameters, context)"),
         ({"kind": "loss"}, "radio.models.0.fraction: required, and missing"),
         ({"kind": "loss", "fraction": 1.5}, "radio.models.0.fraction: expected <= 1, got 1.5"),
         ({"kind": "loss", "fraction": "half"}, 'radio.models.0.fraction: expected a number, got "half"'),
