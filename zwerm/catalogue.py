@@ -7,6 +7,7 @@ Everything that lists, checks, preloads or documents algorithms and plug-ins rea
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from typing import Final, Literal
 
 Role = Literal["robot", "base", "coordinator"]
@@ -73,8 +74,8 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         paper="Ramaithitima, Whitzer, Bhattacharya, Kumar 2015",
         page="papers/sensor-coverage.md",
         controllers={
-            ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}:CentralRobot"},
-            BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}:CentralBase"},
+            ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}.central_robot:CentralRobot"},
+            BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}.central_base:CentralBase"},
             COORDINATOR: {"sensor-coverage": f"{_SENSOR_COVERAGE_COORDINATOR}.coordinator:SensorCoverageCoordinator"},
         },
         variants=(
@@ -107,6 +108,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
                 controllers=_DECENTRALISED,
             ),
         ),
+        layers=("zwerm.view.sensor_coverage:ComplexLayer",),
         scenarios=("sensor-coverage*",),
     ),
     Algorithm(
@@ -145,6 +147,19 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
     ),
 )
 
+# Commands of the command line, in the order of `zwerm --help`, as `module:function`.
+COMMANDS: Final = {
+    "list": "zwerm.cli.commands.list_command:list_catalogue",
+    "check": "zwerm.cli.commands.check_command:check",
+    "run": "zwerm.cli.commands.run_command:run",
+    "world": "zwerm.cli.commands.world_command:world",
+    "robot": "zwerm.cli.commands.robot_command:robot",
+    "twin": "zwerm.cli.commands.twin_command:twin",
+    "shrink": "zwerm.cli.commands.shrink_command:shrink",
+    "study": "zwerm.cli.commands.study_command:study",
+    "compare": "zwerm.cli.commands.compare_command:compare",
+}
+
 SENSORS: Final = {
     "bearings": "zwerm.world.sensors.bearings:Bearings",
     "boundary": "zwerm.world.sensors.boundary:Boundary",
@@ -156,6 +171,14 @@ SENSORS: Final = {
     "odometry": "zwerm.world.sensors.odometry:Odometry",
     "pose": "zwerm.world.sensors.pose:PoseSensor",
     "touch": "zwerm.world.sensors.touch:Touch",
+}
+
+FIELDS: Final = {
+    "bitmap": "zwerm.world.fields.bitmap:Bitmap",
+    "constant": "zwerm.world.fields.constant:Constant",
+    "gaussians": "zwerm.world.fields.gaussians:Gaussians",
+    "lamp": "zwerm.world.fields.lamp:Lamp",
+    "linear": "zwerm.world.fields.linear:Linear",
 }
 
 RADIO_MODELS: Final = {
@@ -193,12 +216,28 @@ FAULTS: Final = {
 RENAMED_RADIO_MODELS: Final = {"bursts": "gilbert_elliott", "walls": "wall_attenuation"}
 
 
+def plugins() -> dict[str, Mapping[str, str]]:
+    """Return the rows of every kind of plug-in."""
+    return {"sensor": SENSORS, "field": FIELDS, "radio model": RADIO_MODELS, "command": COMMANDS}
+
+
+def row_of(file_name: str) -> Algorithm | None:
+    """Return the row whose patterns name a scenario or study of this name, or None."""
+    return next((row for row in ALGORITHMS if any(fnmatchcase(file_name, each) for each in row.scenarios)), None)
+
+
 def algorithm_of(controller: str) -> Algorithm | None:
     """Return the row that has a controller of this name, of any role, or None."""
     for row in ALGORITHMS:
         if any(controller in group for group in row.controllers.values()):
             return row
     return None
+
+
+def layers_of(controller: str) -> Sequence[str]:
+    """Return the picture layers of the algorithm that has a controller of this name."""
+    row = algorithm_of(controller)
+    return () if row is None else row.layers
 
 
 def names(role: Role) -> list[str]:

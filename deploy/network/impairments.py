@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from zwerm.deploy.network.namespaces import Namespaces, address_of, lacks_netem, port_of
+from zwerm.deploy.network.namespaces import Namespaces, address_of, netem_unavailable_reason, port_of
 from zwerm.errors import ScenarioError
 from zwerm.link.peer_radio import HEAD_BYTES, Transport
 from zwerm.maths.keyed_random import Draws
@@ -73,7 +73,7 @@ class Impairments:
     )  # by receiver: mean [s] and largest deviation [s]
 
 
-def possible(scenario: Scenario) -> tuple[Scenario, list[str]]:
+def supported(scenario: Scenario) -> tuple[Scenario, list[str]]:
     """Return `scenario` without the models this machine's kernel does not support, and a line for each of these.
 
     Raises ScenarioError with every part of the scenario that a real network cannot reproduce.
@@ -102,7 +102,7 @@ def possible(scenario: Scenario) -> tuple[Scenario, list[str]]:
             except ScenarioError as error:
                 wrong += error.mistakes
                 continue
-            if isinstance(rule, ReceiverDelay) and (reason := reason or lacks_netem()):
+            if isinstance(rule, ReceiverDelay) and (reason := reason or netem_unavailable_reason()):
                 skipped.append(f"{path} ({model.kind}): {reason}")
             elif path.startswith(f"{name}.models."):
                 kept.append(model)
@@ -154,7 +154,7 @@ def _fault_refused(fault: OpenTable) -> str:
 
 
 def translate(scenario: Scenario, links: Mapping[str, Pairs]) -> Impairments:
-    """Return the rules of the network for a `possible` scenario; `links` are all (sender, receiver) pairs by channel.
+    """Return the rules of the network for a `supported` scenario; `links` are all (sender, receiver) pairs by channel.
 
     Raises ScenarioError with a line for each model that a real network cannot reproduce.
     """
