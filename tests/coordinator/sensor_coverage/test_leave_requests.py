@@ -3,12 +3,6 @@
 import math
 
 import pytest
-from zwerm.agents.sensor_coverage.messages.snapshots import (
-    ComplexSnapshot,
-    MembershipSnapshot,
-    Snapshot,
-    decode_snapshot,
-)
 
 from zwerm.agents.runtime.contract import Body, Setup
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
@@ -38,6 +32,12 @@ from zwerm.agents.sensor_coverage.messages.locks import (
 )
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, PeerMessage, read
 from zwerm.agents.sensor_coverage.messages.peers import write as write_word
+from zwerm.agents.sensor_coverage.messages.snapshots import (
+    ComplexSnapshot,
+    MembershipSnapshot,
+    Snapshot,
+    decode_snapshot,
+)
 from zwerm.agents.sensor_coverage.negotiating_robot import NegotiatingRobot
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox
 from zwerm.coordinator.sensor_coverage.leave_requests import LeaveRequests

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, decode_snapshot
 
 from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.messages.commands import (
@@ -25,6 +24,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     read_request,
     write,
 )
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, decode_snapshot
 from zwerm.agents.sensor_coverage.protocols.transport.deduplication import COPIES_MAX, RequestDeduplicator
 from zwerm.coordinator.sensor_coverage.command_mailbox import RECOVERY_COPIES, ROLL_CALL_COPIES, CommandMailbox
 from zwerm.coordinator.sensor_coverage.coordinator import SensorCoverageCoordinator
