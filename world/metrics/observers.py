@@ -14,11 +14,14 @@ from zwerm.world.metrics import Metric, MetricContext, Truth
 from zwerm.world.metrics.own import own_metric
 from zwerm.world.tick.telemetry import TelemetrySink
 
-# Metrics of every run, whatever the scenario asks for; those of the radio come with a radio or an uplink.
+# Metrics of every run, whatever the scenario asks for, and those of a radio or an uplink.
 ENGINE_NAMES: Final = (
-    *("robots_in_arena", "robots_exited", "robots_done_fraction", "faults_missed", "refused_messages"),
+    *("robots_in_arena", "robots_exited", "faults_missed", "refused_messages"),
     *("late_commands", "deadman_stops", "tick_overruns", "telemetry_dropped"),
-    *("delivered_fraction", "messages_per_robot_*", "bytes_per_robot_*", "information_age_*", "receivers_*"),
+)
+RADIO_NAMES: Final = (
+    *("robots_done_fraction", "delivered_fraction", "out_of_reach_fraction"),
+    *("messages_per_robot_*", "bytes_per_robot_*", "information_age_*"),
 )
 TELEMETRY_NAMES: Final = "telemetry.*"
 
@@ -89,7 +92,7 @@ def make_observers(scenario: Scenario, arena: Arena, field: Field | None) -> Obs
             metrics.append(class_named(kind, "metric", METRICS)(parameters, context))
         except ScenarioError as error:
             mistakes += error.mistakes
-    known = [*ENGINE_NAMES, TELEMETRY_NAMES, *_catalogue_names()] if scenario.metrics.own else []
+    known = [*ENGINE_NAMES, *RADIO_NAMES, TELEMETRY_NAMES, *_catalogue_names()] if scenario.metrics.own else []
     for index, name in enumerate(scenario.metrics.own):
         try:
             metric = own_metric(name, context)
