@@ -27,7 +27,7 @@ class Reports(Controller):
             "half": np.float32(0.5),
             "even": observation.tick % 2 == 0,
         }
-        return Command(drive=DRIVE, telemetry=numbers, snapshot=b"\x01" * 8)
+        return Command(drive=DRIVE, telemetry=numbers, snapshot=b"\x01" * 8)  # type: ignore[arg-type]
 
 
 class Forges(Controller):

@@ -92,7 +92,11 @@ def make_points(study: Study, sets: Sequence[str] = ()) -> list[Point]:
 def _unmeasured(study: Study, points: Sequence[Point]) -> dict[str, str]:
     """Return one line for every metric of a study that no scenario of it measures."""
     names = list(dict.fromkeys(name for point in points for name in point.metrics))
-    known = [*names, *REPORTABLE_COLUMNS, *(CELL_METRICS if any(point.scenario.metrics.cells for point in points) else ())]
+    known = [
+        *names,
+        *REPORTABLE_COLUMNS,
+        *(CELL_METRICS if any(point.scenario.metrics.cells for point in points) else ()),
+    ]
     listed = ", ".join(sorted(known))
     return {
         metric: f"{study.path}: metrics: expected names of metrics that its scenarios measure ({listed}), got {metric!r}"

@@ -10,7 +10,7 @@ from zwerm.run.assembly import assemble
 from zwerm.wire.messages import Command
 from zwerm.world.scene import Scene
 from zwerm.world.tick import telemetry
-from zwerm.world.tick.telemetry import DISTINCT_NAMES_MAX, TelemetrySink
+from zwerm.world.tick.telemetry import DISTINCT_NAMES_MAX, TelemetryRecord, TelemetrySink
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_five_robots_over_3000_ticks_stay_within_the_stated_bound_of_memory(scen
 
 def test_a_listener_gets_every_record_whatever_is_dropped(scene: Scene) -> None:
     sink = TelemetrySink(numbers_max=0, bytes_max=0)
-    heard = []
+    heard: list[TelemetryRecord] = []
     sink.listeners.append(heard.append)
     sink.accept(scene, 3, Command(telemetry={"x": True}, snapshot=b"s"), decides=False)
     sink.accept(scene, 3, Command(), decides=False)
