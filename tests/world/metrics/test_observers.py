@@ -36,7 +36,7 @@ def test_a_function_of_the_users_own_is_a_metric_with_a_series_and_changes_no_tr
     own = run(measuring(own=["own_metrics:order_parameter", "own_metrics:newest_tick"], every_s=0.5), 1, "inline")
     assert 0.0 <= own.metrics["order_parameter"] <= 1.0
     assert own.series["order_parameter"][-1] == own.metrics["order_parameter"]
-    assert own.series["newest_tick"] == [-1.0, 4.0, 9.0, 14.0, 19.0]
+    assert own.series["newest_tick"].tolist() == [-1.0, 4.0, 9.0, 14.0, 19.0]
     assert own.as_json()["metrics"]["newest_tick"] == 19.0
     assert own.trace == run(measuring(), 1, "inline").trace
 
