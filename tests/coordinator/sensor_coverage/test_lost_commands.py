@@ -371,7 +371,7 @@ def test_a_coordinator_that_begins_anew_goes_on_within_two_seconds(at_s: float, 
     resumed(run("sensor-coverage", runner="inline", overrides=[*HALL, *more, crash(at_s, ", for_s=3.0")]), at_s + 3.0)
 
 
-def test_a_coordinator_that_begins_anew_in_a_process_of_its_own_asks_the_robots_by_radio() -> None:
+def test_a_coordinator_that_restarts_in_its_own_process_asks_the_robots_by_radio() -> None:
     inline, processes = (
         run("sensor-coverage", runner=each, overrides=[*HALL, crash(35.0, ", for_s=3.0")])
         for each in ("inline", "processes")

@@ -69,13 +69,13 @@ def leave_at_random(seed: int, loss: float, wanting: int = 12, ticks: int = 400)
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.5])
-def test_robots_leave_by_agreement_and_never_open_a_hole(loss: float) -> None:
+def test_robots_that_leave_by_agreement_never_open_a_hole(loss: float) -> None:
     found = [leave_at_random(seed, loss) for seed in range(4)]
     assert sum(left for left, _ in found) > 8
     assert sum(changed for _, changed in found) == 0
 
 
-def test_a_robot_that_has_granted_a_lock_stands_still_until_it_is_over() -> None:
+def test_a_robot_that_granted_a_lock_stands_still_until_the_lock_is_released() -> None:
     first, second = (LeaveNegotiation(node, DT_S, np.random.Generator(np.random.Philox(node)), True) for node in (1, 2))
     ticks = iter(range(100))
 
@@ -122,7 +122,7 @@ def drive(scenario: Scenario, seed: int) -> tuple[World, list[LocalRobot]]:
     return world, robots()
 
 
-def test_robots_are_freed_and_pushed_again_while_words_are_lost_and_nobody_is_lost() -> None:
+def test_redundant_robots_leave_and_are_pushed_again_under_loss_and_no_robot_is_lost() -> None:
     settings = (*HALL, *CLOSE, *LINK, "radio.loss=0.1", "time.duration_s=240.0")
     for seed in range(1, 9):  # not in every run there is anybody to spare
         world, robots = drive(load("sensor-coverage", settings), seed)
@@ -140,7 +140,7 @@ def test_robots_are_freed_and_pushed_again_while_words_are_lost_and_nobody_is_lo
     assert result.metrics["unsafe_removals"] == 0
 
 
-def test_the_checker_finds_a_removal_that_opens_a_hole() -> None:
+def test_the_removal_metric_finds_a_removal_that_opens_a_hole() -> None:
     scenario = load("sensor-coverage", (*LINK, "robots.count=8", "base.pose=[1.0,3.75,0.0]"))
     world = assemble(scenario, 1)
     around = [(2.0 + 0.9 * np.cos(a), 3.75 + 0.9 * np.sin(a)) for a in np.linspace(0.0, 2.0 * np.pi, 7)[:-1]]
