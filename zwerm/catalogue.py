@@ -173,6 +173,9 @@ SENSORS: Final = {
     "touch": "zwerm.world.sensors.touch:Touch",
 }
 
+# The function that returns a sensor's class by its name, for tools that must not import the world.
+SENSOR_LOOKUP: Final = "zwerm.world.sensors.registry:find"
+
 FIELDS: Final = {
     "bitmap": "zwerm.world.fields.bitmap:Bitmap",
     "constant": "zwerm.world.fields.constant:Constant",
