@@ -32,10 +32,10 @@ from zwerm.world.arena.entrance import Depots, EntrySchedule
 from zwerm.world.arena.placement import place
 from zwerm.world.bodies.drives import Drives
 from zwerm.world.bodies.physics import Physics
-from zwerm.world.faults import ticks
+from zwerm.world.faults import Fault, ticks
 from zwerm.world.faults.generator import scheduled
 from zwerm.world.faults.schedule import Schedule, unite
-from zwerm.world.faults.sensing import SensingFault, read
+from zwerm.world.faults.sensing import read
 from zwerm.world.metrics.observers import Observers
 from zwerm.world.radio.medium import Medium
 from zwerm.world.scene import Bools, Floats, Ints, Scene
@@ -86,10 +86,10 @@ class World:
         self._wakes = Wakes(nodes, scenario.time.dt_s)
         self.fault_tables = scheduled(scenario, seed, arena)
         self.schedule = Schedule(self.fault_tables, scenario, self.draws)
-        self.lives = NodeStatus(nodes, self.schedule.unborn)
-        for node in self.schedule.unborn:
+        self.lives = NodeStatus(nodes, self.schedule.late_joiners)
+        for node in self.schedule.late_joiners:
             self.medium.switch_off(node, "receiver-down")
-        self._blinding: list[SensingFault] = []
+        self._blinding: list[Fault] = []
         self._deadman_at: dict[int, int] = {}  # the tick at which a paused robot's motors stop
         self._sensors = {sensor.field: sensor for sensor in sensors}
         # One column of readings a field, up to the last field that any sensor fills.

@@ -173,6 +173,9 @@ SENSORS: Final = {
     "touch": "zwerm.world.sensors.touch:Touch",
 }
 
+# The function that returns a sensor's class by its name, for tools that must not import the world.
+SENSOR_LOOKUP: Final = "zwerm.world.sensors.registry:find"
+
 FIELDS: Final = {
     "bitmap": "zwerm.world.fields.bitmap:Bitmap",
     "constant": "zwerm.world.fields.constant:Constant",
@@ -185,15 +188,35 @@ RADIO_MODELS: Final = {
     "range": "zwerm.world.radio.models.range:DiscRange",
     "line_of_sight": "zwerm.world.radio.models.line_of_sight:LineOfSightModel",
     "path_loss": "zwerm.world.radio.models.path_loss:PathLoss",
-    "walls": "zwerm.world.radio.models.wall_attenuation:WallAttenuation",
+    "wall_attenuation": "zwerm.world.radio.models.wall_attenuation:WallAttenuation",
     "loss": "zwerm.world.radio.models.loss:Loss",
-    "bursts": "zwerm.world.radio.models.gilbert_elliott:GilbertElliott",
+    "gilbert_elliott": "zwerm.world.radio.models.gilbert_elliott:GilbertElliott",
     "delay": "zwerm.world.radio.models.delay:Delay",
     "duplication": "zwerm.world.radio.models.duplication:Duplication",
     "corruption": "zwerm.world.radio.models.corruption:Corruption",
     "rate_limit": "zwerm.world.radio.models.rate_limit:RateLimit",
     "collision": "zwerm.world.radio.models.collision:Collision",
 }
+
+FAULTS: Final = {
+    "crash": "zwerm.world.faults.programs.crash:Crash",
+    "restart": "zwerm.world.faults.programs.restart:Restart",
+    "pause": "zwerm.world.faults.programs.pause:Pause",
+    "slow": "zwerm.world.faults.programs.slow:Slow",
+    "join": "zwerm.world.faults.programs.join:Join",
+    "partition": "zwerm.world.faults.air.partition:Partition",
+    "jam": "zwerm.world.faults.air.jam:Jam",
+    "blackout": "zwerm.world.faults.air.blackout:Blackout",
+    "cut": "zwerm.world.faults.air.cut:Cut",
+    "camera_blackout": "zwerm.world.faults.sensing.camera_blackout:CameraBlackout",
+    "dead_beacon": "zwerm.world.faults.sensing.dead_beacon:DeadBeacon",
+    "stuck_touch": "zwerm.world.faults.sensing.stuck_touch:StuckTouch",
+    "sensor_noise": "zwerm.world.faults.sensing.sensor_noise:SensorNoise",
+    "heal": "zwerm.world.faults.heal:Heal",
+}
+
+# Former names of radio models, which scenarios may still use, and the current names.
+RENAMED_RADIO_MODELS: Final = {"bursts": "gilbert_elliott", "walls": "wall_attenuation"}
 
 
 def plugins() -> dict[str, Mapping[str, str]]:

@@ -182,7 +182,7 @@ def test_radio_packets_arrive_one_tick_later_and_every_one_is_accounted_for() ->
     assert observed[2].inbox == ()
     found = world.medium.summary()
     assert (found["sent"], found["delivered"], found["in_flight"], found["bytes"]) == (3, 2, 0, 8)
-    assert world.medium.channels["robots"].accounts.by_link() == {
+    assert world.medium.channels["robots"].ledger.by_link() == {
         "sender": [0, 0],
         "receiver": [1, 2],
         "sent": [2, 1],

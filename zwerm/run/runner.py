@@ -91,7 +91,7 @@ def run(
         link = MemoryLink(
             {node: each.answer for node, each in nodes.items()},
             lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
-            world.schedule.unborn,
+            world.schedule.late_joiners,
         )
         return drive(world, link, seed, runner, realtime, watcher, record, link)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
@@ -101,7 +101,7 @@ def run(
         members,
         progress=watcher.joined,
         paced=realtime is not None,
-        late_joiners=world.schedule.unborn,
+        late_joiners=world.schedule.late_joiners,
         restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
     ) as swarm:
         return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm)

@@ -6,11 +6,11 @@ to type; the tables here carry them as they are.
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, PrivateAttr, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, PrivateAttr, model_validator
 
-from zwerm.catalogue import Variant, algorithm_of
+from zwerm.catalogue import FAULTS, Variant, algorithm_of
 from zwerm.scenario.services import choose, lacking
 from zwerm.scenario.types import (
     ARRAY,
@@ -145,9 +145,9 @@ class CoordinatorTable(Table):
 
 
 class ChannelTable(Table):
-    """What happens to packets on a channel: `loss` is independent loss, `models` judge in order. `check` audits every tick.
+    """The models of a channel. `loss` is independent loss; `models` judge packets in order. `check` audits every tick.
 
-    An `anonymous` channel tells no receiver who sent a packet.
+    On an `anonymous` channel no receiver gets the id of a sender.
     """
 
     loss: Fraction = 0.0
@@ -157,33 +157,50 @@ class ChannelTable(Table):
 
 
 class RadioTable(ChannelTable):
-    """The radio between robots, channel `robots`: who hears whom. Without this table there is none."""
+    """The radio between robots, channel `robots`. Without this table there is none."""
 
     range_m: Positive | None = None
     line_of_sight: bool = False
 
 
-Rate = NonNegative
+_PER_H: Final = "_per_h"
 
 
 class RandomFaultsTable(Table):
-    """Faults at random times: for each kind how many to expect an hour, over the whole swarm. Each lasts `mean_s` on average.
+    """Faults at random times. `KIND_per_h` is the mean number of faults of a kind per hour, over the whole swarm.
 
-    The schedule is drawn from `seed`, or else from the run's; the run's result holds it as `[[faults]]` tables.
+    Each fault lasts `mean_s` on average. `seed`, by default that of the run, determines the schedule; the result of the run has
+    it as `[[faults]]` tables.
     """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, NonNegative]
 
     seed: Annotated[int, Field(ge=0)] | None = None
     mean_s: Positive = 10.0
-    crash_per_h: Rate = 0.0
-    pause_per_h: Rate = 0.0
-    slow_per_h: Rate = 0.0
-    partition_per_h: Rate = 0.0
-    jam_per_h: Rate = 0.0
-    blackout_per_h: Rate = 0.0
-    cut_per_h: Rate = 0.0
-    camera_blackout_per_h: Rate = 0.0
-    dead_beacon_per_h: Rate = 0.0
-    stuck_touch_per_h: Rate = 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _only_rates(cls, given: Any) -> Any:
+        keys = given if isinstance(given, dict) else ()
+        unknown = [key for key in keys if key not in cls.model_fields and not _is_rate(key)]
+        if unknown:
+            raise ValueError(
+                f"expected seed, mean_s, or KIND{_PER_H} with a built-in fault ({', '.join(FAULTS)}) or module:Class, "
+                f"got {', '.join(unknown)}"
+            )
+        return given
+
+    @property
+    def rates_per_h(self) -> dict[str, float]:
+        """The rate of each kind that is given [1/h]."""
+        return {key.removesuffix(_PER_H): rate for key, rate in (self.__pydantic_extra__ or {}).items()}
+
+
+def _is_rate(key: str) -> bool:
+    """Return whether a key is the rate of a kind of fault: one of the catalogue, or `module:Class`."""
+    kind = key.removesuffix(_PER_H)
+    return kind != key and (kind in FAULTS or ":" in kind)
 
 
 class VoronoiMetricsTable(Table):

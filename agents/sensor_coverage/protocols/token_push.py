@@ -16,7 +16,7 @@ the time of the next wake-up.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 import msgspec
@@ -24,7 +24,7 @@ import msgspec
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.commands import Landmark, Sighting
+from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import (
     AllSettled,
     AllStanding,
@@ -35,19 +35,13 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     PushDone,
     PushMessage,
     PushToken,
-    ReferenceBearing,
     SlotMemory,
     TakeSlot,
 )
 from zwerm.agents.sensor_coverage.motion.drives import DriveResult
-from zwerm.agents.sensor_coverage.motion.push_geometry import (
-    FIRST_BEARINGS_RAD,
-    SlotReference,
-    direction_to,
-    future_occupants,
-    landmarks_for_move,
-)
+from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
+from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 
 # Bounds of the ticks to wait: for the token, for another robot's drive, for the leader to leave or to give up, for the
 # leader's neighbours to agree, for a robot out of range, and for this robot's neighbours to agree at the end.
@@ -91,9 +85,8 @@ class TokenPush:
         self._announce_vacated = announce_vacated
         self._since = situation.tick
         self._fresh = fresh
-        self._chain = chain
-        self._index = next(n for n, (_, node) in enumerate(chain) if node == situation.node)
-        self._back = back if self._index == 0 else chain[self._index - 1][1]
+        self._chain = PushChain(chain, situation.node)
+        self._back = back if self._chain.is_rear else self._chain.behind
         self._memory: SlotMemory | None = None
         self._plan: Plan | None = None
         self._first_bearings = list(FIRST_BEARINGS_RAD) if first else []
@@ -109,11 +102,11 @@ class TokenPush:
         """Take in a message of this push."""
         match body:
             case LeaderReady():
-                self._chain, self._memory = body.chain, body.memory
+                self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
                 self._leader_epoch = body.epoch
                 self._enter("armed")
             case TakeSlot():
-                self._chain, self._memory = body.chain, body.memory
+                self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
                 self._call()
             case PushAborted():
                 self.close(body)
@@ -176,14 +169,15 @@ class TokenPush:
     def _offer(self) -> None:
         self._map.update_plans()
         self._plan = None if self._first_bearings else self._map.best_plan()
-        if self._first_bearings or (self._plan is not None and self._index == 0):
+        behind = self._chain.behind
+        if self._first_bearings or (self._plan is not None and behind is None):
             self._deploy()
-        elif self._plan is None:
+        elif self._plan is None or behind is None:
             self.close(PushAborted(self.id, False))
         else:
             self._enter("offering")
-            memory = self._map.memory()
-            self._write_to(self._index - 1, LeaderReady(self.id, self._chain, memory, self._map.epoch))
+            ready = LeaderReady(self.id, self._chain.links, self._map.memory(), self._map.epoch)
+            self._situation.mailbox.write(behind, ready)
 
     def _deploy(self) -> None:
         self._enter("deploying")
@@ -226,7 +220,7 @@ class TokenPush:
         if self._plan is None:
             return ()
         back_rad = wrapped(self._plan.direction + math.pi - self._heading)
-        future = self._future()
+        future = self._chain.future()
         nodes = [future.get(slot, self._map.at(slot)) for slot in self._plan.anchors]
         return tuple(Sighting(node, back_rad) for node in nodes if node is not None)
 
@@ -235,10 +229,11 @@ class TokenPush:
     def _call(self) -> None:
         """Let the follower come, and drive once it knows."""
         self._enter("calling")
-        if self._index == 0:
+        behind = self._chain.behind
+        if behind is None:
             self._follow()
         else:
-            self._write_to(self._index - 1, TakeSlot(self.id, self._chain, self._map.memory()))
+            self._situation.mailbox.write(behind, TakeSlot(self.id, self._chain.links, self._map.memory()))
 
     def _follow(self) -> None:
         """Drive to the slot ahead, and inherit it."""
@@ -246,29 +241,13 @@ class TokenPush:
         if memory is None:
             return
         self._enter("following")
-        origin = self._chain[self._index][0]
+        origin = self._chain.origin
         back_rad = direction_to(memory, origin)
-        landmarks = self._landmarks(memory.references, self._future(), origin)
+        landmarks = self._chain.landmarks(memory.references, self._chain.future(), self._heading, origin)
         hop_m = self._map.parameters.hop_m if back_rad is not None else 0.0
         bearing_rad = wrapped(back_rad + math.pi - self._heading) if back_rad is not None else 0.0
         self._map.inherit(memory)
         self._situation.move(bearing_rad, hop_m, landmarks)
-
-    def _future(self) -> dict[int, int]:
-        return future_occupants([slot for slot, _ in self._chain], [node for _, node in self._chain])
-
-    def _landmarks(
-        self, references: Sequence[ReferenceBearing], future: Mapping[int, int], origin: int
-    ) -> tuple[Landmark, ...]:
-        rear = self._chain[0][0]
-        return landmarks_for_move(
-            (SlotReference(each.slot, each.node, each.direction_rad) for each in references),
-            future,
-            self._situation.node,
-            self._heading,
-            vacated=() if rear in (0, NOWHERE) else (rear,),
-            station=0 if origin == 0 else None,
-        )
 
     # --- after the drive ----------------------------------------------------------------------------------------------
 
@@ -280,10 +259,10 @@ class TokenPush:
 
     def _report_standing(self) -> None:
         self._enter("standing")
-        if self._index:
-            self._write(AllStanding(self.id))
-        else:
+        if self._chain.is_rear:
             self._behind_settled = True
+        else:
+            self._write(AllStanding(self.id))
 
     def _straighten(self) -> None:
         """Correct the distance in a single file, where bearings did not determine it."""
@@ -295,7 +274,7 @@ class TokenPush:
 
     def _back_bearing_rad(self) -> float:
         """Return the approximate bearing of the robot that has taken this robot's former slot."""
-        there_rad = direction_to(self._memory, self._chain[self._index][0])
+        there_rad = direction_to(self._memory, self._chain.origin)
         return 0.0 if there_rad is None else wrapped(there_rad - self._heading)
 
     def _home(self) -> None:
@@ -305,10 +284,11 @@ class TokenPush:
             self._settled()
             return
         self._enter("homing")
-        moving = {s: n for s, n in self._future().items() if n not in states or states[n].moving}
-        still = {s: n for s, n in self._future().items() if s not in moving}
+        future = self._chain.future()
+        moving = {slot: node for slot, node in future.items() if node not in states or states[node].moving}
+        still = {slot: node for slot, node in future.items() if slot not in moving}
         references = [msgspec.structs.replace(r, node=still.get(r.slot, r.node)) for r in self._memory.references]
-        self._situation.move(0.0, 0.0, self._landmarks(references, moving, NOWHERE))
+        self._situation.move(0.0, 0.0, self._chain.landmarks(references, moving, self._heading, NOWHERE))
 
     def _correct(self) -> None:
         self._enter("correcting")
@@ -317,17 +297,18 @@ class TokenPush:
     def _settled(self) -> None:
         """Stand at the new slot, and tell the robot ahead; the leader ends the push."""
         self._situation.stand()
-        if self._leads:
+        ahead = self._chain.ahead
+        if ahead is None:
             self.close(PushDone(self.id))
             return
-        self._write_to(self._index + 1, AllSettled(self.id))
+        self._situation.mailbox.write(ahead, AllSettled(self.id))
         self._enter("await")
 
     # --- the end ------------------------------------------------------------------------------------------------------
 
     def close(self, end: Body) -> None:
         """End the push, once this robot's view agrees with its neighbours' states again."""
-        if self._leads and isinstance(end, PushAborted):
+        if self._chain.leads and isinstance(end, PushAborted):
             self._map.abandon_push(self._fresh, self._back)
         self.end = end
         self._enter("closing")
@@ -354,30 +335,25 @@ class TokenPush:
         return self._situation.tick - self._since
 
     @property
-    def _leads(self) -> bool:
-        return self._index == len(self._chain) - 1
-
-    @property
     def _heading(self) -> float:
         return self._map.heading or 0.0
 
-    def _patience(self, index: int) -> int:
+    def _wait_ticks(self, node: int | None) -> int:
         """Return the ticks to wait for a robot of the chain: few if it is not visible and so out of range."""
-        visible = 0 <= index < len(self._chain) and self._chain[index][1] in self._situation.bearings
-        return WAVE_TICKS if visible else LOST_TICKS
+        return WAVE_TICKS if node is not None and node in self._situation.bearings else LOST_TICKS
 
     def _leader_is_back(self) -> bool:
         """Return whether the leader stands at its slot after a later drive than the one it announced."""
-        slot, leader = self._chain[-1]
+        slot, leader = self._chain.leader
         state = self._map.states.get(leader)
         return state is not None and not state.moving and state.slot == slot and state.epoch > self._leader_epoch
 
     def _leader_is_gone(self) -> bool:
         """Return whether the leader is not visible, or visible beside its slot: its announcement was lost."""
-        memory, leader = self._memory, self._chain[-1][1]
+        memory, (_, leader) = self._memory, self._chain.leader
         if memory is None or leader not in self._situation.bearings:
             return True
-        back_rad = direction_to(memory, self._chain[self._index][0])
+        back_rad = direction_to(memory, self._chain.origin)
         seen_rad = self._situation.bearings[leader] + self._heading
         return back_rad is not None and angle_between(back_rad + math.pi, seen_rad) > BACK_RAD
 
@@ -393,9 +369,6 @@ class TokenPush:
         """Write to the robot behind, or to the sender of the token."""
         if self._back is not None:
             self._situation.mailbox.write(self._back, body)
-
-    def _write_to(self, index: int, body: Body) -> None:
-        self._situation.mailbox.write(self._chain[index][1], body)
 
     def _wake_after(self, ticks: int) -> int:
         """Return the tick after `ticks` of this phase, or the next tick if that has passed."""
@@ -423,19 +396,19 @@ def _next_tick(push: TokenPush) -> int:
 
 
 def _wake_for_ahead(push: TokenPush) -> int:
-    return push._wake_after(push._patience(push._index + 1))
+    return push._wake_after(push._wait_ticks(push._chain.ahead))
 
 
 def _wake_for_behind(push: TokenPush) -> int:
-    return push._wake_after(push._patience(push._index - 1))
+    return push._wake_after(push._wait_ticks(push._chain.behind))
 
 
 def _waited_for_ahead(push: TokenPush) -> bool:
-    return push._waited > push._patience(push._index + 1)
+    return push._waited > push._wait_ticks(push._chain.ahead)
 
 
 def _settled_behind(push: TokenPush) -> bool:
-    return push._behind_settled or push._waited > push._patience(push._index - 1)
+    return push._behind_settled or push._waited > push._wait_ticks(push._chain.behind)
 
 
 def _may_offer(push: TokenPush) -> bool:
@@ -444,11 +417,11 @@ def _may_offer(push: TokenPush) -> bool:
 
 def _may_finish(push: TokenPush) -> bool:
     # Neighbours hear of the end of the leader's drive one tick later.
-    return (push._situation.clear and push._waited > push._leads) or push._waited > CLOSE_TICKS
+    return (push._situation.clear and push._waited > push._chain.leads) or push._waited > CLOSE_TICKS
 
 
 def _out_of_range(push: TokenPush) -> bool:
-    return push._index > 0 and push._waited > TELL_TICKS and push._back not in push._situation.bearings
+    return not push._chain.is_rear and push._waited > TELL_TICKS and push._back not in push._situation.bearings
 
 
 # fmt: off

@@ -123,7 +123,7 @@ def test_robots_alone_cover_a_small_hall_about_as_well_as_with_a_coordinator(
     [
         (),
         ("radio.loss=0.5",),
-        ('radio.models=[{kind="bursts", loss_fraction=0.3, burst_packets=16.0}]',),
+        ('radio.models=[{kind="gilbert_elliott", loss_fraction=0.3, burst_packets=16.0}]',),
         ('radio.models=[{kind="delay", delay_s=0.3, jitter_s=0.3}, {kind="duplication", fraction=0.3}]',),
     ],
 )

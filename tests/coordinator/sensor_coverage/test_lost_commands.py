@@ -43,7 +43,7 @@ from zwerm.world.world import World
 HALL = ("arena.size_m=[2.2,1.7]", "base.pose=[0.2,0.8,0.0]", "robots.count=18")
 AHEAD = Deploy(1, 0.0, 0.95, 0.8)
 DONE = Arrived(1, True, False, False, 0.95, ())
-BURSTS = 'uplink.models=[{kind="bursts", loss_fraction=0.3, burst_packets=16.0}]'
+BURSTS = 'uplink.models=[{kind="gilbert_elliott", loss_fraction=0.3, burst_packets=16.0}]'
 MANGLED = (
     'uplink.models=[{kind="delay", delay_s=0.2, jitter_s=0.3}, {kind="duplication", fraction=0.3}, '
     '{kind="corruption", bit_error_rate=0.002}]'

@@ -19,11 +19,9 @@ from zwerm.run.runner import run
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Observation, decode_observation
 from zwerm.world.drivers.lockstep import LockStep
-from zwerm.world.faults.generator import draw
-from zwerm.world.faults.nodes import CrashTable
-from zwerm.world.faults.schedule import KINDS as SCHEDULE_KINDS
-from zwerm.world.faults.sensing import KINDS as SENSING_KINDS
-from zwerm.world.faults.sensing import SensorNoise, SensorNoiseTable
+from zwerm.world.faults.generator import random_faults
+from zwerm.world.faults.programs.crash import Crash, CrashTable
+from zwerm.world.faults.sensing.sensor_noise import SensorNoise, SensorNoiseTable
 from zwerm.world.tick.node_status import ProcessAction
 from zwerm.world.world import Send
 
@@ -51,7 +49,9 @@ class Life:
         self.orders: list[list[ProcessAction]] = []
         nodes = {node: Node(*spec).answer for node, spec in node_specs(chosen, seed).items()}
         link = MemoryLink(
-            nodes, lambda node, life: Node(*restart_spec(chosen, seed, node, life)).answer, self.world.schedule.unborn
+            nodes,
+            lambda node, life: Node(*restart_spec(chosen, seed, node, life)).answer,
+            self.world.schedule.late_joiners,
         )
         self._spy()
         self.outcome = LockStep(self.world, link, programs=link).run()
@@ -334,7 +334,7 @@ def test_what_is_in_no_fault_draws_what_it_drew_without_any() -> None:
 def struck(seed: int, *more: dict[str, Any]) -> list[tuple[int, list[int]]]:
     """Return when the fault that was drawn began, and whom it killed."""
     world = Life(faulty({"kind": "crash", "fraction": 0.5, "between_s": [0.5, 1.5]}, *more), seed).world
-    return [(fault.begins or 0, fault.nodes) for fault in world.schedule.faults]
+    return [(each.begins or 0, getattr(each.fault, "nodes", [])) for each in world.schedule.faults]
 
 
 def test_a_crash_can_strike_a_fraction_of_those_who_live_at_a_time_that_the_seed_draws() -> None:
@@ -380,10 +380,8 @@ def test_a_new_optional_key_of_a_kind_of_fault_changes_no_draw(monkeypatch: pyte
     class WiderNoise(SensorNoiseTable):
         depth_m: float = 3.0 if wider else 2.0
 
-    monkeypatch.setitem(SCHEDULE_KINDS, "crash", WiderCrash)
-    monkeypatch.setitem(SCHEDULE_KINDS, "sensor_noise", WiderNoise)
-    sensing: Any = SENSING_KINDS
-    monkeypatch.setitem(sensing, WiderNoise, SensorNoise)
+    monkeypatch.setattr(Crash, "Parameters", WiderCrash)
+    monkeypatch.setattr(SensorNoise, "Parameters", WiderNoise)
     assert drawn_now() == before
     # What a scenario writes does key the draws: the same value, given, is another fault.
     assert drawn_now(depth_m=WiderNoise.model_fields["depth_m"].default)[1] != before[1]
@@ -396,7 +394,7 @@ def test_the_order_of_keys_and_an_integer_for_a_number_change_no_draw_and_the_ki
     traces = [Life(faulty(each, robots=seeing)).world.trace.hex() for each in (noise, turned)]
     assert traces[0] == traces[1]
     out = [{"kind": kind, "robots": [0], "at_s": 0.0} for kind in ("dead_beacon", "camera_blackout")]
-    purposes = [fault.purpose for fault in assemble(faulty(*out, robots=seeing), 1).schedule.faults]
+    purposes = [each.purpose for each in assemble(faulty(*out, robots=seeing), 1).schedule.faults]
     assert len(set(purposes)) == 2
     assert all(purpose.startswith("faults/1/") for purpose in purposes), "each is the first of its kind"
 
@@ -421,7 +419,7 @@ def test_a_random_schedule_has_its_rates_is_sorted_and_can_be_run_as_written() -
     # 10 kinds x 4000 / h x 2 s: 22 expected a seed, Poisson.
     chosen = faulty(random_faults=RATES, robots=SENSES)
     arena = assemble(chosen, 1).arena
-    schedules = [draw(chosen, seed, arena) for seed in range(300)]
+    schedules = [random_faults(chosen, seed, arena) for seed in range(300)]
     assert len({fault.kind for schedule in schedules for fault in schedule}) == 10
     counts = [len(schedule) for schedule in schedules]
     assert abs(np.mean(counts) - 22.2) < 2.576 * np.sqrt(22.2 / 300)
@@ -443,7 +441,7 @@ def test_random_stuck_switches_are_drawn_among_those_that_the_sensor_has(touch: 
     robots = {"sensors": [{"kind": "touch", **touch}]}
     chosen = faulty(random_faults={"stuck_touch_per_h": 4_000.0}, robots=robots)
     arena = assemble(faulty(robots=robots), 1).arena
-    tables = [table for seed in range(100) for table in draw(chosen, seed, arena)]
+    tables = [table for seed in range(100) for table in random_faults(chosen, seed, arena)]
     # About 220 faults: the chance that one switch of 12 is never drawn is below 1e-7.
     assert {table.parameters["switch"] for table in tables} == set(range(touch.get("switches", 8)))
     for seed in range(10):
@@ -466,8 +464,9 @@ def test_random_faults_that_cannot_be_are_mistakes() -> None:
 @pytest.mark.parametrize(
     ("fault", "line"),
     [
-        ({"kind": "explode", "at_s": 0}, "faults.0.kind: expected one of partition, jam, blackout, cut, heal, crash, restart, "
-         "pause, slow, join, sensor_noise, stuck_touch, dead_beacon, camera_blackout, got 'explode'"),
+        ({"kind": "explode", "at_s": 0}, "faults.0.kind: expected a built-in fault (crash, restart, pause, slow, join, "
+         "partition, jam, blackout, cut, camera_blackout, dead_beacon, stuck_touch, sensor_noise, heal) or module:Class, "
+         "got 'explode'"),
         ({"kind": "crash", "nodes": [9], "at_s": 0}, "faults.0.nodes.0: no such robot: ids are 0 to 3, got 9"),
         ({"kind": "crash", "nodes": [-1], "at_s": 0}, "faults.0.nodes.0: no such robot: ids are 0 to 3, got -1"),
         ({"kind": "crash", "nodes": ["coordinator"], "at_s": 0}, "faults.0.nodes.0: the scenario has no coordinator"),

@@ -6,7 +6,7 @@ import pytest
 from air import Radio, ring
 from support import ROOT, script
 
-from zwerm.world.radio.registry import BUILT_IN
+from zwerm.catalogue import RADIO_MODELS
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,7 @@ def fidelity() -> ModuleType:
 def test_every_model_keeps_its_promise_over_thirty_thousand_packets(fidelity: ModuleType) -> None:
     rows = list(fidelity.measure(30_000, seed=1))
     assert [row for row in rows if not fidelity.is_inside(row)] == []
-    assert {row[0] for row in rows} == set(BUILT_IN)
+    assert {row[0] for row in rows} == set(RADIO_MODELS)
 
 
 def test_a_model_that_is_off_by_a_tenth_is_found_out(fidelity: ModuleType) -> None:

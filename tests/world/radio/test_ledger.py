@@ -13,19 +13,19 @@ from hypothesis import strategies as st
 from rich.console import Console
 from support import scenario
 
+from zwerm.catalogue import RADIO_MODELS
 from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.run.runner import run
 from zwerm.wire.messages import Transmission
 from zwerm.world.radio.links import Links
-from zwerm.world.radio.registry import BUILT_IN
 
 MODELS: dict[str, dict[str, Any]] = {
     "range": {"range_m": 1.2},
     "line_of_sight": {},
     "path_loss": {"tx_power_dbm": -50.0},
-    "walls": {"material": "glass", "margin_db": 1.0},
+    "wall_attenuation": {"material": "glass", "margin_db": 1.0},
     "loss": {"fraction": 0.3},
-    "bursts": {"loss_fraction": 0.4, "burst_packets": 3.0},
+    "gilbert_elliott": {"loss_fraction": 0.4, "burst_packets": 3.0},
     "delay": {"delay_s": 0.05, "jitter_s": 0.2, "distribution": "exponential"},
     "duplication": {"fraction": 0.5, "copies": 2},
     "corruption": {"bit_error_rate": 0.02},
@@ -40,7 +40,7 @@ def table(kind: str, **more: Any) -> dict[str, Any]:
 
 
 def test_every_model_that_exists_is_tried_here() -> None:
-    assert sorted(MODELS) == sorted(BUILT_IN)
+    assert sorted(MODELS) == sorted(RADIO_MODELS)
 
 
 @pytest.mark.parametrize(("first", "second"), list(product(MODELS, MODELS)))
@@ -98,9 +98,9 @@ def test_the_books_balance_whatever_is_sent_and_whoever_sleeps_or_dies(
 def test_an_audit_finds_a_packet_that_vanishes() -> None:
     radio = Radio(ring(3))
     radio.step({0: (Transmission("robots", b"x"),)})
-    radio.medium.channels["robots"].mail.remove_from(0)  # behind the books' back
+    radio.medium.channels["robots"].queue.remove_from(0)  # behind the books' back
     with pytest.raises(
-        AssertionError, match=r"^channel robots: link 0 to 1: the books have 1 packets in flight, the air has 0"
+        AssertionError, match=r"^channel robots: link 0 to 1: the ledger has 1 packets in flight, the queue has 0"
     ):
         radio.medium.audit()
 
@@ -108,7 +108,7 @@ def test_an_audit_finds_a_packet_that_vanishes() -> None:
 def test_the_books_by_link_are_sorted_and_add_up_to_the_summary() -> None:
     radio = Radio(ring(4), [table("loss"), table("duplication")])
     summary = radio.all_broadcast(50)
-    books = radio.medium.channels["robots"].accounts.by_link()
+    books = radio.medium.channels["robots"].ledger.by_link()
     assert list(zip(books["sender"], books["receiver"], strict=True)) == [
         (a, b) for a in range(4) for b in range(4) if a != b
     ]
@@ -145,7 +145,7 @@ def test_the_books_are_a_table_of_every_cause_with_the_links_that_lost_most() ->
 def test_messages_and_bytes_are_counted_once_for_each_sender() -> None:
     radio = Radio(ring(3))
     radio.step({0: (Transmission("robots", b"12345"), Transmission("robots", b"1", to=2)), 2: ()})
-    books = radio.medium.channels["robots"].accounts
+    books = radio.medium.channels["robots"].ledger
     assert books.node_messages.tolist() == [2, 0, 0]
     assert books.node_bytes.tolist() == [6, 0, 0]
     assert radio.medium.summary()["bytes"] == 6
@@ -229,7 +229,7 @@ def test_the_age_of_information_is_what_watching_every_tick_gives() -> None:
                 newest[link] = max(newest.get(link, -1), sent_tick[packet.sender, node, packet.payload])
         for link, sent in newest.items():
             ages.setdefault(link, []).append(tick - sent)
-    found = radio.medium.channels["robots"].accounts.ages_s(200)
+    found = radio.medium.channels["robots"].ledger.ages_s(200)
     assert found is not None
     assert found[0] == pytest.approx(DT_S * np.mean([np.mean(each) for each in ages.values()]))
     # Looked at just before the next packet came, one tick later than at the tick before.
