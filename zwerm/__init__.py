@@ -45,9 +45,10 @@ if TYPE_CHECKING:
         Wake,
         WheelSpeeds,
     )
+    from zwerm.world.faults import Fault, FaultContext, FaultTable, ProgramStates
     from zwerm.world.fields import Field
     from zwerm.world.metrics import Metric, MetricContext, Truth
-    from zwerm.world.radio import Air, LinkModel, LinkTable, ModelPlace, Packets, Verdict
+    from zwerm.world.radio import ModelContext, Packets, RadioModel, RadioModelTable, Transmissions, Verdict
     from zwerm.world.scene import Scene
     from zwerm.world.sensors import Sensor, Surroundings
     from zwerm.world.tick.telemetry import TelemetryArrays, TelemetryRecord
@@ -67,7 +68,8 @@ _NAMES: Final = {
     # plug-ins: base classes and what they are given
     "zwerm.world.sensors": ("Sensor", "Surroundings"),
     "zwerm.world.scene": ("Scene",),
-    "zwerm.world.radio": ("Air", "LinkModel", "LinkTable", "ModelPlace", "Packets", "Verdict"),
+    "zwerm.world.radio": ("ModelContext", "Packets", "RadioModel", "RadioModelTable", "Transmissions", "Verdict"),
+    "zwerm.world.faults": ("Fault", "FaultContext", "FaultTable", "ProgramStates"),
     "zwerm.world.fields": ("Field",),
     "zwerm.world.metrics": ("Metric", "MetricContext", "Truth"),
     "zwerm.world.tick.telemetry": ("TelemetryArrays", "TelemetryRecord"),
@@ -82,7 +84,6 @@ _HOMES: Final = {name: (module, name) for module, names in _NAMES.items() for na
 }
 
 __all__ = [
-    "Air",
     "Bearing",
     "Body",
     "BodyVelocity",
@@ -91,17 +92,18 @@ __all__ = [
     "Controller",
     "ControllerError",
     "Displacement",
+    "Fault",
+    "FaultContext",
+    "FaultTable",
     "Field",
     "FieldSample",
     "LandmarkBearing",
     "Layer",
     "LinkError",
-    "LinkModel",
-    "LinkTable",
     "Metric",
     "MetricContext",
     "MissingExtraError",
-    "ModelPlace",
+    "ModelContext",
     "Neighbour",
     "Observation",
     "Packet",
@@ -109,7 +111,10 @@ __all__ = [
     "PictureError",
     "Pose",
     "Positions",
+    "ProgramStates",
     "ProtocolError",
+    "RadioModel",
+    "RadioModelTable",
     "RunResult",
     "Scenario",
     "ScenarioError",
@@ -122,6 +127,7 @@ __all__ = [
     "TelemetryArrays",
     "TelemetryRecord",
     "Transmission",
+    "Transmissions",
     "Truth",
     "Verdict",
     "Wake",
