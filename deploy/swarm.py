@@ -121,17 +121,17 @@ class LocalSwarm(_Swarm):
         order: Sequence[int] | None = None,
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
-        unborn: Collection[int] = (),
+        late_joiners: Collection[int] = (),
         restart: RestartSpec | None = None,
         stations: Mapping[int, Station] | None = None,
     ) -> None:
         """`order` is the order of starting; `deadline_s` is given to each process to join; `paced` is real time.
 
-        The nodes in `unborn` are not started before `start` is called; `restart` says who plays a node's next incarnation,
-        the same as before if it is not given. Nodes with a place in `stations` have their radio there.
+        The nodes in `late_joiners` are not started before `start` is called. `restart` returns the controller and setup of a
+        node's next incarnation; without it they stay the same. Nodes in `stations` have their radio there.
         """
         super().__init__(run, members, progress, deadline_s, paced)
-        self._order = [node for node in (members if order is None else order) if node not in unborn]
+        self._order = [node for node in (members if order is None else order) if node not in late_joiners]
         self._restart = restart
         self._stations = stations
         self._ran = set(self._order)

@@ -142,6 +142,7 @@ class Schedule:
 
     def __init__(self, tables: Sequence[tuple[str, OpenTable]], scenario: Scenario, draws: Draws) -> None:
         """Raises ScenarioError with every mistake, each `path: rule, got value`."""
+        self.tables = [table for _, table in tables]
         count = scenario.robots.count
         self._nodes = count + (scenario.coordinator is not None)
         wrong: list[str] = []
@@ -171,7 +172,7 @@ class Schedule:
         self._now: list[Fault] = []
 
     @property
-    def unborn(self) -> list[int]:
+    def late_joiners(self) -> list[int]:
         """The nodes that are not started with the others, ascending."""
         return sorted({node for fault in self.faults if isinstance(fault.table, JoinTable) for node in fault.nodes})
 
@@ -357,10 +358,13 @@ def _model(table: RadioFaultTable, scenario: Scenario, nodes: int) -> LinkModel:
     return model
 
 
-def unite(orders: Sequence[ProcessAction], restarts: Sequence[int]) -> list[ProcessAction]:
-    """Return `orders`, and for each of `restarts` that they do not touch, that it is killed and started."""
-    touched = {order.node for order in orders}
-    return [
-        *orders,
-        *(ProcessAction(deed, node) for node in restarts if node not in touched for deed in ("kill", "start")),
-    ]
+def unite(actions: Sequence[ProcessAction], restarts: Sequence[int]) -> list[ProcessAction]:
+    """Return `actions`, and a kill and a start for each of `restarts` that they do not touch."""
+    touched = {action.node for action in actions}
+    restarted = [node for node in restarts if node not in touched]
+    return [*actions, *(action for node in restarted for action in restart(node))]
+
+
+def restart(node: int) -> list[ProcessAction]:
+    """Return the actions that restart a node's program."""
+    return [ProcessAction("kill", node), ProcessAction("start", node)]

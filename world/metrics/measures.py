@@ -49,13 +49,13 @@ def measure(world: "World", table: MetricsTable) -> dict[str, float]:
     """Return the metrics of the world as it is now."""
     position = world.scene.position[world.scene.present]
     found = {"robots_in_arena": float(len(position))}
-    if world.scenario.robots.inflow is not None:
-        found["robots_exited"] = float(len(world.exited))
+    if world.scenario.robots.entrance is not None:
+        found["robots_exited"] = float(len(world.bodies.exited))
     if table.cells is not None:
-        counts = cell_counts(position, world.arena.bounds, table.cells)
+        counts = cell_counts(position, world.scene.arena.bounds, table.cells)
         found["cell_coverage_fraction"] = cell_coverage_fraction(counts)
     if table.coverage_radius_m is not None:
-        found["area_coverage_fraction"] = area_coverage_fraction(position, table.coverage_radius_m, world.arena)
+        found["area_coverage_fraction"] = area_coverage_fraction(position, table.coverage_radius_m, world.scene.arena)
     if table.sight_range_m is not None:
         found |= _sight(world, table.sight_range_m)
         if _robots_leave(world.scenario):
@@ -76,7 +76,7 @@ def _robots_leave(scenario: Scenario) -> bool:
 def concluded_early(world: "World") -> float:
     """Return 1 where the base station has concluded while a living robot knew where to expand, else 0."""
     claimed: dict[int, bool] = {}
-    for each in world.audience.told:
+    for each in world.telemetry.told:
         if "frontier" in each.told:
             claimed[each.node] = each.told["frontier"]["claimed"]
     return float(world.completed and any(there and node not in world.dead for node, there in claimed.items()))
@@ -85,9 +85,9 @@ def concluded_early(world: "World") -> float:
 def _told(world: "World") -> dict[str, float]:
     """Return the numbers that nodes told, the newest of each; but cycles over all lives."""
     found: dict[str, float] = {}
-    for each in world.audience.told:
+    for each in world.telemetry.told:
         found |= {name: float(value) for name, value in each.told.items() if isinstance(value, int | float)}
-    return found | deployment_cycles(world.audience.told)
+    return found | deployment_cycles(world.telemetry.told)
 
 
 def deployment_cycles(told: Sequence[TelemetryRecord]) -> dict[str, float]:
@@ -119,10 +119,10 @@ def _covered(world: "World", position: Floats, range_m: float) -> dict[str, floa
     """Return the fractions in sight of the free space, and of what of it robots can get into."""
     if not len(position):
         return {"coverage_fraction": 0.0, "reachable_coverage_fraction": 0.0}
-    seen = SeenArea(world.arena, range_m).area(position)
-    inside = reachable(world.arena, world.scene.radius_m, position)
+    seen = SeenArea(world.scene.arena, range_m).area(position)
+    inside = reachable(world.scene.arena, world.scene.radius_m, position)
     return {
-        "coverage_fraction": min(1.0, float(seen.area / world.arena.area_m2)),
+        "coverage_fraction": min(1.0, float(seen.area / world.scene.arena.area_m2)),
         "reachable_coverage_fraction": min(1.0, float(shapely.intersection(seen, inside).area / inside.area)),
     }
 
@@ -131,12 +131,12 @@ def _sight(world: "World", range_m: float) -> dict[str, float]:
     """Return how well the living robots cover the arena by sight, and how that compares with the ideal packing."""
     scene = world.scene
     robots = living(scene.present_ids(), world.dead)
-    ideal = hexagonal_packing_robots(world.arena, range_m)
+    ideal = hexagonal_packing_robots(world.scene.arena, range_m)
     return {
         **_covered(world, scene.position[robots], range_m),
         "robots_deployed": float(len(robots)),
         "hexagonal_packing_robots": ideal,
         "robots_over_hexagonal": len(robots) / ideal,
         "holes": float(holes(Visibility().pairs(scene, range_m), robots)),
-        "obstacles": float(obstacles(world.arena)),
+        "obstacles": float(obstacles(world.scene.arena)),
     }

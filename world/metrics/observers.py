@@ -46,7 +46,7 @@ class Observers:
         self._last_tick = -1
         self._time_s: list[float] = []
 
-    def look(self, scene: Scene, dead: Sequence[int] = (), now: bool = False) -> bool:
+    def sample(self, scene: Scene, dead: Sequence[int] = (), now: bool = False) -> bool:
         """Have the meters look, if it is time to or `now` is true, and they have not yet; tell whether they have."""
         if not self._meters or scene.tick == self._last_tick or (scene.tick % self._stride and not now):
             return False

@@ -21,7 +21,7 @@ def removals(world: "World", range_m: float) -> dict[str, float]:
     dead = dict.fromkeys(world.dead)
     count = unsafe = 0
     sight = Visibility()
-    for each in world.audience.told:
+    for each in world.telemetry.told:
         removal = each.told.get("removal")
         if removal is None:
             continue

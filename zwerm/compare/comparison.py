@@ -22,7 +22,7 @@ from zwerm.study.plan import Point
 from zwerm.study.summary import Results
 from zwerm.study.tables import Setting, Study, VariantTable, check_study
 from zwerm.study.trial import Row
-from zwerm.world.drivers.lockstep import FAILED
+from zwerm.world.tick.completion import FAILED
 
 # What is compared unless somebody says what: of these, what any run measured and not all as zero.
 METRICS: Final = (

@@ -1,7 +1,7 @@
 """Links carry bytes between the world and its nodes: in memory within one process, or over Zenoh between processes.
 
-A link knows nothing of what the bytes mean and makes no promise on order between nodes; from one node, messages arrive
-in the order they were sent, each exactly once, until the node is lost.
+A link does not interpret the bytes. Messages from one node arrive in the order in which they were sent, each exactly once,
+until the node is lost. The order between nodes is undefined.
 """
 
 from collections.abc import Callable, Iterable
@@ -10,13 +10,13 @@ from typing import Any, Final, NamedTuple, Protocol
 
 
 class Arrival(NamedTuple):
-    """A message from a node; `payload` None says that the node is lost: its process ended without a word."""
+    """A message from a node. `payload` None reports the node lost: its process ended without a message."""
 
     node: int
     payload: bytes | None
 
 
-# An Arrival of a pair, without the call of a Python function that its own constructor is.
+# Makes an Arrival of a pair without the Python call that the constructor of a named tuple is.
 arrival: Final[Callable[[Iterable[Any]], Arrival]] = partial(tuple.__new__, Arrival)
 
 
@@ -30,39 +30,26 @@ class WorldLink(Protocol):
         """Return the next arrival, or None after `timeout_s` seconds without one."""
 
     def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
-        """Return all that has arrived, as soon as there are `count`, or a loss, or after `timeout_s` seconds."""
+        """Return all arrivals, as soon as there are `count`, or a loss, or after `timeout_s` seconds."""
 
     def close(self) -> None:
-        """Release all that the link holds; idempotent."""
+        """Release all resources of the link; idempotent."""
 
 
 class NodeProcesses(Protocol):
-    """Whoever runs the nodes' programs, and can do to them what faults demand."""
+    """Runs the programs of the nodes, and kills, starts, pauses and resumes them for faults."""
 
     def kill(self, node: int) -> None:
-        """End a node's program without a word; the link then reports the node lost."""
+        """End a node's program without a message; the link then reports the node lost."""
 
     def start(self, node: int) -> None:
-        """Start a node's program, its next incarnation if it ran before; return when it has joined."""
+        """Start a node's program, as its next incarnation if it ran before; return when it has joined."""
 
     def pause(self, node: int) -> None:
-        """Stop a node's program where it is."""
+        """Stop a node's program; its memory stays."""
 
     def resume(self, node: int) -> None:
-        """Let it go on."""
-
-
-class NodeLink(Protocol):
-    """A node's end of the link to the world."""
-
-    def send(self, payload: bytes) -> None:
-        """Send one message to the world."""
-
-    def receive(self, timeout_s: float) -> bytes | None:
-        """Return the next message from the world, or None after `timeout_s` seconds without one."""
-
-    def close(self) -> None:
-        """Release all that the link holds; idempotent."""
+        """Continue a paused program."""
 
 
 Answer = Callable[[bytes], bytes]

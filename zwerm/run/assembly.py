@@ -35,15 +35,21 @@ def assemble(scenario: Scenario, seed: int) -> World:
 
 
 class Prepared(NamedTuple):
-    """All of a world that does not depend on the seed. Sensors and meters are for one run each."""
+    """The parts of a world that do not depend on the seed. Sensors are for one run each."""
 
     arena: Arena
     sensors: Sequence[Sensor]
-    meters: Observers
+
+
+def make_observers(scenario: Scenario, arena: Arena) -> Observers:
+    """Return the observers that take a scenario's metrics during a run; the runner has them take samples."""
+    table = scenario.field
+    field = None if table is None else make_field(table, arena.bounds, scenario.folder, scenario.place)
+    return make_meters(scenario.metrics, arena, field, scenario.time.dt_s)
 
 
 def prepare(scenario: Scenario) -> Prepared:
-    """Return the arena, the sensors and the meters of `scenario`.
+    """Return the arena and the sensors of `scenario`.
 
     Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
     """
@@ -61,7 +67,7 @@ def prepare(scenario: Scenario) -> Prepared:
         meters = _attempt(lambda: make_meters(scenario.metrics, arena, field, scenario.time.dt_s), scenario, mistakes)
     if arena is None or sensors is None or meters is None or mistakes:
         raise ScenarioError(mistakes)
-    return Prepared(arena, sensors, meters)
+    return Prepared(arena, sensors)
 
 
 def _attempt(make: Callable[[], T], scenario: Scenario, mistakes: list[str]) -> T | None:

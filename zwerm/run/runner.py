@@ -5,9 +5,9 @@ import secrets
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Final, Literal, Protocol
 
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs, restart_spec
@@ -16,38 +16,46 @@ from zwerm.errors import ScenarioError, StragglerError
 from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
-from zwerm.run.assembly import assemble
+from zwerm.run.assembly import assemble, make_observers
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
-from zwerm.world.drivers.lockstep import FAILED, INTERRUPTED, LockStep
+from zwerm.world.drivers.driver import TickObserver
+from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.drivers.realtime import RealTime
 from zwerm.world.metrics.measures import cell_counts, measure
+from zwerm.world.metrics.observers import Observers
 from zwerm.world.radio.report import messages, radio_metrics, radio_report
+from zwerm.world.scene import Scene
+from zwerm.world.tick.completion import FAILED, INTERRUPTED
+from zwerm.world.tick.node_status import Event
 from zwerm.world.world import World
 
 Runner = Literal["processes", "inline"]
 
-# How many samples of a run its history takes, for pictures and animations, and how often a watcher is told of ticks.
-HISTORY_SAMPLES = 4_000
-TOLD_TIMES = 1_000
+# The samples of positions that a run's history holds for pictures, and the progress reports of a run, at most about.
+HISTORY_SAMPLES: Final = 4_000
+PROGRESS_REPORTS: Final = 1_000
+
+# The events, besides crashes and restarts, that a result lists nodes for.
+HINDRANCES: Final[tuple[Event, ...]] = ("paused", "slow", "late")
 
 
 class ProgressListener(Protocol):
-    """Somebody to tell how a run is getting on."""
+    """Receives reports on the progress of a run."""
 
     def joined(self, count: int, total: int) -> None:
-        """`count` of `total` robots have joined."""
+        """Take the report that `count` of `total` robots have joined."""
 
     def ticked(self, tick: int, ticks: int) -> None:
-        """`tick` of `ticks` are done."""
+        """Take the report that `tick` of `ticks` are done."""
 
     def covered(self, fraction: float, robots: int) -> None:
-        """This fraction of the arena is in sight of so many robots."""
+        """Take the report that `robots` robots see a `fraction` of the arena."""
 
 
 class NullProgress:
-    """A watcher that does not look."""
+    """Ignores all reports."""
 
     def joined(self, count: int, total: int) -> None:
         """Ignore it."""
@@ -92,7 +100,7 @@ def run(
         link = MemoryLink(
             {node: each.answer for node, each in nodes.items()},
             lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
-            world.schedule.unborn,
+            world.schedule.late_joiners,
         )
         return drive(world, link, seed, runner, realtime, watcher, record, link)
     with LocalSwarm(
@@ -100,7 +108,7 @@ def run(
         members,
         progress=watcher.joined,
         paced=realtime is not None,
-        unborn=world.schedule.unborn,
+        late_joiners=world.schedule.late_joiners,
         restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
     ) as swarm:
         return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm)
@@ -139,7 +147,7 @@ def serve(
 
 
 def new_run_id() -> str:
-    """Return a name for a run that no other run on the same router has; it influences nothing."""
+    """Return a name for a run, unique among the runs of a router; it has no effect on results."""
     return secrets.token_hex(8)
 
 
@@ -155,65 +163,96 @@ def drive(
 ) -> RunResult:
     """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`.
 
-    `programs` does to nodes what the scenario's faults demand.
+    `programs` carries out on nodes' programs what the scenario's faults demand.
     """
-    if record is None:
-        return _drive(world, link, seed, runner, realtime, watcher or NullProgress(), programs)
-    from zwerm.record.recording import Recording
+    scenario = world.scenario
+    sampling = Sampling(world, make_observers(scenario, world.scene.arena), watcher or NullProgress())
+    with ExitStack() as stack:
+        observers: list[TickObserver] = []
+        if record is not None:
+            from zwerm.record.recording import Recording
 
-    about = {"scenario": world.scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
-    with Recording(record, world.scenario.time.dt_s, about) as world.recording:
-        return _drive(world, link, seed, runner, realtime, watcher or NullProgress(), programs)
+            about = {"scenario": scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
+            recording = stack.enter_context(Recording(record, scenario.time.dt_s, about))
+            observers.append(ExchangeObserver(world, recording))
+        observers.append(sampling)
+        driver = (
+            LockStep(world, link, observers, programs)
+            if realtime is None
+            else RealTime(world, link, realtime, observers, programs)
+        )
+        start = time.monotonic()
+        try:
+            with _collecting_seldom():
+                outcome, reason = driver.run(), driver.reason
+        except StragglerError as error:
+            outcome, reason = FAILED, str(error)
+        except KeyboardInterrupt:
+            outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
+        wall_s = time.monotonic() - start
+        sampling.finish()
+        return _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, link)
 
 
-def _drive(
-    world: World,
-    link: WorldLink,
-    seed: int,
-    runner: str,
-    realtime: float | None,
-    watcher: ProgressListener,
-    programs: NodeProcesses | None,
-) -> RunResult:
-    table = world.scenario.time
-    ticks = round(table.duration_s / table.dt_s)
-    stride, telling = max(1, ticks // HISTORY_SAMPLES), max(1, ticks // TOLD_TIMES)
-    history = History()
-    history.append(world.scene, world.dead)
-    world.meters.look(world.scene, world.dead)
+class Sampling:
+    """Samples a run after every tick: its metrics, its history for pictures, and its progress."""
 
-    def on_tick(world: World) -> None:
-        if world.meters.look(world.scene, world.dead):
-            newest = world.meters.newest()
+    def __init__(self, world: World, observers: Observers, watcher: ProgressListener) -> None:
+        table = world.scenario.time
+        self.observers = observers
+        self.history = History()
+        self._world = world
+        self._watcher = watcher
+        self._ticks = round(table.duration_s / table.dt_s)
+        self._history_stride = max(1, self._ticks // HISTORY_SAMPLES)
+        self._progress_stride = max(1, self._ticks // PROGRESS_REPORTS)
+        self.history.append(world.scene, world.dead)
+        self.observers.sample(world.scene, world.dead)
+
+    def __call__(self, world: World) -> None:
+        """Sample the tick that begins."""
+        if self.observers.sample(world.scene, world.dead):
+            newest = self.observers.newest()
             if "coverage_fraction" in newest:
-                watcher.covered(newest["coverage_fraction"], int(newest["robots_deployed"]))
-        if world.tick % stride == 0:
-            history.append(world.scene, world.dead)
-        if world.tick % telling == 0:
-            watcher.ticked(world.tick, ticks)
+                self._watcher.covered(newest["coverage_fraction"], int(newest["robots_deployed"]))
+        if world.tick % self._history_stride == 0:
+            self.history.append(world.scene, world.dead)
+        if world.tick % self._progress_stride == 0:
+            self._watcher.ticked(world.tick, self._ticks)
 
-    driver = (
-        LockStep(world, link, on_tick, programs)
-        if realtime is None
-        else RealTime(world, link, realtime, on_tick, programs)
-    )
-    start = time.monotonic()
-    try:
-        with _collecting_seldom():
-            outcome, reason = driver.run(), driver.reason
-    except StragglerError as error:
-        outcome, reason = FAILED, str(error)
-    except KeyboardInterrupt:
-        outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
-    wall_s = time.monotonic() - start
-    if world.tick % stride:
-        history.append(world.scene, world.dead)
-    return _result(world, seed, runner, outcome, reason, wall_s, driver, history, link)
+    def finish(self) -> None:
+        """Take the last samples, if they have not been taken."""
+        world = self._world
+        if world.tick % self._history_stride:
+            self.history.append(world.scene, world.dead)
+        self.observers.sample(world.scene, world.dead, now=True)
+
+
+class ExchangeRecorder(Protocol):
+    """Records the messages of every tick."""
+
+    def exchange(
+        self, tick: int, nodes: Sequence[int], observations: Sequence[bytes], answers: Sequence[bytes], scene: Scene
+    ) -> None:
+        """Record one tick: the observations sent to `nodes`, their answers (b"" for none), and the scene."""
+
+
+class ExchangeObserver:
+    """Gives the messages of every tick to a recorder, with the scene in which they were sent."""
+
+    def __init__(self, world: World, recorder: ExchangeRecorder) -> None:
+        self._recorder = recorder
+        self._scene = world.scene
+
+    def __call__(self, world: World) -> None:
+        """Record the tick that has ended."""
+        self._recorder.exchange(*world.intake.exchange, self._scene)
+        self._scene = world.scene
 
 
 @contextmanager
 def _collecting_seldom() -> Iterator[None]:
-    """Let Python look for cycles of garbage a hundred times less often: messages are part of none, and make up most objects."""
+    """Let Python search for garbage cycles 100 times less often: messages form no cycles, and most objects are messages."""
     often, *rest = gc.get_threshold()
     gc.set_threshold(100 * often, *rest)
     try:
@@ -230,27 +269,26 @@ def _result(
     reason: str,
     wall_s: float,
     driver: LockStep | RealTime,
-    history: History,
+    sampling: Sampling,
     link: WorldLink,
 ) -> RunResult:
-    scenario = world.scenario
-    world.meters.look(world.scene, world.dead, now=True)
-    metrics = measure(world, scenario.metrics) | world.meters.metrics()
+    scenario, status, intake = world.scenario, world.status, world.intake
+    metrics = measure(world, scenario.metrics) | sampling.observers.metrics()
     if scenario.radio is not None or scenario.coordinator is not None:
-        metrics["robots_done_fraction"] = world.done_fraction
-        metrics |= radio_metrics(world.medium, world.count, world.tick)
+        metrics["robots_done_fraction"] = world.completion.done_fraction
+        metrics |= radio_metrics(world.medium, scenario.robots.count, world.tick)
     if cycles := metrics.get("deployment_cycles"):
         metrics["ticks_per_cycle_mean"] = world.tick / cycles
         metrics["messages_per_cycle_mean"] = messages(world.medium) / cycles
-    metrics["refused_messages"] = float(world.refused.total())
+    metrics["refused_messages"] = float(intake.refused.total())
     if isinstance(driver, RealTime):
-        metrics["late_commands"] = float(world.answers.late_count)
+        metrics["late_commands"] = float(intake.late_count)
         metrics["deadman_stops"] = float(driver.deadman_stops)
         metrics["tick_overruns"] = float(driver.overruns)
     counts = None
     if scenario.metrics.cells is not None:
         position = world.scene.position[world.scene.present]
-        counts = cell_counts(position, world.arena.bounds, scenario.metrics.cells)
+        counts = cell_counts(position, world.scene.arena.bounds, scenario.metrics.cells)
     return RunResult(
         scenario=scenario,
         seed=seed,
@@ -259,23 +297,23 @@ def _result(
         reason=reason,
         trace=world.trace.hex(),
         ticks=world.tick,
-        sim_s=round(world.time_s, 9),
+        sim_s=round(world.scene.time_s, 9),
         wall_s=round(wall_s, 6),
-        robots=world.count,
-        robot_ticks=world.robot_ticks,
+        robots=scenario.robots.count,
+        robot_ticks=intake.observed_count,
         metrics=metrics,
         radio=radio_report(world.medium, world.tick),
         middleware_lost=driver.lost,
-        crashed=sorted({*world.crashed, *world.lives.ever.get("crashed", ())}),
-        restarted=sorted(world.lives.ever.get("restarted", ())),
-        hindered={what: sorted(world.lives.ever.get(what, ())) for what in ("paused", "slow", "late")},
-        faults=[table.model_dump() for _, table in world.fault_tables],
+        crashed=sorted({*status.crashed, *status.ever("crashed")}),
+        restarted=sorted(status.ever("restarted")),
+        hindered={event: sorted(status.ever(event)) for event in HINDRANCES},
+        faults=[table.model_dump() for table in world.schedule.tables],
         missed_faults=[fault.in_words for fault in world.schedule.missed],
-        arena=world.arena,
-        history=history,
+        arena=world.scene.arena,
+        history=sampling.history,
         cell_counts=counts,
-        refused=dict(world.refused + Counter(getattr(link, "refused", {}))),
-        series=world.meters.series(),
-        told=world.audience.told,
-        tracebacks={node: failure.traceback for node, failure in world.failures.items()},
+        refused=dict(intake.refused + Counter(getattr(link, "refused", {}))),
+        series=sampling.observers.series(),
+        told=world.telemetry.told,
+        tracebacks={node: failure.traceback for node, failure in status.failures.items()},
     )

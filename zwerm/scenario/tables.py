@@ -90,7 +90,7 @@ class PlacementTable(Table):
     poses: list[Pose] | None = None
 
 
-class InflowTable(Table):
+class EntranceTable(Table):
     """Robots wait in a depot and enter one by one, at random places of a rectangle; they leave in another."""
 
     every_s: Positive
@@ -106,7 +106,7 @@ class RobotsTable(Table):
     parameters: dict[str, Any] = {}
     body: BodyTable = BodyTable()
     placement: PlacementTable = PlacementTable()
-    inflow: InflowTable | None = None
+    entrance: EntranceTable | None = None
     sensors: list[OpenTable] = []
     on_crash: Literal["fail", "continue"] = "fail"
 

@@ -16,8 +16,8 @@ from zwerm.maths.statistics import Sample, condense, half_width
 from zwerm.study.plan import Point
 from zwerm.study.tables import Published, Setting, Study
 from zwerm.study.trial import Row
-from zwerm.world.drivers.lockstep import FAILED
 from zwerm.world.scene import Floats
+from zwerm.world.tick.completion import FAILED
 
 # Metrics of all trials of a point together: of the mean number of robots in each cell, the least and the most.
 CELL_METRICS = {"least_cell_robots": np.argmin, "most_cell_robots": np.argmax}

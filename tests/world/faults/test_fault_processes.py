@@ -114,7 +114,7 @@ def test_a_process_that_somebody_else_stops_ends_the_run_with_its_name(nothing_l
 def test_a_late_joiner_has_no_process_before_its_time(nothing_left: None) -> None:
     chosen = scenario(faults=[{"kind": "join", "nodes": [3], "at_s": 1.0}])
     world = assemble(chosen, 1)
-    with LocalSwarm(new_run_id(), node_specs(chosen, 1), unborn=world.schedule.unborn) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(chosen, 1), late_joiners=world.schedule.late_joiners) as swarm:
         assert len(robots_of_this_process()) == 3
         result = drive(world, swarm.link, 1, "processes", programs=swarm)
         assert len(robots_of_this_process()) == 4

@@ -47,7 +47,9 @@ class Life:
         self.orders: list[list[ProcessAction]] = []
         nodes = {node: Node(*spec).answer for node, spec in node_specs(chosen, seed).items()}
         link = MemoryLink(
-            nodes, lambda node, life: Node(*restart_spec(chosen, seed, node, life)).answer, self.world.schedule.unborn
+            nodes,
+            lambda node, life: Node(*restart_spec(chosen, seed, node, life)).answer,
+            self.world.schedule.late_joiners,
         )
         self._spy()
         self.outcome = LockStep(self.world, link, programs=link).run()
@@ -194,7 +196,7 @@ def test_faults_that_overlap_are_all_in_force_and_end_one_by_one() -> None:
 
 
 def test_a_fault_waits_for_a_robot_to_be_deployed() -> None:
-    robots = {"inflow": {"every_s": 0.4, "entry_m": [0.5, 0.5, 1.5, 1.5]}, "placement": {}}
+    robots = {"entrance": {"every_s": 0.4, "entry_m": [0.5, 0.5, 1.5, 1.5]}, "placement": {}}
     life = Life(faulty({"kind": "blackout", "when": {"robot_deployed": 2}, "for_s": 0.3}, robots=robots))
     entered = life.awake(2)[0]
     assert entered == 8
@@ -206,7 +208,7 @@ def test_a_fault_waits_for_coverage() -> None:
         ("cell_coverage_fraction", {"cells": [2, 2]}),
         ("area_coverage_fraction", {"coverage_radius_m": 0.7}),
     ):
-        robots = {"inflow": {"every_s": 0.1, "entry_m": [0.1, 0.1, 1.9, 1.9]}, "placement": {}, "count": 8}
+        robots = {"entrance": {"every_s": 0.1, "entry_m": [0.1, 0.1, 1.9, 1.9]}, "placement": {}, "count": 8}
         when = {"metric": metric, "at_least": 0.7}
         life = Life(faulty({"kind": "blackout", "when": when}, robots=robots, metrics=metrics))
         begun = life.heard(1, 0)[-1] + 1
@@ -228,7 +230,7 @@ def test_a_crashed_robot_is_neither_observed_nor_heard_and_returns_without_memor
     assert position[0] == pytest.approx(1.7 + 0.001 * (5 + 10), abs=1e-6), "its motors stood still meanwhile"
     assert life.orders[5] == [ProcessAction("kill", 1)]
     assert life.orders[10] == [ProcessAction("start", 1)]
-    assert life.world.lives.ever == {"crashed": [1], "restarted": [1]}
+    assert life.world.status.history == {"crashed": [1], "restarted": [1]}
 
 
 def test_what_is_sent_to_the_dead_is_dropped_with_its_cause() -> None:
@@ -256,7 +258,7 @@ def test_a_paused_robot_deadlocks_nothing_keeps_its_mail_and_memory_and_its_moto
     assert life.heard(0, 1) == [*range(5), *range(15, 19)]
     assert life.steps(0, 1) == list(range(1, 10)), "it goes on where it was"
     assert len(life.observed[15][1].inbox) == 3 * 11, "its mail has waited"
-    assert life.world.lives.ever == {"paused": [1]}
+    assert life.world.status.history == {"paused": [1]}
     assert life.world.scene.position[1, 0] == pytest.approx(1.7 + 0.001 * (5 + 3 + 5), abs=1e-6)
 
 
@@ -265,7 +267,7 @@ def test_a_slow_robot_is_observed_every_so_often_and_what_it_says_comes_that_lat
     assert life.awake(1) == [0, 1, 2, 3, 4, 8, 12, 16, 17, 18, 19]
     # Observed at 4, 8 and 12, it answers at 7, 11 and 15.
     assert life.heard(0, 1) == [0, 1, 2, 3, 7, 11, 15, 16, 17, 18]
-    assert life.world.lives.ever == {"slow": [1]}
+    assert life.world.status.history == {"slow": [1]}
 
 
 def test_a_robot_that_joins_late_is_not_observed_before_and_its_body_is_there() -> None:
@@ -273,7 +275,7 @@ def test_a_robot_that_joins_late_is_not_observed_before_and_its_body_is_there() 
     assert life.awake(1) == list(range(10, 20))
     assert life.world.medium.summary()["dropped"] == {"receiver-down": 3 * 10}
     assert life.world.scene.position[1, 0] == pytest.approx(1.7 + 0.001 * 10, abs=1e-6)
-    assert life.world.lives.ever == {"late": [1]}
+    assert life.world.status.history == {"late": [1]}
     assert life.orders[10] == [ProcessAction("start", 1)]
 
 
@@ -371,7 +373,7 @@ SENSES = {"sensors": [{"kind": "bearings"}, {"kind": "touch"}, {"kind": "line_of
 
 def drawn(run_seed: int = 1, **rates: Any) -> list[dict[str, Any]]:
     chosen = faulty(random_faults=RATES | rates, robots=SENSES)
-    return [table.model_dump() for _, table in assemble(chosen, run_seed).fault_tables]
+    return [table.model_dump() for table in assemble(chosen, run_seed).schedule.tables]
 
 
 def test_a_random_schedule_has_its_rates_is_sorted_and_can_be_run_as_written() -> None:

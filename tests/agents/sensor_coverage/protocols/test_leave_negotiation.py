@@ -112,7 +112,7 @@ def drive(scenario: Scenario, seed: int) -> tuple[World, list[LocalRobot]]:
         held = [each.vicinity.place for each in robots() if each.push is None and each.vicinity.place != NOWHERE]
         assert len(held) == len(set(held))
 
-    LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), look).run()
+    LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), [look]).run()
     return world, robots()
 
 
@@ -120,7 +120,7 @@ def test_robots_are_freed_and_pushed_again_while_words_are_lost_and_nobody_is_lo
     settings = (*HALL, *CLOSE, *LINK, "radio.loss=0.1", "time.duration_s=240.0")
     for seed in range(1, 9):  # not in every run there is anybody to spare
         world, robots = drive(load("sensor-coverage", settings), seed)
-        told = [each.told["removal"] for each in world.audience.told if "removal" in each.told]
+        told = [each.told["removal"] for each in world.telemetry.told if "removal" in each.told]
         spare = [each.node for each in robots if each.vicinity.spare]
         assert len(spare) == sum("out" in each for each in told) - sum("in" in each for each in told)
         homeless = [each.node for each in robots if each.vicinity.place == NOWHERE]
@@ -141,9 +141,9 @@ def test_the_checker_finds_a_removal_that_opens_a_hole() -> None:
     world.scene.present[:] = True
     world.scene.present[0] = False
     for node in (1, 2):  # the hub of a wheel, and then one of its rim: a hole comes, and goes
-        world.audience.hear(world.scene, node, Command(told={"removal": {"out": node}}), decides=False)
+        world.telemetry.hear(world.scene, node, Command(told={"removal": {"out": node}}), decides=False)
         assert removals(world, 1.0) == {"removals": node, "unsafe_removals": node}
-    world.audience.hear(world.scene, 1, Command(told={"removal": {"in": 1}}), decides=False)
-    world.audience.hear(world.scene, 2, Command(told={"removal": {"in": 2}}), decides=False)
-    world.audience.hear(world.scene, 2, Command(told={"removal": {"out": 2}}), decides=False)
+    world.telemetry.hear(world.scene, 1, Command(told={"removal": {"in": 1}}), decides=False)
+    world.telemetry.hear(world.scene, 2, Command(told={"removal": {"in": 2}}), decides=False)
+    world.telemetry.hear(world.scene, 2, Command(told={"removal": {"out": 2}}), decides=False)
     assert removals(world, 1.0) == {"removals": 3.0, "unsafe_removals": 2.0}
