@@ -381,7 +381,7 @@ def test_a_random_schedule_has_its_rates_is_sorted_and_can_be_run_as_written() -
     assert [fault["at_s"] for fault in found] == sorted(fault["at_s"] for fault in found)
     # 10 kinds x 4000 / h x 2 s: 22 expected a seed, Poisson.
     chosen = faulty(random_faults=RATES, robots=SENSES)
-    arena = assemble(chosen, 1).arena
+    arena = assemble(chosen, 1).scene.arena
     schedules = [draw(chosen, seed, arena) for seed in range(300)]
     assert len({fault.kind for schedule in schedules for fault in schedule}) == 10
     counts = [len(schedule) for schedule in schedules]
