@@ -76,7 +76,7 @@ def run(
     watcher: ProgressListener | None = None,
     record: Path | None = None,
 ) -> RunResult:
-    """Run `scenario` (a built-in name, a path, or one already loaded) and return its result.
+    """Run `scenario` (a built-in name, a path, or a loaded scenario) and return its result.
 
     `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock; `record` is a file
     to write an MCAP recording to. Raises ScenarioError for a mistake in the scenario, and LinkError where robots cannot
