@@ -86,7 +86,7 @@ class World:
         self._lifecycle.stop_paused(tick)
         return actions
 
-    def observe(self, send: Send | None = None) -> tuple[Sequence[int], Sequence[bytes]]:
+    def observe(self, send: Send | None = None) -> tuple[list[int], list[bytes]]:
         """Sense, and return the ids of the nodes that are awake, ascending, and the encoded observation of each.
 
         Each observation is given to `send` as soon as it is encoded, so that nodes start while others are still encoded.

