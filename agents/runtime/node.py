@@ -13,6 +13,7 @@ from zwerm.agents.runtime.contract import Setup, Stepper
 from zwerm.agents.runtime.controllers import make
 from zwerm.link import Answer
 from zwerm.wire.messages import MESSAGE_BYTES_MAX, Command, Failure, Observation, decode_observation, encode
+from zwerm.wire.telemetry import plain_numbers
 
 if TYPE_CHECKING:
     from zwerm.link.peer_radio import PeerRadio
@@ -63,6 +64,10 @@ class Node:
             try:
                 command = step(observation)
                 command.tick = tick
+                if command.telemetry:
+                    command.telemetry = plain_numbers(command.telemetry)
+                if command.snapshot and type(command.snapshot) is not bytes:
+                    raise TypeError(f"snapshot: expected bytes, got {type(command.snapshot).__name__}")
                 said = write(command)
                 if len(said) > MESSAGE_BYTES_MAX:
                     raise ValueError(f"the command takes {len(said)} bytes, at most {MESSAGE_BYTES_MAX} are allowed")

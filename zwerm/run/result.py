@@ -10,7 +10,7 @@ from zwerm.record.history import History
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.scene import Ints
-from zwerm.world.tick.telemetry import TelemetryRecord
+from zwerm.world.tick.telemetry import TelemetryArrays, TelemetryRecord
 
 if TYPE_CHECKING:  # pictures need matplotlib
     from zwerm.view.run_view import RunView
@@ -45,7 +45,8 @@ class RunResult:
     series: dict[str, list[float]] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     tracebacks: dict[int, str] = field(default_factory=dict)
-    told: list[TelemetryRecord] = field(default_factory=list)
+    telemetry: TelemetryArrays = field(default_factory=TelemetryArrays.empty)
+    snapshots: list[TelemetryRecord] = field(default_factory=list)
 
     @property
     def ok(self) -> bool:
@@ -101,9 +102,10 @@ class RunResult:
             table.cells,
             table.sight_range_m,
             0 if self.scenario.base is None else self.scenario.base.stations,
-            self.told,
+            self.snapshots,
             self.series,
             (*layers_of(self.scenario.robots.controller), *self.scenario.pictures.layers),
+            None if self.scenario.coordinator is None else self.robots,
         )
 
     @property

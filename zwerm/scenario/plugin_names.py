@@ -1,8 +1,27 @@
-"""Classes by name: `module:Class`, as a scenario names a controller, a sensor or a model of somebody else's."""
+"""Plug-ins by name: `module:Class`, or `module:function`, as a scenario names those outside the catalogue."""
 
 import importlib
 from collections.abc import Iterable
 from typing import Any
+
+
+def object_named(name: str, what: str, built_in: Iterable[str]) -> Any:
+    """Return the class or function that `name`, `module:name`, names.
+
+    Raises ValueError, in one line, where it names none; `what` is then what was expected, `built_in` the shorter names.
+    """
+    module_name, _, object_name = name.partition(":")
+    if not module_name or not object_name:
+        known = f"a built-in {what} ({', '.join(built_in)}) or " if built_in else ""
+        raise ValueError(f"expected {known}module:{'Class' if built_in else 'name'}, got {name!r}")
+    try:
+        module = importlib.import_module(module_name)
+    except ImportError as error:
+        raise ValueError(f"cannot import {module_name!r}: {error}") from error
+    found = getattr(module, object_name, None)
+    if found is None:
+        raise ValueError(f"module {module_name!r} has no {'class' if built_in else what} {object_name!r}")
+    return found
 
 
 def class_named(name: str, what: str, built_in: Iterable[str]) -> type[Any]:
@@ -10,14 +29,8 @@ def class_named(name: str, what: str, built_in: Iterable[str]) -> type[Any]:
 
     Raises ValueError, in one line, where it names none; `what` is then what was expected, `built_in` the shorter names.
     """
-    module_name, _, class_name = name.partition(":")
-    if not module_name or not class_name:
-        raise ValueError(f"expected a built-in {what} ({', '.join(built_in)}) or module:Class, got {name!r}")
-    try:
-        module = importlib.import_module(module_name)
-    except ImportError as error:
-        raise ValueError(f"cannot import {module_name!r}: {error}") from error
-    found = getattr(module, class_name, None)
+    found = object_named(name, what, list(built_in))
     if not isinstance(found, type):
+        module_name, _, class_name = name.partition(":")
         raise ValueError(f"module {module_name!r} has no class {class_name!r}")
     return found

@@ -1,0 +1,25 @@
+"""What is measured of a run: the metrics of every run, those of its observers, and telemetry."""
+
+from zwerm.world.metrics import Truth
+from zwerm.world.radio.report import messages, radio_metrics
+from zwerm.world.world import World
+
+
+def truth_of(world: World) -> Truth:
+    """Return the true state of a world now, as metrics see it."""
+    return Truth(world.scene, world.dead, world.completed, world.telemetry, messages(world.medium))
+
+
+def measure(world: World) -> dict[str, float]:
+    """Return the metrics of a world at its end, by name; those of telemetry cannot replace any other."""
+    scenario = world.scenario
+    found = {"robots_in_arena": float(world.scene.present.sum())}
+    if scenario.robots.inflow is not None:
+        found["robots_exited"] = float(len(world.exited))
+    found |= world.observers.finish(truth_of(world))
+    if world.schedule.faults:
+        found["faults_missed"] = float(len(world.schedule.missed))
+    if scenario.radio is not None or scenario.coordinator is not None:
+        found["robots_done_fraction"] = world.done_fraction
+        found |= radio_metrics(world.medium, world.count, world.tick)
+    return {**found, **world.telemetry.metrics()}
