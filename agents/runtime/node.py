@@ -12,8 +12,15 @@ import msgspec
 from zwerm.agents.runtime.contract import Setup, Stepper
 from zwerm.agents.runtime.controllers import make
 from zwerm.link import Answer
-from zwerm.wire.messages import MESSAGE_BYTES_MAX, Command, Failure, Observation, decode_observation, encode
-from zwerm.wire.telemetry import plain_numbers
+from zwerm.wire.messages import (
+    MESSAGE_BYTES_MAX,
+    Command,
+    Failure,
+    Observation,
+    decode_observation,
+    encode,
+    encode_command,
+)
 
 if TYPE_CHECKING:
     from zwerm.link.peer_radio import PeerRadio
@@ -56,7 +63,7 @@ class Node:
         self.answer = self._answering(step_on_air)
 
     def _answering(self, step: Callable[[Observation], Command]) -> Answer:
-        decode, write, fail = decode_observation, encode, self._fail
+        decode, write, fail = decode_observation, encode_command, self._fail
 
         def answer(payload: bytes) -> bytes:
             observation = decode(payload)
@@ -64,10 +71,6 @@ class Node:
             try:
                 command = step(observation)
                 command.tick = tick
-                if command.telemetry:
-                    command.telemetry = plain_numbers(command.telemetry)
-                if command.snapshot and type(command.snapshot) is not bytes:
-                    raise TypeError(f"snapshot: expected bytes, got {type(command.snapshot).__name__}")
                 said = write(command)
                 if len(said) > MESSAGE_BYTES_MAX:
                     raise ValueError(f"the command takes {len(said)} bytes, at most {MESSAGE_BYTES_MAX} are allowed")

@@ -7,7 +7,7 @@ algorithm's controllers. A scenario adds a class or a function of the user's own
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
@@ -56,7 +56,7 @@ class Truth:
         return self.scene.time_s
 
 
-class Metric(Protocol):
+class Metric:
     """A group of metrics over one run. Derive from this class and override what the metric needs.
 
     `names` are the names of its metrics, units last; `*` in a name stands for any characters. `every_s` is the sampling
@@ -64,7 +64,7 @@ class Metric(Protocol):
     type of its key's value in `[metrics]`. A method `report(record)`, if there is one, gets every TelemetryRecord as it comes.
     """
 
-    names: ClassVar[Sequence[str]]
+    names: ClassVar[Sequence[str]] = ()
     every_s: ClassVar[float | None] = None
     Parameters: ClassVar[Any] = None
 

@@ -50,10 +50,8 @@ def own_metric(name: str, context: MetricContext) -> Metric:
     """
     found = object_named(name, "metric", ())
     if isinstance(found, type):
-        missing = [each for each in ("sample", "metrics") if not callable(getattr(found, each, None))]
-        names = getattr(found, "names", None)
-        if missing or not isinstance(names, list | tuple) or not names:
-            raise ValueError(f"expected a subclass of zwerm.Metric with `names` and `sample`, got {name!r}")
+        if not issubclass(found, Metric) or not isinstance(found.names, list | tuple) or not found.names:
+            raise ValueError(f"expected a subclass of zwerm.Metric that declares its `names`, got {name!r}")
         metric: Metric = found(None, context)
     elif callable(found) and hasattr(found, "__name__"):
         try:

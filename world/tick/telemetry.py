@@ -1,6 +1,6 @@
 """Telemetry of a run: named numbers and snapshots that nodes report for observers of the run. No node receives them.
 
-Memory is bounded. Numbers are kept as columns, at most `NUMBERS_MAX` of them (20 bytes each); snapshots as bytes with
+Memory is bounded. Numbers are kept as columns, at most `NUMBERS_MAX` of them (`NUMBER_BYTES` each); snapshots as bytes with
 references to the position arrays of their tick, at most `SNAPSHOT_BYTES_MAX` bytes. Beyond a bound, or beyond
 `DISTINCT_NAMES_MAX` names in one run, a record is counted in `dropped` and not kept. The newest value of each known name of
 each node, and what listeners of the sink compute, do not depend on the first two bounds.
@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from zwerm.wire.messages import Command
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 
-NUMBERS_MAX: Final = 2_000_000  # 40 MB
+NUMBERS_MAX: Final = 2_000_000  # 44 MB
+NUMBER_BYTES: Final = 22  # tick, node, name and value
 SNAPSHOT_BYTES_MAX: Final = 64 * 2**20
 DISTINCT_NAMES_MAX: Final = 1_024
 PREFIX: Final = "telemetry."

@@ -166,7 +166,9 @@ def drive(
     from zwerm.record.recording import Recording
 
     about = {"scenario": world.scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
-    with Recording(record, world.scenario.time.dt_s, about) as world.recording:
+    with Recording(record, world.scenario.time.dt_s, about) as recording:
+        world.recording = recording
+        world.telemetry.listeners.append(recording.telemetry)
         return _drive(world, link, seed, runner, realtime, watcher or NullProgress(), programs)
 
 

@@ -18,7 +18,7 @@ import msgspec
 from msgspec import Struct
 
 from zwerm.errors import ProtocolError
-from zwerm.wire.telemetry import telemetry_error
+from zwerm.wire.telemetry import plain_numbers, telemetry_error
 
 PROTOCOL_VERSION: Final = 1
 
@@ -291,6 +291,18 @@ def open_answer(payload: bytes) -> Command | Failure:
         if answer.telemetry and (rule := telemetry_error(answer.telemetry)):
             raise ProtocolError("telemetry", rule)
     return answer
+
+
+def encode_command(command: Command) -> bytes:
+    """Return a controller's command as it crosses the wire, its telemetry as plain floats.
+
+    Raises TypeError or ValueError that names the field, the rule and the value.
+    """
+    if command.telemetry:
+        command.telemetry = plain_numbers(command.telemetry)
+    if command.snapshot and type(command.snapshot) is not bytes:
+        raise TypeError(f"snapshot: expected bytes, got {type(command.snapshot).__name__}")
+    return encode(command)
 
 
 def traced_bytes(command: Command, payload: bytes) -> bytes:
