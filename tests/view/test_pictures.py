@@ -14,8 +14,8 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 from PIL import Image
 from shapely.geometry import LineString, Polygon, box
-from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_snapshot
 
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_snapshot
 from zwerm.errors import PictureError
 from zwerm.record.history import History
 from zwerm.view.animation import animate_run

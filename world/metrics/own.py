@@ -48,7 +48,7 @@ def own_metric(name: str, context: MetricContext) -> Metric:
     Raises ValueError, in one line, where it names neither a metric class nor a function of one argument, or its metrics have no
     proper names; and ScenarioError where the class refuses the scenario.
     """
-    found = object_named(name, "metric", ())
+    found = object_named(name, "metric")
     if isinstance(found, type):
         if not issubclass(found, Metric) or not isinstance(found.names, list | tuple) or not found.names:
             raise ValueError(f"expected a subclass of zwerm.Metric that declares its `names`, got {name!r}")

@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import Any, ClassVar, Final
 
 from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, MembershipSnapshot, decode_snapshot
-
 from zwerm.catalogue import BASE
 from zwerm.maths.simplicial import betti
 from zwerm.scenario.tables import Scenario

@@ -12,8 +12,8 @@ from zwerm.world.tick.telemetry import TelemetryRecord
 class RunView:
     """The drawable part of one run: `name` is its scenario and seed, `ending` says how it ended.
 
-    `cells` is (columns, rows); `snapshots` and `series` are those of the run's result; `coordinator` is its node's id. `layers` are classes of picture layers, as
-    `module:Class`, drawn in this order over the arena.
+    `cells` is (columns, rows); `snapshots` and `series` are those of the run's result; `coordinator` is the id of its node.
+    `layers` are classes of picture layers, as `module:Class`, drawn in this order over the arena.
     """
 
     arena: Arena

@@ -3,12 +3,6 @@
 import math
 
 import pytest
-from zwerm.agents.sensor_coverage.messages.snapshots import (
-    ComplexSnapshot,
-    MembershipSnapshot,
-    Snapshot,
-    decode_snapshot,
-)
 
 from zwerm.agents.runtime.contract import Body, Setup
 from zwerm.agents.sensor_coverage.frontier.services import ScanResult
@@ -30,6 +24,12 @@ from zwerm.agents.sensor_coverage.messages.commands import (
 )
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, ListRequest, Word, read
 from zwerm.agents.sensor_coverage.messages.peers import write as write_word
+from zwerm.agents.sensor_coverage.messages.snapshots import (
+    ComplexSnapshot,
+    MembershipSnapshot,
+    Snapshot,
+    decode_snapshot,
+)
 from zwerm.agents.sensor_coverage.negotiating_robot import NegotiatingRobot
 from zwerm.agents.sensor_coverage.protocols import leave_lock as redundancy
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox

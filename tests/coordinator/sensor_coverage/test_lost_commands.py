@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, decode_snapshot
 
 from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.messages.commands import (
@@ -26,6 +25,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     read_reply,
     write,
 )
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, decode_snapshot
 from zwerm.agents.sensor_coverage.protocols.deduplication import COPIES_MAX, RequestDeduplicator
 from zwerm.coordinator.sensor_coverage.command_mailbox import HASTE_COPIES, MUSTER_COPIES, CommandMailbox
 from zwerm.coordinator.sensor_coverage.coordinator import SensorCoverageCoordinator

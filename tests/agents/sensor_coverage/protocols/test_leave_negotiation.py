@@ -5,11 +5,11 @@ import random
 import networkx
 import numpy as np
 import pytest
-from zwerm.agents.sensor_coverage.messages.snapshots import MembershipSnapshot, decode_snapshot, encode_snapshot
 
 from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.peers import NOWHERE, ListRequest, Word, read, write
+from zwerm.agents.sensor_coverage.messages.snapshots import MembershipSnapshot, decode_snapshot, encode_snapshot
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 from zwerm.deploy.node_specs import node_specs
 from zwerm.link.memory import MemoryLink
