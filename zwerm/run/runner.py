@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal, Protocol
 
+import numpy as np
+
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import ScenarioError, StragglerError
@@ -275,7 +277,7 @@ def _result(
         history=history,
         cell_counts=counts,
         refused=dict(world.refused + Counter(getattr(link, "refused", {}))),
-        series=world.observers.series(),
+        series={name: np.array(values) for name, values in world.observers.series().items()},
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,
         tracebacks={node: failure.traceback for node, failure in world.failures.items()},
