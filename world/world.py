@@ -16,6 +16,7 @@ The world is deterministic: its state after a tick is a function of the scenario
 
 from collections.abc import Callable, Sequence
 
+from zwerm.errors import ProtocolError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import BodyVelocity, Command, Failure, Transmission, WheelSpeeds
@@ -60,7 +61,7 @@ class World:
         self.completion = Completion(scenario)
         fixed = [*coordinator, *stations]
         self.intake = CommandIntake(self.bodies.drives.kind, scenario.robots.body.kind, fixed, self.medium)
-        self.telemetry = TelemetrySink()
+        self.telemetry = TelemetrySink(dt_s)
         self.trace = Trace()
         self._sensing = Sensing(sensors)
         self._wakes = Wakes(nodes, dt_s)
@@ -129,13 +130,22 @@ class World:
     def accept(self, node: int, payload: bytes, late_allowed: bool = False) -> None:
         """Accept a node's answer to its observation of this tick, or with `late_allowed` of an earlier one.
 
-        Raises ProtocolError, and counts its reason, for a malformed or unexpected answer; the node is still awaited then.
+        Raises ProtocolError, and counts its reason, for a malformed or unexpected answer; the node is still awaited then. A
+        controller that raised has crashed. So has one whose telemetry breaks the rules: it gives no other answer.
         """
-        answer = self.intake.accept(node, payload, late_allowed)
-        if type(answer) is Failure:
+        try:
+            answer = self.intake.accept(node, payload, late_allowed)
+        except ProtocolError as error:
+            if error.reason != "telemetry" or node not in self.awaited():
+                raise
+            reason = f"refused: {error}"
+        else:
+            if type(answer) is not Failure:
+                return
             self.status.failures[node] = answer
-            self.bodies.advance_early()  # the motors stop after this tick, whether it was computed early or not
-            self.crash(node, answer.error)
+            reason = answer.error
+        self.bodies.advance_early()  # the motors stop after this tick, whether it was computed early or not
+        self.crash(node, reason)
 
     def awaited(self) -> list[int]:
         """Return the nodes whose answer to this tick's observation has not come, ascending."""
@@ -143,11 +153,13 @@ class World:
 
     def advance(self) -> None:
         """Apply the accepted commands in id order, let the radio and the bodies act, and go on to the next tick."""
+        tick = self.tick
         self.trace.catch_up()
         self.bodies.advance_early()
         answers = self.intake.end_tick()
-        outboxes = self._apply(self.status.due_answers(answers, self.tick))
-        self.trace.extend(*self.intake.exchange)
+        outboxes = self._apply(self.status.due_answers(answers, tick))
+        exchange = self.intake.exchange
+        self.trace.extend(tick, exchange.nodes, exchange.observations, exchange.traced)
         if outboxes:
             self.medium.send(self.scene, outboxes)
         self.bodies.advance()
@@ -223,8 +235,8 @@ class World:
                 outboxes.append((node, answer.outbox))
             if answer.wake is not None:
                 self._wakes.sleep(node, answer.wake, tick)
-            if answer.told:
-                self.telemetry.hear(self.scene, node, answer, decides=False)
+            if answer.telemetry or answer.snapshot:
+                self.telemetry.accept(self.scene, node, answer)
             if answer.gave_up:
                 completion.give_up(node, answer.gave_up, self.status.dead)
             if answer.release:

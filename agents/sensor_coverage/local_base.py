@@ -193,7 +193,7 @@ class LocalBase(LocalRobot):
         return super()._occupied or not self._takes_census
 
     def _tell_numbers(self) -> None:
-        self._told |= {
+        self._telemetry |= {
             "deployment_cycles": self.cycles,
             "pushes": self.pushes,
             "robots_released": self.released,

@@ -31,6 +31,7 @@ from zwerm.agents.sensor_coverage.messages.peers import (
     read,
     write,
 )
+from zwerm.agents.sensor_coverage.messages.snapshots import MembershipSnapshot, encode_snapshot
 from zwerm.agents.sensor_coverage.motion.homing import Vector
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.failure_detector import FailureDetector
@@ -72,7 +73,7 @@ class LocalRobot(CentralRobot):
         self._calm = self._claimed = False
         self._doubts_at: int | None = None
         self._chosen = 0
-        self._told: dict[str, Any] = {}
+        self._telemetry: dict[str, float | bool] = {}
         self.drives = False
         self.ending = CompletionProtocol(setup, self.random, base=setup.role == "base")
         self.membership = Membership(self, setup, self.random)
@@ -95,14 +96,15 @@ class LocalRobot(CentralRobot):
         self._take_part()
         if not self.vicinity.moving:
             self._keep_watch()
-        self._told |= self.membership.turn(self.senses.seen)
+        member = self.membership.turn(self.senses.seen)
         if bool(self._claims) != self._claimed:
             self._claimed = bool(self._claims)
-            self._told["frontier"] = {"claimed": self._claimed}
+            self._telemetry["claims_frontier"] = self._claimed
         self._say()
         outbox, self._letters = tuple(self._letters), []
-        told, self._told = self._told, {}
-        return Command(drive=drive, outbox=outbox, wake=self._wake(), told=told)
+        telemetry, self._telemetry = self._telemetry, {}
+        snapshot = b"" if member is None else encode_snapshot(MembershipSnapshot(member))
+        return Command(drive=drive, outbox=outbox, wake=self._wake(), telemetry=telemetry, snapshot=snapshot)
 
     def _go_on(self) -> Any:
         drive = STOP

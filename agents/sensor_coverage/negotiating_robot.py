@@ -7,7 +7,7 @@ end of a lock.
 """
 
 from collections.abc import Generator
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
 import msgspec
 
@@ -25,6 +25,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     ScanRequest,
 )
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, ListRequest, read, write
+from zwerm.agents.sensor_coverage.messages.snapshots import MembershipSnapshot, encode_snapshot
 from zwerm.agents.sensor_coverage.motion.homing import Vector
 from zwerm.agents.sensor_coverage.protocols import leave_lock as redundancy
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
@@ -49,7 +50,7 @@ class NegotiatingRobot(CentralRobot):
         self._seeks = False  # it is to leave if it can
         self._drives = False
         self._driven_at = 0
-        self._told: dict[str, Any] = {} if newborn else {"removal": {"in": setup.node}}
+        self._snapshot = b"" if newborn else encode_snapshot(MembershipSnapshot(True))
 
     def step(self, observation: Observation) -> Command:
         """Answer the neighbours, go on with what the coordinator ordered, and leave if that was agreed upon."""
@@ -69,12 +70,12 @@ class NegotiatingRobot(CentralRobot):
             self._driven_at = tick
         leaving.note(self._stands(tick))
         if leaving.turn(self._seeks):
-            self._left, self._told = True, {"removal": {"out": self.setup.node}}
+            self._left, self._snapshot = True, encode_snapshot(MembershipSnapshot(False))
             leaving.note(stands=False)
         words = tuple(Transmission(CHANNEL, write(word), to) for to, word in leaving.letters())
         command.outbox += words
         command.wake = self._sooner(command.wake, tick)
-        command.told, self._told = self._told, {}
+        command.snapshot, self._snapshot = self._snapshot, b""
         return command
 
     def _stands(self, tick: int) -> bool:
@@ -124,7 +125,7 @@ class NegotiatingRobot(CentralRobot):
         while self._leaving.locked:
             yield STOP
         if self._left:
-            self._left, self._told = False, {"removal": {"in": self.setup.node}}
+            self._left, self._snapshot = False, encode_snapshot(MembershipSnapshot(True))
         yield from self._driving(drive)
 
     def _return(self, rest: Vector) -> Generator[BodyVelocity, None, Vector]:

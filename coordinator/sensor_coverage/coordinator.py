@@ -18,6 +18,7 @@ from zwerm.agents.sensor_coverage.frontier.relative_homology import RelativeHomo
 from zwerm.agents.sensor_coverage.frontier.services import Plan, ScanResult, Services
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import LIVES, Emerged, Report, RollCall, ScanRequest
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_snapshot
 from zwerm.coordinator.sensor_coverage.command_mailbox import MUSTER_COPIES, CommandMailbox, Story, together
 from zwerm.coordinator.sensor_coverage.leave_requests import LeaveRequests
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
@@ -100,14 +101,16 @@ class SensorCoverageCoordinator:
         self._spares = setup.services.get("redundancy", "coordinator")
         self._spared_at = 0
         self._silent: dict[int, None] = {}
-        self._told: dict[str, Any] = {}
+        self._telemetry: dict[str, float | bool] = {}
+        self._snapshot = b""
         self._story = self._tell()
 
     def step(self, observation: Observation) -> Command:
         """Take the mail and go on."""
         self.post.take(observation.time_s, observation.inbox)
         wake = next(self._story, Wake())
-        told, self._told = self._told, {}
+        telemetry, self._telemetry = self._telemetry, {}
+        snapshot, self._snapshot = self._snapshot, b""
         outbox = self.post.sent()
         again_s = None if self.outcome else self.post.next_s()
         if again_s is not None and (wake.at_s is None or again_s < wake.at_s):
@@ -117,7 +120,8 @@ class SensorCoverageCoordinator:
             wake=wake,
             done=self.outcome == COVERED,
             gave_up=self._gave_up(),
-            told=told,
+            telemetry=telemetry,
+            snapshot=snapshot,
         )
 
     def _gave_up(self) -> str:
@@ -321,21 +325,22 @@ class SensorCoverageCoordinator:
     # --- for those who watch ----------------------------------------------------------------------------------------
 
     def _tell_complex(self, plans: Iterable[Plan]) -> None:
-        """Tell who watches what the swarm looks like, by robots."""
-        self._told["complex"] = {
-            "cycle": self.cycle,
-            "edges": self._by_robot(self.picture.complex_.edges),
-            "frontier": self._by_robot(self.services.frontier.frontier),
-            "obstacle": self._by_robot(self.services.frontier.obstacle),
-            "paths": [[self.places.occupant[each] for each in plan.path] for plan in plans],
-        }
+        """Report the complex of the swarm, by robots, to metrics and pictures."""
+        complex_ = ComplexSnapshot(
+            cycle=self.cycle,
+            edges=self._by_robot(self.picture.complex_.edges),
+            frontier=self._by_robot(self.services.frontier.frontier),
+            obstacle=self._by_robot(self.services.frontier.obstacle),
+            paths=tuple(tuple(self.places.occupant[each] for each in plan.path) for plan in plans),
+        )
+        self._snapshot = encode_snapshot(complex_)
 
-    def _by_robot(self, edges: Iterable[Edge]) -> list[list[int]]:
+    def _by_robot(self, edges: Iterable[Edge]) -> tuple[tuple[int, int], ...]:
         occupant = self.places.occupant
-        return [[occupant[i], occupant[j]] for i, j in edges]
+        return tuple((occupant[i], occupant[j]) for i, j in edges)
 
     def _tell_numbers(self) -> None:
-        self._told |= {
+        self._telemetry |= {
             "deployment_cycles": self.cycle,
             "pushes": self.pushing.pushes,
             "robots_released": len(self.sources.out),

@@ -69,7 +69,8 @@ class RedundancyAdvisor:
 
     def step(self, observation: Observation) -> Command:
         """Take in what robots say, and tell those who can be spared."""
-        tick, told = observation.tick, {}
+        tick = observation.tick
+        telemetry: dict[str, float | bool] = {}
         outbox = [] if self._begun else [_packet(CollectReports(), None)]
         self._begun = True
         for packet in observation.inbox:
@@ -78,11 +79,11 @@ class RedundancyAdvisor:
                 outbox += self._take(packet.sender, word, tick)
         if self._look_at is not None and tick >= self._look_at:
             self._look_at = None
-            told = {"redundant_robots": self._look(tick)}
+            telemetry = {"redundant_robots": self._look(tick)}
         self._find_unheard(tick)
         for said in (self._questions, self._verdicts):
             outbox += [_packet(each.word, node) for node, each in said.items() if each.again(tick)]
-        return Command(outbox=tuple(outbox), wake=Wake(at_s=self._next_s(), on_packet=True), told=told)
+        return Command(outbox=tuple(outbox), wake=Wake(at_s=self._next_s(), on_packet=True), telemetry=telemetry)
 
     # --- what it hears ----------------------------------------------------------------------------------------------
 

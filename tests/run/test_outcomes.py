@@ -9,10 +9,10 @@ import pytest
 from halls import HALL, Link, drive
 from support import ROOT, ZWERM
 
+from zwerm.run.measurement import measure
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.wire.messages import BodyVelocity, Command, decode_observation, encode, open_answer
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 STATIONS = ("arena.size_m=[4.2,2.6]", "robots.count=40", "base.poses=[[0.2,1.3,0.0],[4.0,1.3,3.0]]")
@@ -121,7 +121,7 @@ def test_a_robot_that_cannot_get_to_its_place_is_given_up_and_another_comes(robo
     scenario = load("sensor-coverage", HALL)
     outcome, world = drive(scenario, around=with_dead_motors(robot, from_tick))
     assert outcome == "completed"
-    assert measure(world, scenario.metrics)["coverage_fraction"] >= 0.99
+    assert measure(world)["coverage_fraction"] >= 0.99
 
 
 def test_of_two_stations_one_may_die() -> None:

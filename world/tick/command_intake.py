@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 from typing import Final, NamedTuple, Protocol
 
 from zwerm.errors import ProtocolError
-from zwerm.wire.messages import BodyVelocity, Command, Failure, Transmission, WheelSpeeds, open_answer
+from zwerm.wire.messages import BodyVelocity, Command, Failure, Transmission, WheelSpeeds, open_answer, traced_bytes
 
 NO_ANSWER: Final = b""
 
@@ -25,12 +25,16 @@ class Addressing(Protocol):
 
 
 class Exchange(NamedTuple):
-    """The messages of one tick: parallel sequences by node id, ascending. A node without an answer has b""."""
+    """The messages of one tick: parallel sequences by node id, ascending. A node without an answer has b"".
+
+    `traced` is the part of `commands` that the trace covers: all but telemetry and snapshots.
+    """
 
     tick: int
     nodes: Sequence[int]
     observations: Sequence[bytes]
     commands: Sequence[bytes]
+    traced: Sequence[bytes]
 
 
 class CommandIntake:
@@ -48,7 +52,7 @@ class CommandIntake:
         addressing: Addressing,
     ) -> None:
         """A body of kind `body` takes the drive type `drive`; the nodes in `fixed` have no body that moves."""
-        self.exchange = Exchange(-1, (), (), ())
+        self.exchange = Exchange(-1, (), (), (), ())
         self.refused: Counter[str] = Counter()
         self.late_count = 0
         self.observed_count = 0
@@ -62,6 +66,7 @@ class CommandIntake:
         self._observations: Sequence[bytes] = ()
         self._pending: dict[int, None] = {}
         self._accepted: dict[int, tuple[bytes, Command | Failure]] = {}
+        self._traced: dict[int, bytes] = {}  # the traced bytes of the accepted commands with telemetry
         self._late: list[NodeAnswer] = []
         self._newest: dict[int, int] = {}  # the tick that a node answered last, where answers may be late
 
@@ -70,6 +75,7 @@ class CommandIntake:
         self._tick, self._nodes, self._observations = tick, nodes, observations
         self._pending = dict.fromkeys(nodes)
         self._accepted = {}
+        self._traced = {}
         self.observed_count += len(nodes)
 
     def accept(self, node: int, payload: bytes, late_allowed: bool = False) -> Command | Failure:
@@ -95,6 +101,8 @@ class CommandIntake:
         else:
             self._accepted[node] = payload, answer
             del self._pending[node]
+            if type(answer) is Command and (answer.telemetry or answer.snapshot):
+                self._traced[node] = traced_bytes(answer, payload)
         if late_allowed:
             self._newest[node] = answer.tick
         return answer
@@ -108,7 +116,10 @@ class CommandIntake:
         accepted, nodes = self._accepted, self._nodes
         commands = [accepted[node][0] if node in accepted else NO_ANSWER for node in nodes]
         answers = self._late + [(node, accepted[node][1]) for node in nodes if node in accepted]
-        self.exchange = Exchange(self._tick, nodes, self._observations, commands)
+        traced = commands
+        if self._traced:
+            traced = [self._traced.get(node, command) for node, command in zip(nodes, commands, strict=True)]
+        self.exchange = Exchange(self._tick, nodes, self._observations, commands, traced)
         self._late = []
         self.begin_tick(self._tick + 1, (), ())
         return answers

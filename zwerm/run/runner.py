@@ -9,22 +9,25 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final, Literal, Protocol
 
+import numpy as np
+
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import ScenarioError, StragglerError
 from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
-from zwerm.run.assembly import assemble, make_observers
+from zwerm.run.assembly import assemble_run, observers_of
+from zwerm.run.measurement import measure, truth_of
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.driver import TickObserver
 from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.drivers.realtime import RealTime
-from zwerm.world.metrics.measures import cell_counts, measure
+from zwerm.world.metrics.coverage import cell_counts
 from zwerm.world.metrics.observers import Observers
-from zwerm.world.radio.report import messages, radio_metrics, radio_report
+from zwerm.world.radio.report import radio_report
 from zwerm.world.scene import Scene
 from zwerm.world.tick.completion import FAILED, INTERRUPTED
 from zwerm.world.tick.node_status import Event
@@ -90,7 +93,7 @@ def run(
             raise ScenarioError([f"overrides: a scenario that is already loaded takes none, got {list(overrides)}"])
     else:
         scenario = load(str(scenario), tuple(overrides))
-    world = assemble(scenario, seed)
+    world, metrics = assemble_run(scenario, seed)
     members = node_specs(scenario, seed)
     watcher = watcher or NullProgress()
     if runner == "inline":
@@ -101,7 +104,7 @@ def run(
             lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
             world.schedule.late_joiners,
         )
-        return drive(world, link, seed, runner, realtime, watcher, record, link)
+        return drive(world, link, seed, runner, realtime, watcher, record, link, metrics)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
     with LocalSwarm(
@@ -112,7 +115,7 @@ def run(
         late_joiners=world.schedule.late_joiners,
         restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
     ) as swarm:
-        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm)
+        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics)
 
 
 def serve(
@@ -129,7 +132,7 @@ def serve(
 
     Waits `deadline_s` for them to connect to one of the Zenoh endpoints `listen`. Raises ScenarioError and LinkError.
     """
-    world = assemble(scenario, seed)
+    world, metrics = assemble_run(scenario, seed)
     if world.schedule.touches_programs:
         raise ScenarioError(
             [f"{scenario.place}: faults: robots that run elsewhere cannot be killed, started or paused"]
@@ -146,7 +149,7 @@ def serve(
         deadline_s=deadline_s,
         paced=realtime is not None,
     ) as swarm:
-        return drive(world, swarm.link, seed, "remote", realtime, watcher, record)
+        return drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics)
 
 
 def new_run_id() -> str:
@@ -163,13 +166,17 @@ def drive(
     watcher: ProgressListener | None = None,
     record: Path | None = None,
     programs: NodeProcesses | None = None,
+    metrics: Observers | None = None,
 ) -> RunResult:
     """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`.
 
-    `programs` carries out on nodes' programs what the scenario's faults demand.
+    `programs` carries out on nodes' programs what the scenario's faults demand. `metrics` measure the run; without them, new
+    observers do, as the scenario asks.
     """
     scenario = world.scenario
-    sampling = Sampling(world, make_observers(scenario, world.scene.arena), watcher or NullProgress())
+    if metrics is None:
+        metrics = observers_of(scenario, world.scene.arena)
+    sampling = Sampling(world, metrics, watcher or NullProgress())
     with ExitStack() as stack:
         observers: list[TickObserver] = []
         if record is not None:
@@ -177,6 +184,7 @@ def drive(
 
             about = {"scenario": scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
             recording = stack.enter_context(Recording(record, scenario.time.dt_s, about))
+            world.telemetry.listeners.append(recording.telemetry)
             observers.append(ExchangeObserver(world, recording))
         observers.append(sampling)
         driver = (
@@ -210,11 +218,13 @@ class Sampling:
         self._history_stride = max(1, self._ticks // HISTORY_SAMPLES)
         self._progress_stride = max(1, self._ticks // PROGRESS_REPORTS)
         self.history.append(world.scene, world.dead)
-        self.observers.sample(world.scene, world.dead)
+        self.observers.subscribe(world.telemetry)
+        self.observers.sample(truth_of(world))
 
     def __call__(self, world: World) -> None:
         """Sample the tick that begins."""
-        if self.observers.sample(world.scene, world.dead):
+        if self.observers.is_due(world.tick):
+            self.observers.sample(truth_of(world))
             newest = self.observers.newest()
             if "coverage_fraction" in newest:
                 self._watcher.covered(newest["coverage_fraction"], int(newest["robots_deployed"]))
@@ -224,11 +234,9 @@ class Sampling:
             self._watcher.ticked(world.tick, self._ticks)
 
     def finish(self) -> None:
-        """Take the last samples, if they have not been taken."""
-        world = self._world
-        if world.tick % self._history_stride:
-            self.history.append(world.scene, world.dead)
-        self.observers.sample(world.scene, world.dead, now=True)
+        """Add the last scene to the history, if it is not there."""
+        if self._world.tick % self._history_stride:
+            self.history.append(self._world.scene, self._world.dead)
 
 
 class ExchangeRecorder(Protocol):
@@ -249,7 +257,8 @@ class ExchangeObserver:
 
     def __call__(self, world: World) -> None:
         """Record the tick that has ended."""
-        self._recorder.exchange(*world.intake.exchange, self._scene)
+        tick, nodes, observations, commands, _ = world.intake.exchange
+        self._recorder.exchange(tick, nodes, observations, commands, self._scene)
         self._scene = world.scene
 
 
@@ -276,13 +285,7 @@ def _result(
     link: WorldLink,
 ) -> RunResult:
     scenario, status, intake = world.scenario, world.status, world.intake
-    metrics = measure(world, scenario.metrics) | sampling.observers.metrics()
-    if scenario.radio is not None or scenario.coordinator is not None:
-        metrics["robots_done_fraction"] = world.completion.done_fraction
-        metrics |= radio_metrics(world.medium, scenario.robots.count, world.tick)
-    if cycles := metrics.get("deployment_cycles"):
-        metrics["ticks_per_cycle_mean"] = world.tick / cycles
-        metrics["messages_per_cycle_mean"] = messages(world.medium) / cycles
+    metrics = measure(world, sampling.observers)
     metrics["refused_messages"] = float(intake.refused.total())
     if isinstance(driver, RealTime):
         metrics["late_commands"] = float(intake.late_count)
@@ -316,7 +319,8 @@ def _result(
         history=sampling.history,
         cell_counts=counts,
         refused=dict(intake.refused + Counter(getattr(link, "refused", {}))),
-        series=sampling.observers.series(),
-        told=world.telemetry.told,
+        series={name: np.array(values) for name, values in sampling.observers.series().items()},
+        telemetry=world.telemetry.arrays(),
+        snapshots=world.telemetry.snapshots,
         tracebacks={node: failure.traceback for node, failure in status.failures.items()},
     )

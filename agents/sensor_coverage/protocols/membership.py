@@ -6,7 +6,7 @@ nobody is lost or counted twice: it has its place until it leaves, none until it
 """
 
 from collections.abc import Collection
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -92,11 +92,11 @@ class Membership:
         """A push is over that the robot was part of."""
         self._reserve.over(push)
 
-    def turn(self, sight: Collection[int]) -> dict[str, Any]:
-        """Go on, and return what is to be told to those who watch."""
+    def turn(self, sight: Collection[int]) -> bool | None:
+        """Go on; return whether the robot is now part of the complex where that has changed, else None."""
         if self._leaving is None:
-            return {}
-        told: dict[str, Any] = {}
+            return None
+        member: bool | None = None
         vicinity = self._robot.vicinity
         self._leaving.note(self._stands)
         versions = None
@@ -105,13 +105,13 @@ class Membership:
         if self._leaving.turn(self._redundant(sight, told=versions is not None), versions):
             vicinity.stand_down()
             self._leaving.note(stands=False)
-            self._out, told = True, {"removal": {"out": self._robot.node}}
+            self._out, member = True, False
         elif self._out and not vicinity.spare:
-            self._out, told = False, {"removal": {"in": self._robot.node}}
+            self._out, member = False, True
         self._reserve.turn()
         if self._counsel is not None:
             self._counsel.note(self._robot.tick, self._standing())
-        return told
+        return member
 
     def letters(self) -> list[tuple[int | None, Word]]:
         """Return what is to be sent now to robots, with whom it is for (None: all that hear it)."""

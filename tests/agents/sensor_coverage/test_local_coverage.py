@@ -21,11 +21,11 @@ from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
+from zwerm.run.measurement import measure
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.lockstep import LockStep
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 HALL = ("arena.size_m=[2.2,1.7]", "base.pose=[0.2,0.8,0.0]", "robots.count=18")
@@ -132,7 +132,7 @@ def test_robots_alone_cover_a_small_hall_about_as_well_as_with_a_coordinator(
 def test_nobody_is_lost_or_counted_twice_whatever_the_radio_does(air: tuple[str, ...]) -> None:
     scenario = load("sensor-coverage", (*ALONE, *air))
     outcome, world, robots = drive(scenario)
-    found = measure(world, scenario.metrics)
+    found = measure(world)
     places = [robot.vicinity.place for robot in robots if not robot._waiting]
     assert outcome == "completed"
     assert found["coverage_fraction"] >= 0.98

@@ -23,6 +23,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     write,
 )
 from zwerm.agents.sensor_coverage.motion.homing import offset, slid, unit
+from zwerm.run.measurement import measure
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.wire.messages import (
@@ -37,7 +38,6 @@ from zwerm.wire.messages import (
     open_answer,
 )
 from zwerm.wire.messages import encode as to_wire
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 # --- the mathematics of one robot -----------------------------------------------------------------------------------
@@ -261,7 +261,7 @@ def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
             world.crash(killed[-1], "struck by lightning")
 
     outcome, world = drive(scenario, kill)
-    found = measure(world, scenario.metrics)
+    found = measure(world)
     assert outcome == "completed"
     assert len(killed) == 2
     assert found["coverage_fraction"] >= 0.99
@@ -279,7 +279,7 @@ def test_a_robot_that_dies_at_the_door_is_followed_by_another(unlucky: int) -> N
     outcome, world = drive(scenario, kill)
     assert outcome == "completed"
     assert unlucky in world.status.crashed
-    assert measure(world, scenario.metrics)["coverage_fraction"] >= 0.99
+    assert measure(world)["coverage_fraction"] >= 0.99
 
 
 def test_robots_in_processes_leave_the_same_trace() -> None:

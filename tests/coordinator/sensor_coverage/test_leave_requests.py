@@ -24,6 +24,12 @@ from zwerm.agents.sensor_coverage.messages.commands import (
 )
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, ListRequest, Word, read
 from zwerm.agents.sensor_coverage.messages.peers import write as write_word
+from zwerm.agents.sensor_coverage.messages.snapshots import (
+    ComplexSnapshot,
+    MembershipSnapshot,
+    Snapshot,
+    decode_snapshot,
+)
 from zwerm.agents.sensor_coverage.negotiating_robot import NegotiatingRobot
 from zwerm.agents.sensor_coverage.protocols import leave_lock as redundancy
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox
@@ -53,7 +59,7 @@ class Pair:
         self.tick = self.number = 0
         self.answers: list[Answer] = []
         self.words: list[Word] = []
-        self.told: list[dict[str, dict[str, int]]] = []
+        self.changes: list[Snapshot | None] = []
         self.drives = False
 
     def turn(self, *said: Word, order: Order | None = None, again: bool = False) -> None:
@@ -74,7 +80,7 @@ class Pair:
             )
         )
         self.drives = command.drive not in (None, BodyVelocity())
-        self.told += [command.told] if command.told else []
+        self.changes += [decode_snapshot(command.snapshot)] if command.snapshot else []
         for each in command.outbox:
             if each.channel == CHANNEL:
                 word = read(each.payload)
@@ -141,12 +147,12 @@ def test_a_robot_under_no_lock_moves_at_once() -> None:
 def test_a_robot_leaves_once_when_it_is_asked_to_find_out_and_its_neighbour_agrees_and_says_so_until_it_moves() -> None:
     pair = Pair().rest()
     pair.leaves()
-    assert pair.told == [{"removal": {"out": 1}}]
+    assert pair.changes == [MembershipSnapshot(False)]
     assert [type(each) for each in pair.answers] == [LeftComplex]
     pair.turn(order=ScanRequest(3, ()))
     assert isinstance(pair.answers[-1], LeftComplex)
     pair.turn(order=AWAY)
-    assert pair.told[1:] == [{"removal": {"in": 1}}]
+    assert pair.changes[1:] == [MembershipSnapshot(True)]
     for _ in range(200):
         pair.turn()
     assert isinstance(pair.answers[-1], Arrived)
@@ -164,15 +170,15 @@ def test_a_robot_that_nobody_asked_and_one_whose_neighbour_does_not_agree_stay()
         pair.turn(redundancy.NeighbourList(1, (1,)))
     assert any(isinstance(each, redundancy.LockRequest) for each in pair.words)
     assert [type(each) for each in pair.answers] == [Report]
-    assert pair.told == []
+    assert pair.changes == []
     number = max(each.number for each in pair.words if isinstance(each, redundancy.LockRequest))
     pair.turn(redundancy.LockGrant(number))
-    assert pair.told == [], "it has said that it stays"
+    assert pair.changes == [], "it has said that it stays"
 
 
 def test_a_robot_without_memory_is_one_of_the_complex_and_stands_still_for_a_lease() -> None:
     pair = Pair(incarnation=2).rest()
-    assert pair.told == [{"removal": {"in": 1}}]
+    assert pair.changes == [MembershipSnapshot(True)]
     pair.turn(order=AWAY)
     while not pair.drives:
         pair.turn()
@@ -210,15 +216,25 @@ def test_who_has_left_is_taken_back_where_it_is_missed() -> None:
 # --- the whole swarm ------------------------------------------------------------------------------------------------
 
 
+def complexes(result: RunResult) -> list[tuple[float, ComplexSnapshot]]:
+    """Return the complexes that the coordinator reported, and when [s]."""
+    found = [(each.time_s, decode_snapshot(each.snapshot)) for each in result.snapshots]
+    return [(time_s, each) for time_s, each in found if isinstance(each, ComplexSnapshot)]
+
+
 def outs(result: RunResult, until_s: float = math.inf) -> tuple[dict[int, None], int]:
     """Return who had left by then and not come back, and how many had come back."""
     out: dict[int, None] = {}
     back = 0
-    for each in result.told:
-        removal = each.told.get("removal", {}) if each.time_s < until_s else {}
-        back += "in" in removal
-        out |= dict.fromkeys([removal["out"]] if "out" in removal else [])
-        out.pop(removal.get("in", -1), None)
+    for each in result.snapshots:
+        change = decode_snapshot(each.snapshot)
+        if each.time_s >= until_s or not isinstance(change, MembershipSnapshot):
+            continue
+        if change.member:
+            back += 1
+            out.pop(each.node, None)
+        else:
+            out[each.node] = None
     return out, back
 
 
@@ -250,10 +266,10 @@ def test_a_coordinator_that_begins_anew_learns_from_the_robots_who_has_left() ->
     crash = 'faults=[{kind="crash", at_s=129.0, nodes=["coordinator"], for_s=3.0}]'
     result = run("sensor-coverage", runner="inline", overrides=[*HALL, *CLOSE, OFTEN, crash])
     out, _ = outs(result, 129.0)
-    anew = [each.told["complex"] for each in result.told if each.time_s >= 132.0 and "complex" in each.told]
+    anew = [each for time_s, each in complexes(result) if time_s >= 132.0]
     assert out
-    assert not any(node in edge for node in out for edge in anew[0]["edges"])
-    assert any(path[0] in out for path in anew[0]["paths"])
+    assert not any(node in edge for node in out for edge in anew[0].edges)
+    assert any(path[0] in out for path in anew[0].paths)
     assert result.outcome == "completed"
     assert result.metrics["unsafe_removals"] == 0
 
@@ -266,7 +282,7 @@ def test_robots_are_spared_also_while_the_swarms_of_two_stations_have_not_met() 
     assert result.outcome == "time-limit"
     assert result.metrics["removals"] >= 1
     assert result.metrics["unsafe_removals"] == 0
-    assert max(each.told["complex"]["cycle"] for each in result.told if "complex" in each.told) > 5
+    assert max(each.cycle for _, each in complexes(result)) > 5
 
 
 def test_what_is_agreed_upon_in_processes_is_what_is_agreed_upon_inline() -> None:

@@ -9,17 +9,19 @@ import pytest
 from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.peers import NOWHERE, ListRequest, Word, read, write
+from zwerm.agents.sensor_coverage.messages.snapshots import MembershipSnapshot, decode_snapshot, encode_snapshot
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 from zwerm.deploy.node_specs import node_specs
 from zwerm.link.memory import MemoryLink
 from zwerm.maths.simplicial import FlagComplex, betti
 from zwerm.run.assembly import assemble
+from zwerm.run.measurement import truth_of
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Command
 from zwerm.world.drivers.lockstep import LockStep
-from zwerm.world.metrics.removals import removals
+from zwerm.world.metrics.sensor_coverage import removals
 from zwerm.world.world import World
 
 DT_S = 0.1
@@ -120,12 +122,13 @@ def test_robots_are_freed_and_pushed_again_while_words_are_lost_and_nobody_is_lo
     settings = (*HALL, *CLOSE, *LINK, "radio.loss=0.1", "time.duration_s=240.0")
     for seed in range(1, 9):  # not in every run there is anybody to spare
         world, robots = drive(load("sensor-coverage", settings), seed)
-        told = [each.told["removal"] for each in world.telemetry.told if "removal" in each.told]
+        changes = [decode_snapshot(each.snapshot) for each in world.telemetry.snapshots]
+        left, entered = changes.count(MembershipSnapshot(False)), changes.count(MembershipSnapshot(True))
         spare = [each.node for each in robots if each.vicinity.spare]
-        assert len(spare) == sum("out" in each for each in told) - sum("in" in each for each in told)
+        assert len(spare) == left - entered
         homeless = [each.node for each in robots if each.vicinity.place == NOWHERE]
         assert len(homeless) <= 2, "one waits at the base, and one may be on its way"
-        if any("in" in each for each in told):
+        if entered:
             break
     result = run("sensor-coverage", seed=seed, runner="processes", overrides=settings)
     assert result.trace == world.trace.hex()
@@ -140,10 +143,15 @@ def test_the_checker_finds_a_removal_that_opens_a_hole() -> None:
     world.scene.position[1:8] = [(2.0, 3.75), *around]
     world.scene.present[:] = True
     world.scene.present[0] = False
+
+    def report(node: int, member: bool) -> None:
+        command = Command(snapshot=encode_snapshot(MembershipSnapshot(member)))
+        world.telemetry.accept(world.scene, node, command)
+
     for node in (1, 2):  # the hub of a wheel, and then one of its rim: a hole comes, and goes
-        world.telemetry.hear(world.scene, node, Command(told={"removal": {"out": node}}), decides=False)
-        assert removals(world, 1.0) == {"removals": node, "unsafe_removals": node}
-    world.telemetry.hear(world.scene, 1, Command(told={"removal": {"in": 1}}), decides=False)
-    world.telemetry.hear(world.scene, 2, Command(told={"removal": {"in": 2}}), decides=False)
-    world.telemetry.hear(world.scene, 2, Command(told={"removal": {"out": 2}}), decides=False)
-    assert removals(world, 1.0) == {"removals": 3.0, "unsafe_removals": 2.0}
+        report(node, False)
+        assert removals(truth_of(world), 1.0) == {"removals": node, "unsafe_removals": node}
+    report(1, True)
+    report(2, True)
+    report(2, False)
+    assert removals(truth_of(world), 1.0) == {"removals": 3.0, "unsafe_removals": 2.0}
