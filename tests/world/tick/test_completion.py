@@ -15,8 +15,8 @@ from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.drivers.realtime import RealTime
 from zwerm.world.tick.completion import COMPLETED, FAILED, TIME_LIMIT, Completion, Ending
 
-COORDINATOR = {"coordinator": {"controller": "sensor-coverage"}}
-BASE = {"base": {"controller": "random-walk", "pose": [1.0, 1.0, 0.0]}}
+COORDINATOR: dict[str, Any] = {"coordinator": {"controller": "sensor-coverage"}}
+BASE: dict[str, Any] = {"base": {"controller": "random-walk", "pose": [1.0, 1.0, 0.0]}}
 
 
 def completion(done: Sequence[int], **tables: Any) -> Completion:
