@@ -14,8 +14,8 @@ from support import ROBOTS, robots_of_this_process
 if TYPE_CHECKING:  # most tests need no study
     from zwerm.study.study_tables import Study
 
-# A shell has what it runs in the background ignore Ctrl-C, children included, and Python leaves it at that: tests that press
-# it would wait for ever.
+# A shell makes its background processes ignore SIGINT, and Python and its children inherit this. Tests that send SIGINT would
+# then wait without end.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 

@@ -31,7 +31,7 @@ kind = "differential"
 cells = [2, 2]
 """
 
-# A robot's stream differs with the seed, so that a trial can be told to go wrong by it.
+# A robot's random stream depends on the seed, so a controller can fail for some seeds.
 CONTROLLERS = """
 import os, time
 from zwerm.agents.runtime.contract import Controller

@@ -101,7 +101,7 @@ def _declarations(
         if FIELD_OF.get(sensor) is None and not extra:
             found.append(f"sensors: {sensor!r} is none that Zwerm knows; give a reading of your own with extra=")
         if sensors is not None and sensor not in sensors:
-            found.append(f"sensors: it declares {sensor!r}, which check() was told not to give")
+            found.append(f"sensors: it declares {sensor!r}, which check() does not give")
     kind = getattr(controller, "Parameters", NoParameters)
     if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct)):
         found.append(f"Parameters: expected a msgspec.Struct, got {kind!r}")

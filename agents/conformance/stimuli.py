@@ -141,7 +141,7 @@ def _packets(channel: str, random: np.random.Generator) -> dict[str, list[Packet
     return {
         "an empty packet": [Packet(channel, b"", 1)],
         "packets of noise": noise,
-        "a packet of nobody": [Packet(channel, b"\x01", None)],
+        "a packet without a sender": [Packet(channel, b"\x01", None)],
         "the same packet twice": [Packet(channel, b"\x93\x01\x02\x03", 2)] * 2,
         "a long packet": [Packet(channel, bytes(20_000), 3)],
         "many packets": [Packet(channel, bytes([number]), number + 1) for number in range(_MANY)],

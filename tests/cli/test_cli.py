@@ -7,7 +7,7 @@ import pytest
 from command_line import zwerm
 
 from zwerm import __version__
-from zwerm.cli.app import COMMANDS
+from zwerm.catalogue import ALGORITHMS, COMMANDS, plugins
 from zwerm.scenario.load import built_in
 
 
@@ -16,6 +16,21 @@ def test_list_names_every_scenario() -> None:
     assert ran.returncode == 0
     for name in built_in():
         assert f"{name} " in ran.stdout
+
+
+def test_list_groups_scenarios_and_studies_by_algorithm_and_filters_them() -> None:
+    whole = json.loads(zwerm("list", "--json").stdout)["algorithms"]
+    assert [row["name"] for row in whole] == [row.name for row in ALGORITHMS]
+    assert {each["name"] for row in whole for each in row["entries"] if each["kind"] == "scenario"} == set(built_in())
+    some = json.loads(zwerm("list", "gossip", "--json").stdout)["algorithms"]
+    assert [each["name"] for row in some for each in row["entries"]] == ["gossip-max"]
+    assert "nothing in the catalogue has this text" in zwerm("list", "no such thing").stdout
+
+
+def test_list_names_the_plug_ins_of_every_kind() -> None:
+    ran = zwerm("list", "--plugins")
+    for kind, rows in plugins().items():
+        assert f"{kind}: {', '.join(rows)}" in " ".join(ran.stdout.split())
 
 
 def test_every_built_in_scenario_checks() -> None:

@@ -13,7 +13,7 @@ from zwerm.study.plan import make_points
 from zwerm.study.study_tables import load_study
 
 
-def test_a_variant_is_a_name_and_what_it_sets() -> None:
+def test_a_variant_argument_is_a_name_and_its_settings() -> None:
     assert parse_variant("central").set == []
     both = parse_variant("gradient:services.path=gradient, services.redundancy=link")
     assert (both.name, both.set) == ("gradient", ["services.path=gradient", "services.redundancy=link"])
@@ -22,7 +22,7 @@ def test_a_variant_is_a_name_and_what_it_sets() -> None:
 
 
 @pytest.mark.parametrize("text", ["", ":a=1", "name:", "name:a", "na/me", "name:a=1,b"])
-def test_what_is_no_variant_is_one_line(text: str) -> None:
+def test_a_malformed_variant_is_an_error_of_one_line(text: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         parse_variant(text)
     assert caught.value.mistakes == [f"--variant: expected NAME or NAME:PATH=VALUE,PATH=VALUE, got {text!r}"]
@@ -46,7 +46,7 @@ def test_a_sweep_lists_its_values_or_counts_them(text: str, values: list[object]
     assert sweep.levels == {}
 
 
-def test_a_sweep_of_tables_and_arrays_names_its_values() -> None:
+def test_a_sweep_of_tables_and_arrays_has_named_levels() -> None:
     sweep = parse_sweep("a.models+b.models=none:[],bursts:[{kind='bursts', n=3}],[1, 2]")
     assert sweep.values == ["none", "bursts", "[1, 2]"]
     assert sweep.levels["bursts"] == ["a.models=[{kind='bursts', n=3}]", "b.models=[{kind='bursts', n=3}]"]
@@ -66,23 +66,23 @@ def test_a_sweep_of_tables_and_arrays_names_its_values() -> None:
         ("radio.loss=a,b,...,c", "expected FIRST,SECOND,...,LAST in even steps"),
     ],
 )
-def test_what_is_no_sweep_is_one_line(text: str, rule: str) -> None:
+def test_a_malformed_sweep_is_an_error_of_one_line(text: str, rule: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         parse_sweep(text)
     assert caught.value.mistakes == [f"--sweep: {rule}, got {text!r}"]
 
 
-def test_one_variant_is_nothing_to_compare() -> None:
+def test_a_comparison_needs_two_variants() -> None:
     with pytest.raises(ScenarioError, match="variants: expected 2 at least to compare, got 0"):
         make_comparison("gossip-max")
 
 
-def test_a_figure_has_a_kind_that_can_be_drawn() -> None:
+def test_an_unsupported_figure_suffix_is_an_error() -> None:
     with pytest.raises(PictureError, match=r"figure.jpeg: expected a file that ends in .png or .pdf or .svg"):
         check_figure(Path("figure.jpeg"))
 
 
-def test_an_axis_sets_one_path_or_several_or_what_its_values_are_levels_of(gossip: Path) -> None:
+def test_an_axis_sets_one_path_or_several_or_levels_of_settings(gossip: Path) -> None:
     sweeps = ("radio.loss+robots.sensors.0.false_negative=0.25,0.5", "models=none:[],late:[]")
     study = planned(gossip, sweeps, base=None)
     study.table.set.append("robots.sensors=[{kind='line_of_sight'}]")
@@ -103,7 +103,7 @@ def test_an_axis_sets_one_path_or_several_or_what_its_values_are_levels_of(gossi
     assert (last.robots.count, points[2].scenario.robots.count) == (4, 10)
 
 
-def test_variants_grid_and_settings_come_from_a_study_and_what_is_given_here_wins(tmp_path: Path, gossip: Path) -> None:
+def test_arguments_override_the_variants_grid_and_settings_of_a_study(tmp_path: Path, gossip: Path) -> None:
     (tmp_path / "ways.toml").write_text(
         'seeds = 7\nmetrics = ["delivered_fraction"]\nscenario = "none"\nset = ["robots.count=5"]\n'
         '[[variants]]\nname = "a"\n[[variants]]\nname = "b"\nset = ["radio.loss=0.1"]\n'
@@ -130,7 +130,7 @@ def test_variants_grid_and_settings_come_from_a_study_and_what_is_given_here_win
         ("[levels.lag]\nnone = []", "levels.lag: expected what 'long' of the grid sets"),
     ],
 )
-def test_a_mistake_in_levels_is_one_line(tmp_path: Path, levels: str, mistake: str) -> None:
+def test_an_error_in_levels_is_one_line(tmp_path: Path, levels: str, mistake: str) -> None:
     text = 'scenario = "gossip-max"\nseeds = 1\nmetrics = ["delivered_fraction"]\n[grid]\nlag = ["none", "long"]\n'
     (tmp_path / "ways.toml").write_text(text + levels)
     with pytest.raises(ScenarioError, match=mistake):

@@ -20,15 +20,13 @@ from zwerm.study.rows import read_rows
 from zwerm.study.study_runner import run_study
 
 
-def test_a_sweep_of_loss_is_words_on_its_axis_and_any_other_is_its_path() -> None:
+def test_the_axis_label_of_a_loss_sweep_is_text_and_of_others_the_path() -> None:
     assert axis_label("radio.loss+uplink.loss") == axis_label("radio.loss") == "messages lost [fraction]"
     assert axis_label("faults.0.at_s") == "faults.0.at_s"
     assert axis_label("") == ""
 
 
-def test_a_comparison_goes_on_where_it_was_and_gives_in_processes_what_it_gives_inline(
-    gossip: Path, tmp_path: Path
-) -> None:
+def test_a_comparison_continues_and_gives_the_same_rows_in_processes_and_inline(gossip: Path, tmp_path: Path) -> None:
     study = planned(gossip, ("radio.loss=0.3",))
     inline = run_study(study, tmp_path / "inline.parquet", seeds=[1, 2], jobs=1)
     again = run_study(study, tmp_path / "inline.parquet", seeds=[1, 2, 3], jobs=1)
@@ -42,7 +40,7 @@ def test_a_comparison_goes_on_where_it_was_and_gives_in_processes_what_it_gives_
     assert here["often"] != here["seldom"]
 
 
-def test_there_is_one_figure_for_every_setting_of_the_further_sweeps(gossip: Path, tmp_path: Path) -> None:
+def test_each_value_of_a_second_sweep_has_its_own_figure(gossip: Path, tmp_path: Path) -> None:
     study = planned(gossip, ("radio.loss=0.0,0.5", "radio.range_m=0.8,1.0"))
     result = run_study(study, tmp_path / "out.parquet", seeds=[1, 2], jobs=1)
     for suffix, start in ((".png", b"\x89PNG"), (".pdf", b"%PDF")):
@@ -51,7 +49,7 @@ def test_there_is_one_figure_for_every_setting_of_the_further_sweeps(gossip: Pat
         assert all(path.read_bytes().startswith(start) for path in drawn)
 
 
-def test_a_line_goes_through_numbers_as_they_ascend_however_they_were_given(gossip: Path, tmp_path: Path) -> None:
+def test_a_line_connects_values_in_ascending_order(gossip: Path, tmp_path: Path) -> None:
     drawn: list[Any] = []
     for sweep in ("radio.loss=0.0,0.3,0.6", "radio.loss=0.3,0.6,0.0"):
         result = run_study(planned(gossip, (sweep,)), tmp_path / "out.parquet", seeds=[1], jobs=1)
@@ -60,9 +58,7 @@ def test_a_line_goes_through_numbers_as_they_ascend_however_they_were_given(goss
 
 
 @pytest.mark.parametrize("width", [80, 140])
-def test_tables_are_readable_on_a_narrow_terminal_and_no_wider_than_it(
-    gossip: Path, tmp_path: Path, width: int
-) -> None:
+def test_comparison_tables_fit_the_width_of_the_terminal(gossip: Path, tmp_path: Path, width: int) -> None:
     variants = [parse_variant(each) for each in ("as-it-is", "decentralised-seldom:robots.parameters.every_ticks=5")]
     sweeps = [parse_sweep("radio.loss+robots.body.radius_m=0.05,0.1"), parse_sweep("robots.parameters.done_at=9")]
     study = make_comparison(str(gossip), variants, sweeps, metrics=["messages_per_robot_mean"])
@@ -87,7 +83,7 @@ def zwerm(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_the_command_prints_tables_draws_a_figure_and_with_json_one_object(gossip: Path, tmp_path: Path) -> None:
+def test_compare_prints_tables_and_draws_a_figure_or_prints_one_json_object(gossip: Path, tmp_path: Path) -> None:
     command = ["compare", "talk.toml", "--seeds", "2", "--jobs", "1", "--sweep", "radio.loss=0.0,0.5"]
     command += [word for each in VARIANTS for word in ("--variant", each)]
     ran = zwerm(*command, cwd=tmp_path)
@@ -122,7 +118,9 @@ def test_the_command_prints_tables_draws_a_figure_and_with_json_one_object(gossi
         (["--variants", "nothing.toml"], "nothing.toml: expected a study's file or the name of a built-in one"),
     ],
 )
-def test_a_mistake_is_one_line_and_status_2(gossip: Path, tmp_path: Path, arguments: list[str], line: str) -> None:
+def test_an_input_error_of_compare_is_one_line_and_status_2(
+    gossip: Path, tmp_path: Path, arguments: list[str], line: str
+) -> None:
     ran = zwerm("compare", "talk.toml", *arguments, cwd=tmp_path)
     assert ran.returncode == 2
     assert line in ran.stderr
@@ -130,7 +128,7 @@ def test_a_mistake_is_one_line_and_status_2(gossip: Path, tmp_path: Path, argume
     assert ran.stdout == ""
 
 
-def test_a_study_too_is_one_json_object(gossip: Path, tmp_path: Path) -> None:
+def test_study_with_json_prints_one_object(gossip: Path, tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(
         'scenario = "talk.toml"\nseeds = 2\nmetrics = ["delivered_fraction", "nothing"]\n'
         "[[paper.points]]\nvalues = { delivered_fraction = { at_least = 0.01 } }\n"

@@ -20,7 +20,7 @@ from zwerm.study.study_tables import Study
 from zwerm.study.summary import Results
 
 
-def test_variants_of_one_seed_have_the_same_faults_at_random_and_the_same_places(gossip: Path) -> None:
+def test_variants_with_one_seed_have_the_same_random_faults_and_positions(gossip: Path) -> None:
     study = planned(gossip, ("random_faults.cut_per_h=36000.0",))
     study.table.set.append("random_faults.mean_s=0.2")
     often, seldom = make_points(study)
@@ -42,7 +42,7 @@ def rows_of(study: Study, told: dict[str, list[dict[str, Any]]]) -> Comparison:
     return Comparison(Results(study, points, rows))
 
 
-def test_a_difference_is_of_pairs_and_has_students_interval(gossip: Path) -> None:
+def test_a_difference_is_over_pairs_of_seeds_with_students_interval(gossip: Path) -> None:
     ours, theirs = [3.0, 5.0, 4.0, math.nan, 9.0], [2.5, 4.0, 4.25, 1.0]
     comparison = rows_of(
         planned(gossip, (), metrics=["cost"]),
@@ -62,7 +62,7 @@ def test_a_difference_is_of_pairs_and_has_students_interval(gossip: Path) -> Non
     assert comparison.sample(place.points[1], "cost").n == 4
 
 
-def test_a_run_that_failed_counts_with_what_it_measured_and_is_told_by_its_reason(gossip: Path) -> None:
+def test_a_failed_run_counts_with_its_measured_values_and_its_reason(gossip: Path) -> None:
     gave_up = "node 160 gave up: cut-off: no path leads to the frontier, 3 frontier edges left"
     crashed = "node {} crashed at tick 5: ValueError"
     comparison = rows_of(
@@ -86,7 +86,7 @@ def test_a_run_that_failed_counts_with_what_it_measured_and_is_told_by_its_reaso
     assert comparison.difference(place, place.points[1], "completed").mean == -0.5
 
 
-def test_a_coordinators_crash_is_nothing_to_a_variant_without_one_which_is_run_once(tmp_path: Path) -> None:
+def test_a_setting_without_effect_on_a_variant_runs_its_trials_once(tmp_path: Path) -> None:
     study = make_comparison(
         "sensor-coverage",
         [parse_variant("central"), parse_variant("decentralised:services.path=gradient")],
@@ -106,7 +106,7 @@ def test_a_coordinators_crash_is_nothing_to_a_variant_without_one_which_is_run_o
     assert comparison.difference(crash, crash.points[1], "coverage_fraction").n == 2
 
 
-def test_what_nothing_measured_or_all_as_zero_is_left_out_unless_it_was_asked_for(gossip: Path) -> None:
+def test_unmeasured_and_zero_metrics_are_left_out_unless_requested(gossip: Path) -> None:
     rows = [{"outcome": "completed", "coverage_fraction": 0.0, "robots_deployed": 3.0}]
     told = {"often": rows, "seldom": rows}
     assert rows_of(planned(gossip, ()), told).metrics == ["robots_deployed"]
@@ -138,5 +138,5 @@ def test_a_mean_and_its_interval_have_the_same_digits(values: tuple[int, float, 
         ("sim_s", "duration of the run [s]"),
     ],
 )
-def test_a_metric_on_an_axis_is_words_with_a_unit(metric: str, words: str) -> None:
+def test_the_label_of_a_metric_is_text_with_its_unit(metric: str, words: str) -> None:
     assert label(metric) == words

@@ -43,18 +43,6 @@ def examples(language: str) -> list[tuple[str, str, str]]:
 # --- what is generated ----------------------------------------------------------------------------------------------
 
 
-def test_every_generator_is_used_and_every_mark_is_known(generated: ModuleType) -> None:
-    used = [name for page in PAGES for name in generated.MARK.findall(page.read_text(encoding="utf-8"))]
-    assert sorted(used) == sorted(generated.GENERATED)
-
-
-def test_a_mark_is_replaced_and_the_text_around_it_stays(generated: ModuleType) -> None:
-    page = generated.on_page_markdown("before\n\n<!-- generated: built-in-scenarios -->\n\nafter", page=None)
-    assert page.startswith("before\n\n| scenario |")
-    assert page.endswith("|\n\nafter")
-    assert "`computation-free`" in page
-
-
 def keys_of(model: type) -> set[str]:
     schema = model.model_json_schema()  # type: ignore[attr-defined]
     tables = [schema, *(each for name, each in schema["$defs"].items() if name != "OpenTable")]

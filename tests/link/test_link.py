@@ -1,4 +1,4 @@
-"""Links: one suite for every implementation, then what only a link between processes can do."""
+"""Links: tests of both implementations, then tests of the link between processes."""
 
 import contextlib
 import signal
@@ -68,7 +68,7 @@ def take(link: WorldLink, count: int) -> dict[int, list[bytes]]:
     return taken
 
 
-def test_thousands_of_messages_arrive_in_the_order_of_each_node_and_exactly_once(open_link: Open) -> None:
+def test_messages_of_each_node_arrive_in_order_and_exactly_once(open_link: Open) -> None:
     link = open_link(lambda payload: b"answer " + payload)
     count = 2_000
     for number in range(count):
@@ -100,7 +100,7 @@ def test_without_messages_receive_returns_none(open_link: Open) -> None:
     assert link.receive(0.05) is None
 
 
-def test_closing_twice_is_closing_once(open_link: Open) -> None:
+def test_closing_a_link_twice_is_allowed(open_link: Open) -> None:
     link = open_link(bytes)
     link.send(0, b"x")
     link.close()
@@ -127,7 +127,7 @@ def net(private_tmp: Path) -> Iterator[Network]:
         yield opened
 
 
-def test_receive_waits_as_long_as_it_is_told_even_after_a_longer_wait(net: Network) -> None:
+def test_receive_waits_for_its_own_timeout_after_a_longer_one(net: Network) -> None:
     node = net.node(0)
     node.join()
     threading.Timer(0.1, node.send, [b"x"]).start()
@@ -138,7 +138,7 @@ def test_receive_waits_as_long_as_it_is_told_even_after_a_longer_wait(net: Netwo
     node.close()
 
 
-def test_many_are_received_once_enough_have_arrived_or_a_node_is_lost(net: Network) -> None:
+def test_receive_many_returns_after_enough_messages_or_the_loss_of_a_node(net: Network) -> None:
     node = net.node(0)
     node.join()
     for number in range(3):
@@ -155,7 +155,7 @@ def test_many_are_received_once_enough_have_arrived_or_a_node_is_lost(net: Netwo
     assert net.link.receive_many(1, 0.1) == [], "a loss ends one wait only"
 
 
-def test_a_node_that_sends_more_than_anybody_takes_is_held_back(
+def test_a_node_that_sends_faster_than_the_world_receives_is_blocked(
     private_tmp: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("zwerm.link.world_link.CAPACITY", 10)
@@ -171,7 +171,7 @@ def test_a_node_that_sends_more_than_anybody_takes_is_held_back(
         node.close()
 
 
-def test_a_closed_link_says_so(net: Network) -> None:
+def test_receiving_from_a_closed_link_raises_an_error(net: Network) -> None:
     net.link.close()
     with pytest.raises(LinkError, match=r"^the world's link is closed"):
         net.link.receive(1.0)
@@ -193,7 +193,7 @@ HELLOS = {
 }
 
 
-def test_a_hello_that_is_wrong_is_refused_for_its_reason_and_counted(net: Network) -> None:
+def test_a_wrong_hello_is_refused_and_counted_by_its_reason(net: Network) -> None:
     session = net.session(net.credentials.nodes[0])
     for payload, reason in HELLOS.items():
         net.link.refused.clear()
@@ -206,7 +206,7 @@ def test_a_hello_that_is_wrong_is_refused_for_its_reason_and_counted(net: Networ
     session.close()
 
 
-def test_a_node_that_is_not_expected_is_refused(private_tmp: Path) -> None:
+def test_a_hello_of_an_unexpected_node_is_refused(private_tmp: Path) -> None:
     with network(private_tmp, members={0: ExpectedNode(1, "nobody", NIL)}) as net:
         node = net.node(1)
         with pytest.raises(LinkError, match=r"^node 1 at unixsock-stream/.*: the world refuses it: unknown$"):
@@ -215,7 +215,7 @@ def test_a_node_that_is_not_expected_is_refused(private_tmp: Path) -> None:
         assert net.link.refused == {"unknown": 1}
 
 
-def test_a_command_from_a_node_that_has_not_joined_is_counted_and_not_heard(net: Network) -> None:
+def test_a_command_of_a_node_that_has_not_joined_is_counted_and_discarded(net: Network) -> None:
     session = net.session(net.credentials.nodes[0])
     session.put(command_key(RUN, 0), b"early")
     ask(session, 0, hello(0, 9))  # answered after the command has arrived
@@ -227,7 +227,7 @@ def test_a_command_from_a_node_that_has_not_joined_is_counted_and_not_heard(net:
     session.close()
 
 
-def test_a_node_that_has_not_joined_cannot_hold_up_the_world(net: Network) -> None:
+def test_a_node_that_has_not_joined_cannot_block_the_world(net: Network) -> None:
     session = net.session(net.credentials.nodes[0])
     over = threading.Event()
 
@@ -246,7 +246,7 @@ def test_a_node_that_has_not_joined_cannot_hold_up_the_world(net: Network) -> No
     session.close()
 
 
-def test_what_is_sent_while_a_node_is_still_joining_is_not_lost(net: Network) -> None:
+def test_a_message_to_a_joining_node_is_not_lost(net: Network) -> None:
     node = net.node(0)
     node.join()
     for number in range(100):
@@ -259,7 +259,7 @@ def test_what_is_sent_while_a_node_is_still_joining_is_not_lost(net: Network) ->
     node.close()
 
 
-def test_zenoh_s_threads_keep_what_python_knows_of_them_from_one_message_to_the_next(net: Network) -> None:
+def test_python_keeps_the_state_of_zenohs_thread_between_messages(net: Network) -> None:
     node = net.node(0)
     node.join()
     own, threads, counts = threading.local(), set(), []
@@ -277,7 +277,7 @@ def test_zenoh_s_threads_keep_what_python_knows_of_them_from_one_message_to_the_
     node.close()
 
 
-def test_a_dismissed_node_hears_goodbye_and_its_leaving_is_no_loss(net: Network) -> None:
+def test_a_dismissed_node_receives_goodbye_and_is_not_reported_lost(net: Network) -> None:
     node, other = net.node(0), net.node(1)
     node.join()
     other.join()
@@ -293,7 +293,7 @@ def test_a_dismissed_node_hears_goodbye_and_its_leaving_is_no_loss(net: Network)
     other.close()
 
 
-def test_a_node_that_takes_leave_has_been_heard_out_and_its_place_is_free_again(net: Network) -> None:
+def test_all_messages_before_a_confirmed_goodbye_arrive_and_the_node_can_join_again(net: Network) -> None:
     node = net.node(0)
     node.join()
     for number in range(500):
@@ -317,7 +317,7 @@ def test_a_node_that_takes_leave_has_been_heard_out_and_its_place_is_free_again(
     again.close()
 
 
-def test_a_node_that_takes_leave_is_not_heard_out_before_the_world_confirms_it(net: Network) -> None:
+def test_a_goodbye_is_confirmed_only_when_the_world_answers(net: Network) -> None:
     node = net.node(0)
     node.join()
     node.send(b"last words")
@@ -330,10 +330,10 @@ def test_a_node_that_takes_leave_is_not_heard_out_before_the_world_confirms_it(n
     assert [net.link.receive(20.0) for _ in range(2)] == [Arrival(0, b"last words"), Arrival(0, None)]
     heard.clear()
     node.send_goodbye("again", heard.set)
-    assert heard.is_set(), "a link that is closed has nobody to wait for"
+    assert heard.is_set(), "closing the link confirms a goodbye"
 
 
-def test_closing_ends_the_wait_for_a_world_that_does_not_confirm(net: Network) -> None:
+def test_closing_the_link_ends_the_wait_for_a_confirmation(net: Network) -> None:
     node = net.node(0)
     node.join()
     heard = threading.Event()
@@ -343,7 +343,7 @@ def test_closing_ends_the_wait_for_a_world_that_does_not_confirm(net: Network) -
         assert heard.wait(20.0)
 
 
-def test_a_node_learns_that_the_world_is_gone(private_tmp: Path) -> None:
+def test_a_node_is_told_when_the_world_is_lost(private_tmp: Path) -> None:
     gone = threading.Event()
     with network(private_tmp) as net:
         node = net.node(0, on_lost=gone.set)
@@ -352,7 +352,7 @@ def test_a_node_learns_that_the_world_is_gone(private_tmp: Path) -> None:
     node.close()
 
 
-def test_a_message_that_is_far_too_long_is_not_even_put_together(net: Network) -> None:
+def test_the_router_discards_a_message_above_its_size_limit(net: Network) -> None:
     node = net.node(0)
     node.join()
     node.send(bytes(20 * MESSAGE_BYTES_MAX))
@@ -372,7 +372,7 @@ def said(link: WorldLink, node: int, tick: int) -> Arrival | None:
     return link.receive(20.0)
 
 
-def test_a_killed_process_is_reported_and_comes_back_as_a_new_incarnation(nothing_left: None) -> None:
+def test_a_killed_process_is_reported_lost_and_restarts_as_a_new_incarnation(nothing_left: None) -> None:
     with echo_swarm(3) as swarm:
         assert said(swarm.link, 1, 0) is not None
         swarm.supervisor.kill(1)
@@ -390,7 +390,7 @@ def test_a_killed_process_is_reported_and_comes_back_as_a_new_incarnation(nothin
     assert set(swarm.supervisor.exit_codes.values()) == {0}
 
 
-def test_a_stopped_process_is_not_lost_and_answers_when_it_goes_on(nothing_left: None) -> None:
+def test_a_paused_process_is_not_lost_and_answers_after_it_resumes(nothing_left: None) -> None:
     with echo_swarm(2) as swarm:
         swarm.supervisor.send_signal(0, signal.SIGSTOP)
         status = Path(f"/proc/{swarm.supervisor.pids[0]}/status")

@@ -50,7 +50,7 @@ def wait_for_rows(journal: Path) -> None:
     until(lambda: journal.exists() and journal.read_bytes().count(b"\n") >= 2, "rows", DEADLINE_S)
 
 
-def test_ctrl_c_keeps_what_is_done_and_leaves_no_process(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_ctrl_c_keeps_the_rows_of_a_study_and_leaves_no_process(write: Callable[..., Study], tmp_path: Path) -> None:
     write(TINY.replace("seeds = 3", "seeds = 500"), "Slow")
     process = start(tmp_path, "tiny.toml", "--out", "out.parquet", "--jobs", "2")
     wait_for_rows(tmp_path / "out.parquet.journal")
@@ -76,7 +76,7 @@ def test_a_killed_study_leaves_no_process_and_its_rows_in_the_journal(
     assert run_here(load_study(str(tmp_path / "tiny.toml")), tmp_path / "out.parquet", seeds=range(1, 3)).ran == 0
 
 
-def test_the_command_prints_a_table_and_says_with_its_status_how_it_went(
+def test_study_prints_a_table_and_exits_with_the_status_of_its_trials(
     write: Callable[..., Study], tmp_path: Path
 ) -> None:
     write(GRID + "[[paper.points]]\nat = { 'robots.count' = 1 }\nvalues = { cell_coverage_fraction = 0.9 }")

@@ -47,13 +47,15 @@ from zwerm.study.study_tables import Study, built_in, load_study, parse_seeds
         ),
     ],
 )
-def test_a_mistake_in_a_study_is_one_line(write: Callable[..., Study], tmp_path: Path, text: str, mistake: str) -> None:
+def test_an_error_in_a_study_file_is_one_line(
+    write: Callable[..., Study], tmp_path: Path, text: str, mistake: str
+) -> None:
     with pytest.raises(ScenarioError) as raised:
         write(text)
     assert raised.value.mistakes == [f"{tmp_path / 'tiny.toml'}: {mistake}"]
 
 
-def test_a_mistake_in_a_scenario_names_the_point_of_the_grid_once(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_an_error_in_a_scenario_names_the_point_of_the_grid_once(write: Callable[..., Study], tmp_path: Path) -> None:
     study = write(TINY + "[grid]\n'robots.count' = [4, -1]\n'time.dt_s' = [0.1, 0.2]")
     with pytest.raises(ScenarioError) as raised:
         make_points(study)
@@ -61,7 +63,7 @@ def test_a_mistake_in_a_scenario_names_the_point_of_the_grid_once(write: Callabl
     assert raised.value.mistakes == [f"{place}: robots.count: expected >= 1, got -1"]
 
 
-def test_an_unknown_study_is_one_line_with_those_that_are_known() -> None:
+def test_an_unknown_study_is_an_error_of_one_line_with_the_known_names() -> None:
     with pytest.raises(
         ScenarioError, match=r"^nope: expected a study's file .* built in are computation-free-comparison,"
     ):
@@ -79,7 +81,7 @@ def test_seeds_are_a_count_a_list_or_a_range(write: Callable[..., Study]) -> Non
             parse_seeds(text)
 
 
-def test_every_variant_is_run_at_every_point_with_every_seed(write: Callable[..., Study]) -> None:
+def test_each_variant_runs_at_each_point_with_each_seed(write: Callable[..., Study]) -> None:
     study = write(
         TINY
         + "set = ['time.duration_s=3']\n[grid]\nn = [1, 4]\n'time.dt_s' = [0.1, 1]\n"
@@ -119,7 +121,7 @@ def test_every_variant_is_run_at_every_point_with_every_seed(write: Callable[...
         ("computation-free-shapes", 3 * 1000),
     ],
 )
-def test_a_study_of_the_computation_free_swarm_is_as_large_as_the_papers(name: str, trials: int) -> None:
+def test_the_computation_free_studies_have_as_many_trials_as_the_paper(name: str, trials: int) -> None:
     study = load_study(name)
     points = make_points(study)
     assert len(make_trials(study, points, study.table.seeds)) == trials
@@ -128,7 +130,7 @@ def test_a_study_of_the_computation_free_swarm_is_as_large_as_the_papers(name: s
 
 
 @pytest.mark.parametrize("name", sorted(built_in()))
-def test_a_built_in_study_is_ready_to_run(name: str) -> None:
+def test_a_built_in_study_has_valid_scenarios(name: str) -> None:
     study = load_study(name)
     assert make_points(study)
     assert study.table.summary

@@ -16,7 +16,7 @@ from zwerm.study.study_tables import Published, Study
 from zwerm.study.summary import SummaryLine
 
 
-def test_a_mean_has_students_interval() -> None:
+def test_the_interval_of_a_mean_is_students() -> None:
     values = [0.5, 0.75, 0.25, 0.9, 0.6]
     n, mean, sd, half = condense(values)
     low, high = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
@@ -44,13 +44,13 @@ def test_a_mean_has_students_interval() -> None:
         (condense([0.5, 0.6]), None, None, None),
     ],
 )
-def test_the_papers_value_is_met_within_the_interval_and_the_tolerance(
+def test_a_papers_value_agrees_within_the_interval_and_the_tolerance(
     sample: Sample, published: Published | None, trials: int | None, agrees: bool | None
 ) -> None:
     assert SummaryLine("", {}, "m", sample, published, trials).agrees is agrees
 
 
-def test_a_papers_values_find_their_points(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_a_papers_values_are_assigned_to_their_points(write: Callable[..., Study], tmp_path: Path) -> None:
     study = write(
         GRID
         + "[[variants]]\nname = 'a'\n[[variants]]\nname = 'b'\n"
@@ -70,7 +70,7 @@ def test_a_papers_values_find_their_points(write: Callable[..., Study], tmp_path
     assert lines[0].agrees
 
 
-def test_the_least_covered_cell_is_that_of_the_means_over_all_trials(
+def test_the_least_covered_cell_is_that_of_the_mean_counts_over_all_trials(
     write: Callable[..., Study], tmp_path: Path
 ) -> None:
     study = write(TINY.replace('["cell_coverage_fraction"]', '["least_cell_robots", "most_cell_robots"]'))
@@ -80,7 +80,9 @@ def test_the_least_covered_cell_is_that_of_the_means_over_all_trials(
     assert [line.sample.mean for line in result.results.lines()] == pytest.approx([min(means), max(means)])
 
 
-def test_a_metric_that_nothing_measures_is_told(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_a_metric_without_measurements_is_reported_with_the_known_ones(
+    write: Callable[..., Study], tmp_path: Path
+) -> None:
     study = write(TINY.replace('"cell_coverage_fraction"', '"cel_coverage"'))
     results = run_here(study, tmp_path / "out.parquet").results
     assert results.unknown_metrics() == ["cel_coverage"]
@@ -102,7 +104,7 @@ def test_a_metric_that_nothing_measures_is_told(write: Callable[..., Study], tmp
     ],
     ids=["line", "bars", "heatmap", "series", "tracks", "tracks with cells", "density"],
 )
-def test_a_study_is_drawn(write: Callable[..., Study], tmp_path: Path, text: str) -> None:
+def test_each_kind_of_study_figure_is_drawn(write: Callable[..., Study], tmp_path: Path, text: str) -> None:
     result = run_here(write(text), tmp_path / "out.parquet")
     with Image.open(draw_study(tmp_path / "out.png", result.results)) as image:
         assert len(image.convert("RGB").getcolors(1 << 24) or []) > 10

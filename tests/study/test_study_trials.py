@@ -14,7 +14,7 @@ from zwerm.study.study_runner import run_study
 from zwerm.study.study_tables import Study
 
 
-def test_a_row_is_what_the_run_of_that_seed_gives(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_a_row_equals_the_result_of_a_run_with_its_seed(write: Callable[..., Study], tmp_path: Path) -> None:
     result = run_here(write(GRID), tmp_path / "out.parquet")
     assert (result.planned, result.ran, result.done, result.failed, result.interrupted) == (6, 6, 6, 0, False)
     rows = read_rows(tmp_path / "out.parquet")
@@ -30,7 +30,7 @@ def test_a_row_is_what_the_run_of_that_seed_gives(write: Callable[..., Study], t
     assert rows[0]["trace"] != rows[1]["trace"]
 
 
-def test_a_study_goes_on_where_it_was_and_runs_nothing_twice(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_a_study_continues_with_its_missing_trials_only(write: Callable[..., Study], tmp_path: Path) -> None:
     out, study = tmp_path / "out.parquet", write(GRID)
     assert run_here(study, out, seeds=[1, 2]).ran == 4
     before = read_rows(out)
@@ -41,9 +41,7 @@ def test_a_study_goes_on_where_it_was_and_runs_nothing_twice(write: Callable[...
     assert (fewer.ran, fewer.done, len(read_rows(out))) == (0, 2, 6)
 
 
-def test_rows_of_a_scenario_that_has_changed_are_run_again_and_replaced(
-    write: Callable[..., Study], tmp_path: Path
-) -> None:
+def test_rows_of_a_changed_scenario_are_replaced(write: Callable[..., Study], tmp_path: Path) -> None:
     out = tmp_path / "out.parquet"
     run_here(write(GRID), out)
     before = {row["fingerprint"] for row in read_rows(out)}
@@ -60,7 +58,7 @@ def test_rows_of_a_scenario_that_has_changed_are_run_again_and_replaced(
     assert run_here(write(GRID), out, sets=["time.duration_s=1"]).ran == 6
 
 
-def test_a_row_is_safe_as_soon_as_its_trial_has_ended(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_a_row_is_stored_when_its_trial_ends(write: Callable[..., Study], tmp_path: Path) -> None:
     out, study = tmp_path / "out.parquet", write(TINY)
 
     class Stop:
@@ -85,14 +83,14 @@ def test_a_row_is_safe_as_soon_as_its_trial_has_ended(write: Callable[..., Study
     assert not journal.exists()
 
 
-def test_two_studies_do_not_write_to_one_file(tmp_path: Path) -> None:
+def test_a_second_study_with_the_same_file_is_refused(tmp_path: Path) -> None:
     with Rows(tmp_path / "out.parquet"), pytest.raises(ScenarioError, match="another study is writing to it"):
         Rows(tmp_path / "out.parquet")
     with Rows(tmp_path / "out.parquet"):
         pass
 
 
-def test_a_file_of_something_else_is_left_alone(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_a_file_without_study_results_is_refused_and_unchanged(write: Callable[..., Study], tmp_path: Path) -> None:
     out = tmp_path / "notes.parquet"
     out.write_text("my notes")
     with pytest.raises(ScenarioError, match="expected a Parquet file of a study's results"):
@@ -100,7 +98,7 @@ def test_a_file_of_something_else_is_left_alone(write: Callable[..., Study], tmp
     assert out.read_text() == "my notes"
 
 
-def test_a_file_that_cannot_be_written_is_one_line(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_is_an_error_of_one_line(write: Callable[..., Study], tmp_path: Path) -> None:
     out = tmp_path / "tiny-scenario.toml" / "out.parquet"
     study = write(TINY)
     with pytest.raises(ScenarioError) as raised:
@@ -108,7 +106,7 @@ def test_a_file_that_cannot_be_written_is_one_line(write: Callable[..., Study], 
     assert raised.value.mistakes[0].startswith(f"{out}: cannot be written: ")
 
 
-def test_a_file_that_the_scenario_names_is_part_of_what_a_row_stands_for(
+def test_a_change_of_a_file_named_by_the_scenario_changes_the_fingerprint(
     write: Callable[..., Study], tmp_path: Path
 ) -> None:
     study = write(TINY)
@@ -122,7 +120,7 @@ def test_a_file_that_the_scenario_names_is_part_of_what_a_row_stands_for(
     assert before.fingerprint == same.fingerprint != after.fingerprint
 
 
-def test_a_trial_that_fails_is_a_row_with_its_reason(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_a_failed_trial_gives_a_row_with_its_reason(write: Callable[..., Study], tmp_path: Path) -> None:
     out = tmp_path / "out.parquet"
     study = write(TINY.replace("seeds = 3", "seeds = 8"), "Raises")
     result = run_here(study, out)
@@ -137,14 +135,14 @@ def test_a_trial_that_fails_is_a_row_with_its_reason(write: Callable[..., Study]
     assert run_here(study, out, retry=True).ran == len(failed)
 
 
-def test_a_placement_that_finds_no_room_fails_its_trial_only(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_a_placement_without_room_fails_its_trial_only(write: Callable[..., Study], tmp_path: Path) -> None:
     study = write(TINY + "[grid]\n'robots.count' = [2, 300]")
     result = run_here(study, tmp_path / "out.parquet")
     outcomes = {(row["robots.count"], row["outcome"]) for row in read_rows(result.path)}
     assert outcomes == {(2, "time-limit"), (300, "failed")}
 
 
-def test_a_process_that_dies_takes_its_own_trial_only(write: Callable[..., Study], tmp_path: Path) -> None:
+def test_a_worker_that_dies_fails_its_own_trial_only(write: Callable[..., Study], tmp_path: Path) -> None:
     study = write(TINY.replace("seeds = 3", "seeds = 6"), "Dies")
     result = run_study(study, tmp_path / "dies.parquet", jobs=2)
     rows = read_rows(result.path)

@@ -18,21 +18,9 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperGroup
 
+from zwerm.catalogue import COMMANDS
 from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err
 from zwerm.version import __version__
-
-# The built-in commands, in the order of `zwerm --help`: name -> module:function.
-COMMANDS: Final[dict[str, str]] = {
-    "list": "zwerm.cli.list_command:list_scenarios",
-    "check": "zwerm.cli.check_command:check",
-    "run": "zwerm.cli.run_command:run",
-    "world": "zwerm.cli.world_command:world",
-    "robot": "zwerm.cli.robot_command:robot",
-    "twin": "zwerm.cli.twin_command:twin",
-    "shrink": "zwerm.cli.shrink_command:shrink",
-    "study": "zwerm.cli.study_command:study",
-    "compare": "zwerm.cli.compare_command:compare",
-}
 
 HELP: Final = (
     "Emulate robot swarms as what they are: many processes that pass messages, with bit-identical runs.\n\n"

@@ -11,7 +11,6 @@ from rich.table import Table
 
 if TYPE_CHECKING:  # progress needs neither
     from zwerm.run.result import RunResult
-    from zwerm.scenario.tables import Scenario
 
 
 class RunProgress:
@@ -60,18 +59,6 @@ class RunProgress:
         if task is None:
             task = self._tasks[title] = self._progress.add_task(title, total=total, unit=unit)
         self._progress.update(task, completed=done, unit=unit)
-
-
-def print_scenarios(console: Console, scenarios: Sequence["Scenario"]) -> None:
-    """Print the built-in scenarios as a table."""
-    table = Table(box=None, padding=(0, 2, 0, 0), title_justify="left")
-    table.add_column("scenario", style="bold", no_wrap=True)
-    table.add_column("robots", justify="right")
-    table.add_column("duration", justify="right")
-    table.add_column("what it is")
-    for each in scenarios:
-        table.add_row(each.name, str(each.robots.count), f"{each.time.duration_s:g} s", each.summary)
-    console.print(table)
 
 
 def print_result(console: Console, result: "RunResult", drawn: Sequence[Path]) -> None:

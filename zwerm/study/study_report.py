@@ -9,7 +9,6 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from zwerm.study.study_tables import Study
 from zwerm.study.summary import Results, SummaryLine
 
 # Period of the speed estimate: trials are long and differ in length.
@@ -55,19 +54,6 @@ class StudyProgress:
         self._failed += failed
         note = f", [red]{self._failed} failed[/red]" if self._failed else ""
         self._progress.update(self._task, advance=1, failed=note)
-
-
-def print_studies(console: Console, studies: list[Study]) -> None:
-    """Print the built-in studies as a table."""
-    table = Table(box=None, padding=(0, 2, 0, 0), title_justify="left")
-    table.add_column("study", style="bold", no_wrap=True)
-    table.add_column("trials", justify="right")
-    table.add_column("what it is")
-    for study in studies:
-        grid = math.prod(len(axis) for axis in study.table.grid.values())
-        trials = len(study.variants) * grid * len(study.table.seeds)
-        table.add_row(study.name, str(trials), study.table.summary)
-    console.print(table)
 
 
 def print_results(console: Console, results: Results) -> None:

@@ -4,6 +4,7 @@ The rules are those of a scenario: unknown keys and wrong types are refused, and
 `file: path: rule, got value`. `plan` checks whether the settings exist in the scenario.
 """
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -143,6 +144,11 @@ class Study:
     def variants(self) -> list[VariantTable]:
         """The variants; one without a name if the file has none."""
         return self.table.variants or [VariantTable.model_construct(name="")]
+
+    @property
+    def trials(self) -> int:
+        """The number of trials: variants times points of the grid times seeds."""
+        return len(self.variants) * math.prod(len(axis) for axis in self.table.grid.values()) * len(self.table.seeds)
 
     def published(self, variant: str, settings: Mapping[str, Setting]) -> dict[str, Published]:
         """Return the paper's value of each metric at this point, with its tolerance; later tables override earlier ones."""

@@ -56,12 +56,12 @@ class Wanderer:
         return Command(drive=drive, outbox=outbox, wake=Wake(at_s=observation.time_s + 1.0, on_packet=True))
 
 
-def test_a_controller_of_somebody_elses_conforms() -> None:
+def test_a_controller_without_the_base_class_conforms() -> None:
     check(Wanderer, {"speed_m_s": 0.2})
     check(Wanderer, {"speed_m_s": 0.2}, channels=())
 
 
-def test_a_lazy_import_is_no_input_or_output() -> None:
+def test_an_import_inside_step_is_no_violation() -> None:
     def step(self: Any, observation: Observation) -> Command:
         if observation.tick == 1:
             sys.modules.pop("colorsys", None)
@@ -72,7 +72,7 @@ def test_a_lazy_import_is_no_input_or_output() -> None:
     check(stepping(step))
 
 
-def test_a_sensor_of_ones_own_is_read_from_extra() -> None:
+def test_a_user_sensor_is_read_from_extra() -> None:
     def step(self: Any, observation: Observation) -> Command:
         assert observation.extra is not None
         return Command(drive=WheelSpeeds(observation.extra["light"][0], 0.0))
@@ -107,7 +107,7 @@ def test_every_controller_of_the_documentation_conforms(shelf: list[type[Any]]) 
         check(controller)
 
 
-def test_the_guides_example_of_the_kit_says_what_the_kit_says(shelf: list[type[Any]]) -> None:
+def test_the_guides_example_shows_the_kits_real_output(shelf: list[type[Any]]) -> None:
     guide = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
     (text,) = re.findall(r"^```pycon\n(.*?)^```$", guide, re.M | re.S)
     example = doctest.DocTestParser().get_doctest(text, {}, "the guide", None, None)
@@ -117,7 +117,7 @@ def test_the_guides_example_of_the_kit_says_what_the_kit_says(shelf: list[type[A
 # --- the bad: what it is --------------------------------------------------------------------------------------------
 
 
-def test_all_violations_are_told_at_once_with_the_controllers_name() -> None:
+def test_all_violations_are_reported_at_once_with_the_controllers_name() -> None:
     def step(self: Any, observation: Observation) -> Command:
         time.time()
         print("hello")  # noqa: T201
@@ -136,17 +136,17 @@ def test_all_violations_are_told_at_once_with_the_controllers_name() -> None:
     assert len(str(raised.value).splitlines()) == 5
 
 
-def test_what_is_no_controller_class_is_refused() -> None:
+def test_an_object_that_is_no_controller_class_is_refused() -> None:
     assert violations(still) == [f"expected a class, got {still!r}"]
     assert violations(type("Empty", (), {})) == ["it has no method step(observation)"]
     assert violations(stepping(still, sensors="touch")) == ["sensors: expected a tuple of names, got 'touch'"]
     assert violations(stepping(still, Parameters=dict)) == ["Parameters: expected a msgspec.Struct, got <class 'dict'>"]
     assert violations(stepping(still, sensors=("touch",)), sensors=["pose"]) == [
-        "sensors: it declares 'touch', which check() was told not to give"
+        "sensors: it declares 'touch', which check() does not give"
     ]
 
 
-def test_a_constructor_takes_one_setup_and_its_parameters() -> None:
+def test_a_constructor_that_refuses_its_setup_is_a_violation() -> None:
     class Two(Controller):
         def __init__(self, setup: Setup, speed: float) -> None:
             super().__init__(setup)
@@ -166,7 +166,7 @@ def test_a_constructor_takes_one_setup_and_its_parameters() -> None:
     assert violations(NoBody) == ["the constructor refuses its Setup: needs wings"]
 
 
-def test_a_setup_stays_as_it_was() -> None:
+def test_a_constructor_that_changes_its_setup_is_a_violation() -> None:
     class Keeps(Controller):
         def __init__(self, setup: Setup) -> None:
             setup.parameters["mine"] = 1
@@ -194,15 +194,13 @@ def raises_on(condition: Callable[[Observation], object]) -> type[Controller]:
         (lambda o: o.neighbours == (), "nothing to be seen"),
         (lambda o: len(o.neighbours or ()) > 50, "everything to be seen"),
         (lambda o: o.touch and o.touch[0].half_width_rad > 3.0, "the ends of every range"),
-        (lambda o: any(packet.sender is None for packet in o.inbox), "a packet of nobody"),
+        (lambda o: any(packet.sender is None for packet in o.inbox), "a packet without a sender"),
         (lambda o: any(packet.payload == b"" for packet in o.inbox), "an empty packet"),
         (lambda o: len(o.inbox) > 50, "many packets"),
         (lambda o: o.tick > 2**31 - 1, "tick 2147483648"),
     ],
 )
-def test_an_odd_observation_that_it_does_not_stand_is_named(
-    condition: Callable[[Observation], object], title: str
-) -> None:
+def test_the_observation_that_makes_step_raise_is_named(condition: Callable[[Observation], object], title: str) -> None:
     found = violations(raises_on(condition))
     place = f"{__file__}:{raises_on.__code__.co_firstlineno + 3}"
     assert f"step() raised ValueError: odd at {place}, on {title} as its first observation" in found
@@ -225,13 +223,13 @@ def test_an_odd_observation_that_it_does_not_stand_is_named(
         (Command(outbox=(Transmission("robots", b"", -1),)), "step() sends to node -1"),
     ],
 )
-def test_an_answer_that_the_world_would_refuse_is_told(answer: Any, violation: str) -> None:
+def test_an_answer_that_the_world_refuses_is_a_violation(answer: Any, violation: str) -> None:
     found = violations(stepping(lambda self, observation: answer))
     assert found
     assert all(each.startswith(violation) for each in found), found
 
 
-def test_a_drive_that_fits_no_body_is_told() -> None:
+def test_a_drive_command_that_fits_no_body_is_a_violation() -> None:
     def step(self: Any, observation: Observation) -> Command:
         return Command(drive=WheelSpeeds() if observation.tick % 2 else BodyVelocity())
 
@@ -239,7 +237,7 @@ def test_a_drive_that_fits_no_body_is_told() -> None:
     assert violations(stepping(step))
 
 
-def test_sending_without_a_radio_is_told() -> None:
+def test_sending_without_a_radio_is_a_violation() -> None:
     sends = stepping(lambda self, observation: Command(outbox=(Transmission("robots", b""),)))
     check(sends)
     assert all("its Setup names none" in found for found in violations(sends, channels=()))

@@ -29,7 +29,7 @@ from zwerm.wire.messages import Command, Observation, WheelSpeeds
 
 
 def doing(action: Callable[[], object]) -> type[Controller]:
-    """Return a controller whose answers are good whatever `action` gives."""
+    """Return a controller that calls `action` in each step and returns a correct command."""
 
     def step(self: Any, observation: Observation) -> Command:
         if observation.tick == 1:
@@ -64,23 +64,23 @@ def doing(action: Callable[[], object]) -> type[Controller]:
         (lambda: subprocess.run(["true"], check=True), "starts a process (subprocess.Popen)"),
     ],
 )
-def test_what_a_controller_must_not_do_is_told_with_its_line(action: Callable[[], object], violation: str) -> None:
+def test_a_forbidden_action_is_reported_with_its_line(action: Callable[[], object], violation: str) -> None:
     here = f", at {__file__}:{action.__code__.co_firstlineno}"
     assert any(each.startswith(violation) and each.endswith(here) for each in violations(doing(action)))
 
 
-def test_the_global_stream_of_numpy_is_told_and_left_as_it_was() -> None:
+def test_use_of_numpys_global_stream_is_reported_and_undone() -> None:
     before = np.random.get_state()[1].tolist()  # type: ignore[index]  # noqa: NPY002
     assert violations(doing(lambda: np.random.rand())) == ["draws from a global random stream: numpy.random"]  # noqa: NPY002
     assert np.random.get_state()[1].tolist() == before  # type: ignore[index]  # noqa: NPY002
 
 
-def test_printing_is_told() -> None:
+def test_printing_is_a_violation() -> None:
     assert violations(doing(lambda: print("where am I"))) == ["prints: 'where am I'"]  # noqa: T201
     assert violations(doing(lambda: sys.stderr.write("help\n"))) == ["prints: 'help'"]
 
 
-def test_what_a_constructor_must_not_do_is_told() -> None:
+def test_a_forbidden_action_in_the_constructor_is_reported() -> None:
     class Late(Controller):
         def __init__(self, setup: Setup) -> None:
             super().__init__(setup)
@@ -92,7 +92,7 @@ def test_what_a_constructor_must_not_do_is_told() -> None:
     assert found.startswith("reads the wall clock: time.time(), at ")
 
 
-def test_the_traps_are_gone_afterwards(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_purity_monitor_is_inactive_after_the_check(capsys: pytest.CaptureFixture[str]) -> None:
     profiler = sys.getprofile()
     check(doing(lambda: None))
     assert sys.getprofile() is profiler
@@ -105,7 +105,7 @@ def test_the_traps_are_gone_afterwards(capsys: pytest.CaptureFixture[str]) -> No
 DIFFERENT = "two controllers with the same Setup answer the same observations differently"
 
 
-def test_chance_that_is_not_its_own_stream_is_told() -> None:
+def test_randomness_outside_the_setups_stream_is_a_violation() -> None:
     class Unseeded(Controller):
         def __init__(self, setup: Setup) -> None:
             self.random = np.random.default_rng()
@@ -118,7 +118,7 @@ def test_chance_that_is_not_its_own_stream_is_told() -> None:
     assert found.endswith("(first at observation 0, nothing to be seen)")
 
 
-def test_state_that_outlives_a_controller_is_told() -> None:
+def test_state_that_outlives_a_controller_is_a_violation() -> None:
     class Counts(Controller):
         steps = 0
 
@@ -130,7 +130,7 @@ def test_state_that_outlives_a_controller_is_told() -> None:
     assert found.startswith(DIFFERENT)
 
 
-def test_state_that_is_shared_with_its_neighbours_is_told() -> None:
+def test_state_shared_between_controllers_is_a_violation() -> None:
     class Blackboard(Controller):
         board: ClassVar[dict[int, int]] = {}
 
@@ -147,7 +147,7 @@ def test_state_that_is_shared_with_its_neighbours_is_told() -> None:
 
 
 @pytest.mark.parametrize("name", ["OrderOfASet", "HashOfAName"])
-def test_an_answer_that_depends_on_the_hash_seed_is_told(name: str) -> None:
+def test_an_answer_that_depends_on_the_hash_seed_is_a_violation(name: str) -> None:
     (found,) = violations(find(f"bad_controllers:{name}"))
     assert found.startswith("its answers differ in another process with another PYTHONHASHSEED")
 
@@ -156,7 +156,7 @@ def test_a_sorted_set_is_no_violation() -> None:
     check(find("bad_controllers:OrderOfASortedSet"))
 
 
-def test_an_observation_stays_as_it_was() -> None:
+def test_a_step_that_changes_its_observation_is_a_violation() -> None:
     def step(self: Any, observation: Observation) -> Command:
         msgspec.structs.force_setattr(observation, "time_s", 0.5)
         return Command(drive=WheelSpeeds())
@@ -167,7 +167,7 @@ def test_an_observation_stays_as_it_was() -> None:
 
 
 @pytest.mark.parametrize("field", ["line_of_sight", "pose", "compass_rad"])
-def test_reading_a_sensor_that_is_not_declared_is_told(field: str) -> None:
+def test_reading_an_undeclared_sensor_is_a_violation(field: str) -> None:
     def step(self: Any, observation: Observation) -> Command:
         return Command(drive=WheelSpeeds(0.1 if getattr(observation, field) else 0.0, 0.0))
 
@@ -177,7 +177,7 @@ def test_reading_a_sensor_that_is_not_declared_is_told(field: str) -> None:
     check(stepping(step), sensors=[kind])
 
 
-def test_a_sensor_that_is_not_declared_and_breaks_it_is_told_as_well() -> None:
+def test_an_undeclared_sensor_is_reported_even_if_step_raises() -> None:
     def step(self: Any, observation: Observation) -> Command:
         return Command(drive=WheelSpeeds(len(observation.touch), 0.0))  # type: ignore[arg-type]
 
