@@ -22,7 +22,7 @@ from zwerm.study.plan import Point
 from zwerm.study.study_tables import Setting, Study, VariantTable, check_study
 from zwerm.study.summary import Results
 from zwerm.study.trial import Row
-from zwerm.world.drivers.lockstep import FAILED
+from zwerm.world.tick.completion import FAILED
 
 # Default metrics to compare: those of them that a run measured, unless all values are zero.
 METRICS: Final = (

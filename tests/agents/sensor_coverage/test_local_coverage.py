@@ -47,7 +47,7 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
         held = [each.local_map.slot for each in robots if each.push is None and each.local_map.slot != NOWHERE]
         assert len(held) == len(set(held)), f"tick {world.tick}: each has a place of its own, but {sorted(held)}"
 
-    driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), watch)
+    driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), [watch])
     return driver.run(), world, out()
 
 
