@@ -235,7 +235,7 @@ METRICS: Final = {
 
 def plugins() -> dict[str, Mapping[str, str]]:
     """Return the rows of every kind of plug-in."""
-    return {"sensor": SENSORS, "field": FIELDS, "radio model": RADIO_MODELS, "command": COMMANDS}
+    return {"sensor": SENSORS, "field": FIELDS, "radio model": RADIO_MODELS, "metric": METRICS, "command": COMMANDS}
 
 
 def row_of(file_name: str) -> Algorithm | None:
