@@ -1,12 +1,13 @@
 """A run as pandas frames, in long form. pandas comes with the extra `frames`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from zwerm.errors import MissingExtraError
 from zwerm.run.positions import Positions
+from zwerm.world.scene import Floats
 from zwerm.world.tick.telemetry import TelemetryArrays
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ FrameKind = Literal["positions", "metrics", "telemetry"]
 
 
 def frame_of(
-    kind: FrameKind, positions: Positions, series: Mapping[str, Sequence[float]], telemetry: TelemetryArrays
+    kind: FrameKind, positions: Positions, series: Mapping[str, Floats], telemetry: TelemetryArrays
 ) -> "DataFrame":
     """Return the frame that `RunResult.to_frame` describes."""
     if kind not in get_args(FrameKind):
