@@ -14,6 +14,7 @@ import zwerm
 from zwerm.catalogue import SENSORS
 from zwerm.run.assembly import assemble
 from zwerm.run.result import RunResult
+from zwerm.run.runner import run
 from zwerm.scenario.load import built_in, validate
 from zwerm.scenario.tables import Scenario
 from zwerm.study.study_tables import StudyTable
@@ -99,7 +100,41 @@ def titled(words: str) -> str:
     return found[1] if found else ""
 
 
-@pytest.mark.parametrize(("page", "words", "text"), [each for each in examples("python") if titled(each[1])])
+# The plug-ins of the recipes, by module: a scenario that has them, and a key of its result that proves their effect.
+PLUG_INS: dict[str, tuple[list[str], str]] = {
+    "rain": (['radio.models=[{kind="rain:Rain", mm_per_h=30.0}]'], "rain"),
+    "flood": (
+        [
+            'faults=[{kind="flood:Flood", area_m=[-100.0, -100.0, 100.0, 100.0], at_s=0.0, for_s=0.5}]',
+            'random_faults={"flood:Flood_per_h"=3600.0}',
+        ],
+        "flood",
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("module", "text"),
+    [(titled(words), text) for _, words, text in examples("python") if titled(words) in PLUG_INS],
+)
+def test_every_plug_in_in_the_documentation_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, text: str
+) -> None:
+    (tmp_path / f"{module}.py").write_text(text, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    overrides, cause = PLUG_INS[module]
+    result = run("gossip-max", 1, "inline", [*overrides, "time.duration_s=3"])
+    assert result.radio["dropped"][cause] > 0
+
+
+def test_the_documentation_has_every_plug_in_that_these_tests_run() -> None:
+    assert {titled(words) for _, words, _ in examples("python")} >= set(PLUG_INS)
+
+
+@pytest.mark.parametrize(
+    ("page", "words", "text"),
+    [each for each in examples("python") if titled(each[1]) and titled(each[1]) not in PLUG_INS],
+)
 def test_every_controller_in_the_documentation_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, page: str, words: str, text: str
 ) -> None:
