@@ -25,7 +25,7 @@ from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, FAULTS, FIELDS, RADIO
 from zwerm.cli.app import app
 from zwerm.run.runner import run
 from zwerm.scenario.load import built_in, load
-from zwerm.scenario.tables import Scenario
+from zwerm.scenario.tables import Scenario, metrics_table
 from zwerm.scenario.types import OpenTable
 from zwerm.study.study_tables import StudyTable
 from zwerm.wire import messages as protocol
@@ -119,6 +119,9 @@ def study_tables() -> str:
 def _tables(model: type[BaseModel], root: str) -> str:
     schema = model.model_json_schema()
     definitions = schema.get("$defs", {})
+    if "MetricsTable" in definitions:  # its keys are rows of the catalogue
+        metrics = metrics_table().model_json_schema()
+        definitions |= metrics.pop("$defs", {}) | {"MetricsTable": metrics}
     parts: list[str] = []
 
     def describe(table: Schema, path: str, title: str) -> None:

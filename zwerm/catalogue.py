@@ -57,6 +57,7 @@ class Algorithm:
 
 _SENSOR_COVERAGE: Final = "zwerm.agents.sensor_coverage"
 _SENSOR_COVERAGE_COORDINATOR: Final = "zwerm.coordinator.sensor_coverage"
+_SENSOR_COVERAGE_METRICS: Final = "zwerm.world.metrics.sensor_coverage"
 _NEGOTIATING: Final[Controllers] = {
     ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}.negotiating_robot:NegotiatingRobot"},
     BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}.negotiating_robot:NegotiatingBase"},
@@ -107,6 +108,11 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
                 stations_max=1,
                 controllers=_DECENTRALISED,
             ),
+        ),
+        metrics=(
+            f"{_SENSOR_COVERAGE_METRICS}:Deployment",
+            f"{_SENSOR_COVERAGE_METRICS}:Conclusion",
+            f"{_SENSOR_COVERAGE_METRICS}:Removals",
         ),
         layers=("zwerm.view.sensor_coverage:ComplexLayer",),
         scenarios=("sensor-coverage*",),
@@ -217,6 +223,14 @@ FAULTS: Final = {
 
 # Former names of radio models, which scenarios may still use, and the current names.
 RENAMED_RADIO_MODELS: Final = {"bursts": "gilbert_elliott", "walls": "wall_attenuation"}
+
+# Metrics by the key of `[metrics]` that switches them on; the value of the key is validated by the class's `Parameters`.
+METRICS: Final = {
+    "cells": "zwerm.world.metrics.coverage:CellCoverage",
+    "coverage_radius_m": "zwerm.world.metrics.coverage:AreaCoverage",
+    "voronoi": "zwerm.world.metrics.voronoi_coverage:VoronoiMetrics",
+    "sight_range_m": "zwerm.world.metrics.sight_coverage:SightCoverage",
+}
 
 
 def plugins() -> dict[str, Mapping[str, str]]:

@@ -5,12 +5,24 @@ are reported at once, each as `file: path: rule, got value`. What a sensor or a 
 to type; the tables here carry them as they are.
 """
 
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    SerializeAsAny,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    create_model,
+    model_validator,
+)
 
-from zwerm.catalogue import FAULTS, Variant, algorithm_of
+from zwerm.catalogue import FAULTS, METRICS, Variant, algorithm_of
+from zwerm.scenario.plugin_names import class_named
 from zwerm.scenario.services import choose, lacking
 from zwerm.scenario.types import (
     ARRAY,
@@ -203,29 +215,37 @@ def _is_rate(key: str) -> bool:
     return kind != key and (kind in FAULTS or ":" in kind)
 
 
-class VoronoiMetricsTable(Table):
-    """Coverage of the field by Voronoi cells: errors, cost, when statistics of the error fall below `converged_m`.
-
-    With `peak_m` also the density in `rings` about it. The first `stationary` robots have cells, and no errors.
-    """
-
-    converged_m: Positive = 1e-7
-    peak_m: Point | None = None
-    rings: Count = 10
-    stationary: Annotated[int, Field(ge=0)] = 0
-
-
 class MetricsTable(Table):
-    """What is measured of the run; metrics whose settings are absent are not computed.
+    """What is measured of the run. Each other key switches on the metrics of its row in the catalogue, and is typed there.
 
-    What is measured all through the run is looked at every `every_s`.
+    Metrics that sample during a run do so every `every_s`. `own` names metrics of the user's own as `module:name`: a
+    subclass of `zwerm.Metric`, or a function of the truth.
     """
 
-    cells: Grid | None = None
-    coverage_radius_m: Positive | None = None
-    sight_range_m: Positive | None = None
     every_s: Positive | None = None
-    voronoi: VoronoiMetricsTable | None = None
+    own: list[str] = []
+
+    def __getattr__(self, name: str) -> Any:
+        """Return None for a key of the catalogue that the scenario does not give."""
+        if name in METRICS:
+            return None
+        return super().__getattr__(name)  # type: ignore[misc]
+
+
+@cache
+def metrics_table(keys: tuple[str, ...] = tuple(METRICS)) -> type[MetricsTable]:
+    """Return the table `[metrics]` with these keys of the catalogue, each typed by the `Parameters` of its row's class."""
+    fields: dict[str, Any] = {
+        key: (class_named(METRICS[key], "metric", METRICS).Parameters | None, None) for key in keys
+    }
+    return create_model("MetricsTable", __base__=MetricsTable, __doc__=MetricsTable.__doc__, **fields)
+
+
+def _metrics(given: Any, otherwise: ValidatorFunctionWrapHandler) -> Any:
+    """Validate `[metrics]` by the rows of the keys that it has."""
+    if isinstance(given, dict):
+        return metrics_table(tuple(key for key in METRICS if key in given)).model_validate(given)
+    return otherwise(given)
 
 
 class PicturesTable(Table):
@@ -252,7 +272,7 @@ class Scenario(Table):
     uplink: ChannelTable | None = None
     faults: list[OpenTable] = []
     random_faults: RandomFaultsTable | None = None
-    metrics: MetricsTable = MetricsTable()
+    metrics: Annotated[SerializeAsAny[MetricsTable], WrapValidator(_metrics)] = MetricsTable()
     pictures: PicturesTable = PicturesTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")

@@ -127,7 +127,7 @@ def test_jitter_reorders_and_an_inbox_is_in_the_order_of_arrival() -> None:
     assert order != sorted(order)
 
 
-def test_copies_have_their_rate_and_are_judged_by_themselves() -> None:
+def test_copies_have_their_rate_and_random_numbers_of_their_own() -> None:
     models = [{"kind": "duplication", "fraction": 0.25, "copies": 2}, {"kind": "loss", "fraction": 0.5}]
     summary = Radio(ring(10), models).all_broadcast(200)
     within(summary["copies"] / 18_000, 0.5, 2 * math.sqrt(0.25 * 0.75), 18_000)
@@ -193,7 +193,7 @@ def test_collisions_follow_pure_aloha() -> None:
     assert found == pytest.approx(survives, abs=Z99 * math.sqrt(survives * (1 - survives) / (400 * count / 2)))
 
 
-def test_only_who_is_in_range_of_both_loses_and_who_sends_hears_nothing_meanwhile() -> None:
+def test_a_collision_needs_both_senders_in_range_and_a_sender_receives_nothing_meanwhile() -> None:
     # 0 and 2 are hidden from each other; 1 hears both, 3 hears only 2.
     model = {"kind": "collision", "airtime_s": 0.1, "range_m": 1.5}
     radio = Radio([(10, 10), (11, 10), (12, 10), (13, 10)], [{"kind": "range", "range_m": 1.5}, model])
@@ -210,7 +210,7 @@ def test_only_who_is_in_range_of_both_loses_and_who_sends_hears_nothing_meanwhil
 # --- space ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_packet_carries_its_range_and_no_further() -> None:
+def test_a_packet_reaches_its_range_and_no_further() -> None:
     radio = Radio([(10, 10), (12, 10), (12.001, 10)], range_m=2.0)
     radio.step({0: (Transmission("robots", b"x"),)})
     radio.step({})
@@ -218,7 +218,7 @@ def test_a_packet_carries_its_range_and_no_further() -> None:
     assert radio.medium.summary()["dropped"] == {"out-of-range": 1}
 
 
-def test_line_of_sight_is_looked_along_again_when_a_robot_has_moved() -> None:
+def test_line_of_sight_is_computed_again_after_a_robot_moved() -> None:
     radio = Radio([(10, 10), (12, 10)], walls=[[[11, 9], [11, 11]]], line_of_sight=True)
     radio.one_link(2)
     radio.position[1] = 10, 12
@@ -228,7 +228,7 @@ def test_line_of_sight_is_looked_along_again_when_a_robot_has_moved() -> None:
     assert (summary["delivered"], summary["dropped"]) == (2, {"no-line-of-sight": 3})
 
 
-def test_walls_take_their_decibels_by_material_and_region() -> None:
+def test_walls_attenuate_by_material_and_region() -> None:
     walls = [[[11, 0], [11, 20]], [[12, 0], [12, 20]], [[13, 0], [13, 20]]]
 
     def delivered(margin_db: float, **more: Any) -> int:
@@ -241,7 +241,7 @@ def test_walls_take_their_decibels_by_material_and_region() -> None:
     assert (delivered(3.0, loss_db=1.0), delivered(2.9, loss_db=1.0)) == (1, 0)
 
 
-def test_a_line_through_a_corner_meets_one_of_its_two_walls() -> None:
+def test_a_line_through_a_corner_crosses_one_of_its_two_walls() -> None:
     model = {"kind": "wall_attenuation", "loss_db": 1.0, "margin_db": 1.5}
     radio = Radio(
         [(10, 10), (12, 10)], [model], walls=[[[11, 9], [11, 10], [11, 11]], [[11, 9.5], [11, 10], [11.5, 11]]]
@@ -266,7 +266,7 @@ def test_path_loss_follows_its_curve_over_the_distance() -> None:
         within(1.0 - lost[apart].mean(), expected, math.sqrt(expected * (1 - expected)) or 1e-9, lost[apart].size)
 
 
-def test_walls_before_a_path_loss_weaken_what_it_receives() -> None:
+def test_wall_attenuation_before_a_path_loss_reduces_the_received_power() -> None:
     weak = {"kind": "path_loss", "shadowing_sd_db": 0.0, "width_db": 0.1, "sensitivity_dbm": -75.0}
     walls = [[[15, 0], [15, 20]]]
     assert Radio([(10, 10), (20, 10)], [weak], walls=walls).one_link(10)["delivered"] == 10
@@ -288,7 +288,7 @@ def test_shadowing_is_log_normal_lasting_and_the_same_in_both_directions() -> No
     assert summary["dropped"]["weak-signal"] > 0
 
 
-# --- who ------------------------------------------------------------------------------------------------------------
+# --- senders and receivers --------------------------------------------------------------------------------------------
 
 
 def test_a_one_way_link_stays_one_way() -> None:
@@ -321,13 +321,13 @@ ALL_RANDOM = [
 ]
 
 
-def test_adding_a_robot_changes_nobody_elses_draws() -> None:
+def test_another_robot_changes_no_random_numbers_of_other_links() -> None:
     four = heard(Radio(ring(4), ALL_RANDOM), 60, 4)
     assert four == heard(Radio([*ring(4), (52.0, 50.0)], ALL_RANDOM), 60, 4)
     assert four != heard(Radio(ring(4), ALL_RANDOM, seed=2), 60, 4)
 
 
-def test_adding_a_model_of_another_kind_changes_no_other_models_draws() -> None:
+def test_another_model_changes_no_random_numbers_of_other_models() -> None:
     idle = {"kind": "rate_limit", "rate_bytes_s": 1e12, "queue_bytes": 1e12}
     four = heard(Radio(ring(4), ALL_RANDOM), 60, 4)
     assert four == heard(Radio(ring(4), [idle, *ALL_RANDOM]), 60, 4)
@@ -336,7 +336,7 @@ def test_adding_a_model_of_another_kind_changes_no_other_models_draws() -> None:
     assert heard(Radio(ring(4), named), 60, 4) == heard(Radio(ring(4), [another, *named]), 60, 4)
 
 
-def test_what_one_robot_sends_changes_nobody_elses_draws() -> None:
+def test_the_packets_of_one_robot_change_no_random_numbers_of_other_links() -> None:
     def run(silent: bool) -> list[Any]:
         radio = Radio(ring(4), ALL_RANDOM)
         for tick in range(60):
@@ -403,7 +403,7 @@ def test_a_former_name_of_a_model_works_with_one_warning_and_the_same_random_num
     assert capsys.readouterr().err == f"zwerm: warning: small.toml: {warning}\n"
 
 
-def test_every_former_name_is_tried_here() -> None:
+def test_these_tests_try_every_former_name() -> None:
     assert set(FORMER) == set(RENAMED_RADIO_MODELS)
 
 
@@ -444,7 +444,7 @@ def test_a_mistake_in_a_model_is_one_line(model: dict[str, Any], line: str) -> N
     assert caught.value.mistakes == [line]
 
 
-def test_the_pairs_of_a_channel_are_all_there_and_those_that_are_stopped_are_told() -> None:
+def test_a_channel_lists_all_its_pairs_and_the_blocked_ones() -> None:
     radio = Radio([(50.0 + node, 50.0) for node in range(20)], [{"kind": "range", "range_m": 17.5}])
     pairs = radio.medium.channels["robots"].pairs()
     assert sorted(pairs) == [(a, b) for a in range(20) for b in range(20) if a != b]
