@@ -192,9 +192,9 @@ def test_a_leader_that_stays_occupies_the_new_slot_if_its_follower_came_after_al
 @pytest.mark.parametrize(
     ("settings", "line"),
     [
-        (("services.path=mesh",), 'services.path: expected "coordinator" or "gradient", got "mesh"'),
+        (("services.path=mesh",), "services.path: expected 'coordinator' or 'gradient', got 'mesh'"),
         (("services.pathh=gradient",), "services.pathh"),
-        (("services.path=gradient",), "services.path: robots find the path from one base station"),
+        (("services.path=gradient",), "services: path=gradient, redundancy=none needs 1 to 1 base stations, got 3"),
     ],
 )
 def test_an_invalid_choice_of_services_is_one_line(settings: tuple[str, ...], line: str) -> None:
