@@ -12,6 +12,7 @@ BUILT_IN: Final = {
     "beacon": "zwerm.agents.gossip:Beacon",
     "computation-free": "zwerm.agents.computation_free:ComputationFree",
     "gossip-max": "zwerm.agents.gossip:GossipMax",
+    "landmark-exploration": "zwerm.agents.landmark_exploration:Explorer",
     "random-walk": "zwerm.agents.computation_free:RandomWalk",
     "sensor-coverage": "zwerm.agents.sensor_coverage:Robot",
     "voronoi-coverage": "zwerm.agents.voronoi_coverage:VoronoiCoverage",

@@ -18,6 +18,7 @@ COORDINATOR: Final = "coordinator"
 PARTS: Final = {
     (BASE, "sensor-coverage"): "zwerm.agents.sensor_coverage:Base",
     (COORDINATOR, "sensor-coverage"): "zwerm.coordinator.sensor_coverage:SensorCoverage",
+    (COORDINATOR, "landmark-exploration"): "zwerm.coordinator.landmark_exploration:LandmarkCoordinator",
 }
 
 # The same where robots find the path among themselves.
@@ -76,6 +77,8 @@ def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
     channels = (("robots",) if scenario.radio is not None else ()) + (("uplink",) if scenario.coordinator else ())
     chosen = scenario.services or ServicesTable()
     services = {"path": chosen.path, "redundancy": chosen.spares}
+    if chosen.map is not None or chosen.assignment is not None:
+        services = {"map": chosen.map or "coordinator", "assignment": chosen.assignment or "coordinator"}
     players: dict[int, tuple[str, Setup]] = {}
 
     def add(node: int, role: str, controller: str, parameters: dict[str, Any]) -> None:

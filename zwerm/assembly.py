@@ -13,6 +13,7 @@ from zwerm.scenario import Scenario
 from zwerm.world.arena import Arena
 from zwerm.world.fields import Field, make_field
 from zwerm.world.meters import Meters, make_meters
+from zwerm.world.scatter import with_landmarks
 from zwerm.world.sensors import Sensor, Surroundings
 from zwerm.world.sensors.registry import BUILT_IN, make_sensors
 from zwerm.world.world import World
@@ -25,6 +26,7 @@ def assemble(scenario: Scenario, seed: int) -> World:
 
     Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the placement.
     """
+    scenario = _with_landmarks(scenario, seed)
     prepared = prepare(scenario)
     mistakes: list[str] = []
     world = _attempt(lambda: World(scenario, seed, *prepared), scenario, mistakes)
@@ -46,6 +48,7 @@ def prepare(scenario: Scenario) -> Prepared:
 
     Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
     """
+    scenario = _with_landmarks(scenario, 1)
     mistakes: list[str] = []
     field, table = None, scenario.field
     sensors, meters = None, None
@@ -61,6 +64,16 @@ def prepare(scenario: Scenario) -> Prepared:
     if arena is None or sensors is None or meters is None or mistakes:
         raise ScenarioError(mistakes)
     return Prepared(arena, sensors, meters)
+
+
+def _with_landmarks(scenario: Scenario, seed: int) -> Scenario:
+    """Return the scenario with its landmarks scattered, or as it is where the arena has a mistake: `prepare` reports that."""
+    try:
+        return with_landmarks(scenario, seed)
+    except ScenarioError as error:
+        if any(line.startswith("scatter") for line in error.mistakes):
+            raise ScenarioError([f"{scenario.place}: {line}" for line in error.mistakes]) from None
+        return scenario
 
 
 def _attempt(make: Callable[[], T], scenario: Scenario, mistakes: list[str]) -> T | None:

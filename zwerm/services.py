@@ -11,12 +11,17 @@ class ServicesTable(BaseModel):
     With `path` `gradient` robots find the way to the frontier by themselves, and with it fence and frontier, where it ends, and
     that all is over, when there is none. By `redundancy`, who can be spared is found by the coordinator, by relative
     homology; with `link` by robots, by agreement among neighbours; or not at all. A coordinator may find that alone.
+
+    `map` and `assignment` are the services of landmark exploration: robots merge the map by `gossip`, and choose their
+    frontiers by themselves, by `claims`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     path: Literal["coordinator", "gradient"] = "coordinator"
     redundancy: Literal["coordinator", "link", "none"] | None = None
+    map: Literal["coordinator", "gossip"] | None = None
+    assignment: Literal["coordinator", "claims"] | None = None
 
     @property
     def spares(self) -> str:
@@ -31,4 +36,6 @@ class ServicesTable(BaseModel):
     @property
     def centre(self) -> bool:
         """Whether anything is the coordinator's."""
+        if self.map is not None or self.assignment is not None:
+            return (self.map, self.assignment) != ("gossip", "claims")
         return "coordinator" in (self.path, self.spares)

@@ -1,0 +1,68 @@
+"""Append-only logs, one for each origin, and the version vector that says how much of each is held.
+
+An origin is a robot in one of its incarnations: only it appends to its log. So two replicas merge by taking the longer of
+each log, in any order and as often as one likes (a grow-only set; Shapiro et al. 2011), and two that have equal vectors hold
+the same. Entries are opaque bytes here.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final, NamedTuple
+
+from zwerm.agents.landmark_exploration.mixing import mix
+
+INCARNATIONS: Final = 256
+
+
+def origin_of(node: int, incarnation: int) -> int:
+    """Return the origin that a robot is in one of its incarnations."""
+    return node * INCARNATIONS + incarnation % INCARNATIONS
+
+
+class Stretch(NamedTuple):
+    """Successive entries of one log, from entry number `first` on."""
+
+    origin: int
+    first: int
+    entries: tuple[bytes, ...]
+
+
+class Replica:
+    """Every log as far as it is known. `vector` maps an origin to how many of its entries are held."""
+
+    def __init__(self) -> None:
+        self.logs: dict[int, list[bytes]] = {}
+        self.vector: dict[int, int] = {}
+        self.digest = 0
+
+    def extend(self, stretch: Stretch) -> Sequence[bytes]:
+        """Add what is new in a stretch, and return it; nothing where entries before it are missing."""
+        origin, first, entries = stretch
+        held = self.vector.get(origin, 0)
+        new = entries[held - first :] if first <= held else ()
+        if new:
+            self.logs.setdefault(origin, []).extend(new)
+            # The digest is the sum of one number for each (origin, count), so that it can be kept up to date.
+            if held:
+                self.digest -= mix(origin, held)
+            self.vector[origin] = held + len(new)
+            self.digest = (self.digest + mix(origin, held + len(new))) % (1 << 64)
+        return new
+
+    def append(self, origin: int, entries: Sequence[bytes]) -> Stretch:
+        """Add entries at the end of a log, and return them as a stretch."""
+        stretch = Stretch(origin, self.vector.get(origin, 0), tuple(entries))
+        self.extend(stretch)
+        return stretch
+
+    def missing(self, vector: Mapping[int, int], origins: Iterable[int], entries_max: int) -> list[Stretch]:
+        """Return what the holder of `vector` lacks of the logs of `origins`, up to so many entries."""
+        found: list[Stretch] = []
+        for origin in origins:
+            first = vector.get(origin, 0)
+            some = tuple(self.logs.get(origin, ())[first : first + entries_max])
+            if some:
+                found.append(Stretch(origin, first, some))
+                entries_max -= len(some)
+            if entries_max <= 0:
+                break
+        return found
