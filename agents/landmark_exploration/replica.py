@@ -12,6 +12,9 @@ from zwerm.agents.landmark_exploration.mixing import mix
 
 INCARNATIONS: Final = 256
 
+# Digests are below this.
+DIGESTS: Final = 1 << 62
+
 
 def origin_of(node: int, incarnation: int) -> int:
     """Return the origin that a robot is in one of its incarnations."""
@@ -45,7 +48,7 @@ class Replica:
             if held:
                 self.digest -= mix(origin, held)
             self.vector[origin] = held + len(new)
-            self.digest = (self.digest + mix(origin, held + len(new))) % (1 << 64)
+            self.digest = (self.digest + mix(origin, held + len(new))) % DIGESTS
         return new
 
     def append(self, origin: int, entries: Sequence[bytes]) -> Stretch:

@@ -1,0 +1,37 @@
+"""What a scenario may set of landmark-based exploration."""
+
+from typing import Annotated, Final, Literal
+
+from msgspec import Meta, Struct
+
+from zwerm.agents.landmark_exploration.messages import LARGE_BYTES, SMALL_BYTES
+
+Ticks = Annotated[int, Meta(ge=1, le=1_000_000)]
+NonNegative = Annotated[float, Meta(ge=0.0)]
+
+Strategy = Literal["cost-utility", "nearest-frontier", "random-walk"]
+
+# Failures to get to a frontier before it is given up: it is then taken for a potential obstacle boundary.
+FAILURES_MAX: Final = 2
+
+
+class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
+    """The robots' parameters; those of choosing frontiers count where robots choose by themselves.
+
+    `beta` weighs the cost against the utility. `cross_ticks` are given to get across a frontier's line, `search_ticks` to search
+    behind it (minimal effort: 1). `message_bytes_max` caps every radio message. `lease_ticks`: a claim of whom nothing is heard
+    for so long is void. `dead_ticks`: a robot silent for so long is presumed dead. `freeze_ticks`: a robot that finds nothing
+    left to explore for so long adds nothing to the map any more. `robots_expected`: how many robots must agree that all is
+    explored; one that was never heard of counts as silent from the start. `turn_sd_rad` is the turn of the random walk a tick.
+    """
+
+    beta: NonNegative = 10.0
+    strategy: Strategy = "cost-utility"
+    cross_ticks: Ticks = 40
+    search_ticks: Ticks = 40
+    message_bytes_max: Annotated[int, Meta(ge=SMALL_BYTES, le=LARGE_BYTES)] = LARGE_BYTES
+    lease_ticks: Ticks = 150
+    dead_ticks: Ticks = 1_500
+    freeze_ticks: Ticks = 40
+    robots_expected: Annotated[int, Meta(ge=1, le=100_000)] = 1
+    turn_sd_rad: NonNegative = 0.15
