@@ -5,7 +5,6 @@ its map and writes what is news into its log; the log goes to the coordinator, o
 a frontier and the way there, come from the coordinator, or it chooses and claims them by itself. `services` says which.
 """
 
-from collections.abc import Iterator
 from typing import Any, ClassVar, Final
 
 from zwerm.agents.contract import Controller, Setup
@@ -26,7 +25,7 @@ from zwerm.agents.landmark_exploration.messages import Message, Order, Register,
 from zwerm.agents.landmark_exploration.motion import Drive, Outcome, explore, travel, wander
 from zwerm.agents.landmark_exploration.orders import OrderIntake, Task, landmark_bytes
 from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, Parameters
-from zwerm.agents.landmark_exploration.planning import Policy, cost_utility, nearest_frontier, utilities
+from zwerm.agents.landmark_exploration.planning import Offer, Policy, cost_utility, nearest_frontier
 from zwerm.agents.landmark_exploration.registers import Registers
 from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
 from zwerm.agents.landmark_exploration.upload import Upload
@@ -36,8 +35,13 @@ from zwerm.protocol import Command, Observation, Packet, Transmission
 # Ticks between reports of a free robot, and of a busy one: what tells the coordinator that it lives.
 FREE_REPORT_TICKS: Final = 5
 BUSY_REPORT_TICKS: Final = 50
-# Ticks after which a robot that found no frontier to explore looks for one again.
+# Ticks after which a robot that found no frontier to explore looks for one again: at first, and at most.
 RETRY_TICKS: Final = 10
+RETRY_TICKS_MAX: Final = 80
+# A robot looks around where it begins, and then only while it explores: what an idle robot happens to see would open
+# frontiers for ever. After so many idle ticks it looks again: perhaps it is cut off from all that is known.
+LOOK_TICKS: Final = 5
+CUT_OFF_TICKS: Final = 200
 # Ticks for which a robot leaves a frontier alone that it did not get to.
 AVOID_TICKS: Final = 300
 # Ticks between what a robot tells those who watch the run.
@@ -71,6 +75,7 @@ class Explorer(Controller):
         self._gossip: Gossip | None = None
         if (gossips or self._claims) and self._channel in setup.channels:
             self._gossip = Gossip(setup.node, self.replica, self.registers, self._learn, rules.message_bytes_max)
+        self._carries = (gossips and self._claims) or rules.strategy == "random-walk"
         self._upload: Upload | None = None
         if not self._claims and UPLINK in setup.channels:
             self._upload = Upload(self.replica, self._origin, rules.message_bytes_max)
@@ -84,10 +89,12 @@ class Explorer(Controller):
         self._frozen = False
         self._quiet_since = 0
         self._choose_at = 0
+        self._patience_ticks = RETRY_TICKS
+        self._idle_ticks = 0
         self._failures: dict[int, int] = {}
         self._avoid_until: dict[int, int] = {}
         self._outbox: list[Transmission] = []
-        self._told: dict[str, Any] = {}
+        self._seen: list[tuple[int, ...]] = []
         self._drive: Drive = self._live()
         self.done = False
 
@@ -96,7 +103,8 @@ class Explorer(Controller):
         self.view.take(observation)
         for packet in observation.inbox:
             self._hear(packet)
-        if not (self._frozen or self._halted):
+        self._idle_ticks = self._idle_ticks + 1 if self._task is None else 0
+        if self._looks():
             self._observe()
         direction = self._slide.along(next(self._drive), self.view)
         self._judge()
@@ -105,6 +113,14 @@ class Explorer(Controller):
         return Command(
             drive=self.view.drive(direction, self._speed_m_s), outbox=outbox, done=self.done, told=self._telemetry()
         )
+
+    def _looks(self) -> bool:
+        """Tell whether the robot adds what it sees to the map."""
+        if self._frozen or self._halted:
+            return False
+        if self.parameters.strategy == "random-walk":
+            return True
+        return self._idle_ticks == 0 or self.view.tick <= LOOK_TICKS or self._idle_ticks > CUT_OFF_TICKS
 
     # --- the map ----------------------------------------------------------------------------------------------------
 
@@ -115,6 +131,8 @@ class Explorer(Controller):
         parts = (len(snapshot.landmarks) - 1) // 13  # the entry that completes an observation gives it its rank
         if len(snapshot.landmarks) and self.map.observe(snapshot, (number + max(parts, 0), self._origin)):
             self._write(observation_entries(snapshot))
+            if self._claims:
+                self._seen.append(snapshot.landmarks)
 
     def _raise(self, keys: list[int], status: int) -> None:
         """Raise frontiers to a status, and write it down."""
@@ -142,7 +160,9 @@ class Explorer(Controller):
             if self._task is None:
                 self._choose()
             if self._task is None or self._task.key is None:
-                yield None if self._halted else next(idle)
+                # Where robots carry the map to each other, the idle ones do; where a coordinator has it they wait for it.
+                waits = not self._carries and self._idle_ticks <= CUT_OFF_TICKS
+                yield None if self._halted or waits else next(idle)
                 continue
             task = self._task
             outcome = yield from self._carry_out(task)
@@ -196,21 +216,17 @@ class Explorer(Controller):
         if not self._claims or self._frozen or rules.strategy == "random-walk" or tick < self._choose_at:
             return
         frontiers = self.map.frontiers
-        taken: dict[int, None] = {}
-        sent: dict[int, int] = {}
-        for key in self.registers.claims(self.setup.node, tick):
-            taken[key] = None
-            for landmark in pair_of(key):
-                sent[landmark] = sent.get(landmark, 0) + 1
         avoided = dict.fromkeys(key for key, until in self._avoid_until.items() if tick < until)
         choice = None
         if frontiers.open:
             policy: Policy = nearest_frontier if rules.strategy == "nearest-frontier" else cost_utility(rules.beta)
-            utility = utilities(frontiers, taken | avoided, sent)
-            choice = policy(self.map.complex, self.view.snapshot.landmarks, utility)
+            offer = Offer(frontiers, self.registers.claims(self.setup.node, tick), avoided)
+            choice = policy(self.map.complex, self.view.snapshot.landmarks, offer)
         if choice is None:
-            self._choose_at = tick + RETRY_TICKS
+            self._choose_at = tick + self._patience_ticks
+            self._patience_ticks = min(2 * self._patience_ticks, RETRY_TICKS_MAX)
             return
+        self._patience_ticks = RETRY_TICKS
         status = ABANDONED if frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
         self._task = Task(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status)
         self._claim = choice.key + 1
@@ -284,12 +300,11 @@ class Explorer(Controller):
     # --- for those who watch ----------------------------------------------------------------------------------------
 
     def _telemetry(self) -> dict[str, Any]:
-        """Return what has changed of what those who watch the run may know."""
+        """Return what those who watch the run may know: what this robot saw first, and what it has left to do."""
         if not self._claims or (self.view.tick % TELEMETRY_TICKS and not self.done):
             return {}
-        return {"landmark_robot": {"open": len(self.map.frontiers.open), "frozen": self._frozen, "done": self.done}}
-
-
-def simplices_told(map_: LandmarkMap) -> Iterator[tuple[int, ...]]:
-    """Yield the free simplices of a map, for those who watch the run."""
-    yield from sorted(map_.complex.simplices.values())
+        seen, self._seen = self._seen, []
+        told = {"open": len(self.map.frontiers.open), "done": self.done, "simplices": seen}
+        if self._claim:
+            told["claim"] = pair_of(self._claim - 1)
+        return {"landmark_robot": told}

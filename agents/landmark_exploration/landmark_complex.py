@@ -33,6 +33,11 @@ class LandmarkComplex:
         self._holders: dict[int, set[int]] = {}  # landmark: the vertices that contain it
         self._bearings: dict[Simplex, tuple[Rank, tuple[int, ...]]] = {}
 
+    @property
+    def vertices(self) -> int:
+        """How many vertices there ever were: their numbers are below this."""
+        return len(self._ever)
+
     def landmarks_of(self, vertex: int) -> Simplex:
         """Return the landmarks of a vertex that is or was free."""
         return self._ever[vertex]

@@ -6,7 +6,7 @@ that share a landmark with <a, b>, divided by one more than the number of robots
 no frontier farther away can be better.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 from typing import NamedTuple, Protocol
 
@@ -61,73 +61,99 @@ def path_to(vertex: int, before: Mapping[int, int]) -> tuple[int, ...]:
     return tuple(reversed(path))
 
 
-def utilities(frontiers: Frontiers, taken: Collection[int], sent: Mapping[int, int]) -> dict[int, float]:
-    """Return the utility of every open frontier that is not `taken`.
+class Offer:
+    """The open frontiers that are free, and what each is worth: its utility, worked out when it is asked for.
 
-    `sent` maps a landmark to how many robots are sent to a frontier with it; both landmarks of one robot's count once.
+    `taken` are the keys of frontiers that robots are sent to, `avoided` others that are not to be chosen.
     """
-    # The robots sent to a or b: at most those of a and of b; those sent to both are in `taken` by the pair itself.
-    found: dict[int, float] = {}
-    for key in frontiers.open:
-        if key in taken:
-            continue
-        a, b = pair_of(key)
-        robots = sent.get(a, 0) + sent.get(b, 0)
-        if robots and (b << 16 | a) in taken:
-            robots -= 1
-        found[key] = frontiers.sharing(key) / (1 + robots)
-    return found
+
+    def __init__(self, frontiers: Frontiers, taken: Iterable[int], avoided: Collection[int] = ()) -> None:
+        self._frontiers = frontiers
+        self._taken: dict[int, None] = {}
+        self._avoided = avoided
+        self._sent: dict[int, int] = {}  # landmark: robots sent to a frontier with it
+        self._utility: dict[int, float] = {}
+        self._most: float | None = None
+        for key in taken:
+            self.take(key)
+
+    def take(self, key: int) -> None:
+        """Note that a robot is sent to a frontier."""
+        self._taken[key] = None
+        for landmark in pair_of(key):
+            self._sent[landmark] = self._sent.get(landmark, 0) + 1
+        self._utility.clear()
+
+    def most(self) -> float:
+        """Return a bound that no utility exceeds, now or later."""
+        if self._most is None:
+            at = self._frontiers.open_at
+            self._most = float(max([at[key >> 16] + at[key & 0xFFFF] for key in self._frontiers.open], default=0))
+        return self._most
+
+    def is_empty(self) -> bool:
+        """Tell whether no frontier is free."""
+        return not any(self.is_free(key) for key in self._frontiers.open)
+
+    def is_free(self, key: int) -> bool:
+        """Tell whether a frontier is open and may be chosen."""
+        return key in self._frontiers.open and key not in self._taken and key not in self._avoided
+
+    def utility(self, key: int) -> float:
+        """Return U(<a, b>) of a frontier that is free."""
+        known = self._utility.get(key)
+        if known is None:
+            a, b = pair_of(key)
+            robots = self._sent.get(a, 0) + self._sent.get(b, 0)
+            if robots and (b << 16 | a) in self._taken:
+                robots -= 1  # that one is sent to both
+            known = self._utility[key] = self._frontiers.sharing(key) / (1 + robots)
+        return known
 
 
 class Policy(Protocol):
-    """Chooses a frontier for a robot that sees `landmarks`, given the utility of each one that is free."""
+    """Chooses a frontier of an offer for a robot that sees `landmarks`."""
 
-    def __call__(
-        self, complex_: LandmarkComplex, landmarks: Sequence[int], utility: Mapping[int, float]
-    ) -> Choice | None:
+    def __call__(self, complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer) -> Choice | None:
         """Return the choice, or None where no free frontier can be reached."""
 
 
 def cost_utility(beta: float) -> Policy:
     """Return the policy of the paper: the greatest utility less `beta` times the cost."""
 
-    def choose(complex_: LandmarkComplex, landmarks: Sequence[int], utility: Mapping[int, float]) -> Choice | None:
-        return _best(complex_, landmarks, utility, lambda key, cost: utility[key] - beta * cost, beta)
+    def choose(complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer) -> Choice | None:
+        return _best(complex_, landmarks, offer, lambda key, cost: offer.utility(key) - beta * cost, offer.most(), beta)
 
     return choose
 
 
-def nearest_frontier(
-    complex_: LandmarkComplex, landmarks: Sequence[int], utility: Mapping[int, float]
-) -> Choice | None:
+def nearest_frontier(complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer) -> Choice | None:
     """Return the frontier that costs least to reach (Yamauchi 1997, greedily shared out among robots)."""
-    return _best(complex_, landmarks, utility, lambda key, cost: -cost, 1.0, bound=0.0)
+    return _best(complex_, landmarks, offer, lambda key, cost: -cost, 0.0, 1.0)
 
 
 def _best(
     complex_: LandmarkComplex,
     landmarks: Sequence[int],
-    utility: Mapping[int, float],
+    offer: Offer,
     gain: Callable[[int, float], float],
+    most: float,
     slope: float,
-    bound: float | None = None,
 ) -> Choice | None:
-    """Return the frontier with the greatest gain, of equals the smallest key of those that were reached first.
+    """Return the free frontier with the greatest gain; of equals the smallest key.
 
-    At a cost c no gain exceeds `bound` (the greatest utility, unless given) - `slope` c.
+    At a cost c no gain exceeds `most` - `slope` c.
     """
-    if not utility:
+    if offer.is_empty():
         return None
-    most = max(utility.values()) if bound is None else bound
     best: tuple[float, int, int] | None = None  # gain, -key, vertex
-    here = sorted(landmarks)
-    best = _candidates(here, HERE, 0.0, utility, gain, best)
+    best = _candidates(sorted(landmarks), HERE, 0.0, offer, gain, best)
     before: dict[int, int] = {}
     for cost, vertex, previous in reach(complex_, landmarks):
-        if best is not None and most - slope * cost <= best[0]:
+        if best is not None and most - slope * cost < best[0]:
             break
         before[vertex] = previous
-        best = _candidates(complex_.simplices[vertex], vertex, cost, utility, gain, best)
+        best = _candidates(complex_.simplices[vertex], vertex, cost, offer, gain, best)
     if best is None:
         return None
     value, negative_key, vertex = best
@@ -138,14 +164,14 @@ def _candidates(
     simplex: Sequence[int],
     vertex: int,
     cost: float,
-    utility: Mapping[int, float],
+    offer: Offer,
     gain: Callable[[int, float], float],
     best: tuple[float, int, int] | None,
 ) -> tuple[float, int, int] | None:
     for i, a in enumerate(simplex):
         for b in simplex[i + 1 :]:
             for key in (a << 16 | b, b << 16 | a):
-                if key in utility:
+                if offer.is_free(key):
                     candidate = gain(key, cost), -key, vertex
                     if best is None or candidate[:2] > best[:2]:
                         best = candidate

@@ -22,17 +22,20 @@ from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.messages import LARGE_BYTES, Entries, Report, Vector
 from zwerm.agents.landmark_exploration.orders import Task, cut, landmarks_in, write_task
 from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, NonNegative, Ticks
-from zwerm.agents.landmark_exploration.planning import Choice, Policy, cost_utility, nearest_frontier, utilities
+from zwerm.agents.landmark_exploration.planning import Choice, Offer, Policy, cost_utility, nearest_frontier
 from zwerm.agents.landmark_exploration.registers import Registers
 from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
 from zwerm.protocol import Command, Observation, Transmission
 
-# Ticks after which a robot that has nothing to explore is considered again.
+# Ticks after which a robot that has nothing to explore is considered again: at first, and at most.
 RETRY_TICKS: Final = 10
+RETRY_TICKS_MAX: Final = 80
 # Ticks between two tries of the same order.
 SAY_AGAIN_TICKS: Final = 4
 # Ticks between pictures of the map for those who watch the run.
-TELEMETRY_TICKS: Final = 50
+TELEMETRY_TICKS: Final = 25
+# Frontiers in one such picture, at most.
+FRONTIERS_TOLD_MAX: Final = 3_000
 
 
 class CoordinatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
@@ -77,6 +80,7 @@ class _Robot:
     landmarks: tuple[int, ...] = ()
     entries: int = 0
     consider_at: int = 0
+    patience_ticks: int = RETRY_TICKS
 
 
 class LandmarkCoordinator:
@@ -98,6 +102,7 @@ class LandmarkCoordinator:
         self._outbox: list[Transmission] = []
         self._acknowledge: dict[int, int] = {}
         self._told_version = -1
+        self._told_vertices = 0
         self._done = False
         self._registers = Registers(rules.dead_ticks, rules.dead_ticks, setup.node)
         self._gossip: Gossip | None = None
@@ -189,8 +194,7 @@ class LandmarkCoordinator:
         """
         living = [node for node, robot in self._robots.items() if self._tick - robot.heard_at < self._rules.dead_ticks]
         frontiers = self.map.frontiers
-        taken: dict[int, None] = {}
-        sent: dict[int, int] = {}
+        taken: list[int] = []
         for node in living:
             robot = self._robots[node]
             if robot.task is None or robot.task.key is None:
@@ -198,32 +202,28 @@ class LandmarkCoordinator:
             if robot.task.key not in frontiers.open and robot.landmarks and frontiers.open:
                 robot.free = True  # somebody else cleared it: the robot need not go there
                 continue
-            self._take_note(robot.task.key, taken, sent)
+            taken.append(robot.task.key)
+        offer = Offer(frontiers, taken)
         while frontiers.open:
             free = [node for node in living if self._robots[node].free and self._robots[node].consider_at <= self._tick]
             if not free:
                 break
-            utility = utilities(frontiers, taken, sent)
             best: tuple[float, int, Choice] | None = None
             for node in free:
-                choice = self._policy(self.map.complex, self._robots[node].landmarks, utility)
+                choice = self._policy(self.map.complex, self._robots[node].landmarks, offer)
                 if choice is None:
-                    self._robots[node].consider_at = self._tick + RETRY_TICKS
+                    robot = self._robots[node]
+                    robot.consider_at = self._tick + robot.patience_ticks
+                    robot.patience_ticks = min(2 * robot.patience_ticks, RETRY_TICKS_MAX)
                 elif best is None or choice.gain > best[0]:
                     best = choice.gain, node, choice
             if best is None:
                 break
             _, node, choice = best
-            self._take_note(choice.key, taken, sent)
+            offer.take(choice.key)
             status = ABANDONED if frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
             self._order(node, Task(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status))
         return not frontiers.open and self._finish(living)
-
-    @staticmethod
-    def _take_note(key: int, taken: dict[int, None], sent: dict[int, int]) -> None:
-        taken[key] = None
-        for landmark in pair_of(key):
-            sent[landmark] = sent.get(landmark, 0) + 1
 
     def _finish(self, living: Sequence[int]) -> bool:
         """Halt all robots, and tell whether all is explored: nothing is open, or will be by what a robot has written."""
@@ -252,7 +252,7 @@ class LandmarkCoordinator:
     def _order(self, node: int, task: Task) -> None:
         robot = self._robots[node]
         robot.order += 1
-        robot.task, robot.free = task, False
+        robot.task, robot.free, robot.patience_ticks = task, False, RETRY_TICKS
         self._say(node, robot)
 
     def _say(self, node: int, robot: _Robot) -> None:
@@ -267,8 +267,16 @@ class LandmarkCoordinator:
     # --- for those who watch ----------------------------------------------------------------------------------------
 
     def _telemetry(self) -> dict[str, Any]:
-        """Return numbers, and the simplices of the map, where that has changed."""
+        """Return the map, as far as it has changed, for those who watch the run."""
         if (self._tick % TELEMETRY_TICKS and not self._done) or self.map.version == self._told_version:
             return {}
         self._told_version = self.map.version
-        return {"open_frontiers": len(self.map.frontiers.open)}
+        first, self._told_vertices = self._told_vertices, self.map.complex.vertices
+        simplices = [self.map.complex.landmarks_of(vertex) for vertex in range(first, self._told_vertices)]
+        tasks = {node: robot.task for node, robot in self._robots.items()}
+        assigned = [(node, *pair_of(task.key)) for node, task in tasks.items() if task and task.key is not None]
+        frontiers = [pair_of(key) for key in list(self.map.frontiers.open)[:FRONTIERS_TOLD_MAX]]
+        return {
+            "open_frontiers": len(self.map.frontiers.open),
+            "landmark_map": {"simplices": simplices, "frontiers": frontiers, "assigned": assigned},
+        }
