@@ -15,9 +15,9 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from zwerm.agents.contract import Setup
+from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.identity import issue, renew, router_settings, save
-from zwerm.deploy.private import private_directory
+from zwerm.deploy.runtime_directory import private_directory
 from zwerm.deploy.supervisor import (
     JOIN_DEADLINE_S,
     LEAVE_PATIENCE_S,
@@ -27,15 +27,15 @@ from zwerm.deploy.supervisor import (
     prepare,
 )
 from zwerm.errors import LinkError
+from zwerm.link.peer_radio import Station
 from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials
-from zwerm.link.station import Station
-from zwerm.link.zenoh_world import Member, ZenohWorldLink
-from zwerm.protocol import encode
+from zwerm.link.world import ExpectedNode, ZenohWorldLink
+from zwerm.wire.messages import encode
 
 Members = Mapping[int, tuple[str, Setup]]
 
 # Of a node's id and incarnation: who plays it.
-Recast = Callable[[int, int], tuple[str, Setup]]
+RestartSpec = Callable[[int, int], tuple[str, Setup]]
 
 
 class Certificate(NamedTuple):
@@ -94,9 +94,9 @@ class _Swarm(ABC):
             passwords.unlink()
         self._stack.callback(self.link.close)
 
-    def _member(self, credential: Credential) -> Member:
+    def _member(self, credential: Credential) -> ExpectedNode:
         controller, setup = self._members[credential.node]
-        return Member(credential.incarnation, controller, encode(setup), self._paced)
+        return ExpectedNode(credential.incarnation, controller, encode(setup), self._paced)
 
     @abstractmethod
     def _open(self, directory: Path) -> None:
@@ -122,17 +122,17 @@ class LocalSwarm(_Swarm):
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
         unborn: Collection[int] = (),
-        recast: Recast | None = None,
+        restart: RestartSpec | None = None,
         stations: Mapping[int, Station] | None = None,
     ) -> None:
         """`order` is the order of starting; `deadline_s` is given to each process to join; `paced` is real time.
 
-        The nodes in `unborn` are not started before `start` is called; `recast` says who plays a node's next incarnation,
+        The nodes in `unborn` are not started before `start` is called; `restart` says who plays a node's next incarnation,
         the same as before if it is not given. Nodes with a place in `stations` have their radio there.
         """
         super().__init__(run, members, progress, deadline_s, paced)
         self._order = [node for node in (members if order is None else order) if node not in unborn]
-        self._recast = recast
+        self._restart = restart
         self._stations = stations
         self._ran = set(self._order)
         self._stopped: set[int] = set()
@@ -187,8 +187,8 @@ class LocalSwarm(_Swarm):
     def _revive(self, node: int) -> None:
         self.link.wait_joined(lambda joined: node not in joined, LEAVE_PATIENCE_S)
         credential = renew(self._current[node])
-        if self._recast is not None:
-            self._members = {**self._members, node: self._recast(node, credential.incarnation)}
+        if self._restart is not None:
+            self._members = {**self._members, node: self._restart(node, credential.incarnation)}
         self.link.expect(node, self._member(credential))
         self._current[node] = credential
         self.supervisor.restart(credential, self._deadline_s)

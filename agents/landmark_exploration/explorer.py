@@ -7,7 +7,6 @@ a frontier and the way there, come from the coordinator, or it chooses and claim
 
 from typing import Any, ClassVar, Final
 
-from zwerm.agents.contract import Controller, Setup
 from zwerm.agents.landmark_exploration import messages
 from zwerm.agents.landmark_exploration.boundary_trace import inconsistent
 from zwerm.agents.landmark_exploration.entries import observation_entries, status_entries
@@ -30,7 +29,8 @@ from zwerm.agents.landmark_exploration.registers import Registers
 from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
 from zwerm.agents.landmark_exploration.upload import Upload
 from zwerm.agents.landmark_exploration.view import Slide, View
-from zwerm.protocol import Command, Observation, Packet, Transmission
+from zwerm.agents.runtime.contract import Controller, Setup
+from zwerm.wire.messages import Command, Observation, Packet, Transmission
 
 # Ticks between reports of a free robot, and of a busy one: what tells the coordinator that it lives.
 FREE_REPORT_TICKS: Final = 5
@@ -187,9 +187,7 @@ class Explorer(Controller):
         outcome = yield from travel(self.view, task.path, self.random, is_there)
         if outcome == "unreached" or superseded():
             return "unreached"
-        return (
-            yield from explore(self.view, a, b, self.random, is_clear, rules.cross_ticks, rules.search_ticks)
-        )
+        return (yield from explore(self.view, a, b, self.random, is_clear, rules.cross_ticks, rules.search_ticks))
 
     def _conclude(self, task: Task, outcome: Outcome) -> None:
         """Note how a task ended."""

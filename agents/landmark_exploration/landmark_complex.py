@@ -121,6 +121,4 @@ class LandmarkComplex:
 
     def edges(self) -> set[tuple[int, int]]:
         """Return the edges of the 1-skeleton of the complex, each (smaller id, larger id)."""
-        return {
-            (a, b) for simplex in self.simplices.values() for i, a in enumerate(simplex) for b in simplex[i + 1 :]
-        }
+        return {(a, b) for simplex in self.simplices.values() for i, a in enumerate(simplex) for b in simplex[i + 1 :]}

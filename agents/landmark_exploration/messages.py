@@ -9,7 +9,7 @@ from typing import Annotated, Final
 
 from msgspec import Meta, Struct
 
-from zwerm.frame import Sealed
+from zwerm.wire.checksum import Sealed
 
 # The smallest cap that is supported [bytes]; a radio of tens of bytes at a time has this much.
 SMALL_BYTES: Final = 64

@@ -18,7 +18,7 @@ FAILURES_MAX: Final = 2
 class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     """The robots' parameters; those of choosing frontiers count where robots choose by themselves.
 
-    `beta` weighs the cost against the utility. `cross_ticks` are given to get across a frontier's line, `search_ticks` to search
+    `beta` weighs the cost against the utility. `cross_ticks` are given to cross the line of a frontier, `search_ticks` to search
     behind it (minimal effort: 1). `message_bytes_max` caps every radio message. `lease_ticks`: a claim of whom nothing is heard
     for so long is void. `dead_ticks`: a robot silent for so long is presumed dead. `freeze_ticks`: a robot that finds nothing
     left to explore for so long adds nothing to the map any more. `robots_expected`: how many robots must agree that all is

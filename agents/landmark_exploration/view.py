@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from zwerm.agents.landmark_exploration.bearings import Snapshot, to_steps
-from zwerm.protocol import BodyVelocity, Observation
+from zwerm.wire.messages import BodyVelocity, Observation
 
 _FULL: Final = 2.0 * math.pi
 
@@ -73,7 +73,9 @@ class Slide:
             if left is None or right is None:
                 return None
             nearer = apart_rad(left, direction_rad) - apart_rad(right, direction_rad)
-            self._hand = (1 if self._random.random() < 0.5 else -1) if abs(nearer) < 0.1 else (1 if nearer < 0.0 else -1)
+            self._hand = (
+                (1 if self._random.random() < 0.5 else -1) if abs(nearer) < 0.1 else (1 if nearer < 0.0 else -1)
+            )
         return self._turned(direction_rad, view, self._hand)
 
     def _turned(self, direction_rad: float, view: View, hand: int) -> float | None:

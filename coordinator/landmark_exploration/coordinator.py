@@ -25,7 +25,7 @@ from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, NonNegati
 from zwerm.agents.landmark_exploration.planning import Choice, Offer, Policy, cost_utility, nearest_frontier
 from zwerm.agents.landmark_exploration.registers import Registers
 from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
-from zwerm.protocol import Command, Observation, Transmission
+from zwerm.wire.messages import Command, Observation, Transmission
 
 # Ticks after which a robot that has nothing to explore is considered again: at first, and at most.
 RETRY_TICKS: Final = 10

@@ -1,0 +1,45 @@
+"""Controllers by name: those of the catalogue, and `module:Class` for any other."""
+
+from typing import Any
+
+import msgspec
+
+from zwerm.agents.runtime.contract import NoParameters, Setup, Stepper
+from zwerm.catalogue import ROBOT, algorithm_of, names
+from zwerm.errors import ControllerError
+from zwerm.scenario.plugin_names import class_named
+
+
+def find(name: str) -> type[Any]:
+    """Return the controller class that `name` names.
+
+    Raises ControllerError, in one line, where there is none or it has no `step`.
+    """
+    try:
+        row = algorithm_of(name)
+        built_in = {} if row is None else row.controllers.get(ROBOT, {})
+        found = class_named(built_in.get(name, name), "controller", sorted(names(ROBOT)))
+    except ValueError as error:
+        raise ControllerError(str(error)) from error
+    if not callable(getattr(found, "step", None)):
+        raise ControllerError(f"{name}: a controller needs a method step(observation) -> Command")
+    return found
+
+
+def make(name: str, setup: Setup) -> Stepper:
+    """Return the controller `name`, made for `setup`.
+
+    Raises ControllerError where it cannot be found or its parameters do not fit.
+    """
+    found = find(name)
+    try:
+        controller: Stepper = found(setup)
+    except msgspec.ValidationError as error:
+        raise ControllerError(f"{name}: {error}") from None
+    return controller
+
+
+def parameters_of(found: type[Any]) -> type[Any]:
+    """Return the struct that types the controller's parameters."""
+    kind: type[Any] = getattr(found, "Parameters", NoParameters)
+    return kind

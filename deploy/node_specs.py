@@ -1,0 +1,92 @@
+"""Node specifications: the controller class and the Setup of every node of a run."""
+
+from typing import Any
+
+import msgspec
+
+from zwerm.agents.runtime.contract import Body, Setup
+from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role, algorithm_of, names
+from zwerm.errors import ControllerError
+from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.tables import Scenario
+
+
+def controller_for(scenario: Scenario, role: Role, name: str) -> str:
+    """Return the class, `module:Class`, that runs on a node of `role` under the name that the scenario gives.
+
+    Raises ControllerError where the role is the coordinator's or a base station's, and the catalogue has no such name.
+    """
+    row = algorithm_of(name)
+    known = {} if row is None else row.controllers.get(role, {})
+    if name not in known:
+        if role == COORDINATOR and ":" not in name:
+            expected = ", ".join(names(role))
+            raise ControllerError(f"expected a built-in coordinator ({expected}) or module:Class, got {name!r}")
+        return name
+    variant = scenario.variant
+    own = {} if variant is None else variant.controllers.get(role, {})
+    return own.get(name, known[name])
+
+
+def services_of(scenario: Scenario) -> dict[str, str]:
+    """Return the provider of every service: those of the chosen variant, or the algorithm's first."""
+    variant, row = scenario.variant, algorithm_of(scenario.robots.controller)
+    if variant is None and row is not None and row.variants:
+        variant = row.variants[0]
+    return dict(variant.services) if variant is not None else dict(scenario.services or {})
+
+
+def restart_spec(scenario: Scenario, seed: int, node: int, incarnation: int) -> tuple[str, Setup]:
+    """Return (controller, setup) of a node's later incarnation: the same but for the random stream."""
+    controller, setup = node_specs(scenario, seed)[node]
+    if incarnation == 1:
+        return controller, setup
+    key = Draws(seed).stream_key("controller", node, incarnation)
+    return controller, msgspec.structs.replace(setup, stream_key=key, incarnation=incarnation)
+
+
+def node_specs(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
+    """Return (controller, setup) by node id.
+
+    A node gets the key of its own random stream and no other: from it the run's other draws cannot be told.
+    """
+    draws, robots = Draws(seed), scenario.robots
+    body = Body(
+        kind=robots.body.kind,
+        radius_m=robots.body.radius_m,
+        max_speed_m_s=robots.body.max_speed_m_s,
+        max_turn_rad_s=robots.body.max_turn_rad_s,
+        wheel_base_m=robots.body.wheel_base_m if robots.body.kind == "differential" else 0.0,
+    )
+    sensors = tuple(table.kind for table in robots.sensors)
+    channels = (("robots",) if scenario.radio is not None else ()) + (("uplink",) if scenario.coordinator else ())
+    services = services_of(scenario)
+    specs: dict[int, tuple[str, Setup]] = {}
+
+    def add(node: int, role: Role, controller: str, parameters: dict[str, Any]) -> None:
+        placed = role != COORDINATOR
+        key = draws.stream_key("controller", node)
+        specs[node] = (
+            controller_for(scenario, role, controller),
+            Setup(
+                node=node,
+                role=role,
+                dt_s=scenario.time.dt_s,
+                sensors=sensors if placed else (),
+                stream_key=key,
+                body=body if placed else None,
+                channels=channels if placed else ("uplink",),
+                parameters=parameters,
+                services=services,
+                bases=() if placed or scenario.base is None else tuple(range(scenario.base.stations)),
+            ),
+        )
+
+    for node in range(robots.count):
+        add(node, ROBOT, robots.controller, robots.parameters)
+    if scenario.base is not None:
+        for node in range(scenario.base.stations):
+            add(node, BASE, scenario.base.controller, scenario.base.parameters)
+    if scenario.coordinator is not None:
+        add(robots.count, COORDINATOR, scenario.coordinator.controller, scenario.coordinator.parameters)
+    return specs
