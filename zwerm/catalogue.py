@@ -141,6 +141,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             Variant({"map": "gossip", "assignment": "coordinator"}, decides=COORDINATOR, radio=True),
             Variant({"map": "gossip", "assignment": "claims"}, decides=ROBOT, coordinator=False, radio=True),
         ),
+        metrics=("zwerm.world.metrics.landmark_exploration:landmark_metrics",),
         scenarios=("landmark-*",),
     ),
     Algorithm(

@@ -95,6 +95,7 @@ class Explorer(Controller):
         self._avoid_until: dict[int, int] = {}
         self._outbox: list[Transmission] = []
         self._seen: list[tuple[int, ...]] = []
+        self._told_status = (False, False)
         self._drive: Drive = self._live()
         self.done = False
 
@@ -299,8 +300,10 @@ class Explorer(Controller):
 
     def _telemetry(self) -> dict[str, Any]:
         """Return what those who watch the run may know: what this robot saw first, and what it has left to do."""
-        if not self._claims or (self.view.tick % TELEMETRY_TICKS and not self.done):
+        status = (bool(self.map.frontiers.open), self.done)
+        if not self._claims or (self.view.tick % TELEMETRY_TICKS and status == self._told_status):
             return {}
+        self._told_status = status
         seen, self._seen = self._seen, []
         told = {"open": len(self.map.frontiers.open), "done": self.done, "simplices": seen}
         if self._claim:

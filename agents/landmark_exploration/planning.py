@@ -6,7 +6,7 @@ that share a landmark with <a, b>, divided by one more than the number of robots
 no frontier farther away can be better.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 from typing import NamedTuple, Protocol
 
@@ -110,6 +110,31 @@ class Offer:
             known = self._utility[key] = self._frontiers.sharing(key) / (1 + robots)
         return known
 
+    def best_in(
+        self, simplex: Sequence[int], vertex: int, price: float, useful: bool, best: tuple[float, int, int] | None
+    ) -> tuple[float, int, int] | None:
+        """Return the better of `best` and the best free frontier among the landmarks of an observation.
+
+        Each is (gain, -key, vertex). The gain is the utility, if it is to be `useful`, less `price`.
+        """
+        at = self._frontiers.open_at
+        live = [landmark for landmark in simplex if at.get(landmark)]
+        if len(live) < 2:
+            return best
+        if best is not None and useful:
+            counts = sorted([at[landmark] for landmark in live])
+            if counts[-1] + counts[-2] - price < best[0]:
+                return best
+        open_ = self._frontiers.open
+        for i, a in enumerate(live):
+            for b in live[i + 1 :]:
+                for key in (a << 16 | b, b << 16 | a):
+                    if key in open_ and self.is_free(key):
+                        candidate = (self.utility(key) - price if useful else -price), -key, vertex
+                        if best is None or candidate[:2] > best[:2]:
+                            best = candidate
+        return best
+
 
 class Policy(Protocol):
     """Chooses a frontier of an offer for a robot that sees `landmarks`."""
@@ -122,57 +147,35 @@ def cost_utility(beta: float) -> Policy:
     """Return the policy of the paper: the greatest utility less `beta` times the cost."""
 
     def choose(complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer) -> Choice | None:
-        return _best(complex_, landmarks, offer, lambda key, cost: offer.utility(key) - beta * cost, offer.most(), beta)
+        return _best(complex_, landmarks, offer, beta, offer.most())
 
     return choose
 
 
 def nearest_frontier(complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer) -> Choice | None:
     """Return the frontier that costs least to reach (Yamauchi 1997, greedily shared out among robots)."""
-    return _best(complex_, landmarks, offer, lambda key, cost: -cost, 0.0, 1.0)
+    return _best(complex_, landmarks, offer, 1.0, None)
 
 
 def _best(
-    complex_: LandmarkComplex,
-    landmarks: Sequence[int],
-    offer: Offer,
-    gain: Callable[[int, float], float],
-    most: float,
-    slope: float,
+    complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer, slope: float, most: float | None
 ) -> Choice | None:
     """Return the free frontier with the greatest gain; of equals the smallest key.
 
-    At a cost c no gain exceeds `most` - `slope` c.
+    The gain is the utility, at most `most`, less `slope` times the cost; without `most` it is the cost alone.
     """
     if offer.is_empty():
         return None
     best: tuple[float, int, int] | None = None  # gain, -key, vertex
-    best = _candidates(sorted(landmarks), HERE, 0.0, offer, gain, best)
+    best = offer.best_in(sorted(landmarks), HERE, 0.0, most is not None, best)
     before: dict[int, int] = {}
+    simplices, bound = complex_.simplices, most or 0.0
     for cost, vertex, previous in reach(complex_, landmarks):
-        if best is not None and most - slope * cost < best[0]:
+        if best is not None and bound - slope * cost < best[0]:
             break
         before[vertex] = previous
-        best = _candidates(complex_.simplices[vertex], vertex, cost, offer, gain, best)
+        best = offer.best_in(simplices[vertex], vertex, slope * cost, most is not None, best)
     if best is None:
         return None
     value, negative_key, vertex = best
     return Choice(-negative_key, () if vertex == HERE else path_to(vertex, before), value)
-
-
-def _candidates(
-    simplex: Sequence[int],
-    vertex: int,
-    cost: float,
-    offer: Offer,
-    gain: Callable[[int, float], float],
-    best: tuple[float, int, int] | None,
-) -> tuple[float, int, int] | None:
-    for i, a in enumerate(simplex):
-        for b in simplex[i + 1 :]:
-            for key in (a << 16 | b, b << 16 | a):
-                if offer.is_free(key):
-                    candidate = gain(key, cost), -key, vertex
-                    if best is None or candidate[:2] > best[:2]:
-                        best = candidate
-    return best

@@ -9,6 +9,7 @@ nothing to its log. A robot that is silent for `dead_ticks` is presumed dead: it
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from typing import Any, Final, Protocol
 
 import msgspec
@@ -204,26 +205,38 @@ class LandmarkCoordinator:
                 continue
             taken.append(robot.task.key)
         offer = Offer(frontiers, taken)
-        while frontiers.open:
-            free = [node for node in living if self._robots[node].free and self._robots[node].consider_at <= self._tick]
-            if not free:
-                break
-            best: tuple[float, int, Choice] | None = None
-            for node in free:
-                choice = self._policy(self.map.complex, self._robots[node].landmarks, offer)
-                if choice is None:
-                    robot = self._robots[node]
-                    robot.consider_at = self._tick + robot.patience_ticks
-                    robot.patience_ticks = min(2 * robot.patience_ticks, RETRY_TICKS_MAX)
-                elif best is None or choice.gain > best[0]:
-                    best = choice.gain, node, choice
-            if best is None:
-                break
-            _, node, choice = best
-            offer.take(choice.key)
-            status = ABANDONED if frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
-            self._order(node, Task(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status))
+        free = [node for node in living if self._robots[node].free and self._robots[node].consider_at <= self._tick]
+        self._greedy(free if frontiers.open else [], offer)
         return not frontiers.open and self._finish(living)
+
+    def _greedy(self, free: Sequence[int], offer: Offer) -> None:
+        """Give the best pair of a free robot and a frontier to each other, then the best of the rest, and so on.
+
+        A robot's best gain never rises while frontiers are given away, so that only a robot that seems best is looked at again.
+        """
+        given = 0
+        queue: list[tuple[float, int, int, Choice]] = []
+        for node in free:
+            self._consider(node, offer, given, queue)
+        while queue:
+            _, node, at, choice = heappop(queue)
+            if at < given:
+                self._consider(node, offer, given, queue)
+                continue
+            given += 1
+            offer.take(choice.key)
+            status = ABANDONED if self.map.frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
+            path = tuple(map(self.map.complex.snapshot_of, choice.path))
+            self._order(node, Task(choice.key, path, status))
+
+    def _consider(self, node: int, offer: Offer, given: int, queue: list[tuple[float, int, int, Choice]]) -> None:
+        robot = self._robots[node]
+        choice = self._policy(self.map.complex, robot.landmarks, offer)
+        if choice is not None:
+            heappush(queue, (-choice.gain, node, given, choice))
+            return
+        robot.consider_at = self._tick + robot.patience_ticks
+        robot.patience_ticks = min(2 * robot.patience_ticks, RETRY_TICKS_MAX)
 
     def _finish(self, living: Sequence[int]) -> bool:
         """Halt all robots, and tell whether all is explored: nothing is open, or will be by what a robot has written."""

@@ -1,12 +1,13 @@
 """What is measured of a run, by name; units are last in the names."""
 
 from collections.abc import Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
-from zwerm.catalogue import BASE
+from zwerm.catalogue import BASE, algorithm_of
 from zwerm.scenario.tables import MetricsTable, Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.geometry.visibility import Visibility
@@ -65,7 +66,12 @@ def measure(world: "World", table: MetricsTable) -> dict[str, float]:
         found["concluded_early"] = concluded_early(world)
     if world.schedule.faults:
         found["faults_missed"] = float(len(world.schedule.missed))
-    return found | _told(world)
+    found |= _told(world)
+    row = algorithm_of(world.scenario.robots.controller)
+    for name in () if row is None else row.metrics:
+        module, _, function = name.partition(":")
+        found |= getattr(import_module(module), function)(world)
+    return found
 
 
 def _robots_leave(scenario: Scenario) -> bool:
