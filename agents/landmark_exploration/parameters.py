@@ -19,10 +19,10 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     """The robots' parameters; those of choosing frontiers count where robots choose by themselves.
 
     `beta` weighs the cost against the utility. A robot has `cross_ticks` to cross the line of a frontier, and `search_ticks` to
-    search behind it (minimal effort: 1). `message_bytes_max` caps every radio message. `lease_ticks`: a claim of whom nothing is
-    heard for so long is void. `dead_ticks`: a robot silent for so long is presumed dead. `freeze_ticks`: a robot that finds
-    nothing left to explore for so long adds nothing to the map any more. `robots_expected`: how many robots must agree that all
-    is explored; one that was never heard of counts as silent from the start. `turn_sd_rad`: the random walk's turn a tick.
+    search behind it (minimal effort: 1). `message_bytes_max` caps every radio message. A claim is void when its robot has
+    been silent for `lease_ticks`; a robot silent for `dead_ticks` is presumed dead. A robot that has found nothing left to
+    explore for `freeze_ticks` adds nothing to the map any more. `robots_expected` is how many robots must agree that all is
+    explored; one that was never heard of counts as silent from the start. `turn_sd_rad` is the random walk's turn a tick.
     """
 
     beta: NonNegative = 10.0
