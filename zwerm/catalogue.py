@@ -132,6 +132,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         controllers={
             ROBOT: {
                 "landmark-exploration": "zwerm.agents.landmark_exploration:Explorer",
+                "landmark-navigator": "zwerm.agents.landmark_exploration:Navigator",
             },
             COORDINATOR: {"landmark-exploration": "zwerm.coordinator.landmark_exploration:LandmarkCoordinator"},
         },

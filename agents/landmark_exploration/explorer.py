@@ -8,6 +8,7 @@ a frontier and the way there, come from the coordinator, or it chooses and claim
 from typing import Any, ClassVar, Final
 
 from zwerm.agents.landmark_exploration import messages
+from zwerm.agents.landmark_exploration.bearings import Snapshot
 from zwerm.agents.landmark_exploration.boundary_trace import inconsistent
 from zwerm.agents.landmark_exploration.entries import observation_entries, status_entries
 from zwerm.agents.landmark_exploration.frontier import (
@@ -94,7 +95,7 @@ class Explorer(Controller):
         self._failures: dict[int, int] = {}
         self._avoid_until: dict[int, int] = {}
         self._outbox: list[Transmission] = []
-        self._seen: list[tuple[int, ...]] = []
+        self._seen: list[Snapshot] = []
         self._told_status = (False, False)
         self._drive: Drive = self._live()
         self.done = False
@@ -133,7 +134,7 @@ class Explorer(Controller):
         if len(snapshot.landmarks) and self.map.observe(snapshot, (number + max(parts, 0), self._origin)):
             self._write(observation_entries(snapshot))
             if self._claims:
-                self._seen.append(snapshot.landmarks)
+                self._seen.append(snapshot)
 
     def _raise(self, keys: list[int], status: int) -> None:
         """Raise frontiers to a status, and write it down."""
@@ -305,7 +306,12 @@ class Explorer(Controller):
             return {}
         self._told_status = status
         seen, self._seen = self._seen, []
-        told = {"open": len(self.map.frontiers.open), "done": self.done, "simplices": seen}
+        told = {
+            "open": len(self.map.frontiers.open),
+            "done": self.done,
+            "simplices": [each.landmarks for each in seen],
+            "bearings": [each.bearings for each in seen],
+        }
         if self._claim:
             told["claim"] = pair_of(self._claim - 1)
         return {"landmark_robot": told}

@@ -36,7 +36,10 @@ SAY_AGAIN_TICKS: Final = 4
 # Ticks between pictures of the map for those who watch the run.
 TELEMETRY_TICKS: Final = 25
 # Frontiers in one such picture, at most.
-FRONTIERS_TOLD_MAX: Final = 3_000
+FRONTIERS_TOLD_MAX: Final = 1_500
+SIMPLICES_TOLD_MAX: Final = 400
+# Bytes of messages that it sends in one tick, at most: a command has to fit into one message to the world.
+OUTBOX_BYTES_MAX: Final = 20_000
 
 
 class CoordinatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
@@ -131,8 +134,16 @@ class LandmarkCoordinator:
         else:
             self._send(self._gossip.tick(self._tick, None))
             self._done = not self.map.frontiers.open and self._registers.concluded(self.replica.digest, self._tick)
-        outbox, self._outbox = tuple(self._outbox), []
-        return Command(outbox=outbox, done=self._done, told=self._telemetry())
+        return Command(outbox=self._due(), done=self._done, told=self._telemetry())
+
+    def _due(self) -> tuple[Transmission, ...]:
+        """Return what fits into one command; the rest waits for the next tick."""
+        size = number = 0
+        while number < len(self._outbox) and size < OUTBOX_BYTES_MAX:
+            size += len(self._outbox[number].payload)
+            number += 1
+        due, self._outbox = tuple(self._outbox[:number]), self._outbox[number:]
+        return due
 
     # --- what robots say --------------------------------------------------------------------------------------------
 
@@ -281,15 +292,23 @@ class LandmarkCoordinator:
 
     def _telemetry(self) -> dict[str, Any]:
         """Return the map, as far as it has changed, for those who watch the run."""
-        if (self._tick % TELEMETRY_TICKS and not self._done) or self.map.version == self._told_version:
+        first, last = self._told_vertices, self.map.complex.vertices
+        behind = last - first >= SIMPLICES_TOLD_MAX
+        if (self._tick % TELEMETRY_TICKS and not (self._done or behind)) or self.map.version == self._told_version:
             return {}
-        self._told_version = self.map.version
-        first, self._told_vertices = self._told_vertices, self.map.complex.vertices
-        simplices = [self.map.complex.landmarks_of(vertex) for vertex in range(first, self._told_vertices)]
+        self._told_vertices = min(last, first + SIMPLICES_TOLD_MAX)
+        if self._told_vertices == last:
+            self._told_version = self.map.version
+        seen = [self.map.complex.snapshot_of(vertex) for vertex in range(first, self._told_vertices)]
         tasks = {node: robot.task for node, robot in self._robots.items()}
         assigned = [(node, *pair_of(task.key)) for node, task in tasks.items() if task and task.key is not None]
         frontiers = [pair_of(key) for key in list(self.map.frontiers.open)[:FRONTIERS_TOLD_MAX]]
         return {
             "open_frontiers": len(self.map.frontiers.open),
-            "landmark_map": {"simplices": simplices, "frontiers": frontiers, "assigned": assigned},
+            "landmark_map": {
+                "simplices": [each.landmarks for each in seen],
+                "bearings": [each.bearings for each in seen],
+                "frontiers": frontiers,
+                "assigned": assigned,
+            },
         }

@@ -110,14 +110,12 @@ def told_simplices(record: dict[str, Any]) -> list[list[int]]:
 
 def landmark_metrics(world: "World") -> dict[str, float]:
     """Return the metrics of landmark-based exploration of a run; nothing where no robot senses landmarks in a range."""
-    tables = [each for each in world.scenario.robots.sensors if each.kind == "landmarks"]
-    range_m = tables[0].parameters.get("range_m") if tables else None
-    records = world.audience.told
+    range_m, records = landmark_range_m(world), world.audience.told
     simplices = [simplex for each in records for simplex in told_simplices(each.told)]
-    if range_m is None or not records:
-        return {}
+    if range_m is None or not simplices:
+        return navigation_metrics(world)
     landmarks = np.array(world.scenario.landmarks, dtype=np.float64).reshape(-1, 2)
-    completion = Completion(world.arena, landmarks, float(range_m))
+    completion = Completion(world.arena, landmarks, range_m)
     reached: dict[str, float] = {}
     for each in records:
         completion.add(told_simplices(each.told))
@@ -137,6 +135,37 @@ def landmark_metrics(world: "World") -> dict[str, float]:
         "obstacles": float(obstacles(world.arena)),
         **_left_open(world),
     }
+
+
+def navigation_metrics(world: "World") -> dict[str, float]:
+    """Return the fraction of goals that robots reached, and the iterations it took; nothing where nobody navigates.
+
+    A goal counts as reached where the robot said so, and all landmarks of the goal were indeed visible.
+    """
+    ends = [(each, each.told["navigation"]) for each in world.audience.told if "navigation" in each.told]
+    range_m = landmark_range_m(world)
+    if not ends or range_m is None:
+        return {}
+    landmarks = np.array(world.scenario.landmarks, dtype=np.float64).reshape(-1, 2)
+    places = np.array([each.position[each.node] for each, _ in ends])
+    seen = visible(world.arena, landmarks, range_m, places)
+    reached = [
+        end for (_, end), there in zip(ends, seen, strict=True) if end["arrived"] and set(end["goal"]) <= set(there)
+    ]
+    return {
+        "navigation_goals": float(len(ends)),
+        "navigation_success_fraction": len(reached) / len(ends),
+        "navigation_iterations_mean": float(np.mean([end["iterations"] for end in reached]))
+        if reached
+        else float("nan"),
+    }
+
+
+def landmark_range_m(world: "World") -> float | None:
+    """Return the range of the robots' landmark sensor [m], or None where it has none."""
+    tables = [each for each in world.scenario.robots.sensors if each.kind == "landmarks"]
+    found = tables[0].parameters.get("range_m") if tables else None
+    return None if found is None else float(found)
 
 
 def _left_open(world: "World") -> dict[str, float]:

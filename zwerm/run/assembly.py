@@ -10,6 +10,7 @@ from zwerm.catalogue import BASE, COORDINATOR, ROBOT, SENSORS, Role
 from zwerm.deploy.node_specs import controller_for
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
+from zwerm.scenario.parameter_files import with_file_texts
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.arena.scatter import with_landmarks
@@ -126,4 +127,8 @@ def _controller_mistakes(
         for sensor in getattr(found, "sensors", ())
         if sensor not in sensors
     ]
+    try:
+        with_file_texts(parameters, scenario.folder, f"{table}.parameters")
+    except ScenarioError as error:
+        mistakes += error.mistakes
     return mistakes + struct_mistakes(parameters_of(found), parameters, f"{table}.parameters")
