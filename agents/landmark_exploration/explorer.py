@@ -219,8 +219,9 @@ class Explorer(Controller):
         avoided = dict.fromkeys(key for key, until in self._avoid_until.items() if tick < until)
         choice = None
         if frontiers.open:
-            policy: Policy = nearest_frontier if rules.strategy == "nearest-frontier" else cost_utility(rules.beta)
-            offer = Offer(frontiers, self.registers.claims(self.setup.node, tick), avoided)
+            alone = rules.strategy == "nearest-frontier"
+            policy: Policy = nearest_frontier if alone else cost_utility(rules.beta)
+            offer = Offer(frontiers, () if alone else self.registers.claims(self.setup.node, tick), avoided)
             choice = policy(self.map.complex, self.view.snapshot.landmarks, offer)
         if choice is None:
             self._choose_at = tick + self._patience_ticks

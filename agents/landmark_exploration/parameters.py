@@ -9,7 +9,9 @@ from zwerm.agents.landmark_exploration.messages import LARGE_BYTES, SMALL_BYTES
 Ticks = Annotated[int, Meta(ge=1, le=1_000_000)]
 NonNegative = Annotated[float, Meta(ge=0.0)]
 
+# Of robots that choose by themselves, and of a coordinator that assigns.
 Strategy = Literal["cost-utility", "nearest-frontier", "random-walk"]
+CentralStrategy = Literal["cost-utility", "nearest-frontier", "min-pos"]
 
 # Failures to get to a frontier before it is given up: it is then taken for a potential obstacle boundary.
 FAILURES_MAX: Final = 2

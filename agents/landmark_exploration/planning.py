@@ -6,6 +6,7 @@ that share a landmark with <a, b>, divided by one more than the number of robots
 no frontier farther away can be better.
 """
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 from typing import NamedTuple, Protocol
@@ -153,8 +154,55 @@ def cost_utility(beta: float) -> Policy:
 
 
 def nearest_frontier(complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer) -> Choice | None:
-    """Return the frontier that costs least to reach (Yamauchi 1997, greedily shared out among robots)."""
+    """Return the frontier that costs least to reach (Yamauchi 1998: robots share the map, and do not coordinate)."""
     return _best(complex_, landmarks, offer, 1.0, None)
+
+
+class Costs(NamedTuple):
+    """What it costs to reach each open frontier, and the way: the vertex that has it, and the vertex before each."""
+
+    cost: dict[int, float]
+    vertex: dict[int, int]
+    before: dict[int, int]
+
+    def path(self, key: int) -> tuple[int, ...]:
+        """Return the vertices on the way to a frontier."""
+        vertex = self.vertex[key]
+        return () if vertex == HERE else path_to(vertex, self.before)
+
+
+def frontier_costs(complex_: LandmarkComplex, landmarks: Sequence[int], frontiers: Frontiers) -> Costs:
+    """Return the cost of every open frontier that can be reached from where `landmarks` are seen."""
+    found = Costs({}, {}, {})
+    _note_costs(sorted(landmarks), HERE, 0.0, frontiers, found)
+    for cost, vertex, before in reach(complex_, landmarks):
+        found.before[vertex] = before
+        _note_costs(complex_.simplices[vertex], vertex, cost, frontiers, found)
+        if len(found.cost) == len(frontiers.open):
+            break
+    return found
+
+
+def _note_costs(simplex: Sequence[int], vertex: int, cost: float, frontiers: Frontiers, found: Costs) -> None:
+    live = [landmark for landmark in simplex if frontiers.open_at.get(landmark)]
+    for i, a in enumerate(live):
+        for b in live[i + 1 :]:
+            for key in (a << 16 | b, b << 16 | a):
+                if key in frontiers.open and key not in found.cost:
+                    found.cost[key], found.vertex[key] = cost, vertex
+
+
+def min_pos(mine: Costs, others: Sequence[Costs]) -> Choice | None:
+    """Return the frontier towards which fewest robots are better placed; of equals the nearest (Bautin et al. 2012).
+
+    The rank of a robot towards a frontier is the number of robots to which it costs less to get there.
+    """
+    best: tuple[int, float, int] | None = None
+    for key, cost in mine.cost.items():
+        rank = sum(other.cost.get(key, math.inf) < cost for other in others)
+        if best is None or (rank, cost, key) < best:
+            best = rank, cost, key
+    return None if best is None else Choice(best[2], mine.path(best[2]), -float(best[0]))
 
 
 def _best(

@@ -22,8 +22,17 @@ from zwerm.agents.landmark_exploration.gossip import Gossip, Said
 from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.messages import LARGE_BYTES, Entries, Report, Vector
 from zwerm.agents.landmark_exploration.orders import Task, cut, landmarks_in, write_task
-from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, NonNegative, Ticks
-from zwerm.agents.landmark_exploration.planning import Choice, Offer, Policy, cost_utility, nearest_frontier
+from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, CentralStrategy, NonNegative, Ticks
+from zwerm.agents.landmark_exploration.planning import (
+    Choice,
+    Costs,
+    Offer,
+    Policy,
+    cost_utility,
+    frontier_costs,
+    min_pos,
+    nearest_frontier,
+)
 from zwerm.agents.landmark_exploration.registers import Registers
 from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
 from zwerm.wire.messages import Command, Observation, Transmission
@@ -31,6 +40,8 @@ from zwerm.wire.messages import Command, Observation, Transmission
 # Ticks after which a robot that has nothing to explore is considered again: at first, and at most.
 RETRY_TICKS: Final = 10
 RETRY_TICKS_MAX: Final = 80
+# The costs by which min-pos ranks the other robots may be so many ticks old.
+RANK_TICKS: Final = 20
 # Ticks between two tries of the same order.
 SAY_AGAIN_TICKS: Final = 4
 # Ticks between pictures of the map for those who watch the run.
@@ -46,7 +57,7 @@ class CoordinatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
     """`beta` weighs the cost against the utility; `strategy` chooses frontiers; a robot silent for `dead_ticks` is dead."""
 
     beta: NonNegative = 10.0
-    strategy: str = "cost-utility"
+    strategy: CentralStrategy = "cost-utility"
     dead_ticks: Ticks = 600
     message_bytes_max: int = LARGE_BYTES
 
@@ -101,7 +112,8 @@ class LandmarkCoordinator:
         self._origin = origin_of(setup.node, setup.incarnation)
         self._tick = 0
         self._robots = {node: _Robot() for node in range(setup.node)}
-        self._policy: Policy = nearest_frontier if rules.strategy == "nearest-frontier" else cost_utility(rules.beta)
+        self._policy: Policy = cost_utility(rules.beta)
+        self._costs: dict[int, tuple[int, Costs]] = {}
         self._failures: dict[int, int] = {}
         self._outbox: list[Transmission] = []
         self._acknowledge: dict[int, int] = {}
@@ -217,7 +229,13 @@ class LandmarkCoordinator:
             taken.append(robot.task.key)
         offer = Offer(frontiers, taken)
         free = [node for node in living if self._robots[node].free and self._robots[node].consider_at <= self._tick]
-        self._greedy(free if frontiers.open else [], offer)
+        if not frontiers.open:
+            pass
+        elif self._rules.strategy == "cost-utility":
+            self._greedy(free, offer)
+        else:
+            for node in free:
+                self._give(node, self._uncoordinated(node, living))
         return not frontiers.open and self._finish(living)
 
     def _greedy(self, free: Sequence[int], offer: Offer) -> None:
@@ -236,18 +254,39 @@ class LandmarkCoordinator:
                 continue
             given += 1
             offer.take(choice.key)
-            status = ABANDONED if self.map.frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
-            path = tuple(map(self.map.complex.snapshot_of, choice.path))
-            self._order(node, Task(choice.key, path, status))
+            self._give(node, choice)
+
+    def _give(self, node: int, choice: Choice | None) -> None:
+        """Send a robot to a frontier; where there is none for it, consider it again later."""
+        if choice is None:
+            robot = self._robots[node]
+            robot.consider_at = self._tick + robot.patience_ticks
+            robot.patience_ticks = min(2 * robot.patience_ticks, RETRY_TICKS_MAX)
+            return
+        status = ABANDONED if self.map.frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
+        self._order(node, Task(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status))
+
+    def _uncoordinated(self, node: int, living: Sequence[int]) -> Choice | None:
+        """Return the choice of a baseline, which is free to send several robots to one frontier."""
+        if self._rules.strategy == "nearest-frontier":
+            return nearest_frontier(self.map.complex, self._robots[node].landmarks, Offer(self.map.frontiers, ()))
+        mine = frontier_costs(self.map.complex, self._robots[node].landmarks, self.map.frontiers)
+        return min_pos(mine, [self._costs_of(other) for other in living if other != node])
+
+    def _costs_of(self, node: int) -> Costs:
+        """Return what each frontier costs a robot, from where it was heard last, by a search that may be a little old."""
+        at, costs = self._costs.get(node, (-RANK_TICKS, None))
+        if costs is None or self._tick - at >= RANK_TICKS:
+            costs = frontier_costs(self.map.complex, self._robots[node].landmarks, self.map.frontiers)
+            self._costs[node] = self._tick, costs
+        return costs
 
     def _consider(self, node: int, offer: Offer, given: int, queue: list[tuple[float, int, int, Choice]]) -> None:
-        robot = self._robots[node]
-        choice = self._policy(self.map.complex, robot.landmarks, offer)
+        choice = self._policy(self.map.complex, self._robots[node].landmarks, offer)
         if choice is not None:
             heappush(queue, (-choice.gain, node, given, choice))
-            return
-        robot.consider_at = self._tick + robot.patience_ticks
-        robot.patience_ticks = min(2 * robot.patience_ticks, RETRY_TICKS_MAX)
+        else:
+            self._give(node, None)
 
     def _finish(self, living: Sequence[int]) -> bool:
         """Halt all robots, and tell whether all is explored: nothing is open, or will be by what a robot has written."""
