@@ -21,7 +21,7 @@ from mkdocs.structure.files import File, Files
 from pydantic import BaseModel
 
 from zwerm.agents.runtime import controllers
-from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, ROBOT, SENSORS, names
+from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, FIELDS, ROBOT, SENSORS, names
 from zwerm.cli.app import app
 from zwerm.run.runner import run
 from zwerm.scenario import tables as scenario
@@ -31,7 +31,7 @@ from zwerm.study.tables import StudyTable
 from zwerm.wire import messages as protocol
 from zwerm.world.faults import FaultTable
 from zwerm.world.faults import schedule as faults
-from zwerm.world.fields import field as fields
+from zwerm.world.fields import registry as fields
 from zwerm.world.radio import LinkTable
 from zwerm.world.radio import registry as radio
 from zwerm.world.sensors import registry as sensors
@@ -209,7 +209,7 @@ def _kinds(kinds: dict[str, tuple[type, type[BaseModel]]], base: type[BaseModel]
 def field_list() -> str:
     """Return every kind of scalar field and what it takes."""
     parts = []
-    for kind, found in fields.KINDS.items():
+    for kind, found in ((kind, fields.find(kind)) for kind in FIELDS):
         parts.append(f"### `{kind}` {{ #field-{kind} }}\n\n{paragraphs(found.__doc__)}")
         parts.append(rows(found.Parameters.model_json_schema()))
     return "\n\n".join(parts)

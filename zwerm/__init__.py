@@ -7,12 +7,12 @@ are first asked for, so that a robot's process does not carry what only the worl
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
+from zwerm.version import __version__
+
 if TYPE_CHECKING:
     from zwerm.run.result import RunResult as RunResult
     from zwerm.run.runner import run as run
     from zwerm.scenario.load import load as load
-
-__version__: Final = "0.1.0"
 
 __all__ = ["RunResult", "__version__", "load", "run"]
 

@@ -107,6 +107,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
                 controllers=_DECENTRALISED,
             ),
         ),
+        layers=("zwerm.view.sensor_coverage:ComplexLayer",),
         scenarios=("sensor-coverage*",),
     ),
     Algorithm(
@@ -179,6 +180,14 @@ SENSORS: Final = {
     "touch": "zwerm.world.sensors.touch:Touch",
 }
 
+FIELDS: Final = {
+    "bitmap": "zwerm.world.fields.bitmap:Bitmap",
+    "constant": "zwerm.world.fields.constant:Constant",
+    "gaussians": "zwerm.world.fields.gaussians:Gaussians",
+    "lamp": "zwerm.world.fields.lamp:Lamp",
+    "linear": "zwerm.world.fields.linear:Linear",
+}
+
 RADIO_MODELS: Final = {
     "range": "zwerm.world.radio.models.range:DiscRange",
     "line_of_sight": "zwerm.world.radio.models.line_of_sight:LineOfSightModel",
@@ -200,6 +209,12 @@ def algorithm_of(controller: str) -> Algorithm | None:
         if any(controller in group for group in row.controllers.values()):
             return row
     return None
+
+
+def layers_of(controller: str) -> Sequence[str]:
+    """Return the picture layers of the algorithm that has a controller of this name."""
+    row = algorithm_of(controller)
+    return () if row is None else row.layers
 
 
 def names(role: Role) -> list[str]:

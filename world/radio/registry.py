@@ -62,6 +62,7 @@ class Selected:
 
     def __init__(self, model: LinkModel, senders: Bools, receivers: Bools) -> None:
         self.cause = model.cause
+        self.out_of_reach: bool = getattr(model, "out_of_reach", False)
         self.model = model
         self._senders = senders
         self._receivers = receivers

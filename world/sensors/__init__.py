@@ -18,7 +18,7 @@ import numpy as np
 
 from zwerm.scenario.types import Table
 from zwerm.world.arena.arena import Arena
-from zwerm.world.fields.field import Field
+from zwerm.world.fields import Field
 from zwerm.world.geometry.visibility import Visibility
 from zwerm.world.scene import Floats, Ints, Scene
 

@@ -14,7 +14,8 @@ from zwerm.scenario.parameter_files import with_file_texts
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.arena.scatter import with_landmarks
-from zwerm.world.fields.field import Field, make_field
+from zwerm.world.fields import Field
+from zwerm.world.fields.registry import make_field
 from zwerm.world.metrics.observers import Observers, make_meters
 from zwerm.world.sensors import Sensor, Surroundings
 from zwerm.world.sensors.registry import find as find_sensor

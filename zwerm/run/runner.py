@@ -11,7 +11,6 @@ from typing import Literal, Protocol
 
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs, restart_spec
-from zwerm.deploy.swarm import LocalSwarm, RemoteSwarm
 from zwerm.errors import ScenarioError, StragglerError
 from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
@@ -95,6 +94,8 @@ def run(
             world.schedule.unborn,
         )
         return drive(world, link, seed, runner, realtime, watcher, record, link)
+    from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
+
     with LocalSwarm(
         new_run_id(),
         members,
@@ -125,6 +126,8 @@ def serve(
         raise ScenarioError(
             [f"{scenario.place}: faults: robots that run elsewhere cannot be killed, started or paused"]
         )
+    from zwerm.deploy.swarm import RemoteSwarm
+
     watcher = watcher or NullProgress()
     with RemoteSwarm(
         new_run_id(),

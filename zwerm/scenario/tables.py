@@ -221,6 +221,12 @@ class MetricsTable(Table):
     voronoi: VoronoiMetricsTable | None = None
 
 
+class PicturesTable(Table):
+    """Pictures and animations of the run: `layers`, as module:Class, are drawn over those of the algorithm."""
+
+    layers: list[str] = []
+
+
 class Scenario(Table):
     """One experiment."""
 
@@ -241,6 +247,7 @@ class Scenario(Table):
     faults: list[OpenTable] = []
     random_faults: RandomFaultsTable | None = None
     metrics: MetricsTable = MetricsTable()
+    pictures: PicturesTable = PicturesTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")
 

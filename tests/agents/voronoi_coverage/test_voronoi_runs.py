@@ -14,7 +14,7 @@ from zwerm.study.tables import built_in as built_in_studies
 from zwerm.study.tables import load_study
 from zwerm.study.trial import run_trial
 from zwerm.world.arena.arena import Arena
-from zwerm.world.fields.field import Lamp
+from zwerm.world.fields.lamp import Lamp
 from zwerm.world.metrics.voronoi_coverage import Rings
 
 TABLE1 = "voronoi-coverage-table1"

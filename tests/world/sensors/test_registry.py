@@ -11,7 +11,7 @@ from zwerm.catalogue import SENSORS
 from zwerm.errors import ScenarioError
 from zwerm.scenario.types import OpenTable
 from zwerm.wire.messages import SENSOR_FIELDS, Observation, Wake, decode_observation, encode
-from zwerm.world.fields.field import Linear
+from zwerm.world.fields.linear import Linear
 from zwerm.world.sensors import Surroundings
 from zwerm.world.sensors.registry import find, make_sensors
 

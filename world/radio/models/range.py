@@ -23,6 +23,7 @@ class DiscRange:
     kind: ClassVar[str] = "range"
     cause: ClassVar[str] = "out-of-range"
     needs_positions: ClassVar[bool] = True
+    out_of_reach: ClassVar[bool] = True
     Parameters: ClassVar[type[LinkTable]] = RangeTable
 
     def __init__(self, parameters: RangeTable, place: ModelPlace) -> None:

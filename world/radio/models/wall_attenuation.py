@@ -57,6 +57,7 @@ class WallAttenuation:
     kind: ClassVar[str] = "walls"
     cause: ClassVar[str] = "walls"
     needs_positions: ClassVar[bool] = True
+    out_of_reach: ClassVar[bool] = True
     Parameters: ClassVar[type[LinkTable]] = WallAttenuationTable
 
     def __init__(self, parameters: WallAttenuationTable, place: ModelPlace) -> None:
