@@ -144,6 +144,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             Variant({"map": "gossip", "assignment": "claims"}, decides=ROBOT, coordinator=False, radio=True),
         ),
         metrics=("zwerm.world.metrics.landmark_exploration:landmark_metrics",),
+        layers=("zwerm.view.landmark_exploration:LandmarkComplexLayer",),
         scenarios=("landmark-*",),
     ),
     Algorithm(

@@ -104,6 +104,7 @@ class RunResult:
             self.told,
             self.series,
             (*layers_of(self.scenario.robots.controller), *self.scenario.pictures.layers),
+            self.scenario.landmarks,
         )
 
     @property

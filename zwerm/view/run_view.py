@@ -12,8 +12,8 @@ from zwerm.world.tick.telemetry import TelemetryRecord
 class RunView:
     """The drawable part of one run: `name` is its scenario and seed, `ending` says how it ended.
 
-    `cells` is (columns, rows); `told` and `series` are those of the run's result. `layers` are classes of picture layers, as
-    `module:Class`, drawn in this order over the arena.
+    `cells` is (columns, rows); `told` and `series` are those of the run's result, `landmarks` are places [m]. `layers` are
+    classes of picture layers, as `module:Class`, drawn in this order over the arena.
     """
 
     arena: Arena
@@ -28,6 +28,7 @@ class RunView:
     told: Sequence[TelemetryRecord] = ()
     series: Mapping[str, Sequence[float]] = field(default_factory=dict)
     layers: Sequence[str] = ()
+    landmarks: Sequence[tuple[float, float]] = ()
 
     @property
     def title(self) -> str:
