@@ -11,7 +11,7 @@ _ENTRIES_BYTES: Final = 4 + 3 + 5 + 5 + 3
 _ENTRY_BYTES: Final = 2
 # The same for a vector, and the most that an (origin, count) pair takes.
 _VECTOR_BYTES: Final = 4 + 3 + 5 + 5 + 3 + 1
-_PAIR_BYTES: Final = 8
+_PAIR_BYTES: Final = 10
 
 # Past every origin.
 ORIGINS_END: Final = 1 << 32

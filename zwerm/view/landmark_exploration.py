@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 import shapely
-from matplotlib.artist import Artist
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -67,7 +66,7 @@ class LandmarkComplexLayer(Layer):
         return len(view.landmarks) > 0
 
     @property
-    def artists(self) -> Sequence[Artist]:
+    def artists(self) -> list[Any]:
         """The collections that `show` changes."""
         return [self._simplices, self._edges, self._frontier, self._assigned]
 
