@@ -40,7 +40,7 @@ BUSY_REPORT_TICKS: Final = 50
 RETRY_TICKS: Final = 10
 RETRY_TICKS_MAX: Final = 80
 # A robot looks around where it begins, and then only while it explores: what an idle robot happens to see would open
-# frontiers for ever. After so many idle ticks it looks again: perhaps it is cut off from all that is known.
+# frontiers for ever. It looks again where it is cut off: for so many ticks there was a frontier for it, and no way there.
 LOOK_TICKS: Final = 5
 CUT_OFF_TICKS: Final = 200
 # Ticks for which a robot leaves a frontier alone that it did not get to.
@@ -91,7 +91,8 @@ class Explorer(Controller):
         self._quiet_since = 0
         self._choose_at = 0
         self._patience_ticks = RETRY_TICKS
-        self._idle_ticks = 0
+        self._no_way_since: int | None = None
+        self._cut_off = False
         self._failures: dict[int, int] = {}
         self._avoid_until: dict[int, int] = {}
         self._outbox: list[Transmission] = []
@@ -105,7 +106,6 @@ class Explorer(Controller):
         self.view.take(observation)
         for packet in observation.inbox:
             self._hear(packet)
-        self._idle_ticks = self._idle_ticks + 1 if self._task is None else 0
         if self._looks():
             self._observe()
         direction = self._slide.along(next(self._drive), self.view)
@@ -122,7 +122,7 @@ class Explorer(Controller):
             return False
         if self.parameters.strategy == "random-walk":
             return True
-        return self._idle_ticks == 0 or self.view.tick <= LOOK_TICKS or self._idle_ticks > CUT_OFF_TICKS
+        return self._task is not None or self._cut_off or self.view.tick <= LOOK_TICKS
 
     # --- the map ----------------------------------------------------------------------------------------------------
 
@@ -163,7 +163,7 @@ class Explorer(Controller):
                 self._choose()
             if self._task is None or self._task.key is None:
                 # Where robots carry the map to each other, the idle ones do; where a coordinator has it they wait for it.
-                waits = not self._carries and self._idle_ticks <= CUT_OFF_TICKS
+                waits = not (self._carries or self._cut_off)
                 yield None if self._halted or waits else next(idle)
                 continue
             task = self._task
@@ -217,17 +217,23 @@ class Explorer(Controller):
             return
         frontiers = self.map.frontiers
         avoided = dict.fromkeys(key for key, until in self._avoid_until.items() if tick < until)
-        choice = None
+        choice = offer = None
         if frontiers.open:
             alone = rules.strategy == "nearest-frontier"
             policy: Policy = nearest_frontier if alone else cost_utility(rules.beta)
             offer = Offer(frontiers, () if alone else self.registers.claims(self.setup.node, tick), avoided)
             choice = policy(self.map.complex, self.view.snapshot.landmarks, offer)
         if choice is None:
+            if offer is None or offer.is_empty():
+                self._no_way_since = None
+            elif self._no_way_since is None:
+                self._no_way_since = tick
+            self._cut_off = self._no_way_since is not None and tick - self._no_way_since >= CUT_OFF_TICKS
             self._choose_at = tick + self._patience_ticks
             self._patience_ticks = min(2 * self._patience_ticks, RETRY_TICKS_MAX)
             return
         self._patience_ticks = RETRY_TICKS
+        self._no_way_since, self._cut_off = None, False
         status = ABANDONED if frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
         self._task = Task(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status)
         self._claim = choice.key + 1
@@ -269,9 +275,10 @@ class Explorer(Controller):
         if task is None:
             return
         self._report_at = 0
-        self._halted = task.key is None
+        self._halted = task.key is None and not task.walk
+        self._cut_off = task.walk
         self._reached = True
-        self._task = None if self._halted else task
+        self._task = None if task.key is None else task
 
     def _speak(self) -> None:
         tick = self.view.tick

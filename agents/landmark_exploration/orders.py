@@ -1,6 +1,6 @@
 """Orders of the coordinator: a frontier and the way there, cut into parts that fit into a packet and put together again.
 
-    frontier <a, b>     2 bytes a landmark; a = b: halt, that is stand still and add nothing to the map
+    frontier <a, b>     2 bytes a landmark; 0, 0: halt, that is stand still and add nothing to the map; 1, 1: walk about
     status              1 byte: what the frontier becomes if the robot's time there runs out
     vertices            for each: the number of its landmarks (1 byte), then landmark and bearing of each (2 bytes and 1 byte)
 
@@ -27,16 +27,20 @@ _LANDMARKS_MAX: Final = 255
 
 
 class Task(NamedTuple):
-    """What a robot shall do: explore the frontier `key` by way of `path`, and give it `status` if time runs out. None: halt."""
+    """What a robot shall do: explore the frontier `key` by way of `path`, and give it `status` if time runs out.
+
+    Without a frontier it halts, or walks about where it is cut off from all that is to be explored.
+    """
 
     key: int | None
     path: tuple[Snapshot, ...] = ()
     status: int = TIMED_OUT
+    walk: bool = False
 
 
 def write_task(task: Task) -> bytes:
     """Return a task as bytes."""
-    a, b = (0, 0) if task.key is None else pair_of(task.key)
+    a, b = (int(task.walk), int(task.walk)) if task.key is None else pair_of(task.key)
     said = [pack(_HEAD, a, b, task.status)]
     for landmarks, bearings in task.path:
         pairs = list(zip(landmarks, bearings, strict=True))[:_LANDMARKS_MAX]
@@ -56,7 +60,7 @@ def read_task(said: bytes) -> Task:
             raise ValueError("a vertex of the path is cut off")
         path.append(snapshot_of(iter_unpack("<HB", said[at + 1 : end])))
         at = end
-    return Task(None if a == b else a << 16 | b, tuple(path), status)
+    return Task(None if a == b else a << 16 | b, tuple(path), status, walk=a == b == 1)
 
 
 def cut(said: bytes, life: int, incarnation: int, order: int, bytes_max: int) -> list[Order]:

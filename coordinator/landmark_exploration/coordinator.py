@@ -235,7 +235,7 @@ class LandmarkCoordinator:
             self._greedy(free, offer)
         else:
             for node in free:
-                self._give(node, self._uncoordinated(node, living))
+                self._give(node, self._uncoordinated(node, living), cut_off=True)
         return not frontiers.open and self._finish(living)
 
     def _greedy(self, free: Sequence[int], offer: Offer) -> None:
@@ -256,12 +256,17 @@ class LandmarkCoordinator:
             offer.take(choice.key)
             self._give(node, choice)
 
-    def _give(self, node: int, choice: Choice | None) -> None:
-        """Send a robot to a frontier; where there is none for it, consider it again later."""
+    def _give(self, node: int, choice: Choice | None, cut_off: bool = False) -> None:
+        """Send a robot to a frontier; where there is none for it, consider it again later.
+
+        A robot that is `cut_off`, since no way leads to what is free, walks about meanwhile.
+        """
         if choice is None:
             robot = self._robots[node]
             robot.consider_at = self._tick + robot.patience_ticks
             robot.patience_ticks = min(2 * robot.patience_ticks, RETRY_TICKS_MAX)
+            if cut_off and (robot.task is None or (robot.task.key is None and not robot.task.walk)):
+                self._order(node, Task(None, walk=True), patience=robot.patience_ticks)
             return
         status = ABANDONED if self.map.frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
         self._order(node, Task(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status))
@@ -286,7 +291,7 @@ class LandmarkCoordinator:
         if choice is not None:
             heappush(queue, (-choice.gain, node, given, choice))
         else:
-            self._give(node, None)
+            self._give(node, None, cut_off=not offer.is_empty())
 
     def _finish(self, living: Sequence[int]) -> bool:
         """Halt all robots, and tell whether all is explored: nothing is open, or will be by what a robot has written."""
@@ -302,20 +307,21 @@ class LandmarkCoordinator:
             self.map.raise_all(again, REOPENED)
             return False
         for node, robot in robots.items():
-            if robot.task is None and robot.free:
+            if robot.free and (robot.task is None or robot.task.walk):
                 self._order(node, Task(None))
         return all(
             robot.task is not None
             and robot.task.key is None
+            and not robot.task.walk
             and robot.free
             and robot.entries == self.replica.vector.get(self._origin_of(node), 0)
             for node, robot in robots.items()
         )
 
-    def _order(self, node: int, task: Task) -> None:
+    def _order(self, node: int, task: Task, patience: int = RETRY_TICKS) -> None:
         robot = self._robots[node]
         robot.order += 1
-        robot.task, robot.free, robot.patience_ticks = task, False, RETRY_TICKS
+        robot.task, robot.free, robot.patience_ticks = task, False, patience
         self._say(node, robot)
 
     def _say(self, node: int, robot: _Robot) -> None:

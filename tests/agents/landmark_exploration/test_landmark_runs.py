@@ -85,7 +85,7 @@ def test_packets_of_64_bytes_are_enough(services: dict[str, str] | None, monkeyp
 
 CRASHES = {
     "for good": [{"kind": "crash", "nodes": [1], "at_s": 8.0}],
-    "without memory": [{"kind": "crash", "nodes": [1, 2], "at_s": 8.0, "restart_after_s": 10.0}],
+    "without memory": [{"kind": "crash", "nodes": [1, 2], "at_s": 8.0, "until_s": 18.0}],
 }
 
 
@@ -103,7 +103,7 @@ def test_a_robot_that_crashes_while_it_holds_a_frontier_holds_nobody_up(
 
 
 def test_a_coordinator_that_loses_its_memory_gets_the_map_again() -> None:
-    faults = [{"kind": "crash", "nodes": ["coordinator"], "at_s": 15.0, "restart_after_s": 3.0}]
+    faults = [{"kind": "crash", "nodes": ["coordinator"], "at_s": 15.0, "until_s": 18.0}]
     result = ran(hall(None, faults=faults))
     assert result.outcome == "completed"
     assert result.restarted
