@@ -22,7 +22,7 @@ from zwerm.agents.landmark_exploration.frontier import (
 from zwerm.agents.landmark_exploration.gossip import Gossip, Said
 from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.messages import Message, Order, Register, Report, Vector
-from zwerm.agents.landmark_exploration.motion import Drive, Outcome, explore, travel, wander
+from zwerm.agents.landmark_exploration.motion import Drive, Outcome, explore, roam, travel, wander
 from zwerm.agents.landmark_exploration.orders import OrderIntake, Task, landmark_bytes
 from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, Parameters
 from zwerm.agents.landmark_exploration.planning import Offer, Policy, cost_utility, nearest_frontier
@@ -31,6 +31,7 @@ from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_o
 from zwerm.agents.landmark_exploration.upload import Upload
 from zwerm.agents.landmark_exploration.view import Slide, View
 from zwerm.agents.runtime.contract import Controller, Setup
+from zwerm.errors import ControllerError
 from zwerm.wire.messages import Command, Observation, Packet, Transmission
 
 # Ticks between reports of a free robot, and of a busy one: what tells the coordinator that it lives.
@@ -65,18 +66,20 @@ class Explorer(Controller):
         self._speed_m_s = setup.body.max_speed_m_s
         self._bytes_max = rules.message_bytes_max
         self.view = View()
-        self.map = LandmarkMap()
+        self.map = LandmarkMap(rules.presence_only)
         self.replica = Replica()
         self._origin = origin_of(setup.node, setup.incarnation)
         self._slide = Slide(self.random)
         self._claims = setup.services.get("assignment", "coordinator") == "claims"
+        if rules.presence_only and not self._claims:
+            raise ControllerError("presence_only: robots without bearings need services.assignment=claims")
         gossips = setup.services.get("map", "coordinator") == "gossip"
         self._channel = ROBOTS if gossips else UPLINK
         self.registers = Registers(rules.lease_ticks, rules.dead_ticks, rules.robots_expected)
         self._gossip: Gossip | None = None
         if (gossips or self._claims) and self._channel in setup.channels:
             self._gossip = Gossip(setup.node, self.replica, self.registers, self._learn, rules.message_bytes_max)
-        self._carries = (gossips and self._claims) or rules.strategy == "random-walk"
+        self._carries = (gossips and self._claims) or rules.strategy == "random-walk" or rules.presence_only
         self._upload: Upload | None = None
         if not self._claims and UPLINK in setup.channels:
             self._upload = Upload(self.replica, self._origin, rules.message_bytes_max)
@@ -91,6 +94,7 @@ class Explorer(Controller):
         self._quiet_since = 0
         self._choose_at = 0
         self._patience_ticks = RETRY_TICKS
+        self._news_at = 0
         self._no_way_since: int | None = None
         self._cut_off = False
         self._failures: dict[int, int] = {}
@@ -120,7 +124,7 @@ class Explorer(Controller):
         """Tell whether the robot adds what it sees to the map."""
         if self._frozen or self._halted:
             return False
-        if self.parameters.strategy == "random-walk":
+        if self.parameters.strategy == "random-walk" or self.parameters.presence_only:
             return True
         return self._task is not None or self._cut_off or self.view.tick <= LOOK_TICKS
 
@@ -132,6 +136,7 @@ class Explorer(Controller):
         number = self.replica.vector.get(self._origin, 0)
         parts = (len(snapshot.landmarks) - 1) // 13  # the entry that completes an observation gives it its rank
         if len(snapshot.landmarks) and self.map.observe(snapshot, (number + max(parts, 0), self._origin)):
+            self._news_at = self.view.tick
             self._write(observation_entries(snapshot))
             if self._claims:
                 self._seen.append(snapshot)
@@ -149,7 +154,7 @@ class Explorer(Controller):
     def _learn(self, stretch: Stretch, held: int) -> None:
         """Take in what others wrote. A frozen robot thaws if that leaves anything to explore."""
         self.map.read(stretch, held)
-        if self._frozen and self.map.frontiers.open:
+        if self._frozen and (self.map.frontiers.open or self.parameters.presence_only):
             self._frozen = False
         self._quiet_since = self.view.tick
 
@@ -158,6 +163,8 @@ class Explorer(Controller):
     def _live(self) -> Drive:
         """Carry out one task after the other, and walk about while there is none."""
         idle = wander(self.view, self.random, self.parameters.turn_sd_rad)
+        if self.parameters.presence_only:
+            idle = roam(self.view, self.random, lambda: self._news_at == self.view.tick)
         while True:
             if self._task is None:
                 self._choose()
@@ -245,9 +252,11 @@ class Explorer(Controller):
         tick = self.view.tick
         if not self._claims or self._gossip is None:
             return
-        if self._task is not None or self.map.frontiers.open:
+        rules = self.parameters
+        if self._task is not None or self.map.frontiers.open or (rules.presence_only and self._news_at == tick):
             self._quiet_since = tick
-        elif not self._frozen and tick - self._quiet_since >= self.parameters.freeze_ticks:
+        quiet_ticks = rules.stagnation_ticks if rules.presence_only else rules.freeze_ticks
+        if not self._frozen and tick - self._quiet_since >= quiet_ticks:
             again = inconsistent(self.map.frontiers)
             if again:
                 self._raise(again, REOPENED)

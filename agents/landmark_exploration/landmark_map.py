@@ -18,9 +18,10 @@ _PARTS_MAX: Final = 4096
 
 
 class LandmarkMap:
-    """Complex and frontiers. `version` counts changes."""
+    """Complex and frontiers. `version` counts changes. Without bearings (`presence_only`) there are no frontiers."""
 
-    def __init__(self) -> None:
+    def __init__(self, presence_only: bool = False) -> None:
+        self._presence_only = presence_only
         self.complex = LandmarkComplex()
         self.frontiers = Frontiers()
         self.version = 0
@@ -28,7 +29,7 @@ class LandmarkMap:
 
     def observe(self, snapshot: Snapshot, rank: tuple[int, int] = (0, 0)) -> bool:
         """Take in an observation; tell whether it was news: a simplex more, or a status that rose."""
-        risen = self.frontiers.note(snapshot)
+        risen = not self._presence_only and self.frontiers.note(snapshot)
         news = self.complex.update(snapshot, rank) or risen
         self.version += news
         return news

@@ -42,6 +42,10 @@ TURN_SD_RAD: Final = 0.35
 # The idle walk: the deviation of its direction [rad] from tick to tick.
 WANDER_SD_RAD: Final = 0.15
 
+# The walk without bearings: the deviation of its direction [rad] where nothing is new, and how long news keep it straight.
+ROAM_SD_RAD: Final = 0.3
+NEWS_TICKS: Final = 10
+
 
 def homing(bearing: dict[int, float], target: dict[int, float]) -> tuple[float, float]:
     """Return the control input u of section II-B as (length, direction [rad]) for the best pair of common landmarks.
@@ -162,4 +166,21 @@ def wander(view: View, random: np.random.Generator, turn_sd_rad: float = WANDER_
             direction = away + float(random.uniform(-1.2, 1.2))
         else:
             direction += float(random.normal(0.0, turn_sd_rad))
+        yield direction
+
+
+def roam(view: View, random: np.random.Generator, is_new: Callable[[], bool]) -> Drive:
+    """Explore without bearings, for ever: go straight on while that shows anything new, and else turn at random.
+
+    `is_new` tells whether what is seen now was new to the map. The direction is kept for `NEWS_TICKS` after the last news.
+    """
+    direction = float(random.uniform(-math.pi, math.pi))
+    until = view.tick
+    while True:
+        if is_new():
+            until = view.tick + NEWS_TICKS
+        if any(math.cos(direction - contact) > 0.0 for contact in view.contacts):
+            direction = float(random.uniform(-math.pi, math.pi))
+        elif view.tick >= until:
+            direction += float(random.normal(0.0, ROAM_SD_RAD))
         yield direction

@@ -25,6 +25,8 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     been silent for `lease_ticks`; a robot silent for `dead_ticks` is presumed dead. A robot that has found nothing left to
     explore for `freeze_ticks` adds nothing to the map any more. `robots_expected` is how many robots must agree that all is
     explored; one that was never heard of counts as silent from the start. `turn_sd_rad` is the random walk's turn a tick.
+    With `presence_only` no bearing is used: robots know which landmarks they see, and stop when nothing was new for
+    `stagnation_ticks`.
     """
 
     beta: NonNegative = 10.0
@@ -37,3 +39,5 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     freeze_ticks: Ticks = 40
     robots_expected: Annotated[int, Meta(ge=1, le=100_000)] = 1
     turn_sd_rad: NonNegative = 0.15
+    presence_only: bool = False
+    stagnation_ticks: Ticks = 600
