@@ -16,7 +16,7 @@ COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generat
 .DEFAULT_GOAL := help
 APT_TOOLS := iproute2 nftables ffmpeg
 
-.PHONY: help setup dev compile tools run test lint format docs bench fidelity lock clean
+.PHONY: help setup dev compile tools run test lint format pages docs bench fidelity lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -52,6 +52,9 @@ lint: dev  ## check style, types and import boundaries
 format: dev  ## rewrite the code in the project's format
 	$(BIN)/ruff check --fix-only .
 	$(BIN)/ruff format .
+
+pages: dev  ## write the generated parts of the documentation into its pages
+	$(BIN)/python docs/pages.py
 
 docs: dev  ## build the documentation into site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

@@ -1,6 +1,6 @@
 """A radio without robots: what the medium makes of packets, for tests that count them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,7 +46,7 @@ class Radio:
         place = self.position.copy()
         return Scene(self.tick, self.tick * DT_S, place, heading, there, still, 0.05, self.arena, self.draws)
 
-    def step(self, outboxes: dict[int, Sequence[Transmission]], listeners: Sequence[int] | None = None) -> None:
+    def step(self, outboxes: Mapping[int, Sequence[Transmission]], listeners: Sequence[int] | None = None) -> None:
         """One tick: `listeners` (everyone, if None) take what is there for them, then the outboxes are sent."""
         self.medium.arrive(self.tick)
         nodes = list(range(len(self.position))) if listeners is None else list(listeners)

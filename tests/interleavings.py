@@ -281,7 +281,8 @@ class Explorer:
             told = [] if robot.tell() == before else [LockMessage(None, robot.tell())]
             match event:
                 case "hear":
-                    told += robot.hear(*what, now)
+                    sender, message = what
+                    told += robot.hear(sender, message, now)
                 case "ask" | "leave":
                     told += getattr(robot, event)(now)
                 case "give_up" | "depart":

@@ -7,6 +7,7 @@ Everything that lists, checks, preloads or documents algorithms and plug-ins rea
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from typing import Final, Literal
 
 Role = Literal["robot", "base", "coordinator"]
@@ -168,6 +169,19 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
     ),
 )
 
+# Commands of the command line, in the order of `zwerm --help`, as `module:function`.
+COMMANDS: Final = {
+    "list": "zwerm.cli.commands.list_command:list_catalogue",
+    "check": "zwerm.cli.commands.check_command:check",
+    "run": "zwerm.cli.commands.run_command:run",
+    "world": "zwerm.cli.commands.world_command:world",
+    "robot": "zwerm.cli.commands.robot_command:robot",
+    "twin": "zwerm.cli.commands.twin_command:twin",
+    "shrink": "zwerm.cli.commands.shrink_command:shrink",
+    "study": "zwerm.cli.commands.study_command:study",
+    "compare": "zwerm.cli.commands.compare_command:compare",
+}
+
 SENSORS: Final = {
     "bearings": "zwerm.world.sensors.bearings:Bearings",
     "boundary": "zwerm.world.sensors.boundary:Boundary",
@@ -202,6 +216,16 @@ RADIO_MODELS: Final = {
     "rate_limit": "zwerm.world.radio.models.rate_limit:RateLimit",
     "collision": "zwerm.world.radio.models.collision:Collision",
 }
+
+
+def plugins() -> dict[str, Mapping[str, str]]:
+    """Return the rows of every kind of plug-in."""
+    return {"sensor": SENSORS, "field": FIELDS, "radio model": RADIO_MODELS, "command": COMMANDS}
+
+
+def row_of(file_name: str) -> Algorithm | None:
+    """Return the row whose patterns name a scenario or study of this name, or None."""
+    return next((row for row in ALGORITHMS if any(fnmatchcase(file_name, each) for each in row.scenarios)), None)
 
 
 def algorithm_of(controller: str) -> Algorithm | None:

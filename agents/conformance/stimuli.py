@@ -1,7 +1,7 @@
-"""A life to put a controller through: a few dozen observations, plain and odd, always the same ones.
+"""Stimuli of the conformance kit: about a hundred observations, ordinary and unusual, always the same ones.
 
-Every reading is one that a sensor could give, with the sensors' own promises kept (an arena has an outline, bearings lie in
-(-pi, pi], ids ascend). Packets are another matter: the radio can corrupt them.
+Each reading is one that a sensor can give: an arena has an outline, bearings lie in (-pi, pi], ids ascend. Packets may hold
+any bytes, because the radio can corrupt them.
 """
 
 import math
@@ -26,7 +26,7 @@ from zwerm.wire.messages import (
     encode,
 )
 
-# The observation's field that a built-in sensor fills, by the sensor's name in a scenario and by the field's own.
+# The field of the observation that a built-in sensor fills, by the sensor's name and by the field's name.
 FIELD_OF: Final = {"compass": "compass_rad"} | {field: field for field in SENSOR_FIELDS if field != "extra"}
 
 _PLAIN: Final = 40
@@ -35,7 +35,7 @@ _MANY: Final = 60
 
 
 class StimulusSetup(Struct, frozen=True):
-    """What the life is lived with: the fields that are filled, the radio's channels, readings of other sensors."""
+    """Fields to fill, channels of the radio, and readings of sensors that are not built in."""
 
     fields: tuple[str, ...]
     channels: tuple[str, ...]
@@ -44,34 +44,34 @@ class StimulusSetup(Struct, frozen=True):
 
 
 class Stimulus(NamedTuple):
-    """One observation, encoded, and what is odd about it."""
+    """One encoded observation and its description."""
 
     title: str
     sent: bytes
 
 
-def tell(scene: StimulusSetup) -> list[Stimulus]:
-    """Return the whole story, in the order in which it happens."""
+def make_stimuli(chosen: StimulusSetup) -> list[Stimulus]:
+    """Return all stimuli in ascending order of ticks."""
     random = Draws(1).generator("conformance-story")
-    story: list[Stimulus] = []
+    stimuli: list[Stimulus] = []
     tick = 0
 
     def add(title: str, readings: dict[str, Any], inbox: Sequence[Packet] = (), ticks: int = 1) -> None:
         nonlocal tick
-        extra = dict(scene.extra) or None
-        told = {field: readings[field] for field in scene.fields}
-        observation = Observation(tick, tick * scene.dt_s, tuple(inbox), extra=extra, **told)
-        story.append(Stimulus(title, encode(observation)))
+        extra = dict(chosen.extra) or None
+        filled = {field: readings[field] for field in chosen.fields}
+        observation = Observation(tick, tick * chosen.dt_s, tuple(inbox), extra=extra, **filled)
+        stimuli.append(Stimulus(title, encode(observation)))
         tick += ticks
 
     add("nothing to be seen", _nothing())
     for number in range(_PLAIN):
         few = _some(random, int(random.integers(0, 7)))
-        # It may have slept for a while.
+        # Ticks may be missing: the controller can sleep.
         add("a plain reading", few, ticks=1 if number % 8 else 23)
     add("everything to be seen", _some(random, _MANY))
     add("the ends of every range", _ends())
-    for channel in scene.channels:
+    for channel in chosen.channels:
         for title, packets in _packets(channel, random).items():
             add(title, _some(random, 3), packets)
     for _ in range(_PLAIN):
@@ -79,7 +79,7 @@ def tell(scene: StimulusSetup) -> list[Stimulus]:
     tick = _FAR_TICK
     add(f"tick {_FAR_TICK}", _some(random, 3))
     add("nothing to be seen", _nothing())
-    return story
+    return stimuli
 
 
 def _nothing() -> dict[str, Any]:
@@ -98,7 +98,7 @@ def _nothing() -> dict[str, Any]:
 
 
 def _some(random: np.random.Generator, count: int) -> dict[str, Any]:
-    """Return a reading of every sensor that sees `count` of whatever it sees."""
+    """Return a reading of every sensor; lists have `count` entries."""
     bearings = random.uniform(-math.pi, math.pi, (3, count)).tolist()
     places = random.uniform(-2.0, 2.0, (count, 2)).tolist()
     numbers = random.uniform(-1.0, 1.0, 9).tolist()
@@ -117,7 +117,7 @@ def _some(random: np.random.Generator, count: int) -> dict[str, Any]:
 
 
 def _ends() -> dict[str, Any]:
-    """Return readings at the ends of their ranges, and of things at the robot's own place."""
+    """Return readings at the ends of their ranges, and of objects at the robot's position."""
     return {
         "line_of_sight": True,
         "bearings": (Bearing(1, math.pi), Bearing(2, math.pi), Bearing(99_999, 0.0)),
@@ -136,12 +136,12 @@ _SQUARE: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
 
 def _packets(channel: str, random: np.random.Generator) -> dict[str, list[Packet]]:
-    """Return inboxes by what is odd about them."""
+    """Return inboxes by their description."""
     noise = [Packet(channel, random.bytes(size), sender) for sender, size in enumerate((1, 7, 64), start=1)]
     return {
         "an empty packet": [Packet(channel, b"", 1)],
         "packets of noise": noise,
-        "a packet of nobody": [Packet(channel, b"\x01", None)],
+        "a packet without a sender": [Packet(channel, b"\x01", None)],
         "the same packet twice": [Packet(channel, b"\x93\x01\x02\x03", 2)] * 2,
         "a long packet": [Packet(channel, bytes(20_000), 3)],
         "many packets": [Packet(channel, bytes([number]), number + 1) for number in range(_MANY)],

@@ -16,7 +16,7 @@ from zwerm.run.assembly import assemble
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import built_in, validate
 from zwerm.scenario.tables import Scenario
-from zwerm.study.tables import StudyTable
+from zwerm.study.study_tables import StudyTable
 from zwerm.wire.messages import Observation
 from zwerm.world.sensors import registry as sensors
 
@@ -41,18 +41,6 @@ def examples(language: str) -> list[tuple[str, str, str]]:
 
 
 # --- what is generated ----------------------------------------------------------------------------------------------
-
-
-def test_every_generator_is_used_and_every_mark_is_known(generated: ModuleType) -> None:
-    used = [name for page in PAGES for name in generated.MARK.findall(page.read_text(encoding="utf-8"))]
-    assert sorted(used) == sorted(generated.GENERATED)
-
-
-def test_a_mark_is_replaced_and_the_text_around_it_stays(generated: ModuleType) -> None:
-    page = generated.on_page_markdown("before\n\n<!-- generated: built-in-scenarios -->\n\nafter", page=None)
-    assert page.startswith("before\n\n| scenario |")
-    assert page.endswith("|\n\nafter")
-    assert "`computation-free`" in page
 
 
 def keys_of(model: type) -> set[str]:

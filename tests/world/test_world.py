@@ -247,7 +247,7 @@ def trace_of(*, foreseeing: bool, latency_ticks: int) -> str:
         if foreseeing:
             world.foresee()
         for node in nodes:
-            said = answer.get(world.tick + node, Command(drive=BodyVelocity(1.9, 0.0, 0.05 * node)))
+            said: Command | Failure = answer.get(world.tick + node, Command(drive=BodyVelocity(1.9, 0.0, 0.05 * node)))
             failed = world.tick == 30 and node == nodes[0]
             said = Failure(world.tick, "Oops", "") if failed else msgspec.structs.replace(said, tick=world.tick)
             world.accept(node, encode(said))

@@ -101,7 +101,7 @@ def run(
         members,
         progress=watcher.joined,
         paced=realtime is not None,
-        unborn=world.schedule.unborn,
+        late_joiners=world.schedule.unborn,
         restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
     ) as swarm:
         return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm)

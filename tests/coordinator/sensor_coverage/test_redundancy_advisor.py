@@ -107,7 +107,7 @@ def test_nobody_is_told_to_leave_who_is_not_willing_or_whose_neighbours_are_not_
 ) -> None:
     centre, words = Centre(), wheel()
     fields = {name: getattr(words[node], name) for name in words[node].__struct_fields__}
-    words[node] = StandingReport(**fields | change)  # type: ignore[arg-type]
+    words[node] = StandingReport(**fields | change)
     assert not spared(centre.hear(words.items(), ticks=1 + QUIET_TICKS))
 
 
@@ -253,9 +253,9 @@ class Swarm:
             for sender, to, payload in arrived:
                 if sender is None and to == node:
                     advice.hear(tick, payload)
-            for sender, receiver, word in heard:
+            for sender, receiver, spoken in heard:
                 if receiver == node and self.luck.random() >= 0.2:
-                    leaving.hear(sender, word)  # type: ignore[arg-type]
+                    leaving.hear(sender, spoken)  # type: ignore[arg-type]
             verdict = advice.verdict(tick, sight)
             if leaving.turn(stands and verdict is not None, verdict) or (not self.locks and stands and verdict):
                 self.leave(node, tick)
@@ -266,8 +266,8 @@ class Swarm:
             advice.note(tick, standing)
             for payload in advice.letters():
                 self.send(tick, node, None, payload)
-            for to, word in leaving.letters():
-                self.air += [(node, each, word) for each in (sight if to is None else [to])]
+            for to, letter in leaving.letters():
+                self.air += [(node, each, letter) for each in (sight if to is None else [to])]
 
     def leave(self, node: int, tick: int) -> None:
         there = {

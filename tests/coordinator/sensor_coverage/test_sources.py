@@ -219,7 +219,7 @@ def test_pushes_at_once_have_no_place_and_no_landmark_in_common(seed: int) -> No
 
 
 def test_stories_told_at_once_end_when_the_last_does_and_wake_for_the_first() -> None:
-    def story(times: list[float]):  # type: ignore[no-untyped-def]
+    def story(times: list[float]):
         for at_s in times:
             yield Wake(at_s=at_s, on_packet=at_s > 2.0)
         return times

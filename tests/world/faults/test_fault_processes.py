@@ -11,7 +11,7 @@ from support import robots_of_this_process, scenario, until
 from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError, ScenarioError, StragglerError
-from zwerm.link.node import ZenohNodeLink
+from zwerm.link.node_link import ZenohNodeLink
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import NullProgress, drive, new_run_id, run, serve
 from zwerm.scenario.tables import Scenario
@@ -114,7 +114,7 @@ def test_a_process_that_somebody_else_stops_ends_the_run_with_its_name(nothing_l
 def test_a_late_joiner_has_no_process_before_its_time(nothing_left: None) -> None:
     chosen = scenario(faults=[{"kind": "join", "nodes": [3], "at_s": 1.0}])
     world = assemble(chosen, 1)
-    with LocalSwarm(new_run_id(), node_specs(chosen, 1), unborn=world.schedule.unborn) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(chosen, 1), late_joiners=world.schedule.unborn) as swarm:
         assert len(robots_of_this_process()) == 3
         result = drive(world, swarm.link, 1, "processes", programs=swarm)
         assert len(robots_of_this_process()) == 4

@@ -99,11 +99,11 @@ ALL = list(range(20))
 
 
 def test_a_fault_that_never_came_is_counted_and_told() -> None:
-    never = [
+    never: list[dict[str, Any]] = [
         {"kind": "crash", "nodes": [0], "at_s": 9.0},
         {"kind": "blackout", "when": {"metric": "cell_coverage_fraction", "at_least": 1.0}},
     ]
-    came = [
+    came: list[dict[str, Any]] = [
         {"kind": "pause", "nodes": [1], "at_s": 0.0, "for_s": 1.0},
         {"kind": "restart", "nodes": [2], "at_s": 0.1},
         {"kind": "heal", "at_s": 0.1},
@@ -382,7 +382,8 @@ def test_a_new_optional_key_of_a_kind_of_fault_changes_no_draw(monkeypatch: pyte
 
     monkeypatch.setitem(SCHEDULE_KINDS, "crash", WiderCrash)
     monkeypatch.setitem(SCHEDULE_KINDS, "sensor_noise", WiderNoise)
-    monkeypatch.setitem(SENSING_KINDS, WiderNoise, SensorNoise)
+    sensing: Any = SENSING_KINDS
+    monkeypatch.setitem(sensing, WiderNoise, SensorNoise)
     assert drawn_now() == before
     # What a scenario writes does key the draws: the same value, given, is another fault.
     assert drawn_now(depth_m=WiderNoise.model_fields["depth_m"].default)[1] != before[1]

@@ -98,7 +98,7 @@ def test_items_are_missed_and_imagined_at_their_rates() -> None:
     world = assemble(faulty(*[noise | {"sensor": sensor} for sensor in sensors]), 1)
     looks = [look(world) for _ in range(200)]
 
-    def rate(value: float, expected: float, count: int) -> None:
+    def rate(value: np.floating[Any], expected: float, count: int) -> None:
         assert abs(value - expected) < 2.576 * math.sqrt(expected * (1 - expected) / count), (value, expected)
 
     # Robot 0 sees all others: what it misses is missed, unless it is imagined again.

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 from support import scenario
 
-from zwerm.cli.radio_table import print_books
+from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.run.runner import run
 from zwerm.wire.messages import Transmission
 from zwerm.world.radio.links import Links
@@ -134,7 +134,7 @@ def test_the_books_are_a_table_of_every_cause_with_the_links_that_lost_most() ->
     assert ages[1, 0] == pytest.approx(0.1)
     assert ages[2, 0] > 0.3
     console = Console(record=True, width=120, file=io.StringIO())
-    print_books(console, books, 2)
+    print_radio_ledger(console, books, 2)
     text = [" ".join(line.split()) for line in console.export_text().splitlines()]
     assert text[1] == "from to sent delivered loss cut in flight delivered % age mean s age max s"
     assert text[2].startswith(f"all all 120 {120 - 20 - 10 - 4} 20 10 4 ")
@@ -187,7 +187,7 @@ def test_who_is_out_of_reach_loses_nothing() -> None:
     links = books["channels"]["robots"]["links"]
     assert sum(links["out_of_reach"]) == books["channels"]["robots"]["out_of_reach"] == books["out_of_reach"]
     console = Console(record=True, width=160, file=io.StringIO())
-    print_books(console, books, 1)
+    print_radio_ledger(console, books, 1)
     rows = [line.split() for line in console.export_text().splitlines()]
     assert rows[2][-3] == f"{100.0 * result.metrics['delivered_fraction']:.1f}"
     assert rows[3][:4] == ["1", "0", str(ticks), "0"], "the link that lost most, and not one out of reach"

@@ -19,7 +19,7 @@ def within(found: float, expected: float, sd: float, count: float) -> None:
     assert abs(found - expected) <= Z99 * sd / math.sqrt(count), (found, expected)
 
 
-def lost_by_link(radio: Radio, ticks: int) -> np.ndarray:  # type: ignore[type-arg]
+def lost_by_link(radio: Radio, ticks: int) -> np.ndarray:
     """Return (links, ticks) which packets were lost while everyone broadcast at every tick, by sender and receiver."""
     count = len(radio.position)
     lost = np.ones((count, count, ticks), dtype=np.bool_)
@@ -33,7 +33,7 @@ def lost_by_link(radio: Radio, ticks: int) -> np.ndarray:  # type: ignore[type-a
     return lost[~np.eye(count, dtype=np.bool_)]
 
 
-def runs(flags: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def runs(flags: np.ndarray) -> np.ndarray:
     """Return the lengths of the runs of true in every row of (k, ticks), those that the ends cut short aside."""
     lengths = []
     for row in flags:
@@ -268,7 +268,7 @@ def test_walls_before_a_path_loss_weaken_what_it_receives() -> None:
     weak = {"kind": "path_loss", "shadowing_sd_db": 0.0, "width_db": 0.1, "sensitivity_dbm": -75.0}
     walls = [[[15, 0], [15, 20]]]
     assert Radio([(10, 10), (20, 10)], [weak], walls=walls).one_link(10)["delivered"] == 10
-    models = [{"kind": "walls", "material": "brick"}, weak]
+    models: list[dict[str, Any]] = [{"kind": "walls", "material": "brick"}, weak]
     assert Radio([(10, 10), (20, 10)], models, walls=walls).one_link(10)["dropped"] == {"weak-signal": 10}
 
 

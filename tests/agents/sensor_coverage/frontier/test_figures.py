@@ -96,7 +96,7 @@ class Swarm:
 
     def plans(self, *pair: int) -> list[Plan]:
         first = next(iter(self.planner.plans()))
-        return [each for each in first if self.robots([each.key[:2]])[0] == pair]
+        return [each for each in first if self.robots([(each.key[0], each.key[1])])[0] == pair]
 
     def ways(self, complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
         return Dijkstra(3.0).ways(complex_, sources, self.planner.obstacle)

@@ -76,7 +76,7 @@ def test_what_a_robot_that_stands_in_a_hole_met_counts_but_for_what_is_behind_it
         views, complex_ = seen(places)
         hole = next(each for each in holes(views, complex_) if len(each) > 5)
         assert is_bare(hole, views, complex_, lambda _: ())
-        assert is_bare(hole, views, complex_, lambda place, met=direction: (met,) if place == 8 else ()) == bare
+        assert is_bare(hole, views, complex_, lambda place: (direction,) if place == 8 else ()) == bare  # noqa: B023
 
 
 def test_what_a_robot_met_that_two_see_in_a_hole_counts_whatever_its_direction() -> None:

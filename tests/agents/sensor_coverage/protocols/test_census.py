@@ -48,7 +48,7 @@ class Swarm:
             self.send(node, robot.tick(self.now_s))
         self.ticks += 1
 
-    def send(self, sender: int, outbox: list) -> None:  # type: ignore[type-arg]
+    def send(self, sender: int, outbox: list) -> None:
         for to, message in outbox:
             self.sent += 1
             for receiver in self.graph[sender] if to is None else (to,):

@@ -11,7 +11,7 @@ import networkx
 import pytest
 from interleavings import Budget, Explorer, Graph, Violation
 
-from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, LockMessage, LockRequest, Message
+from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, LockGrant, LockMessage, LockRequest, Message
 
 
 def connected_graphs(largest: int, smallest: int = 2) -> list[Graph]:
@@ -169,8 +169,8 @@ class Fickle(LeaveLock):
     """Takes a grant for any number it ever asked under."""
 
     def hear(self, sender: int, message: Message, now_s: float) -> list[LockMessage]:
-        if self._wish is not None and type(message).__name__ == "Grant":
-            return super().hear(sender, type(message)(self._wish.ask.number), now_s)
+        if self._wish is not None and isinstance(message, LockGrant):
+            return super().hear(sender, LockGrant(self._wish.ask.number), now_s)
         return super().hear(sender, message, now_s)
 
 

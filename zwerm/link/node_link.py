@@ -1,8 +1,7 @@
-"""A node's end of a Zenoh link: a client session that can reach the world's router and nothing else.
+"""A node's end of a Zenoh link: a client session that is connected to the world's router only.
 
-Promises: `join` subscribes before it says hello, so nothing that is sent to a welcomed node is lost; messages arrive
-in the order sent. The link is lost when its transport is, and does not come back: to the world the node is lost as
-well.
+`join` subscribes before it sends hello, so no message to a welcomed node is lost. Messages arrive in the order sent. If the
+transport is lost, the link is lost for good, and the world reports the node lost.
 """
 
 import contextlib
@@ -22,14 +21,14 @@ from zwerm.wire.messages import REFUSABLE, Goodbye, Hello, Welcome, decode_welco
 
 RETRY_S: Final = 0.05
 
-# Zenoh wants a limit for every query. A year stands for none: a world that is gone ends the wait by closing the transport.
+# Zenoh needs a time limit for each query. A year means no limit: if the world is gone, its transport closes first.
 LEAVE_TIMEOUT_S: Final = 365.0 * 86_400.0
 
 
 class ZenohNodeLink:
-    """The end of the node that `credential` names, of the run `run`, connected to `endpoint`.
+    """The link of the node in `credential` to the run `run`, connected to `endpoint`.
 
-    `on_lost` is called, in Zenoh's thread, when the world is gone. Until `listen` is called messages wait for
+    Zenoh's thread calls `on_lost` when the connection to the world is lost. Before `listen` is called, messages wait for
     `receive`.
     """
 
@@ -45,14 +44,14 @@ class ZenohNodeLink:
         deadline_s: float = 30.0,
         on_lost: Callable[[], object] | None = None,
     ) -> None:
-        """Connect. Raises LinkError where that does not succeed within `deadline_s` seconds."""
+        """Connect. Raises LinkError if it does not succeed within `deadline_s` seconds."""
         self._run = run
         self._credential = credential
         self._place = f"node {credential.node} at {endpoint}"
         self._deadline_s = time.monotonic() + deadline_s
         self._inbox: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._deliver: Callable[[bytes], object] = self._inbox.put
-        self._take: Callable[[bytes], object] = self._take_with_care
+        self._take: Callable[[bytes], object] = self._take_while_starting
         self._delivering = threading.Lock()
         self._listening = False
         self._on_lost = on_lost
@@ -82,15 +81,15 @@ class ZenohNodeLink:
             raise
 
     def join(self) -> Welcome:
-        """Say hello until the world answers. Raises LinkError where it refuses, or does not answer in time."""
+        """Send hello until the world answers. Raises LinkError if the world refuses or does not answer in time."""
         node = self._credential.node
         self._session.declare_subscriber(
             observation_key(self._run, node),
             Callback(self._on_sample, indirect=False),
             allowed_origin=zenoh.Locality.REMOTE,
         )
-        # Held, because Zenoh withdraws a token that nobody holds. Declared before hello, so that the world knows it by
-        # then.
+        # Kept as an attribute, because Zenoh withdraws an unreferenced token. Declared before hello, so that the world
+        # knows the token when it answers.
         self._token = self._session.liveliness().declare_token(alive_key(self._run, node))
         hello = encode(Hello(node, self._credential.incarnation))
         while (left_s := self._deadline_s - time.monotonic()) > 0:
@@ -104,7 +103,7 @@ class ZenohNodeLink:
         raise LinkError(f"{self._place}: the world did not answer hello in time")
 
     def listen(self, deliver: Callable[[bytes], object]) -> None:
-        """From now on hand every message, those that wait first, to `deliver`; it runs in Zenoh's thread."""
+        """Call `deliver` with each message from now on, waiting messages first. It runs in Zenoh's thread."""
         with self._delivering:
             while (payload := self.receive(0)) is not None:
                 deliver(payload)
@@ -117,23 +116,22 @@ class ZenohNodeLink:
             return self._inbox.get(timeout=max(timeout_s, 0.0))
         return None
 
-    def take_leave(self, reason: str, heard: Callable[[], object]) -> None:
-        """Say goodbye, and return at once; `heard` is called, in Zenoh's thread, when the world has confirmed it.
+    def send_goodbye(self, reason: str, confirmed: Callable[[], object]) -> None:
+        """Send goodbye and return at once. Zenoh's thread calls `confirmed` when the world has confirmed the goodbye.
 
-        By then all that was sent before has arrived, so the link may be closed; earlier, closing could lose what is just being
-        sent. No time limit ends the wait: a world that is slow still gets everything. `heard` is also called when the link is
-        closed.
+        Then all earlier messages have arrived, and the link may be closed; closing it earlier could lose messages. There is
+        no time limit: a slow world still gets all messages. `confirmed` is also called when the link is closed.
         """
         try:
             self._session.get(
                 hello_key(self._run, self._credential.node),
-                Callback(_ignore, heard, indirect=False),
+                Callback(_ignore, confirmed, indirect=False),
                 payload=encode(Goodbye(reason)),
                 timeout=LEAVE_TIMEOUT_S,
                 express=True,
             )
         except zenoh.ZError:  # closed already
-            heard()
+            confirmed()
 
     def close(self) -> None:
         """Release all that the link holds; idempotent."""
@@ -150,11 +148,11 @@ class ZenohNodeLink:
         return welcome
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
-        take = self._take  # called as an attribute it would be looked for as a method first, every time
+        take = self._take  # a call as an attribute would look for a method first, each time
         take(sample.payload.to_bytes())
 
-    def _take_with_care(self, payload: bytes) -> None:
-        """Take a message while it may not be settled who listens; after that there are no detours."""
+    def _take_while_starting(self, payload: bytes) -> None:
+        """Deliver a message while `listen` may run in another thread; later messages skip the lock."""
         keep_thread()
         with self._delivering:
             self._deliver(payload)
@@ -167,4 +165,4 @@ class ZenohNodeLink:
 
 
 def _ignore(reply: zenoh.Reply) -> None:
-    """Take an answer of which only its coming counts."""
+    """Ignore the content of a reply."""

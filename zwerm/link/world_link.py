@@ -1,12 +1,11 @@
-"""The world's end of a Zenoh link: a session that is itself the router, so that no message takes a detour.
+"""The world's end of a Zenoh link: a session that is also the router, so each message takes one hop.
 
-Promises: only nodes that are expected and have been welcomed are heard, under one incarnation at a time; a node's
-messages arrive in the order sent, and the end of its process after the last of them. What was turned away is counted
-in `refused`. Who may connect, and speak on which key, is not decided here but by the access control in the router's
-settings.
+Only expected and welcomed nodes are received, one incarnation of each at a time. Messages of a node arrive in the order sent,
+and the end of its process after its last message. `refused` counts refused messages by reason. The access control in the
+router's settings decides which node may connect and use which key.
 
-Messages are taken in by Zenoh's own thread, which wakes the world only when there are as many as it waits for: a switch from
-one thread to the other for each message would cost more than all that is done with it.
+Zenoh's thread receives messages, and wakes the world only when as many have arrived as the world waits for. A thread switch
+for each message would cost more than the work on the message.
 """
 
 import contextlib
@@ -26,13 +25,13 @@ from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threa
 from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
 from zwerm.wire.messages import REFUSABLE, Goodbye, Welcome, decode_hello, encode, refusal
 
-# More than can wait at once when every node answers each message with one; past it Zenoh's thread waits, and so in the end
-# do the senders.
+# Largest number of waiting arrivals. Lock-step needs fewer: one for each node. At this number Zenoh's thread blocks, and then
+# the senders do.
 CAPACITY: Final = 16_384
 
 
 class ExpectedNode(Struct, frozen=True):
-    """A node that the world expects: the incarnation it must present, its controller's name, its encoded Setup."""
+    """A node that may join: its incarnation, its controller's name, its encoded Setup, and whether time is real."""
 
     incarnation: int
     controller: str
@@ -41,10 +40,10 @@ class ExpectedNode(Struct, frozen=True):
 
 
 class ZenohWorldLink:
-    """The world's end of the link to the nodes `members` of the run `run`, listening as `settings` say."""
+    """The world's end of the link to the nodes `members` of the run `run`; `settings` are the router's."""
 
     def __init__(self, run: str, members: Mapping[int, ExpectedNode], settings: Mapping[str, Any]) -> None:
-        """Open the router's session and wait for nobody. Raises LinkError where it cannot listen."""
+        """Open the router's session, without waiting for nodes. Raises LinkError if it cannot listen."""
         self.refused: Counter[str] = Counter()
         self._run = run
         self._members = dict(members)
@@ -53,15 +52,15 @@ class ZenohWorldLink:
         self._changed = threading.Condition()
         self._dismissed = False
         self._arrivals: deque[Arrival] = deque()
-        self._wanted = CAPACITY  # so many arrivals are worth waking somebody for
-        self._losses = 0  # among them
+        self._wanted = CAPACITY  # number of arrivals at which Zenoh's thread wakes the receiver
+        self._losses = 0  # lost nodes among the arrivals
         self._closed = False
         set_threads(TWO_THREADS)
         self._session = open_session({"mode": "router", **settings}, "the world cannot listen")
         try:
             self._put = {node: self._publisher(observation_key(run, node)).put for node in self._members}
             self._session.declare_subscriber(command_key(run, EVERY), Callback(self._on_command, indirect=False))
-            self._session.liveliness().declare_subscriber(alive_key(run, EVERY), self._on_life)
+            self._session.liveliness().declare_subscriber(alive_key(run, EVERY), self._on_liveliness)
             self._session.declare_queryable(hello_key(run, EVERY), self._on_hello)
         except BaseException:
             self._session.close()  # type: ignore[no-untyped-call]
@@ -69,16 +68,16 @@ class ZenohWorldLink:
 
     @property
     def joined(self) -> frozenset[int]:
-        """The nodes that have been welcomed and are not lost."""
+        """Nodes that have been welcomed and are not lost."""
         return frozenset(self._joined)
 
     def wait_joined(self, enough: Callable[[Collection[int]], bool], timeout_s: float) -> bool:
-        """Wait until `enough` of the nodes joined is true; tell whether it was within `timeout_s` seconds."""
+        """Wait until `enough(joined nodes)` is true; return whether it is within `timeout_s` seconds."""
         with self._changed:
             return self._changed.wait_for(lambda: enough(self._joined.keys()), timeout_s)
 
     def expect(self, node: int, member: ExpectedNode) -> None:
-        """Let a node that is lost, or never joined, join as `member`. Raises LinkError for one that is joined."""
+        """Allow a lost or new node to join as `member`. Raises LinkError if it is still joined."""
         with self._changed:
             if node in self._joined:
                 raise LinkError(f"node {node} is still joined as incarnation {self._joined[node]}")
@@ -95,18 +94,18 @@ class ZenohWorldLink:
         self._wait(1, timeout_s)
         if not self._arrivals:
             return None
-        return self._taken(1)[0]
+        return self._take(1)[0]
 
     def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
-        """Return all that has arrived, as soon as there are `count`, or a loss, or after `timeout_s` seconds.
+        """Return all arrivals once there are `count`, or a node is lost, or `timeout_s` seconds have passed.
 
         Raises LinkError once closed.
         """
         self._wait(count, timeout_s)
-        return self._taken(len(self._arrivals))
+        return self._take(len(self._arrivals))
 
     def dismiss(self, reason: str) -> None:
-        """Tell every joined node that its life is over; their leaving is no loss and is not reported."""
+        """Tell every joined node to exit; their end is not reported as a loss."""
         self._dismissed = True
         if self._session.is_closed():
             return
@@ -115,7 +114,7 @@ class ZenohWorldLink:
             self._put[node](farewell)
 
     def close(self) -> None:
-        """Release all that the link holds; idempotent."""
+        """Release all resources of the link; idempotent."""
         self._dismissed = True
         with self._changed:
             self._closed = True
@@ -134,7 +133,7 @@ class ZenohWorldLink:
             )
             self._wanted = CAPACITY
 
-    def _taken(self, count: int) -> list[Arrival]:
+    def _take(self, count: int) -> list[Arrival]:
         full = len(self._arrivals) >= CAPACITY
         pop = self._arrivals.popleft
         arrivals = [pop() for _ in range(count)]
@@ -153,7 +152,7 @@ class ZenohWorldLink:
         )
 
     def _on_command(self, sample: zenoh.Sample) -> None:
-        """A message came from whoever may write to that key. Runs in Zenoh's thread."""
+        """Receive a message; access control limits its sender to the key's node. Runs in Zenoh's thread."""
         keep_thread()
         node = self._source_of.get(str(sample.key_expr))
         if node is None:
@@ -166,8 +165,8 @@ class ZenohWorldLink:
                 self._changed.notify_all()
                 self._changed.wait_for(lambda: len(self._arrivals) < CAPACITY or self._closed)
 
-    def _on_life(self, sample: zenoh.Sample) -> None:
-        """A liveliness token came or vanished: after all that the node said. Runs in a thread of its own."""
+    def _on_liveliness(self, sample: zenoh.Sample) -> None:
+        """Handle a liveliness token; it vanishes after the node's last message. Runs in a thread of its own."""
         if sample.kind == zenoh.SampleKind.PUT:
             return
         node = node_of(str(sample.key_expr))
@@ -179,8 +178,8 @@ class ZenohWorldLink:
             self._changed.notify_all()
 
     def _on_hello(self, query: zenoh.Query) -> None:
-        """A node asks to join, or says goodbye. Runs in a thread of its own."""
-        with query, contextlib.suppress(zenoh.ZError):  # closed meanwhile
+        """Answer a node's hello or goodbye. Runs in a thread of its own."""
+        with query, contextlib.suppress(zenoh.ZError):  # the link was closed
             key = str(query.key_expr)
             try:
                 welcome = self._welcome(node_of(key), query.payload.to_bytes() if query.payload else b"")
@@ -192,7 +191,7 @@ class ZenohWorldLink:
             query.reply(key, encode(welcome))
 
     def _welcome(self, node: int, payload: bytes) -> Welcome:
-        """Let the node join and say what it is, or say why not."""
+        """Admit the node and return its controller and Setup, or return the reason for refusing it."""
         try:
             hello = decode_hello(payload)
         except REFUSABLE as error:

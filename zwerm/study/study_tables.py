@@ -1,9 +1,10 @@
-"""A study's file as strict typed tables: which scenarios, over which settings and seeds, and what a paper says of them.
+"""A study's file as strict typed tables: scenarios, settings, seeds, and a paper's values.
 
-The same rules as a scenario's: unknown keys and wrong types are refused, and all mistakes are reported at once, each as
-`file: path: rule, got value`. Whether the settings exist in the scenario is for the plan to say.
+The rules are those of a scenario: unknown keys and wrong types are refused, and all errors are reported at once, each as
+`file: path: rule, got value`. `plan` checks whether the settings exist in the scenario.
 """
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,17 +20,17 @@ from zwerm.scenario.types import Finite, NonNegative, Table
 
 Setting = bool | int | float | str
 
-# Names that the columns of the results have for themselves.
+# Reserved names of columns of the results.
 RESERVED = (
     *("study", "variant", "seed", "outcome", "reason", "trace", "fingerprint", "ticks", "sim_s", "wall_s"),
     *("cell_counts", "series_time_s"),
 )
-# Of them, what a study may report as it does a metric.
-MEASURED_ANYWAY = ("ticks", "sim_s", "wall_s")
+# Reserved columns that a study may report like a metric.
+REPORTABLE_COLUMNS = ("ticks", "sim_s", "wall_s")
 
 
 def _one_kind(values: list[Any]) -> list[Setting]:
-    """Return the values of an axis, all of one type: where one number has a fraction, all are floats."""
+    """Return the values of an axis, all of one type; integers become floats if one value is a float."""
     if not values:
         raise ValueError("expected 1 value at least")
     kinds = {type(value) for value in values}
@@ -43,7 +44,7 @@ def _one_kind(values: list[Any]) -> list[Setting]:
 
 
 def _seeds(given: Any) -> Any:
-    """Return the seeds of a count, 1 to count; of a table of the first and the last; or as they are listed."""
+    """Return the seeds from a count (1 to count), from a table with first and last, or as listed."""
     if isinstance(given, int) and not isinstance(given, bool):
         if given < 1:
             raise ValueError("expected a count >= 1, an array of seeds, or first and last")
@@ -72,7 +73,7 @@ Seeds = Annotated[list[Annotated[int, Field(ge=0)]], BeforeValidator(_seeds), Af
 
 
 class Published(Table):
-    """What a paper says of a metric: a value, or a bound that it claims. `tolerance` is how exactly it says so."""
+    """A paper's value of a metric, or its lower bound. `tolerance` is the precision of the printed value."""
 
     value: Finite | None = None
     at_least: Finite | None = None
@@ -80,7 +81,7 @@ class Published(Table):
 
 
 class PaperPoint(Table):
-    """A paper's values of one variant, or of all, at one point of the grid, or at all that share the settings `at`."""
+    """A paper's values of one variant, or of all, at the points of the grid with the settings `at`."""
 
     variant: str | None = None
     at: dict[str, Any] = Field(default_factory=dict)
@@ -88,7 +89,7 @@ class PaperPoint(Table):
 
 
 class PaperTable(Table):
-    """The numbers to compare with. `trials` is over how many trials the paper took each of its means, where it says so."""
+    """A paper's numbers. `trials` is the number of trials of each mean, if the paper gives it."""
 
     tolerance: NonNegative = 0.0
     trials: Annotated[int, Field(ge=1)] | None = None
@@ -97,7 +98,7 @@ class PaperTable(Table):
 
 
 class VariantTable(Table):
-    """A named column of the study. `axes` says which setting an axis of the grid sets here, if not the one it names."""
+    """A variant of the scenario. `axes` maps an axis of the grid to the setting that it changes in this variant."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]*$")]
     scenario: str | None = None
@@ -106,9 +107,10 @@ class VariantTable(Table):
 
 
 class StudyTable(Table):
-    """One study. Every variant is run at every point of the grid with every seed.
+    """One study. Each variant runs at each point of the grid with each seed.
 
-    An axis of the grid sets the path that it names, or several, `PATH+PATH`; one with `levels` names sets of settings.
+    An axis of the grid sets the path that it names, or several, `PATH+PATH`; the values of an axis with `levels` name lists
+    of settings.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*$")]
@@ -128,7 +130,7 @@ class StudyTable(Table):
 
 @dataclass(frozen=True)
 class Study:
-    """A study that has been read, and its file: paths in it start at the file's folder."""
+    """A checked study and its file. Relative paths in it start at the file's folder."""
 
     table: StudyTable
     path: Path
@@ -140,11 +142,16 @@ class Study:
 
     @property
     def variants(self) -> list[VariantTable]:
-        """The variants; the one without a name where the file has none."""
+        """The variants; one without a name if the file has none."""
         return self.table.variants or [VariantTable.model_construct(name="")]
 
+    @property
+    def trials(self) -> int:
+        """The number of trials: variants times points of the grid times seeds."""
+        return len(self.variants) * math.prod(len(axis) for axis in self.table.grid.values()) * len(self.table.seeds)
+
     def published(self, variant: str, settings: Mapping[str, Setting]) -> dict[str, Published]:
-        """Return what the paper says of each metric at this point, its tolerance filled in; later tables win."""
+        """Return the paper's value of each metric at this point, with its tolerance; later tables override earlier ones."""
         found: dict[str, Published] = {}
         for point in self.table.paper.points:
             if point.variant in (None, variant) and all(settings[axis] == value for axis, value in point.at.items()):
@@ -160,7 +167,7 @@ BUILT_IN = Path(__file__).parents[1] / "studies"
 
 
 def built_in() -> dict[str, Path]:
-    """Return the studies that ship with Zwerm, by name."""
+    """Return the files of the built-in studies, by name."""
     return {path.stem: path for path in sorted(BUILT_IN.glob("*.toml"), key=lambda each: each.stem)}
 
 
@@ -179,7 +186,7 @@ def load_study(name: str) -> Study:
 
 
 def check_study(tables: dict[str, Any], path: Path) -> Study:
-    """Return the study of `tables`, which are `path`'s.
+    """Return the study of `tables`, read from `path`.
 
     Raises ScenarioError with every mistake.
     """
@@ -194,9 +201,9 @@ def check_study(tables: dict[str, Any], path: Path) -> Study:
 
 
 def parse_seeds(text: str) -> list[int]:
-    """Return the seeds that `N` (1 to N) or `FIRST-LAST` stands for.
+    """Return the seeds of `N` (1 to N) or `FIRST-LAST`.
 
-    Raises ScenarioError where it is neither.
+    Raises ScenarioError if `text` is neither.
     """
     first, dash, last = text.partition("-")
     ends = (first, last) if dash else ("1", first)
@@ -208,7 +215,7 @@ def parse_seeds(text: str) -> list[int]:
 
 
 def _contradictions(table: StudyTable) -> Iterator[str]:
-    """Yield what is wrong between tables that are each right."""
+    """Yield the contradictions between tables."""
     if table.scenario is None and not table.variants:
         yield "scenario: required, and missing"
     for name, count in Counter(variant.name for variant in table.variants).items():
@@ -230,7 +237,7 @@ def _contradictions(table: StudyTable) -> Iterator[str]:
         if axis in RESERVED or axis in table.metrics:
             yield f"grid.{axis}: the results have a column of that name"
     for metric, count in Counter(table.metrics).items():
-        if count > 1 or (metric in RESERVED and metric not in MEASURED_ANYWAY):
+        if count > 1 or (metric in RESERVED and metric not in REPORTABLE_COLUMNS):
             yield f"metrics: expected different names of metrics, got {metric!r}"
     for index, point in enumerate(table.paper.points):
         yield from (f"paper.points.{index}.{line}" for line in _point_contradictions(point, table))
