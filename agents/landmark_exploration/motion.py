@@ -40,7 +40,7 @@ KEPT_ANGLE: Final = 0.9
 TURN_SD_RAD: Final = 0.35
 
 # The idle walk: the deviation of its direction [rad] from tick to tick.
-WANDER_SD_RAD: Final = 0.15
+WANDER_SD_RAD: Final = 0.05
 
 # The walk without bearings: the deviation of its direction [rad] where nothing is new, and how long news keep it straight.
 ROAM_SD_RAD: Final = 0.3

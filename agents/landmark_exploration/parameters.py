@@ -38,6 +38,6 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     dead_ticks: Ticks = 1_500
     freeze_ticks: Ticks = 40
     robots_expected: Annotated[int, Meta(ge=1, le=100_000)] = 1
-    turn_sd_rad: NonNegative = 0.15
+    turn_sd_rad: NonNegative = 0.05
     presence_only: bool = False
-    stagnation_ticks: Ticks = 600
+    stagnation_ticks: Ticks = 60

@@ -7,26 +7,33 @@ claim of a robot from which nothing new was heard for a lease, by the listener's
 entry that it does not have. Its register then holds the digest of its logs. Where every robot has said that it is frozen
 with the same digest, none of them can ever add anything: the first of them to do so would have had to receive an entry that
 none of them has, from a robot that is not among them. It does not matter when each of them said it. So a conclusion is wrong
-only about robots that were not heard of, or fell silent for so long that they were presumed dead. A conclusion needs every
-robot to have said it again since it was seen that all agree: a robot that lost its memory meanwhile says something else.
+only about robots that were not heard of, that lost their memory since, or that fell silent for so long that they were presumed
+dead. All have to agree for `settle_ticks`, so that a robot in reach that has lost its memory is heard of.
 """
 
 from collections.abc import Iterable, Iterator
+from typing import Final
 
 from zwerm.agents.landmark_exploration.messages import Register
+
+# All robots have to agree for so many ticks: a few beacons, of which some may be lost.
+SETTLE_TICKS: Final = 60
 
 
 class Registers:
     """The newest register of every robot that was heard of, by node, and the tick at which it came."""
 
-    def __init__(self, lease_ticks: int, dead_ticks: int, robots_expected: int) -> None:
+    def __init__(
+        self, lease_ticks: int, dead_ticks: int, robots_expected: int, settle_ticks: int = SETTLE_TICKS
+    ) -> None:
         self.newest: dict[int, Register] = {}
         self._heard: dict[int, int] = {}
         self._told: dict[int, int] = {}  # when each was last told on
         self._lease_ticks = lease_ticks
         self._dead_ticks = dead_ticks
         self._robots_expected = robots_expected
-        self._agreed: tuple[int, dict[int, tuple[int, int]]] | None = None  # a digest, and the stamps when all agreed
+        self._settle_ticks = settle_ticks
+        self._agreed: tuple[int, int] | None = None  # a digest, and the tick since which all agree on it
 
     def merge(self, register: Register, tick: int) -> bool:
         """Take in a register heard at `tick`; tell whether it was newer than what is known of its robot."""
@@ -67,9 +74,8 @@ class Registers:
             self._agreed = None
             return False
         if self._agreed is None or self._agreed[0] != digest:
-            self._agreed = digest, {node: _age(self.newest[node]) for node in living}
-        since = self._agreed[1]
-        return all(node in since and _age(self.newest[node]) > since[node] for node in living)
+            self._agreed = digest, tick
+        return tick - self._agreed[1] >= self._settle_ticks
 
 
 def _age(register: Register) -> tuple[int, int]:
