@@ -147,9 +147,9 @@ def exchange(robots: list[Robot], links: set[tuple[int, int]], fate: random.Rand
         late = [each for each in late if each[0] > now]
         fate.shuffle(due)
         for _, sender, to, packet in due:
-            message = messages.read(packet)
-            assert message is not None
-            robots[to].gossip.hear(sender, message, robots[to].tick)
+            heard = messages.read(packet)
+            assert heard is not None
+            robots[to].gossip.hear(sender, heard, robots[to].tick)
     return longest
 
 
