@@ -93,7 +93,7 @@ def maximal(simplices: Iterable[Sequence[int]]) -> list[tuple[int, ...]]:
     found: dict[int, tuple[int, ...]] = {}
     for number, simplex in enumerate(sorted({tuple(sorted(each)) for each in simplices}, key=lambda s: (-len(s), s))):
         groups = [holders.get(landmark, set()) for landmark in simplex]
-        if groups and set.intersection(*groups):
+        if not groups or set.intersection(*groups):
             continue
         found[number] = simplex
         for landmark in simplex:
