@@ -16,7 +16,9 @@ import numpy as np
 from bench_homology import swarm
 from csv_rows import add_csv_option, write_csv
 
-from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, LockMessage, Message
+from zwerm.agents.sensor_coverage.messages.locks import LockProtocolMessage
+from zwerm.agents.sensor_coverage.protocols.component import Outgoing
+from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock
 from zwerm.maths.simplicial import FlagComplex, betti, sparing
 
 TICK_S = 0.5
@@ -55,9 +57,9 @@ class Radio:
         self.random = random
         self.loss, self.delay_ticks, self.copies = loss, delay_ticks, copies
         self.sent = self.bytes = 0
-        self._due: dict[int, list[tuple[int, int, Message]]] = {}
+        self._due: dict[int, list[tuple[int, int, LockProtocolMessage]]] = {}
 
-    def send(self, now: int, sender: int, around: list[int], outbox: list[LockMessage]) -> None:
+    def send(self, now: int, sender: int, around: list[int], outbox: list[Outgoing]) -> None:
         for to, message in outbox:
             self.sent += 1
             self.bytes += len(msgspec.msgpack.encode(message))
@@ -67,7 +69,7 @@ class Radio:
                         at = now + 1 + int(self.random.integers(0, self.delay_ticks + 1))
                         self._due.setdefault(at, []).append((sender, receiver, message))
 
-    def arrivals(self, now: int) -> list[tuple[int, int, Message]]:
+    def arrivals(self, now: int) -> list[tuple[int, int, LockProtocolMessage]]:
         return self._due.pop(now, [])
 
 
@@ -100,7 +102,7 @@ class Troubled:
             for sender, receiver, message in self.radio.arrivals(self.tick):
                 if not self.down[receiver] and self.seen[receiver]:
                     wanted = self.robots[receiver].wants
-                    self._send(receiver, self.robots[receiver].hear(sender, message, now_s))
+                    self._send(receiver, self.robots[receiver].receive(sender, message, now_s))
                     self.decisions += wanted and not self.robots[receiver].wants
             for node in np.flatnonzero(self.standing & ~self.down).tolist():
                 self._act(node, now_s)
@@ -110,10 +112,10 @@ class Troubled:
 
     def _see(self, node: int, now_s: float) -> None:
         robot = self.robots[node]
-        before = robot.tell()
-        robot.see(self.lists[node], now_s)
-        if robot.tell() != before or (self.tick + node) % 10 == 0:
-            self._send(node, [LockMessage(None, robot.tell())])
+        before = robot.neighbour_list()
+        robot.update(self.lists[node], now_s)
+        if robot.neighbour_list() != before or (self.tick + node) % 10 == 0:
+            self._send(node, [Outgoing(None, robot.neighbour_list())])
 
     def _act(self, node: int, now_s: float) -> None:
         robot = self.robots[node]
@@ -124,10 +126,10 @@ class Troubled:
             self.standing[node] = False
             self._plan(4, "vanish", node)
         elif robot.wants and (self.tick + node) % 3 == 0:
-            self._send(node, robot.ask(now_s))
+            self._send(node, robot.request(now_s))
             self.decisions += not robot.wants
         elif not robot.wants and self.random.random() < 0.02:
-            self._send(node, robot.ask(now_s))
+            self._send(node, robot.request(now_s))
         elif self.random.random() < 0.002 and not robot.locked(now_s):
             self.decisions += robot.wants
             self._send(node, robot.depart())
@@ -168,7 +170,7 @@ class Troubled:
         near = (apart <= RANGE) & ~np.eye(len(apart), dtype=bool) & self.seen[:, None] & self.seen[None, :]
         self.lists = {node: np.flatnonzero(row).tolist() for node, row in enumerate(near)}
 
-    def _send(self, node: int, outbox: list[LockMessage]) -> None:
+    def _send(self, node: int, outbox: list[Outgoing]) -> None:
         self.radio.send(self.tick, node, self.lists[node], outbox)
 
 
@@ -188,15 +190,18 @@ def freed_by_neighbours(
     while tick - last < 1_500:
         now_s = tick * TICK_S
         for node, robot in robots.items():
-            before = robot.tell()
-            robot.see((other for other in lists[node] if other in robots), now_s)
-            if robot.tell() != before or (tick + node) % 20 == 0:
+            before = robot.neighbour_list()
+            robot.update((other for other in lists[node] if other in robots), now_s)
+            if robot.neighbour_list() != before or (tick + node) % 20 == 0:
                 radio.send(
-                    tick, node, [each for each in lists[node] if each in robots], [LockMessage(None, robot.tell())]
+                    tick,
+                    node,
+                    [each for each in lists[node] if each in robots],
+                    [Outgoing(None, robot.neighbour_list())],
                 )
         for sender, receiver, message in radio.arrivals(tick):
             if receiver in robots:
-                answers = robots[receiver].hear(sender, message, now_s)
+                answers = robots[receiver].receive(sender, message, now_s)
                 radio.send(tick, receiver, [each for each in lists[receiver] if each in robots], answers)
         for node in [each for each in robots if each not in fenced]:
             robot = robots[node]
@@ -207,7 +212,7 @@ def freed_by_neighbours(
                 last = tick
                 del robots[node]
             elif (tick + node) % 3 == 0 if robot.wants else robot.redundant() and patience[node].is_over(tick):
-                outbox = robot.ask(now_s)
+                outbox = robot.request(now_s)
             radio.send(tick, node, around, outbox)
         tick += 1
     return left, radio, last * TICK_S

@@ -74,8 +74,8 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         paper="Ramaithitima, Whitzer, Bhattacharya, Kumar 2015",
         page="papers/sensor-coverage.md",
         controllers={
-            ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}:CentralRobot"},
-            BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}:CentralBase"},
+            ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}.central_robot:CentralRobot"},
+            BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}.central_base:CentralBase"},
             COORDINATOR: {"sensor-coverage": f"{_SENSOR_COVERAGE_COORDINATOR}.coordinator:SensorCoverageCoordinator"},
         },
         variants=(
@@ -194,6 +194,9 @@ SENSORS: Final = {
     "pose": "zwerm.world.sensors.pose:PoseSensor",
     "touch": "zwerm.world.sensors.touch:Touch",
 }
+
+# The function that returns a sensor's class by its name, for tools that must not import the world.
+SENSOR_LOOKUP: Final = "zwerm.world.sensors.registry:find"
 
 FIELDS: Final = {
     "bitmap": "zwerm.world.fields.bitmap:Bitmap",

@@ -17,7 +17,7 @@ from typing import Any, Final
 import msgspec
 
 from zwerm.agents.conformance.purity import PurityMonitor
-from zwerm.agents.conformance.stimuli import FIELD_OF, StimulusSetup, make_stimuli
+from zwerm.agents.conformance.stimuli import StimulusSetup, make_stimuli, sensor_class
 from zwerm.agents.runtime.contract import Body, NoParameters, Setup
 from zwerm.errors import ControllerError, ProtocolError, ZwermError
 from zwerm.maths.keyed_random import Draws
@@ -63,8 +63,8 @@ def check(
     """Raise ConformanceError with every violation of the contract by `controller`.
 
     `parameters` and `sensors` are the scenario's; by default the sensors that the controller declares. `channels` are the
-    radio's channels, `()` for none. `extra` holds a reading of each sensor of your own. The controller must work on one of
-    two bodies, an e-puck's or a holonomic one.
+    radio's channels, `()` for none. `extra` holds a reading of each sensor that is not found by its name. The controller must
+    work on one of two bodies, an e-puck's or a holonomic one.
     """
     name = getattr(controller, "__qualname__", repr(controller))
     found = _declarations(controller, sensors, extra)
@@ -97,7 +97,7 @@ def _declarations(
     if not isinstance(declared, tuple | list) or not all(isinstance(each, str) for each in declared):
         return [*found, f"sensors: expected a tuple of names, got {declared!r}"]
     for sensor in declared:
-        if FIELD_OF.get(sensor) is None and not extra:
+        if sensor_class(sensor) is None and not extra:
             found.append(f"sensors: {sensor!r} is none that Zwerm knows; give a reading of your own with extra=")
         if sensors is not None and sensor not in sensors:
             found.append(f"sensors: it declares {sensor!r}, which check() does not give")
@@ -120,9 +120,10 @@ class _Examination:
         self._setup = setup
         self.violations: list[str] = []
         self.fits = True  # the controller accepts this body and its drive commands fit it
-        fields = [field for sensor in setup.sensors if (field := FIELD_OF.get(sensor)) is not None]
-        self._given = {*fields, *(["extra"] if extra else [])}
-        self._stimuli = make_stimuli(StimulusSetup(tuple(fields), setup.channels, dict(extra or {}), setup.dt_s))
+        sensors = tuple(found for sensor in setup.sensors if (found := sensor_class(sensor)) is not None)
+        self._stimuli = make_stimuli(StimulusSetup(sensors, setup.channels, extra or {}, setup.dt_s))
+        first = decode_observation(self._stimuli[0].sent)
+        self._given = {field for field in SENSOR_FIELDS if getattr(first, field) is not None}
         with PurityMonitor() as monitor:
             self._answers: list[bytes | None] | None = None
             if self._make() is not None:

@@ -163,7 +163,7 @@ def test_picture_at_draws_each_moment_and_an_unknown_cycle_keeps_the_result(tmp_
     moments = ["--picture-at", "2", "--picture-at", "1.5s", "--picture-at", "999"]
     ran = zwerm("run", "sensor-coverage", "--inline", *hall, *moments, cwd=tmp_path)
     assert ran.returncode == 2
-    assert "zwerm: cycle 999: expected one that the run told of, which are " in ran.stderr
+    assert "zwerm: cycle 999: expected one that the run reported, which are " in ran.stderr
     assert "trace" in ran.stdout
     drawn = sorted(path.name for path in (tmp_path / "runs").iterdir())
     assert drawn == [f"sensor-coverage-seed1{each}.png" for each in ("-1.5s", "-cycle2", "")]

@@ -3,20 +3,14 @@
 import pytest
 
 from zwerm.agents.runtime.node import Node
-from zwerm.agents.sensor_coverage.frontier.planner import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
-from zwerm.agents.sensor_coverage.messages.peers import (
-    NOWHERE,
-    UNSAID,
-    PushDone,
-    PushToken,
-    Segment,
-    StateBeacon,
-    read,
-    write,
-)
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, UNSAID, StateBeacon
+from zwerm.agents.sensor_coverage.messages.peers import read, write
+from zwerm.agents.sensor_coverage.messages.pushes import PushDone, PushToken, Segment, SegmentAck
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
-from zwerm.agents.sensor_coverage.protocols.mailbox import TRIES_MAX, ReliableMailbox
+from zwerm.agents.sensor_coverage.protocols.transport.mailbox import TRIES_MAX, ReliableMailbox
 from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.link.memory import MemoryLink
@@ -50,7 +44,7 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
         robots = out()
         seen.update(dict.fromkeys(each.node for each in robots))
         assert len(seen) == len(robots), "nobody that was let out is lost"
-        held = [each.vicinity.place for each in robots if each.push is None and each.vicinity.place != NOWHERE]
+        held = [each.local_map.slot for each in robots if each.push is None and each.local_map.slot != NOWHERE]
         assert len(held) == len(set(held)), f"tick {world.tick}: each has a place of its own, but {sorted(held)}"
 
     driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), watch)
@@ -63,9 +57,9 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
 def test_a_damaged_word_says_nothing() -> None:
     payload = write(Segment(1, PushDone(7)))
     assert read(payload) == Segment(1, PushDone(7))
-    for place in range(len(payload)):
+    for position in range(len(payload)):
         damaged = bytearray(payload)
-        damaged[place] ^= 4
+        damaged[position] ^= 4
         assert read(bytes(damaged)) is None
     assert read(payload[:-1]) is None
 
@@ -80,13 +74,14 @@ def test_letters_arrive_once_and_in_order_whatever_is_lost(lost: float) -> None:
         here.write(2, PushToken(number, 0, (), 0))
     told: list[int] = []
     for tick in range(12_000):
-        for _, word in here.due(tick):
-            assert isinstance(word, Segment)
+        here.poll(tick)
+        for _, segment in here.outgoing():
+            assert isinstance(segment, Segment)
             if luck.random() >= lost:
-                receipt, body = there.take(1, word)
+                body = there.accept(1, segment)
                 told += [] if body is None else [body.push]
                 if luck.random() >= lost:
-                    here.acknowledge(2, receipt)
+                    here.receive(2, SegmentAck(segment.number), tick)
     assert told == sorted(set(told))
     assert {body.push for _, body in here.sent} <= set(told)
     assert len(here.sent) + len(here.lost) == 20
@@ -94,11 +89,14 @@ def test_letters_arrive_once_and_in_order_whatever_is_lost(lost: float) -> None:
 
 
 def test_a_letter_that_nobody_acknowledges_is_given_up() -> None:
-    post = ReliableMailbox()
-    post.write(2, PushDone(1))
-    tries = sum(len(post.due(tick)) for tick in range(10 * TRIES_MAX))
+    mailbox = ReliableMailbox()
+    mailbox.write(2, PushDone(1))
+    tries = 0
+    for tick in range(10 * TRIES_MAX):
+        mailbox.poll(tick)
+        tries += len(mailbox.outgoing())
     assert tries == TRIES_MAX
-    assert post.lost == [(2, PushDone(1))]
+    assert mailbox.lost == [(2, PushDone(1))]
 
 
 # --- the whole swarm ------------------------------------------------------------------------------------------------
@@ -133,12 +131,12 @@ def test_nobody_is_lost_or_counted_twice_whatever_the_radio_does(air: tuple[str,
     scenario = load("sensor-coverage", (*ALONE, *air))
     outcome, world, robots = drive(scenario)
     found = measure(world, scenario.metrics)
-    places = [robot.vicinity.place for robot in robots if not robot._waiting]
+    slots = [robot.local_map.slot for robot in robots if not robot.situation.waiting]
     assert outcome == "completed"
     assert found["coverage_fraction"] >= 0.98
     assert found["concluded_early"] == 0.0
-    assert len(places) == len(set(places)) >= len(robots) - 1, "each holds a place of its own, but for one at the base"
-    assert found["robots_released"] == len(robots) == found["pushes"] + len(robots) - len(places)
+    assert len(slots) == len(set(slots)) >= len(robots) - 1, "each holds a place of its own, but for one at the base"
+    assert found["robots_released"] == len(robots) == found["pushes"] + len(robots) - len(slots)
 
 
 def test_a_coordinator_that_is_killed_changes_nothing_where_there_is_none() -> None:
@@ -166,8 +164,8 @@ def test_an_empty_depot_is_noticed_by_the_base() -> None:
 # --- places ---------------------------------------------------------------------------------------------------------
 
 
-def at(place: int) -> StateBeacon:
-    return StateBeacon(1, place, 3, False, False, 1, (), (), (), UNSAID)
+def at(slot: int) -> StateBeacon:
+    return StateBeacon(1, slot, 3, False, False, 1, (), (), (), UNSAID)
 
 
 @pytest.mark.parametrize(
@@ -176,16 +174,16 @@ def at(place: int) -> StateBeacon:
     ids=["the follower took its place", "the follower stayed", "somebody else was there before"],
 )
 def test_a_leader_that_stays_takes_the_new_name_if_its_follower_came_after_all(
-    sender: int, place: int, name: int
+    sender: int, slot: int, name: int
 ) -> None:
-    leader = LocalMap(7, PlannerParameters())
-    leader.found(4)
-    leader.stay(17, 8)
-    leader.part()
-    assert leader.place == 4
-    leader.hear(sender, at(place), 10)
-    leader.part()
-    assert leader.place == name
+    leader = LocalMap(7, PlannerParameters(), Planner)
+    leader.occupy(4)
+    leader.abandon_push(17, 8)
+    leader.resolve_duplicate()
+    assert leader.slot == 4
+    leader.receive(sender, at(slot), 10)
+    leader.resolve_duplicate()
+    assert leader.slot == name
 
 
 # --- who provides what ----------------------------------------------------------------------------------------------

@@ -8,21 +8,21 @@ import pytest
 from halls import HALL, NOISE, OBSTACLE, Link, drive
 
 from zwerm.agents.runtime.contract import Body, Setup
-from zwerm.agents.sensor_coverage import CentralRobot
+from zwerm.agents.sensor_coverage.central_robot import CentralRobot
 from zwerm.agents.sensor_coverage.messages.commands import (
     Answer,
     Arrived,
     Correct,
     Deploy,
-    Order,
     Report,
     Request,
+    RobotCommand,
     ScanRequest,
     Sighting,
-    read_reply,
+    read_response,
     write,
 )
-from zwerm.agents.sensor_coverage.motion.homing import offset, slid, unit
+from zwerm.agents.sensor_coverage.motion.homing import offset, slide, unit
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.wire.messages import (
@@ -62,8 +62,8 @@ def test_landmarks_in_one_line_leave_the_way_along_it_unknown() -> None:
 
 
 def test_a_robot_slides_along_a_wall_and_away_from_it() -> None:
-    assert slid(1.0, 1.0, (0.0,)) == pytest.approx((0.0, 1.0))
-    assert slid(-1.0, 1.0, (0.0,)) == pytest.approx((-1.0, 1.0))
+    assert slide(1.0, 1.0, (0.0,)) == pytest.approx((0.0, 1.0))
+    assert slide(-1.0, 1.0, (0.0,)) == pytest.approx((-1.0, 1.0))
 
 
 class OneRobot:
@@ -78,7 +78,7 @@ class OneRobot:
         self.said: list[Answer] = []
         self.number = 0
 
-    def tick(self, *orders: Order) -> Command:
+    def tick(self, *orders: RobotCommand) -> Command:
         dx, dy = self.neighbour[0] - self.x, self.neighbour[1] - self.y
         seen = (Bearing(7, math.atan2(dy, dx)),) if math.hypot(dx, dy) <= 1.0 else ()
         touch = (Contact(0.0, math.pi / 12.0),) if self.x >= self.wall_x_m - 0.075 else ()
@@ -97,15 +97,15 @@ class OneRobot:
         x = min(self.x + 0.1 * drive.forward_m_s, self.wall_x_m - 0.07)
         self.moved = (x - self.x, 0.1 * drive.left_m_s)
         self.x, self.y = x, self.y + self.moved[1]
-        replies = [read_reply(each.payload) for each in command.outbox]
+        replies = [read_response(each.payload) for each in command.outbox]
         self.said += [each.answer for each in replies if each is not None]
         return command
 
-    def packet(self, order: Order) -> Packet:
+    def packet(self, order: RobotCommand) -> Packet:
         self.number += 1
         return Packet("uplink", write(Request(1, self.number, 1, 0, order)), 9)
 
-    def until_arrived(self, order: Order) -> Arrived:
+    def until_arrived(self, order: RobotCommand) -> Arrived:
         for _ in range(30):
             self.tick()
         self.tick(order)
@@ -246,8 +246,8 @@ def test_scrambling_the_frames_of_robots_and_stations_gives_the_same_places(
     unturned, *turned = [world.scene.position[world.scene.present] for world in worlds]
     for there in turned:
         assert len(there) == len(unturned) > 8
-        for place in unturned:
-            assert np.hypot(*(there - place).T).min() < 0.01
+        for slot in unturned:
+            assert np.hypot(*(there - slot).T).min() < 0.01
 
 
 def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from zwerm.agents.runtime.contract import Body, Setup
-from zwerm.agents.sensor_coverage.frontier.services import ScanResult
+from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import (
     Ack,
@@ -15,17 +15,24 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     LeftComplex,
     Move,
     NegotiateLeave,
-    Order,
     Report,
     Request,
+    RobotCommand,
     ScanRequest,
-    read_reply,
+    read_response,
     write,
 )
-from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, ListRequest, Word, read
+from zwerm.agents.sensor_coverage.messages.locks import (
+    ListRequest,
+    LockDenial,
+    LockGrant,
+    LockRelease,
+    LockRequest,
+    NeighbourList,
+)
+from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, PeerMessage, read
 from zwerm.agents.sensor_coverage.messages.peers import write as write_word
 from zwerm.agents.sensor_coverage.negotiating_robot import NegotiatingRobot
-from zwerm.agents.sensor_coverage.protocols import leave_lock as redundancy
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox
 from zwerm.coordinator.sensor_coverage.leave_requests import LeaveRequests
 from zwerm.errors import ScenarioError
@@ -52,11 +59,11 @@ class Pair:
         self.robot = NegotiatingRobot(setup)
         self.tick = self.number = 0
         self.answers: list[Answer] = []
-        self.words: list[Word] = []
+        self.words: list[PeerMessage] = []
         self.told: list[dict[str, dict[str, int]]] = []
         self.drives = False
 
-    def turn(self, *said: Word, order: Order | None = None, again: bool = False) -> None:
+    def turn(self, *said: PeerMessage, order: RobotCommand | None = None, again: bool = False) -> None:
         """Let a tick pass in which the neighbour says this, and the coordinator orders that."""
         inbox = [Packet(CHANNEL, write_word(each), 7) for each in said]
         self.number += order is not None and not again
@@ -81,7 +88,7 @@ class Pair:
                 assert word is not None
                 self.words.append(word)
             else:
-                reply = read_reply(each.payload)
+                reply = read_response(each.payload)
                 assert reply is not None
                 self.answers.append(reply.answer)
 
@@ -94,19 +101,19 @@ class Pair:
     def version(self) -> int:
         """Ask the robot for its list, and return its version."""
         self.turn(ListRequest((1,)))
-        return next(each.version for each in reversed(self.words) if isinstance(each, redundancy.NeighbourList))
+        return next(each.version for each in reversed(self.words) if isinstance(each, NeighbourList))
 
     def leaves(self) -> None:
         """Have the coordinator ask the robot to find out, and agree to all that it asks for."""
         self.turn(order=NegotiateLeave(2))
         for _ in range(30):
             asked, self.words = self.words, []
-            answers: list[Word] = []
+            answers: list[PeerMessage] = []
             for each in asked:
                 if isinstance(each, ListRequest):
-                    answers.append(redundancy.NeighbourList(1, (1,)))
-                elif isinstance(each, redundancy.LockRequest):
-                    answers.append(redundancy.LockGrant(each.number))
+                    answers.append(NeighbourList(1, (1,)))
+                elif isinstance(each, LockRequest):
+                    answers.append(LockGrant(each.number))
             self.turn(*answers)
 
 
@@ -115,19 +122,19 @@ AWAY = Move(2, math.pi, 0.4, (Landmark(7, 0.0, True),))
 
 def test_an_order_to_move_waits_for_the_end_of_a_lock_and_is_not_refused() -> None:
     pair = Pair().rest()
-    pair.turn(redundancy.LockRequest(5, ((1, pair.version()),)))
-    assert redundancy.LockGrant(5) in pair.words
+    pair.turn(LockRequest(5, ((1, pair.version()),)))
+    assert LockGrant(5) in pair.words
     pair.turn(order=AWAY)
     for _ in range(20):
         pair.turn()
         assert not pair.drives
     pair.turn(order=AWAY, again=True)
     assert pair.answers == [Ack()]
-    pair.turn(redundancy.LockRelease(5))
+    pair.turn(LockRelease(5))
     assert pair.drives
     pair.words.clear()
-    pair.turn(redundancy.LockRequest(6, ((1, pair.version()),)))
-    assert pair.words[-1] == redundancy.LockDenial(6), "who drives stands still for nobody"
+    pair.turn(LockRequest(6, ((1, pair.version()),)))
+    assert pair.words[-1] == LockDenial(6), "who drives stands still for nobody"
     pair.rest(100)
     assert not pair.drives
 
@@ -158,15 +165,15 @@ def test_a_robot_leaves_once_when_it_is_asked_to_find_out_and_its_neighbour_agre
 
 def test_a_robot_that_nobody_asked_and_one_whose_neighbour_does_not_agree_stay() -> None:
     pair = Pair().rest(200)
-    assert not any(isinstance(each, redundancy.LockRequest) for each in pair.words)
+    assert not any(isinstance(each, LockRequest) for each in pair.words)
     pair.turn(order=NegotiateLeave(2))
     for _ in range(100):
-        pair.turn(redundancy.NeighbourList(1, (1,)))
-    assert any(isinstance(each, redundancy.LockRequest) for each in pair.words)
+        pair.turn(NeighbourList(1, (1,)))
+    assert any(isinstance(each, LockRequest) for each in pair.words)
     assert [type(each) for each in pair.answers] == [Report]
     assert pair.told == []
-    number = max(each.number for each in pair.words if isinstance(each, redundancy.LockRequest))
-    pair.turn(redundancy.LockGrant(number))
+    number = max(each.number for each in pair.words if isinstance(each, LockRequest))
+    pair.turn(LockGrant(number))
     assert pair.told == [], "it has said that it stays"
 
 
@@ -183,15 +190,15 @@ def test_a_robot_without_memory_is_one_of_the_complex_and_stands_still_for_a_lea
 
 
 def test_who_has_left_is_taken_back_where_it_is_missed() -> None:
-    places = Slots()
+    slots = Slots()
     turns = [n * math.pi / 3.0 for n in range(6)]
     spots = [(0.0, 0.0), *((0.55 * math.cos(each), 0.55 * math.sin(each)) for each in turns)]
     for robot in range(7):
-        places.found(robot)
-    conference = LeaveRequests(0.15, places, CommandMailbox(0.1))
-    conference.note({0: LeftComplex(1, None, ()), 1: Report(1, None, ())})
+        slots.add(robot)
+    leave_requests = LeaveRequests(0.15, slots, CommandMailbox(0.1))
+    leave_requests.update({0: LeftComplex(1, None, ()), 1: Report(1, None, ())})
 
-    def picture(there: list[int]) -> ScanResult:
+    def scan(there: list[int]) -> ScanResult:
         views = {
             i: {
                 j: math.atan2(spots[j][1] - spots[i][1], spots[j][0] - spots[i][0])
@@ -202,9 +209,9 @@ def test_who_has_left_is_taken_back_where_it_is_missed() -> None:
         }
         return ScanResult(views, FlagComplex(views), ())
 
-    assert conference.spare(picture([0, 1, 2, 3, 4, 5, 6])) == (0,)
-    assert conference.spare(picture([0, 1, 2, 3])) == (), "a side would be open that it covers"
-    assert conference.spare(picture([0, 1, 4])) == (), "the others would not see each other"
+    assert leave_requests.redundant_slots(scan([0, 1, 2, 3, 4, 5, 6])) == (0,)
+    assert leave_requests.redundant_slots(scan([0, 1, 2, 3])) == (), "a side would be open that it covers"
+    assert leave_requests.redundant_slots(scan([0, 1, 4])) == (), "the others would not see each other"
 
 
 # --- the whole swarm ------------------------------------------------------------------------------------------------

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from zwerm.agents.runtime.contract import Setup
-from zwerm.agents.sensor_coverage.protocols.census import Census, CensusTally, CensusWave, Message
+from zwerm.agents.sensor_coverage.messages.waves import CensusMessage, CensusTally, CensusWave
+from zwerm.agents.sensor_coverage.protocols.census import Census
 from zwerm.agents.sensor_coverage.protocols.completion import CompletionProtocol
 
 POLL_S = 1.0
@@ -25,27 +26,27 @@ class Swarm:
         self.busy = dict.fromkeys(graph, False)
         self.random = np.random.Generator(np.random.Philox(seed))
         self.loss, self.delay_ticks, self.copies = loss, delay_ticks, copies
-        self.robots = {node: self.born(node) for node in graph}
-        self.under_way: list[tuple[int, int, int, Message]] = []
+        self.robots = {node: self.made(node) for node in graph}
+        self.under_way: list[tuple[int, int, int, CensusMessage]] = []
         self.ticks = 0
         self.sent = 0
 
-    def born(self, node: int) -> Census:
+    def made(self, node: int) -> Census:
         return Census(node, POLL_S, EVERY_S, int(self.random.integers(2**62)), base=node == 0)
 
     @property
     def now_s(self) -> float:
         return 0.5 * self.ticks
 
-    def tick(self) -> None:
+    def step(self) -> None:
         arrived = [each for each in self.under_way if each[0] <= self.ticks]
         self.under_way = [each for each in self.under_way if each[0] > self.ticks]
         for node, robot in self.robots.items():
-            robot.note(self.graph[node], self.claims[node], self.busy[node])
+            robot.update(self.graph[node], self.claims[node], self.busy[node])
         for _, sender, receiver, message in arrived:
-            self.send(receiver, self.robots[receiver].hear(sender, message, self.now_s))
+            self.send(receiver, self.robots[receiver].receive(sender, message, self.now_s))
         for node, robot in self.robots.items():
-            self.send(node, robot.tick(self.now_s))
+            self.send(node, robot.poll(self.now_s))
         self.ticks += 1
 
     def send(self, sender: int, outbox: list) -> None:
@@ -60,7 +61,7 @@ class Swarm:
     def until_concluded(self, ticks_max: int) -> bool:
         """Go on until the base concludes, or for so long, and tell which."""
         for _ in range(ticks_max):
-            self.tick()
+            self.step()
             if self.robots[0].concluded:
                 return True
         return False
@@ -116,7 +117,7 @@ def test_a_wave_takes_two_messages_a_robot_where_nobody_has_to_ask_again() -> No
     swarm = Swarm(lattice(5), seed=1)
     swarm.robots = {node: Census(node, 100.0, EVERY_S, node, base=node == 0) for node in swarm.graph}
     for _ in range(int(2.0 * EVERY_S)):
-        swarm.tick()
+        swarm.step()
     assert swarm.robots[0].last is not None
     assert swarm.sent == 2 * len(swarm.graph) - 1
 
@@ -134,7 +135,7 @@ def test_what_stirs_after_a_conclusion_at_the_base_takes_it_back() -> None:
     swarm = Swarm(chain(2), seed=1)
     assert swarm.until_concluded(ticks_max=60)
     swarm.claims[0] = 1
-    swarm.tick()
+    swarm.step()
     assert not swarm.robots[0].concluded
 
 
@@ -164,8 +165,8 @@ def test_when_all_is_quiet_the_base_concludes_in_the_end(graph: Graph, faults: d
 class Hurried(Census):
     """Does not ask who was stirred between two waves: a control."""
 
-    def note(self, neighbours: list[int], claims: int, busy: bool) -> None:  # type: ignore[override]
-        super().note(neighbours, 0, False)
+    def update(self, neighbours: list[int], claims: int, busy: bool) -> None:  # type: ignore[override]
+        super().update(neighbours, 0, False)
         self._claims = claims
 
 
@@ -176,7 +177,7 @@ def handed_around(kind: type[Census], seed: int, loss: float) -> bool:
     holder = 8
     for _ in range(600):
         swarm.claims = dict.fromkeys(swarm.graph, 0) | {holder: 1}
-        swarm.tick()
+        swarm.step()
         if swarm.robots[0].concluded:
             return True
         if swarm.random.random() < 0.5:
@@ -203,8 +204,8 @@ def broken_links(seed: int, faults: dict[str, float], amnesia: float) -> bool:
             swarm.graph = {0: [1, 2], 1: [0, 2, *[3] * (1 in by)], 2: [0, 1, *[3] * (2 in by)], 3: by}
         if swarm.random.random() < amnesia:
             node = int(swarm.random.integers(0, 4))
-            swarm.robots[node] = swarm.born(node)
-        swarm.tick()
+            swarm.robots[node] = swarm.made(node)
+        swarm.step()
         if swarm.robots[0].concluded:
             return True
     return False
@@ -224,16 +225,16 @@ def test_robots_that_lose_their_memory_again_and_again_hardly_ever_make_the_base
 def test_a_robot_that_lost_its_memory_does_not_join_by_its_own_child() -> None:
     child_says = CensusWave(5, parent=1, missing=(1,), again=True)
     reborn = Census(1, POLL_S, EVERY_S, 0)
-    reborn.note([0, 2], 0, False)
-    assert reborn.hear(2, child_says, 0.0) == []
-    assert reborn.hear(0, CensusWave(5, None, (1,), True), 0.0) != []
+    reborn.update([0, 2], 0, False)
+    assert reborn.receive(2, child_says, 0.0) == []
+    assert reborn.receive(0, CensusWave(5, None, (1,), True), 0.0) != []
 
 
 def test_what_a_robot_that_lost_its_memory_did_since_the_last_wave_is_not_taken_for_nothing() -> None:
     swarm = Swarm(chain(2), seed=1)
     for _ in range(6):
-        swarm.tick()
-    swarm.robots[1] = swarm.born(1)
+        swarm.step()
+    swarm.robots[1] = swarm.made(1)
     assert swarm.until_concluded(ticks_max=100)
     assert swarm.now_s > 2.0 * EVERY_S  # the third wave, not the second
 
@@ -241,14 +242,14 @@ def test_what_a_robot_that_lost_its_memory_did_since_the_last_wave_is_not_taken_
 def test_a_robot_joins_by_nobody_who_does_not_wait_for_it() -> None:
     """It may hear robots that do not see it: they would not count it."""
     robot = Census(1, POLL_S, EVERY_S, 0)
-    robot.note([2], 0, False)
-    assert robot.hear(0, CensusWave(5, None, (7,), False), 0.0) == []
+    robot.update([2], 0, False)
+    assert robot.receive(0, CensusWave(5, None, (7,), False), 0.0) == []
 
 
 def test_a_robot_that_went_while_it_was_waited_for_does_not_stop_the_wave_but_nothing_is_concluded_from_it() -> None:
     swarm = Swarm(chain(3), seed=1)
     for _ in range(3):
-        swarm.tick()
+        swarm.step()
     swarm.graph = {0: [1], 1: [0], 2: []}
     assert swarm.until_concluded(ticks_max=200)
     last = swarm.robots[0].last
@@ -260,19 +261,22 @@ def test_a_robot_that_went_while_it_was_waited_for_does_not_stop_the_wave_but_no
 @pytest.mark.parametrize(
     "message", [CensusWave(3, None, (1, 2), False), CensusWave(3, 4, (), True), CensusTally(3, 4, 5, 6, 7)]
 )
-def test_every_message_survives_the_wire(message: Message) -> None:
-    assert msgspec.msgpack.decode(msgspec.msgpack.encode(message), type=Message) == message
+def test_every_message_survives_the_wire(message: CensusMessage) -> None:
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(message), type=CensusMessage) == message
 
 
 def test_a_claim_that_has_come_to_an_end_is_not_counted() -> None:
     setup = Setup(node=0, role="base", dt_s=0.1, sensors=(), stream_key=bytes(16))
-    base = CompletionProtocol(setup, np.random.Generator(np.random.Philox(1)), base=True)
-    for tick, claims in enumerate((2, 2, 0)):
-        base.note(tick, (), claims, busy=False)
-        base.letters(asks=tick in (0, 2))
+    asks = True
+    base = CompletionProtocol(setup, np.random.Generator(np.random.Philox(1)), base=True, asks=lambda: asks)
+    for step, claims in enumerate((2, 2, 0)):
+        base.update(step, (), claims, busy=False)
+        asks = step in (0, 2)
+        base.poll(step)
         assert base.last is not None
         assert base.last.claims == 2
-    base.note(200, (), 0, busy=False)
-    base.letters()
+    asks = True
+    base.update(200, (), 0, busy=False)
+    base.poll(200)
     assert base.last is not None
     assert base.last.claims == 0

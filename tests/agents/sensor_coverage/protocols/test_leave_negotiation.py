@@ -8,7 +8,9 @@ import pytest
 
 from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
-from zwerm.agents.sensor_coverage.messages.peers import NOWHERE, ListRequest, Word, read, write
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.locks import ListRequest
+from zwerm.agents.sensor_coverage.messages.peers import PeerMessage, read, write
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 from zwerm.deploy.node_specs import node_specs
 from zwerm.link.memory import MemoryLink
@@ -36,29 +38,30 @@ def leave_at_random(seed: int, loss: float, wanting: int = 12, ticks: int = 400)
         node: LeaveNegotiation(node, DT_S, np.random.Generator(np.random.Philox(seed + node)), True) for node in graph
     }
     there = dict.fromkeys(robots)
-    air: list[tuple[int, int, Word]] = []
+    air: list[tuple[int, int, PeerMessage]] = []
     left = changed = 0
     for tick in range(ticks):
         lists = {node: sorted(each for each in graph[node] if each in there) for node in there}
         for node, robot in robots.items():
-            robot.watch(tick, sorted(each for each in graph[node] if each in there))
-            robot.note(node in there)
+            robot.observe(tick, sorted(each for each in graph[node] if each in there))
+            robot.update(node in there)
         heard, air = air, []
         for sender, receiver, word in heard:
             if luck.random() >= loss:
                 said = read(write(word))
                 assert said == word
-                robots[receiver].hear(sender, said)  # type: ignore[arg-type]
+                robots[receiver].receive(sender, said, tick)  # type: ignore[arg-type]
         for node, robot in robots.items():
             whole = FlagComplex(lists)
-            redundant = node in there and betti(whole) == betti(whole.without([node]))
-            if robot.turn(redundant):
+            robot.wanted = node in there and betti(whole) == betti(whole.without([node]))
+            robot.poll(tick)
+            if robot.left:
                 now = FlagComplex({each: [other for other in lists[each] if other in there] for each in there})
                 changed += betti(now) != betti(now.without([node]))
                 left += 1
                 del there[node]
-                robot.note(stands=False)
-            for to, word in robot.letters():
+                robot.update(stands=False)
+            for to, word in robot.outgoing():
                 air += [(node, each, word) for each in (graph[node] if to is None else [to])]
     return left, changed
 
@@ -77,15 +80,16 @@ def test_a_robot_that_has_granted_a_lock_stands_still_until_it_is_over() -> None
     def turn(wants: bool) -> bool:
         tick = next(ticks)
         for robot, other in ((first, 2), (second, 1)):
-            robot.watch(tick, [other])
-            robot.note(stands=True)
-        left = first.turn(wants)
-        second.turn(redundant=False)
+            robot.observe(tick, [other])
+            robot.update(stands=True)
+        first.wanted = wants
+        first.poll(tick)
+        second.poll(tick)
         for sender, receiver, at in ((first, second, 1), (second, first, 2)):
-            for _, word in sender.letters():
+            for _, word in sender.outgoing():
                 assert not isinstance(word, ListRequest) or receiver is second
-                receiver.hear(at, word)  # type: ignore[arg-type]
-        return left
+                receiver.receive(at, word, tick)
+        return first.left
 
     assert not second.locked
     while not second.locked:
@@ -109,7 +113,7 @@ def drive(scenario: Scenario, seed: int) -> tuple[World, list[LocalRobot]]:
         return [each for each in out if isinstance(each, LocalRobot)]
 
     def look(world: World) -> None:
-        held = [each.vicinity.place for each in robots() if each.push is None and each.vicinity.place != NOWHERE]
+        held = [each.local_map.slot for each in robots() if each.push is None and each.local_map.slot != NOWHERE]
         assert len(held) == len(set(held))
 
     LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), look).run()
@@ -121,9 +125,9 @@ def test_robots_are_freed_and_pushed_again_while_words_are_lost_and_nobody_is_lo
     for seed in range(1, 9):  # not in every run there is anybody to spare
         world, robots = drive(load("sensor-coverage", settings), seed)
         told = [each.told["removal"] for each in world.audience.told if "removal" in each.told]
-        spare = [each.node for each in robots if each.vicinity.spare]
-        assert len(spare) == sum("out" in each for each in told) - sum("in" in each for each in told)
-        homeless = [each.node for each in robots if each.vicinity.place == NOWHERE]
+        redundant = [each.node for each in robots if each.local_map.redundant]
+        assert len(redundant) == sum("out" in each for each in told) - sum("in" in each for each in told)
+        homeless = [each.node for each in robots if each.local_map.slot == NOWHERE]
         assert len(homeless) <= 2, "one waits at the base, and one may be on its way"
         if any("in" in each for each in told):
             break
