@@ -70,7 +70,7 @@ fidelity: dev  ## hold every model of the radio against its 99 % confidence inte
 
 lock:  ## resolve the dependencies anew (needs uv)
 	$(COMPILE) --upgrade --output-file requirements.txt
-	$(COMPILE) --group dev --constraint requirements.txt --upgrade --output-file requirements-dev.txt
+	$(COMPILE) --extra frames --group dev --constraint requirements.txt --upgrade --output-file requirements-dev.txt
 
 clean:  ## remove .venv and everything that was built
 	rm -rf $(VENV) build dist site *.egg-info zwerm/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -73,7 +73,7 @@ def measure_places(packets: int, seed: int) -> Iterator[Row]:
     models: dict[str, dict[str, Any]] = {
         "range": {"range_m": 4.0},
         "line_of_sight": {},
-        "walls": {"loss_db": 6.0, "margin_db": 10.0},
+        "wall_attenuation": {"loss_db": 6.0, "margin_db": 10.0},
     }
     radios = {
         kind: Radio(ring(NODES, 5.0), [{"kind": kind, **table}], seed, walls, check=False)
@@ -87,7 +87,7 @@ def measure_places(packets: int, seed: int) -> Iterator[Row]:
         between = shapely.linestrings(np.stack([places[first], places[second]], axis=1))
         crossed = sum(shapely.intersects(between, line).astype(int) for line in lines)
         near = shapely.dwithin(shapely.points(places[first]), shapely.points(places[second]), 4.0)
-        for kind, passes in (("range", near), ("line_of_sight", crossed == 0), ("walls", crossed < 2)):
+        for kind, passes in (("range", near), ("line_of_sight", crossed == 0), ("wall_attenuation", crossed < 2)):
             expected[kind] += 2 * int(passes.sum())
             radios[kind].position = places
             radios[kind].step(outboxes)
@@ -106,11 +106,20 @@ def measure(packets: int, seed: int) -> Iterator[Row]:
         sd = math.sqrt(fraction * (1 - fraction))
         yield row("loss", "lost fraction", fraction, found["dropped"]["loss"] / sent, sd, sent)
     for loss, burst in ((0.1, 4.0), (0.5, 10.0)):
-        lost = fates(unaudited_radio([{"kind": "bursts", "loss_fraction": loss, "burst_packets": burst}], seed), ticks)
+        lost = fates(
+            unaudited_radio([{"kind": "gilbert_elliott", "loss_fraction": loss, "burst_packets": burst}], seed), ticks
+        )
         r = 1 - 1 / burst - loss / (1 - loss) / burst
-        yield row("bursts", "lost fraction", loss, lost.mean(), math.sqrt(loss * (1 - loss) * (1 + r) / (1 - r)), sent)
+        yield row(
+            "gilbert_elliott",
+            "lost fraction",
+            loss,
+            lost.mean(),
+            math.sqrt(loss * (1 - loss) * (1 + r) / (1 - r)),
+            sent,
+        )
         length, ends = burst_length(lost)
-        yield row("bursts", "burst length", burst, length, math.sqrt(burst * (burst - 1)), ends)
+        yield row("gilbert_elliott", "burst length", burst, length, math.sqrt(burst * (burst - 1)), ends)
     deviations = {"uniform": 3**-0.5, "exponential": 1.0, "lognormal": math.sqrt(math.e - 1), "pareto": 0.8944}
     for distribution, sd in deviations.items():
         model = {"kind": "delay", "delay_s": 1.0, "jitter_s": 2.0, "distribution": distribution}

@@ -15,11 +15,11 @@ from zwerm.run.runner import run
 
 FIVE_MODELS = (
     'radio.models=[{kind="range", range_m=9}, {kind="line_of_sight"}, {kind="loss", fraction=0.1}, '
-    '{kind="bursts", loss_fraction=0.1, burst_packets=4}, {kind="delay", jitter_s=0.1, distribution="exponential"}]'
+    '{kind="gilbert_elliott", loss_fraction=0.1, burst_packets=4}, {kind="delay", jitter_s=0.1, distribution="exponential"}]'
 )
 SAME_DELIVERY = (
     'radio.models=[{kind="range", range_m=99}, {kind="path_loss", tx_power_dbm=60.0}, {kind="loss", fraction=0.0}, '
-    '{kind="bursts", loss_fraction=1e-9, burst_packets=4}, {kind="delay", delay_s=0.1}]'
+    '{kind="gilbert_elliott", loss_fraction=1e-9, burst_packets=4}, {kind="delay", delay_s=0.1}]'
 )
 TARGET_LOSS = 0.25
 

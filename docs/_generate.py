@@ -10,7 +10,7 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,18 +21,18 @@ from mkdocs.structure.files import File, Files
 from pydantic import BaseModel
 
 from zwerm.agents.runtime import controllers
-from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, FIELDS, ROBOT, SENSORS, names
+from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, FAULTS, FIELDS, RADIO_MODELS, ROBOT, SENSORS, names
 from zwerm.cli.app import app
 from zwerm.run.runner import run
 from zwerm.scenario.load import built_in, load
-from zwerm.scenario.tables import Scenario
+from zwerm.scenario.tables import Scenario, metrics_table
 from zwerm.scenario.types import OpenTable
 from zwerm.study.study_tables import StudyTable
 from zwerm.wire import messages as protocol
 from zwerm.world.faults import FaultTable
-from zwerm.world.faults import schedule as faults
+from zwerm.world.faults import registry as faults
 from zwerm.world.fields import registry as fields
-from zwerm.world.radio import LinkTable
+from zwerm.world.radio import RadioModel, RadioModelTable
 from zwerm.world.radio import registry as radio
 from zwerm.world.sensors import registry as sensors
 
@@ -119,6 +119,9 @@ def study_tables() -> str:
 def _tables(model: type[BaseModel], root: str) -> str:
     schema = model.model_json_schema()
     definitions = schema.get("$defs", {})
+    if "MetricsTable" in definitions:  # its keys are rows of the catalogue
+        metrics = metrics_table().model_json_schema()
+        definitions |= metrics.pop("$defs", {}) | {"MetricsTable": metrics}
     parts: list[str] = []
 
     def describe(table: Schema, path: str, title: str) -> None:
@@ -182,24 +185,26 @@ def sensor_list() -> str:
 
 
 def radio_models() -> str:
-    """Return every link model: its cause, what it is, and its parameters."""
-    return _kinds({kind: (model, model.Parameters) for kind, model in radio.BUILT_IN.items()}, LinkTable)
+    """Return every radio model: what it is, its cause, and its parameters."""
+    return _kinds({kind: radio.find(kind) for kind in RADIO_MODELS}, RadioModelTable)
 
 
 def fault_list() -> str:
     """Return every kind of fault and its parameters."""
-    return _kinds({kind: (table, table) for kind, table in faults.KINDS.items()}, FaultTable)
+    return _kinds({kind: faults.find(kind) for kind in FAULTS}, FaultTable)
 
 
-def _kinds(kinds: dict[str, tuple[type, type[BaseModel]]], base: type[BaseModel]) -> str:
+def _kinds(kinds: Mapping[str, type[Any]], base: type[BaseModel]) -> str:
     parts = []
-    for kind, (described, table) in kinds.items():
-        schema = table.model_json_schema()
+    for kind, found in kinds.items():
+        schema = found.Parameters.model_json_schema()
         own = {key: each for key, each in schema["properties"].items() if key not in base.model_fields}
-        text = first_paragraph(described.__doc__)
-        if hasattr(described, "cause"):
-            text = f"{paragraphs(sys.modules[described.__module__].__doc__)}\n\nDrops for `{described.cause}`."
-        parts.append(f"### `{kind}`\n\n{text}\n\n{rows(schema | {'properties': own}) if own else ''}")
+        parts.append(f"### `{kind}`\n\n{paragraphs(sys.modules[found.__module__].__doc__)}")
+        cause = getattr(found, "cause", RadioModel.cause)
+        if cause != RadioModel.cause:
+            parts.append(f"Drops for `{cause}`.")
+        if own:
+            parts.append(rows(schema | {"properties": own}))
     return "\n\n".join(parts)
 
 

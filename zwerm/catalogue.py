@@ -57,6 +57,7 @@ class Algorithm:
 
 _SENSOR_COVERAGE: Final = "zwerm.agents.sensor_coverage"
 _SENSOR_COVERAGE_COORDINATOR: Final = "zwerm.coordinator.sensor_coverage"
+_SENSOR_COVERAGE_METRICS: Final = "zwerm.world.metrics.sensor_coverage"
 _NEGOTIATING: Final[Controllers] = {
     ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}.negotiating_robot:NegotiatingRobot"},
     BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}.negotiating_robot:NegotiatingBase"},
@@ -108,6 +109,11 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
                 controllers=_DECENTRALISED,
             ),
         ),
+        metrics=(
+            f"{_SENSOR_COVERAGE_METRICS}:Deployment",
+            f"{_SENSOR_COVERAGE_METRICS}:Conclusion",
+            f"{_SENSOR_COVERAGE_METRICS}:Removals",
+        ),
         layers=("zwerm.view.sensor_coverage:ComplexLayer",),
         scenarios=("sensor-coverage*",),
     ),
@@ -144,7 +150,10 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             Variant({"map": "gossip", "assignment": "coordinator"}, decides=COORDINATOR, radio=True),
             Variant({"map": "gossip", "assignment": "claims"}, decides=ROBOT, coordinator=False, radio=True),
         ),
-        metrics=("zwerm.world.metrics.landmark_exploration:landmark_metrics",),
+        metrics=(
+            "zwerm.world.metrics.landmark_exploration:Exploration",
+            "zwerm.world.metrics.landmark_exploration:Navigation",
+        ),
         layers=("zwerm.view.landmark_exploration:LandmarkComplexLayer",),
         scenarios=("landmark-*",),
     ),
@@ -210,9 +219,9 @@ RADIO_MODELS: Final = {
     "range": "zwerm.world.radio.models.range:DiscRange",
     "line_of_sight": "zwerm.world.radio.models.line_of_sight:LineOfSightModel",
     "path_loss": "zwerm.world.radio.models.path_loss:PathLoss",
-    "walls": "zwerm.world.radio.models.wall_attenuation:WallAttenuation",
+    "wall_attenuation": "zwerm.world.radio.models.wall_attenuation:WallAttenuation",
     "loss": "zwerm.world.radio.models.loss:Loss",
-    "bursts": "zwerm.world.radio.models.gilbert_elliott:GilbertElliott",
+    "gilbert_elliott": "zwerm.world.radio.models.gilbert_elliott:GilbertElliott",
     "delay": "zwerm.world.radio.models.delay:Delay",
     "duplication": "zwerm.world.radio.models.duplication:Duplication",
     "corruption": "zwerm.world.radio.models.corruption:Corruption",
@@ -220,10 +229,38 @@ RADIO_MODELS: Final = {
     "collision": "zwerm.world.radio.models.collision:Collision",
 }
 
+FAULTS: Final = {
+    "crash": "zwerm.world.faults.programs.crash:Crash",
+    "restart": "zwerm.world.faults.programs.restart:Restart",
+    "pause": "zwerm.world.faults.programs.pause:Pause",
+    "slow": "zwerm.world.faults.programs.slow:Slow",
+    "join": "zwerm.world.faults.programs.join:Join",
+    "partition": "zwerm.world.faults.air.partition:Partition",
+    "jam": "zwerm.world.faults.air.jam:Jam",
+    "blackout": "zwerm.world.faults.air.blackout:Blackout",
+    "cut": "zwerm.world.faults.air.cut:Cut",
+    "camera_blackout": "zwerm.world.faults.sensing.camera_blackout:CameraBlackout",
+    "dead_beacon": "zwerm.world.faults.sensing.dead_beacon:DeadBeacon",
+    "stuck_touch": "zwerm.world.faults.sensing.stuck_touch:StuckTouch",
+    "sensor_noise": "zwerm.world.faults.sensing.sensor_noise:SensorNoise",
+    "heal": "zwerm.world.faults.heal:Heal",
+}
+
+# Former names of radio models, which scenarios may still use, and the current names.
+RENAMED_RADIO_MODELS: Final = {"bursts": "gilbert_elliott", "walls": "wall_attenuation"}
+
+# Metrics by the key of `[metrics]` that switches them on; the value of the key is validated by the class's `Parameters`.
+METRICS: Final = {
+    "cells": "zwerm.world.metrics.coverage:CellCoverage",
+    "coverage_radius_m": "zwerm.world.metrics.coverage:AreaCoverage",
+    "voronoi": "zwerm.world.metrics.voronoi_coverage:VoronoiMetrics",
+    "sight_range_m": "zwerm.world.metrics.sight_coverage:SightCoverage",
+}
+
 
 def plugins() -> dict[str, Mapping[str, str]]:
     """Return the rows of every kind of plug-in."""
-    return {"sensor": SENSORS, "field": FIELDS, "radio model": RADIO_MODELS, "command": COMMANDS}
+    return {"sensor": SENSORS, "field": FIELDS, "radio model": RADIO_MODELS, "metric": METRICS, "command": COMMANDS}
 
 
 def row_of(file_name: str) -> Algorithm | None:

@@ -29,6 +29,7 @@ from zwerm.wire.messages import (
     WheelSpeeds,
     decode_observation,
     encode,
+    encode_command,
     open_answer,
 )
 
@@ -173,7 +174,7 @@ class _Examination:
     def _answer(self, command: Command, when: str) -> bytes | None:
         """Return the encoded command, or None after noting why the world would refuse it."""
         try:
-            payload = encode(command)
+            payload = encode_command(command)
             open_answer(payload)
         except (TypeError, ValueError, OverflowError, RecursionError) as error:
             self._note(f"step() returned what cannot be encoded: {error}, on {when}")
@@ -325,7 +326,7 @@ def answer_for_parent() -> None:
         observation = decode_observation(sent)
         command = controller.step(observation)
         command.tick = observation.tick
-        answers.append(encode(command))
+        answers.append(encode_command(command))
     sys.stdout.write(_digest(answers))
 
 

@@ -5,7 +5,7 @@ its map and writes what is news into its log; the log goes to the coordinator, o
 a frontier and the way there, come from the coordinator, or it chooses and claims them by itself. `services` says which.
 """
 
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 from zwerm.agents.landmark_exploration import messages
 from zwerm.agents.landmark_exploration.bearings import Snapshot
@@ -28,6 +28,7 @@ from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, Parameter
 from zwerm.agents.landmark_exploration.planning import Offer, Policy, cost_utility, nearest_frontier
 from zwerm.agents.landmark_exploration.registers import Registers
 from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
+from zwerm.agents.landmark_exploration.telemetry import MapTold, columns, write_told
 from zwerm.agents.landmark_exploration.upload import Upload
 from zwerm.agents.landmark_exploration.view import Slide, View
 from zwerm.agents.runtime.contract import Controller, Setup
@@ -117,7 +118,7 @@ class Explorer(Controller):
         self._speak()
         outbox, self._outbox = tuple(self._outbox), []
         return Command(
-            drive=self.view.drive(direction, self._speed_m_s), outbox=outbox, done=self.done, told=self._telemetry()
+            drive=self.view.drive(direction, self._speed_m_s), outbox=outbox, done=self.done, snapshot=self._snapshot()
         )
 
     def _looks(self) -> bool:
@@ -316,19 +317,13 @@ class Explorer(Controller):
 
     # --- for those who watch ----------------------------------------------------------------------------------------
 
-    def _telemetry(self) -> dict[str, Any]:
+    def _snapshot(self) -> bytes:
         """Return what those who watch the run may know: what this robot saw first, and what it has left to do."""
         status = (bool(self.map.frontiers.open), self.done)
         if not self._claims or (self.view.tick % TELEMETRY_TICKS and status == self._told_status):
-            return {}
+            return b""
         self._told_status = status
         seen, self._seen = self._seen, []
-        told = {
-            "open": len(self.map.frontiers.open),
-            "done": self.done,
-            "simplices": [each.landmarks for each in seen],
-            "bearings": [each.bearings for each in seen],
-        }
-        if self._claim:
-            told["claim"] = pair_of(self._claim - 1)
-        return {"landmark_robot": told}
+        claim = () if not self._claim else ((self.setup.node, *pair_of(self._claim - 1)),)
+        count = len(self.map.frontiers.open)
+        return write_told(MapTold(*columns(seen), open=count, done=self.done, of_robot=True, assigned=claim))

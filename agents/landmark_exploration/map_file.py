@@ -6,7 +6,7 @@ an observation, ascending, and the bearing of each in steps of a 256th of a turn
 Statuses are those of `frontier`. Observations that are faces of others may be left out.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Annotated, Any, Final
 
 import msgspec
@@ -16,6 +16,7 @@ from zwerm.agents.landmark_exploration.bearings import STEPS, Snapshot
 from zwerm.agents.landmark_exploration.entries import snapshot_of
 from zwerm.agents.landmark_exploration.frontier import CLEAR, LANDMARKS_MAX, REOPENED, UNKNOWN, key_of, pair_of
 from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.telemetry import MapTold, read_told
 
 FORMAT: Final = "landmark-map/1"
 
@@ -68,13 +69,13 @@ def read_map(text: str) -> LandmarkMap:
     return map_
 
 
-def map_told(records: Iterable[Mapping[str, Any]]) -> LandmarkMap:
-    """Return the map of all observations in the telemetry records of a run, in the order in which they came."""
+def map_told(snapshots: Iterable[bytes]) -> LandmarkMap:
+    """Return the map of all observations in the snapshots that the nodes of a run reported, in that order."""
     map_ = LandmarkMap()
     number = 0
-    for record in records:
-        part = record.get("landmark_map") or record.get("landmark_robot") or {}
-        for landmarks, bearings in zip(part.get("simplices", ()), part.get("bearings", ()), strict=True):
-            map_.observe(snapshot_of(zip(landmarks, bearings, strict=True)), (number, 0))
-            number += 1
+    for told in map(read_told, snapshots):
+        if isinstance(told, MapTold):
+            for landmarks, bearings in zip(told.simplices, told.bearings, strict=True):
+                map_.observe(snapshot_of(zip(landmarks, bearings, strict=True)), (number, 0))
+                number += 1
     return map_

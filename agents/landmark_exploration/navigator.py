@@ -5,7 +5,7 @@ sees all of them. The map comes from a file (see `map_file`), whose text is a pa
 """
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Final
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -14,6 +14,7 @@ from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.map_file import read_map
 from zwerm.agents.landmark_exploration.motion import Drive, travel, wander
 from zwerm.agents.landmark_exploration.planning import path_to, reach
+from zwerm.agents.landmark_exploration.telemetry import GoalTold, write_told
 from zwerm.agents.landmark_exploration.view import Slide, View
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError
@@ -92,7 +93,7 @@ class Navigator(Controller):
         self._goals = rules.goals or self._draw(rules.random_goals)
         self.view = View()
         self._slide = Slide(self.random)
-        self._told: dict[str, Any] = {}
+        self._told = b""
         self._drive = self._live()
         self._done = False
 
@@ -106,18 +107,14 @@ class Navigator(Controller):
         """Perceive and go on."""
         self.view.take(observation)
         direction = self._slide.along(next(self._drive), self.view)
-        told, self._told = self._told, {}
-        return Command(drive=self.view.drive(direction, self._speed_m_s), done=self._done, told=told)
+        told, self._told = self._told, b""
+        return Command(drive=self.view.drive(direction, self._speed_m_s), done=self._done, snapshot=told)
 
     def _live(self) -> Drive:
         for goal in self._goals:
             began = self.view.tick
             outcome = yield from navigate(self.view, self.map, goal, self.random)
-            self._told["navigation"] = {
-                "goal": goal,
-                "arrived": outcome == "arrived",
-                "iterations": self.view.tick - began,
-            }
+            self._told = write_told(GoalTold(tuple(goal), outcome == "arrived", self.view.tick - began))
             yield None
         self._done = True
         while True:

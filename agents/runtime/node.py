@@ -12,7 +12,15 @@ import msgspec
 from zwerm.agents.runtime.contract import Setup, Stepper
 from zwerm.agents.runtime.controllers import make
 from zwerm.link import Answer
-from zwerm.wire.messages import MESSAGE_BYTES_MAX, Command, Failure, Observation, decode_observation, encode
+from zwerm.wire.messages import (
+    MESSAGE_BYTES_MAX,
+    Command,
+    Failure,
+    Observation,
+    decode_observation,
+    encode,
+    encode_command,
+)
 
 if TYPE_CHECKING:
     from zwerm.link.peer_radio import PeerRadio
@@ -55,7 +63,7 @@ class Node:
         self.answer = self._answering(step_with_radio)
 
     def _answering(self, step: Callable[[Observation], Command]) -> Answer:
-        decode, write, fail = decode_observation, encode, self._fail
+        decode, write, fail = decode_observation, encode_command, self._fail
 
         def answer(payload: bytes) -> bytes:
             observation = decode(payload)

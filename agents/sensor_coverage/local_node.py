@@ -60,9 +60,11 @@ class LocalNode(Controller):
         self.components.poll(situation.tick)
         if bool(situation.claims) != self._claimed:
             self._claimed = bool(situation.claims)
-            situation.telemetry["frontier"] = {"claimed": self._claimed}
+            situation.telemetry["claims_frontier"] = self._claimed
         telemetry, situation.telemetry = situation.telemetry, {}
-        return Command(drive=velocity, outbox=self.components.outbox(), wake=self._wake(), told=telemetry)
+        snapshot, situation.snapshot = situation.snapshot, b""
+        outbox = self.components.outbox()
+        return Command(drive=velocity, outbox=outbox, wake=self._wake(), telemetry=telemetry, snapshot=snapshot)
 
     @property
     def _takes_census(self) -> bool:

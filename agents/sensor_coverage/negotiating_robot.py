@@ -51,7 +51,7 @@ class NegotiatingRobot(CentralRobot):
         self._tick = observation.tick
         self._leave.observe(observation.tick, [each.node for each in observation.bearings or ()])
         command = super().step(observation)
-        command.told, self._leave.telemetry = self._leave.telemetry, {}
+        command.snapshot, self._leave.snapshot = self._leave.snapshot, b""
         return command
 
     def _advance(self) -> BodyVelocity:

@@ -35,6 +35,7 @@ from zwerm.agents.landmark_exploration.planning import (
 )
 from zwerm.agents.landmark_exploration.registers import Registers
 from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
+from zwerm.agents.landmark_exploration.telemetry import MapTold, columns, write_told
 from zwerm.wire.messages import Command, Observation, Transmission
 
 # Ticks after which a robot that has nothing to explore is considered again: at first, and at most.
@@ -146,7 +147,7 @@ class LandmarkCoordinator:
         else:
             self._send(self._gossip.tick(self._tick, None))
             self._done = not self.map.frontiers.open and self._registers.concluded(self.replica.digest, self._tick)
-        return Command(outbox=self._due(), done=self._done, told=self._telemetry())
+        return Command(outbox=self._due(), done=self._done, snapshot=self._snapshot())
 
     def _due(self) -> tuple[Transmission, ...]:
         """Return what fits into one command; the rest waits for the next tick."""
@@ -335,25 +336,18 @@ class LandmarkCoordinator:
 
     # --- for those who watch ----------------------------------------------------------------------------------------
 
-    def _telemetry(self) -> dict[str, Any]:
+    def _snapshot(self) -> bytes:
         """Return the map, as far as it has changed, for those who watch the run."""
         first, last = self._told_vertices, self.map.complex.vertices
         behind = last - first >= SIMPLICES_TOLD_MAX
         if (self._tick % TELEMETRY_TICKS and not (self._done or behind)) or self.map.version == self._told_version:
-            return {}
+            return b""
         self._told_vertices = min(last, first + SIMPLICES_TOLD_MAX)
         if self._told_vertices == last:
             self._told_version = self.map.version
         seen = [self.map.complex.snapshot_of(vertex) for vertex in range(first, self._told_vertices)]
         tasks = {node: robot.task for node, robot in self._robots.items()}
-        assigned = [(node, *pair_of(task.key)) for node, task in tasks.items() if task and task.key is not None]
-        frontiers = [pair_of(key) for key in list(self.map.frontiers.open)[:FRONTIERS_TOLD_MAX]]
-        return {
-            "open_frontiers": len(self.map.frontiers.open),
-            "landmark_map": {
-                "simplices": [each.landmarks for each in seen],
-                "bearings": [each.bearings for each in seen],
-                "frontiers": frontiers,
-                "assigned": assigned,
-            },
-        }
+        assigned = tuple((node, *pair_of(task.key)) for node, task in tasks.items() if task and task.key is not None)
+        frontiers = tuple(pair_of(key) for key in list(self.map.frontiers.open)[:FRONTIERS_TOLD_MAX])
+        count = len(self.map.frontiers.open)
+        return write_told(MapTold(*columns(seen), open=count, done=self._done, frontiers=frontiers, assigned=assigned))

@@ -18,6 +18,7 @@ from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.services import Services
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS, Emerged, Report, RollCall, ScanRequest
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_snapshot
 from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
 from zwerm.coordinator.sensor_coverage.command_mailbox import (
     ROLL_CALL_COPIES,
@@ -108,7 +109,8 @@ class SensorCoverageCoordinator:
         self._redundancy = setup.services.get("redundancy", "coordinator")
         self._redundancy_at = 0  # number of pushes when redundant robots were last searched
         self._silent: dict[int, None] = {}
-        self._telemetry: dict[str, Any] = {}
+        self._telemetry: dict[str, float | bool] = {}
+        self._snapshot = b""
         self._routine = self._run()
 
     def step(self, observation: Observation) -> Command:
@@ -116,6 +118,7 @@ class SensorCoverageCoordinator:
         self.mailbox.receive(observation.time_s, observation.inbox)
         wake = next(self._routine, Wake())
         telemetry, self._telemetry = self._telemetry, {}
+        snapshot, self._snapshot = self._snapshot, b""
         outbox = self.mailbox.outgoing()
         repeat_s = None if self.outcome else self.mailbox.next_wake_s()
         if repeat_s is not None and (wake.at_s is None or repeat_s < wake.at_s):
@@ -125,7 +128,8 @@ class SensorCoverageCoordinator:
             wake=wake,
             done=self.outcome == COVERED,
             gave_up=self._gave_up(),
-            told=telemetry,
+            telemetry=telemetry,
+            snapshot=snapshot,
         )
 
     def _gave_up(self) -> str:
@@ -353,17 +357,18 @@ class SensorCoverageCoordinator:
 
     def _report_complex(self, plans: Iterable[Plan]) -> None:
         """Report the complex and the paths of this cycle, by robots."""
-        self._telemetry["complex"] = {
-            "cycle": self.cycle,
-            "edges": self._by_robot(self.scan.complex_.edges),
-            "frontier": self._by_robot(self.services.frontier.frontier),
-            "obstacle": self._by_robot(self.services.frontier.obstacle),
-            "paths": [[self.slots.occupant[each] for each in plan.path] for plan in plans],
-        }
+        complex_ = ComplexSnapshot(
+            cycle=self.cycle,
+            edges=self._by_robot(self.scan.complex_.edges),
+            frontier=self._by_robot(self.services.frontier.frontier),
+            obstacle=self._by_robot(self.services.frontier.obstacle),
+            paths=tuple(tuple(self.slots.occupant[each] for each in plan.path) for plan in plans),
+        )
+        self._snapshot = encode_snapshot(complex_)
 
-    def _by_robot(self, edges: Iterable[Edge]) -> list[list[int]]:
+    def _by_robot(self, edges: Iterable[Edge]) -> tuple[tuple[int, int], ...]:
         occupant = self.slots.occupant
-        return [[occupant[i], occupant[j]] for i, j in edges]
+        return tuple((occupant[i], occupant[j]) for i, j in edges)
 
     def _report_numbers(self) -> None:
         self._telemetry |= {

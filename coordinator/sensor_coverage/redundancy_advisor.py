@@ -80,7 +80,8 @@ class RedundancyAdvisor:
 
     def step(self, observation: Observation) -> Command:
         """Take in reports, and advise redundant robots."""
-        tick, telemetry = observation.tick, {}
+        tick = observation.tick
+        telemetry: dict[str, float | bool] = {}
         outbox = [] if self._started else [_packet(CollectReports(), None)]
         self._started = True
         for packet in observation.inbox:
@@ -93,7 +94,7 @@ class RedundancyAdvisor:
         self._find_unheard(tick)
         for repeated in (self._questions, self._advice):
             outbox += [_packet(each.message, node) for node, each in repeated.items() if each.repeat(tick)]
-        return Command(outbox=tuple(outbox), wake=Wake(at_s=self._next_wake_s(), on_packet=True), told=telemetry)
+        return Command(outbox=tuple(outbox), wake=Wake(at_s=self._next_wake_s(), on_packet=True), telemetry=telemetry)
 
     # --- reports ----------------------------------------------------------------------------------------------------
 

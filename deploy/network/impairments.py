@@ -1,11 +1,12 @@
 """Translate the radio models of a scenario to rules of a real network, or report the models without such a rule.
 
-    range, line_of_sight, walls     an nftables set of blocked pairs of nodes; the world computes the set at every tick,
-    (with margin_db), and faults    also for the faults partition, jam, blackout and cut
-    loss                            nftables, `numgen random`, for each packet
-    bursts                          nftables: a set of pairs in the bad state; packets add and delete pairs at random
-    rate_limit                      `tc tbf` at the sender; a broadcast is one packet for each receiver there
-    delay (fixed or uniform)        `tc netem` before the receiver; skipped, with a message, if the kernel has none
+Each model names its rule (`RadioModel.network_rule`). A network installs four mechanisms:
+
+    BlockedPairs    an nftables set of blocked pairs of nodes; the world computes the set at every tick, also for radio faults
+    RandomLoss      nftables, `numgen random`, for each packet; with bursts a set of pairs in the bad state, where packets
+                    add and delete pairs at random
+    SenderRate      `tc tbf` at the sender; a broadcast is one packet for each receiver there
+    ReceiverDelay   `tc netem` before the receiver; skipped, with a message, if the kernel has none
 
 Other models are refused. Rules are in the order of the models; a packet that one rule drops does not reach the next.
 """
@@ -16,14 +17,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from pydantic import ValidationError
+
 from zwerm.deploy.network.namespaces import Namespaces, address_of, netem_unavailable_reason, port_of
 from zwerm.errors import ScenarioError
 from zwerm.link.peer_radio import HEAD_BYTES, Transport
 from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.tables import Scenario
 from zwerm.scenario.types import OpenTable
+from zwerm.world.faults import registry as faults
 from zwerm.world.radio import ROBOTS
-from zwerm.world.radio.registry import BUILT_IN, selected, tables_of
+from zwerm.world.radio import registry as radio
+from zwerm.world.radio.network_rules import BlockedPairs, NetworkRule, RandomLoss, ReceiverDelay, SenderRate
+from zwerm.world.radio.nodes import selected
+from zwerm.world.radio.registry import tables_of
 
 Pairs = list[tuple[int, int]]
 
@@ -35,17 +43,6 @@ _CHANCES: Final = 1_000_000_000
 # Header bytes: Ethernet, IP, and UDP or TCP with timestamps; then the Zenoh header of a message.
 _WIRE_BYTES: Final = {"udp": 14 + 20 + 8, "tcp": 14 + 20 + 32}
 _ZENOH_BYTES: Final = 16
-
-_BY_PLACE: Final = ("range", "line_of_sight", "walls")
-_BY_CHANCE: Final = ("loss", "bursts")
-_PER_INTERFACE: Final = ("delay", "rate_limit")
-_UNSUPPORTED: Final = {
-    "path_loss": "its chance changes with every distance; say range and loss",
-    "walls": "without margin_db nothing is dropped",
-    "duplication": "Zenoh drops duplicates by their sequence number",
-    "corruption": "the kernel drops packets with a wrong checksum",
-    "collision": "cables do not collide",
-}
 
 
 @dataclass(slots=True)
@@ -83,7 +80,7 @@ def supported(scenario: Scenario) -> tuple[Scenario, list[str]]:
     """
     wrong: list[str] = []
     skipped: list[str] = []
-    cables: list[str] = []
+    interface_rules: list[type[NetworkRule]] = []
     reason = ""
     changed: dict[str, Any] = {}
     nodes = scenario.robots.count + (scenario.coordinator is not None)
@@ -94,26 +91,26 @@ def supported(scenario: Scenario) -> tuple[Scenario, list[str]]:
     for name, table in (("radio", scenario.radio), ("uplink", scenario.uplink)):
         kept: list[OpenTable] = []
         for path, model in [] if table is None else tables_of(table, name):
-            reason_refused = _unsupported_reason(model)
-            if not reason_refused and model.kind in _PER_INTERFACE:
-                if scenario.radio is not None and scenario.coordinator is not None:
-                    reason_refused = "both channels share a node's cable"
-                elif model.kind in cables:
-                    reason_refused = "one such model at most"
-                cables.append(model.kind)
-            if reason_refused:
-                wrong.append(_not_in_the_twin(path, reason_refused, model))
-            elif model.kind == "delay" and (reason := reason or netem_unavailable_reason()):
-                skipped.append(f"{path} (delay): {reason}")
+            try:
+                rule, _ = _rule(model, path, scenario)
+                if isinstance(rule, ReceiverDelay | SenderRate):
+                    if scenario.radio is not None and scenario.coordinator is not None:
+                        raise ScenarioError([_not_in_the_twin(path, "both channels share a node's cable", model)])
+                    if type(rule) in interface_rules:
+                        raise ScenarioError([_not_in_the_twin(path, "one such model at most", model)])
+                    interface_rules.append(type(rule))
+            except ScenarioError as error:
+                wrong += error.mistakes
+                continue
+            if isinstance(rule, ReceiverDelay) and (reason := reason or netem_unavailable_reason()):
+                skipped.append(f"{path} ({model.kind}): {reason}")
             elif path.startswith(f"{name}.models."):
                 kept.append(model)
         if table is not None:
             changed[name] = table.model_copy(update={"models": kept})
-    wrong += [
-        f"faults.{index}.kind: not in the twin: its programs are left alone, got {fault.kind!r}"
-        for index, fault in enumerate(scenario.faults)
-        if fault.kind in ("crash", "restart", "pause", "join")
-    ]
+    for index, fault in enumerate(scenario.faults):
+        if reason_refused := _fault_refused(fault):
+            wrong.append(f"faults.{index}.kind: not in the twin: {reason_refused}, got {fault.kind!r}")
     if scenario.random_faults is not None:
         wrong.append("random_faults: not in the twin; write the schedule into the scenario")
     if wrong:
@@ -121,20 +118,39 @@ def supported(scenario: Scenario) -> tuple[Scenario, list[str]]:
     return scenario.model_copy(update=changed), skipped
 
 
-def _unsupported_reason(model: OpenTable) -> str:
-    """Return why a real network cannot reproduce this model, or an empty string."""
-    if model.kind in _UNSUPPORTED and not (model.kind == "walls" and model.parameters.get("margin_db") is not None):
-        return _UNSUPPORTED[model.kind]
-    if model.kind not in (*_BY_PLACE, *_BY_CHANCE, *_PER_INTERFACE):
-        return "no rule of the network is known for this model"
-    if model.kind == "delay":
-        if model.parameters.get("jitter_s") and model.parameters.get("distribution", "uniform") != "uniform":
-            return "netem has jitter of that mean only uniform"
-        if model.parameters.get("senders") is not None:
-            return "netem delays all that goes to a receiver; say receivers"
-    if model.kind == "rate_limit" and model.parameters.get("receivers") is not None:
-        return "tbf slows down all that a sender sends; say senders"
-    return ""
+def _rule(model: OpenTable, path: str, scenario: Scenario) -> tuple[NetworkRule, Any]:
+    """Return the rule of the model that stands at `path`, and its parameters.
+
+    Raises ScenarioError if a real network cannot reproduce the model, or its table has mistakes.
+    """
+    try:
+        kind = radio.find(model.kind)
+        parameters = kind.Parameters.model_validate(model.parameters)
+        rule = kind.network_rule(parameters)
+        if rule is None:
+            raise ValueError("no rule of the network is known for this model")
+        if isinstance(rule, ReceiverDelay) and parameters.senders is not None:
+            raise ValueError("netem delays all that goes to a receiver; say receivers")
+        if isinstance(rule, SenderRate) and parameters.receivers is not None:
+            raise ValueError("tbf slows down all that a sender sends; say senders")
+    except ValidationError as error:
+        named = f"{scenario.place}: "
+        found = [line.removeprefix(named) for line in mistakes(error, scenario.place, f"{path}.")]
+        raise ScenarioError(found) from None
+    except ValueError as error:
+        raise ScenarioError([_not_in_the_twin(path, str(error), model)]) from None
+    return rule, parameters
+
+
+def _fault_refused(fault: OpenTable) -> str:
+    """Return the reason why a fault cannot occur in the twin, or an empty string."""
+    try:
+        kind = faults.find(fault.kind)
+    except ValueError as error:
+        return str(error)
+    if kind.touches_programs:
+        return "its programs are left alone"
+    return "" if kind.in_network else "no rule of the network is known for this fault"
 
 
 def translate(scenario: Scenario, links: Mapping[str, Pairs]) -> Impairments:
@@ -147,26 +163,27 @@ def translate(scenario: Scenario, links: Mapping[str, Pairs]) -> Impairments:
     for name, every in links.items():
         place, table = ("radio", scenario.radio) if name == ROBOTS else ("uplink", scenario.uplink)
         for index, (path, model) in enumerate([] if table is None else tables_of(table, place)):
-            if reason_refused := _unsupported_reason(model):
-                wrong.append(_not_in_the_twin(path, reason_refused, model))
+            try:
+                rule, parameters = _rule(model, path, scenario)
+            except ScenarioError as error:
+                wrong += error.mistakes
                 continue
-            parameters: Any = BUILT_IN[model.kind].Parameters.model_validate(model.parameters)
             sends, receives = (
                 selected(names, scenario, path, []) for names in (parameters.senders, parameters.receivers)
             )
             pairs = [(sender, receiver) for sender, receiver in every if sends[sender] and receives[receiver]]
-            if model.kind in _BY_PLACE:
-                found.by_place.setdefault(name, []).append(index)
-            elif model.kind == "loss":
-                found.rules.append(Rule(f"loss{len(found.rules)}", pairs, parameters.fraction))
-            elif model.kind == "bursts":
-                found.rules.append(_burst(f"bursts{len(found.rules)}", pairs, parameters))
-            elif model.kind == "rate_limit":
-                for sender, many in Counter(sender for sender, _ in pairs).items():
-                    found.rates[sender] = many * parameters.rate_bytes_s, parameters.queue_bytes, many
-            elif model.kind == "delay":
-                for _, receiver in pairs:
-                    found.delays[receiver] = parameters.delay_s + parameters.jitter_s, parameters.jitter_s
+            match rule:
+                case BlockedPairs():
+                    found.by_place.setdefault(name, []).append(index)
+                case RandomLoss(lose, bursts, enter, leave):
+                    label = f"{'burst_loss' if bursts else 'loss'}{len(found.rules)}"
+                    found.rules.append(Rule(label, pairs, lose, enter, leave, bursts))
+                case SenderRate(rate_bytes_s, queue_bytes):
+                    for sender, many in Counter(sender for sender, _ in pairs).items():
+                        found.rates[sender] = many * rate_bytes_s, queue_bytes, many
+                case ReceiverDelay(mean_s, deviation_s):
+                    for _, receiver in pairs:
+                        found.delays[receiver] = mean_s, deviation_s
     if wrong:
         raise ScenarioError([f"{scenario.place}: {line}" for line in wrong])
     return found
@@ -174,13 +191,6 @@ def translate(scenario: Scenario, links: Mapping[str, Pairs]) -> Impairments:
 
 def _not_in_the_twin(path: str, reason: str, model: OpenTable) -> str:
     return f"{path}.kind: not in the twin: {reason}, got {model.kind!r}"
-
-
-def _burst(name: str, pairs: Pairs, table: Any) -> Rule:
-    """Return the rule with the probabilities of the model `bursts`."""
-    bad = table.loss_fraction / table.bad_loss_fraction
-    enter = bad / (1.0 - bad) / table.burst_packets
-    return Rule(name, pairs, table.bad_loss_fraction, enter, 1.0 / table.burst_packets, bursts=True)
 
 
 def ruleset(rules: Sequence[Rule], draws: Draws) -> str:

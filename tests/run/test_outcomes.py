@@ -9,10 +9,10 @@ import pytest
 from halls import HALL, Link, drive
 from support import ROOT, ZWERM
 
+from zwerm.run.measurement import measure
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.wire.messages import BodyVelocity, Command, decode_observation, encode, open_answer
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 STATIONS = ("arena.size_m=[4.2,2.6]", "robots.count=40", "base.poses=[[0.2,1.3,0.0],[4.0,1.3,3.0]]")
@@ -50,16 +50,18 @@ def test_a_frontier_that_no_path_leads_to_is_cut_off() -> None:
 
     def strike(world: World) -> None:
         position = world.scene.position
-        alive = [robot for robot in world.scene.present_ids().tolist() if robot not in world.crashed]
-        if world.crashed or position[alive, 0].max() > 3.4:
+        alive = [robot for robot in world.scene.present_ids().tolist() if robot not in world.status.crashed]
+        if world.status.crashed or position[alive, 0].max() > 3.4:
             for robot in alive:
                 if 1.6 < position[robot, 0] < 2.6 and world.tick % 40 == 0:
                     world.crash(robot, "struck by lightning")
 
     outcome, world = drive(load("sensor-coverage", corridor), strike)
     assert outcome == "failed"
-    assert world.audience.gave_up.startswith("node 160 gave up: cut-off: no path leads to the frontier; ")
-    assert len(world.crashed) > 2
+    ending = world.ending()
+    assert ending is not None
+    assert ending.reason.startswith("node 160 gave up: cut-off: no path leads to the frontier; ")
+    assert len(world.status.crashed) > 2
 
 
 def test_a_failed_deployment_exits_with_1_and_one_clear_line(tmp_path: Path) -> None:
@@ -119,7 +121,7 @@ def test_a_robot_that_cannot_get_to_its_place_is_given_up_and_another_comes(robo
     scenario = load("sensor-coverage", HALL)
     outcome, world = drive(scenario, around=with_dead_motors(robot, from_tick))
     assert outcome == "completed"
-    assert measure(world, scenario.metrics)["coverage_fraction"] >= 0.99
+    assert measure(world)["coverage_fraction"] >= 0.99
 
 
 def test_of_two_stations_one_may_die() -> None:

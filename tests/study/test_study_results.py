@@ -9,6 +9,7 @@ from PIL import Image
 from scipy import stats
 from study_files import COVERING, GRID, TINY, run_here
 
+from zwerm.errors import ScenarioError
 from zwerm.maths.statistics import Sample, condense, half_width
 from zwerm.study.rows import read_rows
 from zwerm.study.study_figure import draw_study
@@ -80,13 +81,26 @@ def test_the_least_covered_cell_is_that_of_the_mean_counts_over_all_trials(
     assert [line.sample.mean for line in result.results.lines()] == pytest.approx([min(means), max(means)])
 
 
-def test_a_metric_without_measurements_is_reported_with_the_known_ones(
+def test_a_metric_that_no_scenario_measures_is_refused_before_the_first_trial(
     write: Callable[..., Study], tmp_path: Path
 ) -> None:
     study = write(TINY.replace('"cell_coverage_fraction"', '"cel_coverage"'))
-    results = run_here(study, tmp_path / "out.parquet").results
-    assert results.unknown_metrics() == ["cel_coverage"]
-    assert "cell_coverage_fraction" in results.known_metrics
+    with pytest.raises(ScenarioError) as caught:
+        run_here(study, tmp_path / "out.parquet")
+    [line] = caught.value.mistakes
+    assert "metrics: expected names of metrics that its scenarios measure (" in line
+    assert "cell_coverage_fraction, " in line
+    assert line.endswith("got 'cel_coverage'")
+    assert not list(tmp_path.glob("out.parquet*"))
+
+
+def test_telemetry_and_metrics_of_ones_own_are_columns_of_a_study(write: Callable[..., Study], tmp_path: Path) -> None:
+    own = TINY.replace('["cell_coverage_fraction"]', '["telemetry.node", "order_parameter"]')
+    settings = ['robots.controller="reporters:Reports"', 'metrics.own=["own_metrics:order_parameter"]']
+    result = run_here(write(own), tmp_path / "out.parquet", sets=settings)
+    assert {0.0 <= row["order_parameter"] <= 1.0 for row in read_rows(result.path)} == {True}
+    assert {row["telemetry.even"] for row in read_rows(result.path)} <= {0.0, 1.0}
+    assert result.results.unknown_metrics() == []
 
 
 @pytest.mark.parametrize(

@@ -21,8 +21,6 @@ from zwerm.scenario.tables import Scenario
 from zwerm.twin import twin_runner as running
 from zwerm.twin.packet_comparison import compare, lost_runs
 from zwerm.twin.twin_runner import run_twin
-from zwerm.world.radio.models.loss import Loss
-from zwerm.world.radio.registry import BUILT_IN
 
 WHY_NOT = unavailable_reason()
 on_a_real_network = pytest.mark.skipif(bool(WHY_NOT), reason=f"the twin on a real network {WHY_NOT}")
@@ -57,7 +55,7 @@ def test_over_udp_a_real_network_loses_what_the_models_lose(nothing_left: None) 
     models = [
         {"kind": "loss", "fraction": 1.0, "senders": [0], "receivers": [1]},
         {"kind": "loss", "fraction": 0.3, "senders": [1]},
-        {"kind": "bursts", "loss_fraction": 0.4, "burst_packets": 6.0, "senders": [2, 3]},
+        {"kind": "gilbert_elliott", "loss_fraction": 0.4, "burst_packets": 6.0, "senders": [2, 3]},
     ]
     run = run_twin(beacons(0.01, 2.5, radio={"models": models}), 1, "udp")
     found = compare(run)
@@ -237,14 +235,14 @@ def test_namespaces_are_removed_after_an_error(nothing_left: None) -> None:
     [
         ({"radio": {"models": [{"kind": "path_loss"}]}}, "radio.models.0.kind: not in the twin: its chance changes with "
          "every distance; say range and loss, got 'path_loss'"),
-        ({"radio": {"models": [{"kind": "walls"}]}},
-         "radio.models.0.kind: not in the twin: without margin_db nothing is dropped, got 'walls'"),
+        ({"radio": {"models": [{"kind": "wall_attenuation"}]}},
+         "radio.models.0.kind: not in the twin: without margin_db nothing is dropped, got 'wall_attenuation'"),
         ({"radio": {"models": [{"kind": "collision", "airtime_s": 0.1}]}},
          "radio.models.0.kind: not in the twin: cables do not collide, got 'collision'"),
         ({"radio": {"models": [{"kind": "delay", "jitter_s": 1.0, "distribution": "pareto"}]}},
          "radio.models.0.kind: not in the twin: netem has jitter of that mean only uniform, got 'delay'"),
-        ({"radio": {"models": [{"kind": "mine:Own"}]}},
-         "radio.models.0.kind: not in the twin: no rule of the network is known for this model, got 'mine:Own'"),
+        ({"radio": {"models": [{"kind": "own_models:Lossy"}]}},
+         "radio.models.0.kind: not in the twin: no rule of the network is known for this model, got 'own_models:Lossy'"),
         ({"radio": {"models": [{"kind": "rate_limit", "rate_bytes_s": 1.0, "queue_bytes": 1.0}] * 2}},
          "radio.models.1.kind: not in the twin: one such model at most, got 'rate_limit'"),
         ({"coordinator": {"controller": "radioed:Counts"}, "uplink": {"models": [{"kind": "delay", "delay_s": 1.0}]}},
@@ -262,23 +260,48 @@ def test_the_twin_refuses_unsupported_parts_of_a_scenario_with_their_place(table
     assert caught.value.mistakes == [f"small.toml: {line}"]
 
 
+@pytest.mark.parametrize(
+    ("model", "reason"),
+    [
+        ({"kind": "own_models:Lossy"}, "no rule of the network is known for this model"),
+        ({"kind": "collision", "airtime_s": 0.1}, "cables do not collide"),
+    ],
+)
 def test_a_model_without_a_rule_of_the_network_is_refused_by_name_and_never_left_out(
-    monkeypatch: pytest.MonkeyPatch,
+    model: dict[str, Any], reason: str
 ) -> None:
-    monkeypatch.setitem(BUILT_IN, "fading", Loss)  # a built-in model that the twin does not know
-    for kind, reason in (
-        ("fading", "no rule of the network is known for this model"),
-        ("mine:Own", "no rule of the network is known for this model"),
-        ("collision", "cables do not collide"),
-    ):
-        chosen = scenario(radio={"loss": 0.1, "models": [{"kind": kind, "fraction": 0.5}]})
-        line = f"small.toml: radio.models.0.kind: not in the twin: {reason}, got '{kind}'"
-        with pytest.raises(ScenarioError) as caught:
-            supported(chosen)
-        assert caught.value.mistakes == [line]
-        with pytest.raises(ScenarioError) as caught:
-            translate(chosen, {"robots": LINKS})
-        assert caught.value.mistakes == [line]
+    chosen = scenario(radio={"loss": 0.1, "models": [model]})
+    line = f"small.toml: radio.models.0.kind: not in the twin: {reason}, got '{model['kind']}'"
+    with pytest.raises(ScenarioError) as caught:
+        supported(chosen)
+    assert caught.value.mistakes == [line]
+    with pytest.raises(ScenarioError) as caught:
+        translate(chosen, {"robots": LINKS})
+    assert caught.value.mistakes == [line]
+
+
+def test_a_model_of_a_user_can_name_its_rule_of_the_network() -> None:
+    chosen = scenario(radio={"loss": 0.1, "models": [{"kind": "own_models:Rain", "mm_per_h": 20.0, "senders": [1]}]})
+    assert supported(chosen)[1] == []
+    rules = translate(chosen, {"robots": LINKS}).rules
+    assert [(rule.name, rule.lose, len(rule.pairs)) for rule in rules] == [("loss0", 0.1, 12), ("loss1", 0.2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        ({"kind": "own_faults:Flood", "area_m": [0, 0, 1, 1]}, ""),
+        ({"kind": "own_faults:Static", "fraction": 0.5}, "no rule of the network is known for this fault"),
+    ],
+)
+def test_a_fault_of_a_user_is_in_the_twin_only_if_it_says_so(fault: dict[str, Any], reason: str) -> None:
+    chosen = scenario(radio={}, faults=[fault | {"at_s": 0.0}])
+    if not reason:
+        assert supported(chosen)[0].faults == chosen.faults
+        return
+    with pytest.raises(ScenarioError) as caught:
+        supported(chosen)
+    assert caught.value.mistakes == [f"small.toml: faults.0.kind: not in the twin: {reason}, got '{fault['kind']}'"]
 
 
 def test_a_scenario_without_a_radio_has_no_twin() -> None:
@@ -286,15 +309,15 @@ def test_a_scenario_without_a_radio_has_no_twin() -> None:
         supported(scenario())
 
 
-def test_nftables_rules_keep_the_order_of_the_models_and_bursts_start_in_equilibrium() -> None:
-    bursts = {"kind": "bursts", "loss_fraction": 0.5, "burst_packets": 2.0}
+def test_rules_stand_in_the_order_of_the_models_and_bursts_begin_in_equilibrium() -> None:
+    bursts = {"kind": "gilbert_elliott", "loss_fraction": 0.5, "burst_packets": 2.0}
     chosen = scenario(robots={"count": 40, "controller": "beacon"}, radio={"loss": 0.25, "models": [bursts]})
     rules = translate(chosen, {"robots": [(a, b) for a in range(40) for b in range(40) if a != b]}).rules
-    assert [rule.name for rule in rules] == ["loss0", "bursts1"]
+    assert [rule.name for rule in rules] == ["loss0", "burst_loss1"]
     text = ruleset(rules, Draws(1))
     assert "numgen random mod 1000000000 < 250000000 counter name loss0 drop" in text
-    assert text.index("@loss0 jump") < text.index("@bursts1 jump")
-    began = next(line for line in text.splitlines() if "bursts1_bad {" in line).count(" . ") - 1
+    assert text.index("@loss0 jump") < text.index("@burst_loss1 jump")
+    began = next(line for line in text.splitlines() if "burst_loss1_bad {" in line).count(" . ") - 1
     assert abs(began / (40 * 39) - 0.5) < 5.0 * (0.25 / (40 * 39)) ** 0.5
 
 

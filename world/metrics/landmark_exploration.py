@@ -5,19 +5,22 @@ fraction of a grid of places in free space (the union of the simplices' hulls wo
 hulls do not reach the walls). Truth is used here, and only here: robots know no place.
 """
 
+import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from zwerm.agents.landmark_exploration.telemetry import GoalTold, MapTold, read_told
 from zwerm.maths.strong_collapse import betti
+from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
+from zwerm.world.arena.scatter import with_landmarks
+from zwerm.world.metrics import Metric, MetricContext, Truth
 from zwerm.world.metrics.sight import obstacles
 from zwerm.world.scene import Floats
-
-if TYPE_CHECKING:
-    from zwerm.world.world import World
+from zwerm.world.tick.telemetry import TelemetryRecord
 
 # Places a range: the grid is this many times finer than the sensor's range.
 PLACES_PER_RANGE: Final = 10
@@ -101,85 +104,118 @@ def maximal(simplices: Iterable[Sequence[int]]) -> list[tuple[int, ...]]:
     return list(found.values())
 
 
-def told_simplices(record: dict[str, Any]) -> list[list[int]]:
-    """Return the simplices that a node's telemetry adds to the map."""
-    part = record.get("landmark_map") or record.get("landmark_robot") or {}
-    found: list[list[int]] = part.get("simplices", [])
-    return found
+class Exploration(Metric):
+    """How complete the map is that the coordinator has, or all robots together, and how far it was when."""
+
+    names: ClassVar[Sequence[str]] = (
+        "completion_fraction", "iterations", "landmarks", "free_simplices", "landmark_complex_pieces",
+        "landmark_complex_holes", "obstacles", "open_frontiers", "concluded_early",
+        *(f"iterations_to_{percent:g}_percent_completion" for percent in MILESTONES),
+    )  # fmt: skip
+
+    def __init__(self, parameters: Any, context: MetricContext) -> None:
+        self._context = context
+        self._reports: list[tuple[int, int, MapTold]] = []
+        self._truth: Truth | None = None
+
+    def report(self, record: TelemetryRecord) -> None:
+        """Take what a node says of its map."""
+        told = read_told(record.snapshot) if record.snapshot else None
+        if isinstance(told, MapTold):
+            self._reports.append((record.tick, record.node, told))
+
+    def sample(self, truth: Truth) -> None:
+        """Take the tick, and who is dead."""
+        self._truth = truth
+
+    def metrics(self) -> dict[str, float]:
+        """Return the metrics, or nothing where nobody told of a map."""
+        range_m, truth = landmark_range_m(self._context.scenario), self._truth
+        if range_m is None or truth is None or not self._reports:
+            return {}
+        arena, landmarks = self._context.arena, landmarks_of(self._context.scenario, truth)
+        completion = Completion(arena, landmarks, range_m)
+        reached: dict[str, float] = {}
+        for tick, _, told in self._reports:
+            completion.add(told.simplices)
+            for percent in MILESTONES:
+                if completion.fraction >= percent / 100.0:
+                    reached.setdefault(f"iterations_to_{percent:g}_percent_completion", float(tick))
+        complex_ = maximal(simplex for _, _, told in self._reports for simplex in told.simplices)
+        pieces, holes = betti(complex_)
+        return {
+            "completion_fraction": completion.fraction,
+            "iterations": float(truth.scene.tick),
+            **reached,
+            "landmarks": float(len(landmarks)),
+            "free_simplices": float(len(complex_)),
+            "landmark_complex_pieces": float(pieces),
+            "landmark_complex_holes": float(holes),
+            "obstacles": float(obstacles(arena)),
+            **self._left_open(truth),
+        }
+
+    def _left_open(self, truth: Truth) -> dict[str, float]:
+        """Return the frontiers left open; and 1 where a robot concluded while a living one knew an open frontier, else 0."""
+        newest: dict[int, int] = {}
+        early = robots = 0.0
+        for _, node, told in self._reports:
+            newest[node] = told.open
+            robots = max(robots, float(told.of_robot))
+            if told.of_robot and told.done and any(count for each, count in newest.items() if each not in truth.dead):
+                early = 1.0
+        living = [count for node, count in newest.items() if node not in truth.dead]
+        found = {"open_frontiers": float(max(living, default=0))}
+        return found | {"concluded_early": early} if robots else found
 
 
-def landmark_metrics(world: "World") -> dict[str, float]:
-    """Return the metrics of landmark-based exploration of a run; nothing where no robot senses landmarks in a range."""
-    range_m, records = landmark_range_m(world), world.audience.told
-    simplices = [simplex for each in records for simplex in told_simplices(each.told)]
-    if range_m is None or not simplices:
-        return navigation_metrics(world)
-    landmarks = np.array(world.scenario.landmarks, dtype=np.float64).reshape(-1, 2)
-    completion = Completion(world.arena, landmarks, range_m)
-    reached: dict[str, float] = {}
-    for each in records:
-        completion.add(told_simplices(each.told))
-        for percent in MILESTONES:
-            if completion.fraction >= percent / 100.0:
-                reached.setdefault(f"iterations_to_{percent:g}_percent_completion", float(each.tick))
-    complex_ = maximal(simplices)
-    pieces, holes = betti(complex_)
-    return {
-        "completion_fraction": completion.fraction,
-        "iterations": float(world.tick),
-        **reached,
-        "landmarks": float(len(landmarks)),
-        "free_simplices": float(len(complex_)),
-        "landmark_complex_pieces": float(pieces),
-        "landmark_complex_holes": float(holes),
-        "obstacles": float(obstacles(world.arena)),
-        **_left_open(world),
-    }
-
-
-def navigation_metrics(world: "World") -> dict[str, float]:
-    """Return the fraction of goals that robots reached, and the iterations it took; nothing where nobody navigates.
+class Navigation(Metric):
+    """The fraction of goals that robots reached, and the iterations that took.
 
     A goal counts as reached where the robot said so, and all landmarks of the goal were indeed visible.
     """
-    ends = [(each, each.told["navigation"]) for each in world.audience.told if "navigation" in each.told]
-    range_m = landmark_range_m(world)
-    if not ends or range_m is None:
-        return {}
-    landmarks = np.array(world.scenario.landmarks, dtype=np.float64).reshape(-1, 2)
-    places = np.array([each.position[each.node] for each, _ in ends])
-    seen = visible(world.arena, landmarks, range_m, places)
-    reached = [
-        end for (_, end), there in zip(ends, seen, strict=True) if end["arrived"] and set(end["goal"]) <= set(there)
-    ]
-    return {
-        "navigation_goals": float(len(ends)),
-        "navigation_success_fraction": len(reached) / len(ends),
-        "navigation_iterations_mean": float(np.mean([end["iterations"] for end in reached]))
-        if reached
-        else float("nan"),
-    }
+
+    names: ClassVar[Sequence[str]] = ("navigation_goals", "navigation_success_fraction", "navigation_iterations_mean")
+
+    def __init__(self, parameters: Any, context: MetricContext) -> None:
+        self._context = context
+        self._ends: list[tuple[Floats, GoalTold]] = []
+        self._truth: Truth | None = None
+
+    def report(self, record: TelemetryRecord) -> None:
+        """Take the end of a way."""
+        told = read_told(record.snapshot) if record.snapshot else None
+        if isinstance(told, GoalTold):
+            self._ends.append((record.position[record.node].copy(), told))
+
+    def sample(self, truth: Truth) -> None:
+        """Take the truth at the end."""
+        self._truth = truth
+
+    def metrics(self) -> dict[str, float]:
+        """Return the metrics, or nothing where nobody navigates."""
+        range_m = landmark_range_m(self._context.scenario)
+        if not self._ends or range_m is None or self._truth is None:
+            return {}
+        landmarks = landmarks_of(self._context.scenario, self._truth)
+        seen = visible(self._context.arena, landmarks, range_m, np.array([place for place, _ in self._ends]))
+        reached = [
+            end for (_, end), there in zip(self._ends, seen, strict=True) if end.arrived and set(end.goal) <= set(there)
+        ]
+        return {
+            "navigation_goals": float(len(self._ends)),
+            "navigation_success_fraction": len(reached) / len(self._ends),
+            "navigation_iterations_mean": float(np.mean([end.iterations for end in reached])) if reached else math.nan,
+        }
 
 
-def landmark_range_m(world: "World") -> float | None:
+def landmarks_of(scenario: Scenario, truth: Truth) -> Floats:
+    """Return (l, 2) the places of the landmarks [m], scattered as for the run."""
+    return np.array(with_landmarks(scenario, truth.scene.draws.seed).landmarks, dtype=np.float64).reshape(-1, 2)
+
+
+def landmark_range_m(scenario: Scenario) -> float | None:
     """Return the range of the robots' landmark sensor [m], or None where it has none."""
-    tables = [each for each in world.scenario.robots.sensors if each.kind == "landmarks"]
+    tables = [each for each in scenario.robots.sensors if each.kind == "landmarks"]
     found = tables[0].parameters.get("range_m") if tables else None
     return None if found is None else float(found)
-
-
-def _left_open(world: "World") -> dict[str, float]:
-    """Return the frontiers left open, and 1 where a robot concluded while a living one knew an open frontier, else 0."""
-    newest: dict[int, int] = {}
-    early = 0.0
-    for each in world.audience.told:
-        if "landmark_robot" in each.told:
-            newest[each.node] = each.told["landmark_robot"]["open"]
-            if each.told["landmark_robot"]["done"] and any(
-                count for node, count in newest.items() if node not in world.dead
-            ):
-                early = 1.0
-    if not newest:
-        return {}
-    living = [count for node, count in newest.items() if node not in world.dead]
-    return {"open_frontiers": float(max(living, default=0)), "concluded_early": early}

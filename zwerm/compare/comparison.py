@@ -10,7 +10,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -22,7 +22,7 @@ from zwerm.study.plan import Point
 from zwerm.study.study_tables import Setting, Study, VariantTable, check_study
 from zwerm.study.summary import Results
 from zwerm.study.trial import Row
-from zwerm.world.drivers.lockstep import FAILED
+from zwerm.world.tick.completion import FAILED
 
 # Default metrics to compare: those of them that a run measured, unless all values are zero.
 METRICS: Final = (
@@ -68,8 +68,9 @@ def make_comparison(
         if axis not in given or (not given[axis].levels and all(str(value) in each for value in given[axis].values))
     }
     tables["levels"] = levels | {name: each.levels for name, each in given.items() if each.levels}
+    chosen = bool(metrics) or "metrics" in tables
     tables["metrics"] = list(metrics or tables.get("metrics", METRICS))
-    study = check_study(tables, place)
+    study = replace(check_study(tables, place), lenient=not chosen)
     if len(study.variants) < 2:
         raise ScenarioError([f"{place}: variants: expected 2 at least to compare, got {len(study.table.variants)}"])
     return study

@@ -2,7 +2,7 @@
 
 A variant is `NAME` or `NAME:PATH=VALUE,PATH=VALUE`. A sweep is `PATH=VALUE,VALUE`: `A,B,...,Z` counts from A to Z in steps of
 B - A, and `PATH+PATH` sets both paths. A value can be a table or an array, with a name before it or without:
-`radio.models=none:[],bursts:[{kind="bursts", loss_fraction=0.3}]`.
+`radio.models=none:[],bursts:[{kind="gilbert_elliott", loss_fraction=0.3}]`.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""From a scenario to a world ready to run, with every mistake that the typed tables could not see."""
+"""From a scenario to a world and its observers; reports every mistake that the typed tables cannot detect."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
@@ -16,7 +16,7 @@ from zwerm.world.arena.arena import Arena
 from zwerm.world.arena.scatter import with_landmarks
 from zwerm.world.fields import Field
 from zwerm.world.fields.registry import make_field
-from zwerm.world.metrics.observers import Observers, make_meters
+from zwerm.world.metrics.observers import Observers, make_observers
 from zwerm.world.sensors import Sensor, Surroundings
 from zwerm.world.sensors.registry import find as find_sensor
 from zwerm.world.sensors.registry import make_sensors
@@ -26,48 +26,60 @@ T = TypeVar("T")
 
 
 def assemble(scenario: Scenario, seed: int) -> World:
-    """Return the world of `scenario`, its robots placed for `seed`.
+    """Return the world of `scenario`, its robots placed for `seed`. Raises ScenarioError as `assemble_run` does."""
+    return assemble_run(scenario, seed)[0]
 
-    Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the placement.
+
+def assemble_run(scenario: Scenario, seed: int) -> tuple[World, Observers]:
+    """Return the world of `scenario` for `seed`, and the observers that measure its run.
+
+    Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the faults and the placement.
     """
     scenario = _with_landmarks(scenario, seed)
-    prepared = prepare(scenario)
+    arena, sensors, observers = prepare(scenario)
     mistakes: list[str] = []
-    world = _attempt(lambda: World(scenario, seed, *prepared), scenario, mistakes)
+    world = _attempt(lambda: World(scenario, seed, arena, sensors), scenario, mistakes)
     if world is None:
         raise ScenarioError(mistakes)
-    return world
+    return world, observers
 
 
 class Prepared(NamedTuple):
-    """All of a world that does not depend on the seed. Sensors and meters are for one run each."""
+    """The parts of a world and its run that do not depend on the seed. Sensors and observers are for one run each."""
 
     arena: Arena
     sensors: Sequence[Sensor]
-    meters: Observers
+    observers: Observers
+
+
+def observers_of(scenario: Scenario, arena: Arena) -> Observers:
+    """Return new observers for a run of `scenario`, as `prepare` makes them."""
+    table = scenario.field
+    field = None if table is None else make_field(table, arena.bounds, scenario.folder, scenario.place)
+    return make_observers(scenario, arena, field)
 
 
 def prepare(scenario: Scenario) -> Prepared:
-    """Return the arena, the sensors and the meters of `scenario`.
+    """Return the arena, the sensors and the observers of `scenario`.
 
     Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
     """
     scenario = _with_landmarks(scenario, 1)
     mistakes: list[str] = []
     field, table = None, scenario.field
-    sensors, meters = None, None
+    sensors, observers = None, None
     arena = _attempt(lambda: Arena.from_table(scenario.arena, scenario.folder), scenario, mistakes)
     _attempt(lambda: check_controllers(scenario), scenario, mistakes)
     if arena is not None and table is not None:
         bounds = arena.bounds
         field = _attempt(lambda: make_field(table, bounds, scenario.folder, scenario.place), scenario, mistakes)
-    # What needs the field is not told that there is none where the mistake is in the field's own table.
+    # A mistake in the field's own table must not also be reported as a missing field.
     if arena is not None and (field is not None or table is None):
         sensors = _attempt(lambda: _sensors(scenario, arena, field), scenario, mistakes)
-        meters = _attempt(lambda: make_meters(scenario.metrics, arena, field, scenario.time.dt_s), scenario, mistakes)
-    if arena is None or sensors is None or meters is None or mistakes:
+        observers = _attempt(lambda: make_observers(scenario, arena, field), scenario, mistakes)
+    if arena is None or sensors is None or observers is None or mistakes:
         raise ScenarioError(mistakes)
-    return Prepared(arena, sensors, meters)
+    return Prepared(arena, sensors, observers)
 
 
 def _with_landmarks(scenario: Scenario, seed: int) -> Scenario:

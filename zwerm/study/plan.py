@@ -15,12 +15,14 @@ from typing import Any
 
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import prepare
+from zwerm.run.measurement import metric_names
 from zwerm.run.runner import Runner
 from zwerm.scenario.load import built_in as built_in_scenarios
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
-from zwerm.study.study_tables import Setting, Study, VariantTable
+from zwerm.study.study_tables import CELL_METRICS, REPORTABLE_COLUMNS, Setting, Study, VariantTable
 from zwerm.version import __version__
+from zwerm.world.metrics.observers import is_measured
 
 # Descriptive keys of a scenario; runs do not depend on them.
 _DESCRIPTIVE = {"name", "summary", "source"}
@@ -35,6 +37,7 @@ class Point:
     settings: dict[str, Setting]
     scenario: Scenario
     fingerprint: str
+    metrics: tuple[str, ...] = ()  # names of what it measures, where `*` stands for any characters
 
     @property
     def label(self) -> str:
@@ -79,9 +82,27 @@ def make_points(study: Study, sets: Sequence[str] = ()) -> list[Point]:
                 where = label(variant.name, settings)
                 for line in error.mistakes:
                     found.setdefault(line, f"{study.path}: {where}: {line}" if where else f"{study.path}: {line}")
+    if not found and not study.lenient:
+        found = _unmeasured(study, points)
     if found:
         raise ScenarioError(list(found.values()))
     return points
+
+
+def _unmeasured(study: Study, points: Sequence[Point]) -> dict[str, str]:
+    """Return one line for every metric of a study that no scenario of it measures."""
+    names = list(dict.fromkeys(name for point in points for name in point.metrics))
+    known = [
+        *names,
+        *REPORTABLE_COLUMNS,
+        *(CELL_METRICS if any(point.scenario.metrics.cells for point in points) else ()),
+    ]
+    listed = ", ".join(sorted(known))
+    return {
+        metric: f"{study.path}: metrics: expected names of metrics that its scenarios measure ({listed}), got {metric!r}"
+        for metric in study.table.metrics
+        if not is_measured(metric, known)
+    }
 
 
 def make_trials(study: Study, points: Sequence[Point], seeds: Sequence[int], runner: Runner = "inline") -> list[Trial]:
@@ -97,8 +118,9 @@ def _make_point(study: Study, variant: VariantTable, settings: dict[str, Setting
         name = str(beside)
     axes = [each for axis, value in settings.items() for each in _assignments(study, variant, axis, value)]
     scenario = load(name, (*study.table.set, *variant.set, *sets, *axes))
-    arena = prepare(scenario).arena
-    return Point(variant.name, settings, scenario, _fingerprint(scenario, arena.segments.tobytes()))
+    prepared = prepare(scenario)
+    fingerprint = _fingerprint(scenario, prepared.arena.segments.tobytes())
+    return Point(variant.name, settings, scenario, fingerprint, tuple(metric_names(scenario, prepared.observers)))
 
 
 def _assignments(study: Study, variant: VariantTable, axis: str, value: Setting) -> list[str]:

@@ -20,7 +20,7 @@ from zwerm.study.rows import Key, Rows
 from zwerm.study.study_tables import Setting, Study
 from zwerm.study.summary import Results
 from zwerm.study.trial import Row
-from zwerm.world.drivers.lockstep import FAILED
+from zwerm.world.tick.completion import FAILED
 
 
 class StudyListener(Protocol):

@@ -27,6 +27,8 @@ RESERVED = (
 )
 # Reserved columns that a study may report like a metric.
 REPORTABLE_COLUMNS = ("ticks", "sim_s", "wall_s")
+# Metrics over all trials of a point: the smallest and the largest mean number of robots in a cell.
+CELL_METRICS = ("least_cell_robots", "most_cell_robots")
 
 
 def _one_kind(values: list[Any]) -> list[Setting]:
@@ -134,6 +136,7 @@ class Study:
 
     table: StudyTable
     path: Path
+    lenient: bool = False  # a metric that no scenario measures is left out
 
     @property
     def name(self) -> str:

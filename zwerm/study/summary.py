@@ -14,13 +14,12 @@ import numpy as np
 
 from zwerm.maths.statistics import Sample, condense, half_width
 from zwerm.study.plan import Point
-from zwerm.study.study_tables import Published, Setting, Study
+from zwerm.study.study_tables import CELL_METRICS, Published, Setting, Study
 from zwerm.study.trial import Row
-from zwerm.world.drivers.lockstep import FAILED
 from zwerm.world.scene import Floats
+from zwerm.world.tick.completion import FAILED
 
-# Metrics over all trials of a point: the smallest and the largest mean number of robots in a cell.
-CELL_METRICS = {"least_cell_robots": np.argmin, "most_cell_robots": np.argmax}
+_CELL_CHOICE = dict(zip(CELL_METRICS, (np.argmin, np.argmax), strict=True))
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,7 @@ class Results:
             counts = self.cell_counts(point)
             if not len(counts):
                 return condense([])
-            cell = int(CELL_METRICS[metric](counts.mean(axis=0)))
+            cell = int(_CELL_CHOICE[metric](counts.mean(axis=0)))
             return condense(counts[:, cell].tolist())
         values = [row[metric] for row in self.rows(point) if metric in row]
         return condense([value for value in values if not math.isnan(value)])

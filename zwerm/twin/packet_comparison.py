@@ -37,13 +37,13 @@ def compare(run: TwinRun) -> dict[str, Any]:
     counts = _counts(run, modelled, sent, arrived)
     half, links = half_width(counts), agreeing(counts)
     channels = run.world.medium.channels.values()
-    delivered = sum(int(each.accounts.delivered().sum()) for each in channels)
-    model_delay_s = sum(each.accounts.delay_ticks for each in channels) * dt_s / delivered if delivered else None
+    delivered = sum(int(each.ledger.delivered().sum()) for each in channels)
+    model_delay_s = sum(each.ledger.delay_ticks for each in channels) * dt_s / delivered if delivered else None
     return {
         "outcome": run.outcome,
         "ticks": run.world.tick,
         "wall_s": round(run.wall_s, 3),
-        "late_commands": run.world.answers.late_count,
+        "late_commands": run.world.intake.late_count,
         "middleware_lost": run.middleware_lost,
         "modelled": {
             "sent": model_sent,
@@ -99,7 +99,7 @@ def _modelled(run: TwinRun) -> dict[Link, tuple[int, int]]:
     """Return by link the numbers of packets sent and not dropped, from the world's ledgers."""
     found: dict[Link, tuple[int, int]] = {}
     for name, channel in run.world.medium.channels.items():
-        ledger = channel.accounts.by_link()
+        ledger = channel.ledger.by_link()
         dropped = [sum(column) for column in zip(*ledger["dropped"].values(), strict=True)] or [0] * len(ledger["sent"])
         for sender, receiver, sent, lost in zip(
             ledger["sender"], ledger["receiver"], ledger["sent"], dropped, strict=True

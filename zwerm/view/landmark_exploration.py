@@ -13,6 +13,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from zwerm.agents.landmark_exploration.telemetry import MapTold, read_told
 from zwerm.record.history import Tracks
 from zwerm.view.canvas import Sheet
 from zwerm.view.layer import Layer
@@ -42,15 +43,12 @@ class LandmarkComplexLayer(Layer):
         self._axes = sheet.axes
         self._landmarks = np.array(view.landmarks, dtype=np.float64).reshape(-1, 2)
         self._view = view
-        self._records = [
-            (each.time_s, each.node, each.told.get("landmark_map") or each.told["landmark_robot"])
-            for each in view.told
-            if "landmark_map" in each.told or "landmark_robot" in each.told
-        ]
+        told = [(each.time_s, each.node, read_told(each.snapshot)) for each in view.snapshots]
+        self._records = [(time_s, node, each) for time_s, node, each in told if isinstance(each, MapTold)]
         self._hulls: list[tuple[float, Floats]] = []
         self._lines: list[tuple[float, Floats]] = []
-        for time_s, _, told in self._records:
-            for simplex in told["simplices"]:
+        for time_s, _, report in self._records:
+            for simplex in report.simplices:
                 self._note(time_s, self._landmarks[list(simplex)])
         self._simplices = PolyCollection([], facecolors=SIMPLEX, edgecolors="none", linewidths=0, zorder=1.2)
         self._edges = LineCollection([], colors=EDGE, linewidths=0.4, zorder=1.3)
@@ -75,14 +73,15 @@ class LandmarkComplexLayer(Layer):
         until = float("inf") if at_s is None else at_s + 1e-9
         self._simplices.set_verts([hull for time_s, hull in self._hulls if time_s <= until])
         self._edges.set_segments([line for time_s, line in self._lines if time_s <= until])
-        newest = {node: told for time_s, node, told in self._records if time_s <= until}
+        newest = {node: report for time_s, node, report in self._records if time_s <= until}
         position = tracks.position[index]
         frontiers: list[Floats] = []
         assigned: list[Floats] = []
-        for node, told in sorted(newest.items()):
-            frontiers += [self._landmarks[list(pair)] for pair in told.get("frontiers", ())]
-            tasks = [(node, *told["claim"])] if "claim" in told else told.get("assigned", ())
-            assigned += [np.array([position[robot], self._landmarks[[a, b]].mean(axis=0)]) for robot, a, b in tasks]
+        for _, report in sorted(newest.items()):
+            frontiers += [self._landmarks[list(pair)] for pair in report.frontiers]
+            assigned += [
+                np.array([position[robot], self._landmarks[[a, b]].mean(axis=0)]) for robot, a, b in report.assigned
+            ]
         self._frontier.set_segments(frontiers)
         self._assigned.set_segments(assigned)
 

@@ -1,23 +1,24 @@
-"""All that crosses the wire: one `Observation` in, one `Command` out, and the messages that open and end a node's life.
+"""All messages on the wire: one `Observation` to a node, one `Command` back, and the messages that open and end its life.
 
-Messages are MessagePack maps with field names, so that any language can join; small parts that come in numbers (a
-bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as `type`, for
-example "command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and trailing
-bytes are refused with a reason that can be counted.
+Messages are MessagePack maps with field names, so that a node can be written in any language; small parts that come in numbers
+(a bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as `type`, for example
+"command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and trailing bytes are refused,
+each with a reason that is counted.
 
-New fields go last, with defaults; a field at its default is left out of a message (those of a drive are not). Angles
-are radians in (-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
+New fields go last, with defaults; a field at its default is left out of a message (except in drives). Angles are radians in
+(-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
 """
 
 import re
 from collections.abc import Callable
 from math import isfinite
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 from msgspec import Struct
 
 from zwerm.errors import ProtocolError
+from zwerm.wire.telemetry import plain_numbers, telemetry_error
 
 PROTOCOL_VERSION: Final = 1
 
@@ -25,11 +26,11 @@ PROTOCOL_VERSION: Final = 1
 MESSAGE_BYTES_MAX: Final = 65_536
 
 
-# What holds numbers and bytes only is part of no cycle: `gc=False` spares the collector counting and visiting it.
+# Structs of numbers and bytes are part of no reference cycle: with `gc=False` the collector ignores them.
 
 
 class _Part(Struct, frozen=True, gc=False, array_like=True, forbid_unknown_fields=True):
-    """A part of a message that may come in numbers: an array on the wire."""
+    """A part that may occur many times in a message: an array on the wire."""
 
 
 class _Message(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True, tag_field="type"):
@@ -93,7 +94,7 @@ class Displacement(_Part, frozen=True):
 
 
 class Packet(_Part, frozen=True):
-    """A radio packet delivered now. `sender` is None where the channel does not tell it."""
+    """A radio packet delivered now. `sender` is None on an anonymous channel."""
 
     channel: str
     payload: bytes
@@ -101,7 +102,7 @@ class Packet(_Part, frozen=True):
 
 
 class Observation(_Message, frozen=True, tag=f"observation/{PROTOCOL_VERSION}"):
-    """All that a node learns at one tick. A sensor the scenario does not give the node is None, and not on the wire."""
+    """The input of a node at one tick. A sensor that the node does not have is None, and not on the wire."""
 
     tick: int
     time_s: float
@@ -125,8 +126,8 @@ SENSOR_FIELDS: Final = Observation.__struct_fields__[3:]
 # --- what a node commands -------------------------------------------------------------------------------------------
 
 
-# Drives are sent whole: msgspec leaves out a number only where it is the default's own object, so that equal drives
-# could differ in their bytes, and runs in their traces.
+# Drives are encoded with all fields. msgspec omits a default number only if it is the same object, so equal drives could
+# otherwise differ in their bytes, and equal runs in their traces.
 
 
 class BodyVelocity(Struct, frozen=True, gc=False, forbid_unknown_fields=True, tag_field="kind", tag="velocity"):
@@ -153,7 +154,7 @@ class Transmission(_Part, frozen=True):
 
 
 class Wake(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True):
-    """When the node wants its next observation: at `at_s`, or at the first event it names, if that is earlier.
+    """The time of the node's next observation: `at_s`, or the first of the events it names, if that is earlier.
 
     With nothing set the node sleeps until the run ends.
     """
@@ -176,9 +177,11 @@ class Command(
 
     `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation
     at every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of
-    the task is complete, `gave_up`, unless empty, why it never will be. `told` is what the node has to tell those who
-    watch the run, numbers and more; nobody in the run hears it. `tick` is set by whatever runs the controller: the tick of
-    the observation answered.
+    the task is complete, `gave_up`, unless empty, why it never will be. `tick` is set by whatever runs the controller: the
+    tick of the observation answered.
+
+    `telemetry` is named numbers for the observers of the run; no node receives them. `snapshot` is one record in the
+    algorithm's own encoding for its metric and picture classes. The trace covers neither.
     """
 
     tick: int = 0
@@ -188,7 +191,8 @@ class Command(
     release: bool = False
     done: bool = False
     gave_up: str = ""
-    told: dict[str, Any] = {}
+    telemetry: dict[str, float | bool] = {}
+    snapshot: bytes = b""
 
 
 class Failure(_Message, frozen=True, tag=f"failure/{PROTOCOL_VERSION}"):
@@ -210,9 +214,9 @@ class Hello(_Message, frozen=True, tag=f"hello/{PROTOCOL_VERSION}"):
 
 
 class Welcome(_Message, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
-    """The world's answer to `Hello`: what the node is and what it may know of itself, or why it is refused.
+    """The world's answer to `Hello`: the node's controller and setup, or the reason of a refusal.
 
-    In a `paced` run, one in real time, observations come whether or not the node has answered the one before.
+    In a `paced` run (real time) observations come also while the node has not answered the one before.
     """
 
     refused: str = ""
@@ -222,7 +226,7 @@ class Welcome(_Message, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
 
 
 class Goodbye(_Message, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
-    """The world tells a node that its life is over, and why; the node closes and exits. Or a node says that it leaves."""
+    """The world ends a node's run and gives the reason; the node closes and exits. Or a node announces that it leaves."""
 
     reason: str
 
@@ -232,22 +236,21 @@ class Goodbye(_Message, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
 _encoder = msgspec.msgpack.Encoder()
 encode: Final[Callable[[object], bytes]] = _encoder.encode
 
-# For the hot paths; what they raise is turned into a ProtocolError by `refusal`. In a union a message must carry its
-# type.
+# For the hot paths; `refusal` turns their exceptions into a ProtocolError. In a union a message must carry its type.
 decode_observation: Final = msgspec.msgpack.Decoder(Observation).decode
 decode_answer: Final = msgspec.msgpack.Decoder(Command | Failure).decode
 decode_hello: Final = msgspec.msgpack.Decoder(Hello | Goodbye).decode
 decode_welcome: Final = msgspec.msgpack.Decoder(Welcome).decode
 decode_to_node: Final = msgspec.msgpack.Decoder(Observation | Goodbye).decode
 
-# What msgspec says of a message of another type, such as "command/2".
+# The error text of msgspec for a message of another type, such as "command/2".
 _OTHER_TYPE = re.compile(r"Invalid value '\w+/([0-9]{1,9})' - at `\$\.type`")
 
 REFUSABLE: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
 def refusal(error: Exception) -> ProtocolError:
-    """Return what a decoder raised as a ProtocolError.
+    """Return the exception of a decoder as a ProtocolError.
 
     Its reason is `schema` (unknown or missing field, wrong type, another message), `version`, or `malformed` (not
     MessagePack, truncated, trailing bytes).
@@ -262,18 +265,20 @@ def refusal(error: Exception) -> ProtocolError:
 def open_answer(payload: bytes) -> Command | Failure:
     """Return the command or failure in `payload`.
 
-    Raises ProtocolError with the reasons of `refusal`, or `oversized`, or `not-finite` for a number that is none in the
-    drive or the wake.
+    Raises ProtocolError with the reasons of `refusal`, or `oversized`; or `not-finite` for a number in the drive or the wake;
+    or `telemetry` for a name or number that breaks the rules of `zwerm.wire.telemetry`.
     """
     if len(payload) > MESSAGE_BYTES_MAX:
         raise ProtocolError("oversized", f"{len(payload)} bytes, at most {MESSAGE_BYTES_MAX}")
     try:
         answer: Command | Failure = decode_answer(payload)
     except REFUSABLE as error:
-        raise refusal(error) from None
+        found = refusal(error)
+        # A number of another type: the decoder names the field, not the key.
+        raise ProtocolError("telemetry", str(found)) if "`$.telemetry" in str(found) else found from None
     if type(answer) is Command:
         drive, wake = answer.drive, answer.wake
-        # Most drives are finite velocities: those are seen to be without a call.
+        # Most drives are finite velocities: these pass without a function call.
         if not (
             drive is None
             or (type(drive) is BodyVelocity and isfinite(drive.forward_m_s + drive.left_m_s + drive.turn_rad_s))
@@ -282,7 +287,31 @@ def open_answer(payload: bytes) -> Command | Failure:
             raise ProtocolError("not-finite", repr(drive))
         if wake is not None and wake.at_s is not None and not isfinite(wake.at_s):
             raise ProtocolError("not-finite", repr(wake))
+        if answer.telemetry and (rule := telemetry_error(answer.telemetry)):
+            raise ProtocolError("telemetry", rule)
     return answer
+
+
+def encode_command(command: Command) -> bytes:
+    """Return a controller's command as it crosses the wire, its telemetry as plain floats.
+
+    Raises TypeError or ValueError that names the field, the rule and the value.
+    """
+    if command.telemetry:
+        command.telemetry = plain_numbers(command.telemetry)
+    if command.snapshot and type(command.snapshot) is not bytes:
+        raise TypeError(f"snapshot: expected bytes, got {type(command.snapshot).__name__}")
+    return encode(command)
+
+
+def traced_bytes(command: Command, payload: bytes) -> bytes:
+    """Return the bytes of a command that the trace covers: those of the command without `telemetry` and `snapshot`.
+
+    They are `payload` itself where the command carries neither.
+    """
+    if not command.telemetry and not command.snapshot:
+        return payload
+    return encode(msgspec.structs.replace(command, telemetry={}, snapshot=b""))
 
 
 def is_finite_drive(drive: BodyVelocity | WheelSpeeds) -> bool:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -25,8 +24,8 @@ class Situation:
     """The state of one robot or base station.
 
     `driving`: the robot moves in this tick. `in_push`: it is part of a push. `calm`: it stands still, and its view
-    agrees with its neighbours' states. `negotiation` exists if robots may leave the complex. `telemetry` is reported
-    with the next command.
+    agrees with its neighbours' states. `negotiation` exists if robots may leave the complex. `telemetry` and
+    `snapshot` are reported with the next command.
     """
 
     def __init__(
@@ -44,7 +43,8 @@ class Situation:
         if setup.services.get("redundancy") in ("link", "coordinator"):
             self.negotiation = LeaveNegotiation(setup.node, setup.dt_s, random, setup.incarnation == 1)
         self.driving = self.in_push = self.calm = False
-        self.telemetry: dict[str, Any] = {}
+        self.telemetry: dict[str, float | bool] = {}
+        self.snapshot = b""
         self.on_cleared: Callable[[], None] = lambda: None
         self.on_arrived: Callable[[DriveResult], None] = lambda _: self.stand()
         self._activity: Generator[BodyVelocity, None, DriveResult | None] | None = self._look_around()

@@ -14,6 +14,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.messages.advice import StandingReport
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
+from zwerm.agents.sensor_coverage.messages.snapshots import MembershipSnapshot, encode_snapshot
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.advice_client import AdviceClient
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
@@ -55,10 +56,10 @@ class Membership(Component):
             local_map.leave_complex()
             negotiation.update(stands=False)
             self._left = True
-            situation.telemetry["removal"] = {"out": situation.node}
+            situation.snapshot = encode_snapshot(MembershipSnapshot(False))
         elif self._left and not local_map.redundant:
             self._left = False
-            situation.telemetry["removal"] = {"in": situation.node}
+            situation.snapshot = encode_snapshot(MembershipSnapshot(True))
         if self._advice_client is not None:
             self._advice_client.update(tick, self._report())
 

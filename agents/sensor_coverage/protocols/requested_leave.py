@@ -11,6 +11,7 @@ import numpy as np
 
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
+from zwerm.agents.sensor_coverage.messages.snapshots import MembershipSnapshot, encode_snapshot
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 
@@ -22,7 +23,7 @@ class RequestedLeave(Component):
     """The negotiation of a robot under a coordinator.
 
     `wanted`: the robot shall leave if it can. `driving`: it carries out a drive. `has_left`: it has left the complex.
-    `telemetry` has removals that are not reported yet.
+    `snapshot` is a change of membership that is not reported yet.
     """
 
     channel: ClassVar[str] = CHANNEL
@@ -34,8 +35,7 @@ class RequestedLeave(Component):
         self.wanted = False
         self.driving = False
         self.has_left = False
-        self.telemetry: dict[str, Any] = {} if first_incarnation else {"removal": {"in": setup.node}}
-        self._node = setup.node
+        self.snapshot = b"" if first_incarnation else encode_snapshot(MembershipSnapshot(True))
         self._driven_at = 0
 
     def observe(self, tick: int, visible: Iterable[int]) -> None:
@@ -50,7 +50,7 @@ class RequestedLeave(Component):
     def rejoin(self) -> None:
         """Belong to the complex again."""
         if self.has_left:
-            self.has_left, self.telemetry = False, {"removal": {"in": self._node}}
+            self.has_left, self.snapshot = False, encode_snapshot(MembershipSnapshot(True))
 
     def receive(self, sender: int, message: Any, tick: int) -> None:
         """Take in a message about neighbour lists and locks."""
@@ -63,7 +63,7 @@ class RequestedLeave(Component):
         negotiation.wanted = self.wanted
         negotiation.poll(tick)
         if negotiation.left:
-            self.has_left, self.telemetry = True, {"removal": {"out": self._node}}
+            self.has_left, self.snapshot = True, encode_snapshot(MembershipSnapshot(False))
             negotiation.update(stands=False)
 
     def outgoing(self) -> list[Outgoing]:

@@ -24,6 +24,7 @@ from zwerm.agents.landmark_exploration.orders import (
 )
 from zwerm.agents.landmark_exploration.packing import counts_of, pack_entries, pack_vector
 from zwerm.agents.landmark_exploration.replica import Replica, Stretch
+from zwerm.agents.landmark_exploration.telemetry import MapTold, write_told
 from zwerm.agents.landmark_exploration.upload import RETRY_TICKS, Upload
 
 ids = st.integers(0, 65_535)
@@ -143,8 +144,8 @@ def test_a_map_survives_its_file() -> None:
     map_.raise_all([key_of(3, 2)], BOUNDARY)
     again = read_map(write_map(map_))
     assert again.content() == map_.content()
-    record = {"landmark_map": {"simplices": [(1, 2, 3)], "bearings": [(0, 90, 180)]}}
-    assert map_told([{}, record]).complex.table == {(1, 2, 3): (0, 90, 180)}
+    told = write_told(MapTold(((1, 2, 3),), ((0, 90, 180),), open=3))
+    assert map_told([b"nothing", told]).complex.table == {(1, 2, 3): (0, 90, 180)}
 
 
 @pytest.mark.parametrize(

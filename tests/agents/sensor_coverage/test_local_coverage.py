@@ -15,11 +15,11 @@ from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
+from zwerm.run.measurement import measure
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.lockstep import LockStep
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 HALL = ("arena.size_m=[2.2,1.7]", "base.pose=[0.2,0.8,0.0]", "robots.count=18")
@@ -47,14 +47,14 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
         held = [each.local_map.slot for each in robots if each.push is None and each.local_map.slot != NOWHERE]
         assert len(held) == len(set(held)), f"tick {world.tick}: each has a place of its own, but {sorted(held)}"
 
-    driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), watch)
+    driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), [watch])
     return driver.run(), world, out()
 
 
 # --- words and letters ----------------------------------------------------------------------------------------------
 
 
-def test_a_damaged_word_says_nothing() -> None:
+def test_a_corrupt_message_is_ignored() -> None:
     payload = write(Segment(1, PushDone(7)))
     assert read(payload) == Segment(1, PushDone(7))
     for position in range(len(payload)):
@@ -65,7 +65,7 @@ def test_a_damaged_word_says_nothing() -> None:
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.5, 0.9])
-def test_letters_arrive_once_and_in_order_whatever_is_lost(lost: float) -> None:
+def test_segments_arrive_once_and_in_order_at_any_loss(lost: float) -> None:
     import random
 
     luck = random.Random(3)
@@ -88,7 +88,7 @@ def test_letters_arrive_once_and_in_order_whatever_is_lost(lost: float) -> None:
     assert lost > 0.5 or told == list(range(20))
 
 
-def test_a_letter_that_nobody_acknowledges_is_given_up() -> None:
+def test_a_segment_without_acknowledgement_is_given_up() -> None:
     mailbox = ReliableMailbox()
     mailbox.write(2, PushDone(1))
     tries = 0
@@ -103,7 +103,7 @@ def test_a_letter_that_nobody_acknowledges_is_given_up() -> None:
 
 
 @pytest.mark.parametrize(("noise", "seeds"), [((), (1,)), ((NOISE,), (1, 2, 3))])
-def test_robots_alone_cover_a_small_hall_about_as_well_as_with_a_coordinator(
+def test_decentralised_robots_cover_a_small_hall_about_as_well_as_under_a_coordinator(
     noise: tuple[str, ...], seeds: tuple[int, ...]
 ) -> None:
     cycles = 0.0
@@ -123,14 +123,14 @@ def test_robots_alone_cover_a_small_hall_about_as_well_as_with_a_coordinator(
     [
         (),
         ("radio.loss=0.5",),
-        ('radio.models=[{kind="bursts", loss_fraction=0.3, burst_packets=16.0}]',),
+        ('radio.models=[{kind="gilbert_elliott", loss_fraction=0.3, burst_packets=16.0}]',),
         ('radio.models=[{kind="delay", delay_s=0.3, jitter_s=0.3}, {kind="duplication", fraction=0.3}]',),
     ],
 )
-def test_nobody_is_lost_or_counted_twice_whatever_the_radio_does(air: tuple[str, ...]) -> None:
+def test_no_robot_is_lost_or_counted_twice_on_a_lossy_radio(air: tuple[str, ...]) -> None:
     scenario = load("sensor-coverage", (*ALONE, *air))
     outcome, world, robots = drive(scenario)
-    found = measure(world, scenario.metrics)
+    found = measure(world)
     slots = [robot.local_map.slot for robot in robots if not robot.situation.waiting]
     assert outcome == "completed"
     assert found["coverage_fraction"] >= 0.98
@@ -139,7 +139,7 @@ def test_nobody_is_lost_or_counted_twice_whatever_the_radio_does(air: tuple[str,
     assert found["robots_released"] == len(robots) == found["pushes"] + len(robots) - len(slots)
 
 
-def test_a_coordinator_that_is_killed_changes_nothing_where_there_is_none() -> None:
+def test_a_crash_of_the_coordinator_changes_nothing_in_a_run_without_one() -> None:
     kill = 'faults=[{kind="crash", at_s=10.0, nodes=["coordinator"]}]'
     settings = [*ALONE, "time.duration_s=30.0"]
     alone, killed = (run("sensor-coverage", runner="inline", overrides=[*settings, *each]) for each in ((), (kill,)))
@@ -148,14 +148,14 @@ def test_a_coordinator_that_is_killed_changes_nothing_where_there_is_none() -> N
     assert alone.metrics["robots_deployed"] > 2
 
 
-def test_robots_alone_leave_the_same_trace_in_processes() -> None:
+def test_decentralised_robots_leave_the_same_trace_inline_and_in_processes() -> None:
     settings = ["arena.size_m=[2.0,1.4]", "base.pose=[0.2,0.7,0.0]", "robots.count=10", "services.path=gradient"]
     inline, processes = (run("sensor-coverage", runner=each, overrides=settings) for each in ("inline", "processes"))
     assert inline.outcome == processes.outcome == "completed"
     assert inline.trace == processes.trace
 
 
-def test_an_empty_depot_is_noticed_by_the_base() -> None:
+def test_the_decentralised_base_reports_an_empty_depot() -> None:
     result = run("sensor-coverage", runner="inline", overrides=[*ALONE, "robots.count=4"])
     assert result.outcome == "failed"
     assert "depot-dry: the depot is empty" in result.reason
@@ -169,11 +169,11 @@ def at(slot: int) -> StateBeacon:
 
 
 @pytest.mark.parametrize(
-    ("sender", "place", "name"),
+    ("sender", "slot", "name"),
     [(8, 4, 17), (8, 3, 4), (9, 4, 4)],
     ids=["the follower took its place", "the follower stayed", "somebody else was there before"],
 )
-def test_a_leader_that_stays_takes_the_new_name_if_its_follower_came_after_all(
+def test_a_leader_that_stays_occupies_the_new_slot_if_its_follower_came_after_all(
     sender: int, slot: int, name: int
 ) -> None:
     leader = LocalMap(7, PlannerParameters(), Planner)
@@ -192,12 +192,12 @@ def test_a_leader_that_stays_takes_the_new_name_if_its_follower_came_after_all(
 @pytest.mark.parametrize(
     ("settings", "line"),
     [
-        (("services.path=mesh",), 'services.path: expected "coordinator" or "gradient", got "mesh"'),
+        (("services.path=mesh",), "services.path: expected 'coordinator' or 'gradient', got 'mesh'"),
         (("services.pathh=gradient",), "services.pathh"),
-        (("services.path=gradient",), "services.path: robots find the path from one base station"),
+        (("services.path=gradient",), "services: path=gradient, redundancy=none needs 1 to 1 base stations, got 3"),
     ],
 )
-def test_a_mistake_in_the_services_is_one_clear_line(settings: tuple[str, ...], line: str) -> None:
+def test_an_invalid_choice_of_services_is_one_line(settings: tuple[str, ...], line: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         load("sensor-coverage-multi-source" if settings == ("services.path=gradient",) else "sensor-coverage", settings)
     assert len(caught.value.mistakes) == 1
@@ -214,5 +214,5 @@ def test_every_combination_of_services_covers_a_small_hall(path: str, redundancy
     assert result.metrics["coverage_fraction"] >= 0.99
 
 
-def test_a_state_tells_no_position() -> None:
+def test_a_state_beacon_has_no_field_in_metres() -> None:
     assert not any(name.endswith("_m") for name in StateBeacon.__struct_fields__)

@@ -23,6 +23,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     write,
 )
 from zwerm.agents.sensor_coverage.motion.homing import offset, slide, unit
+from zwerm.run.measurement import measure
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.wire.messages import (
@@ -37,14 +38,13 @@ from zwerm.wire.messages import (
     open_answer,
 )
 from zwerm.wire.messages import encode as to_wire
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 # --- the mathematics of one robot -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("aside", [(0.05, 0.0), (-0.03, 0.04), (0.0, -0.06)])
-def test_homing_tells_how_far_the_place_is(aside: tuple[float, float]) -> None:
+def test_homing_returns_the_offset_to_the_goal(aside: tuple[float, float]) -> None:
     landmarks = [unit(math.radians(each)) for each in (10, 130, 200, 290)]
     pairs = []
     for x, y in landmarks:
@@ -55,7 +55,7 @@ def test_homing_tells_how_far_the_place_is(aside: tuple[float, float]) -> None:
     assert (found.x, found.y) == pytest.approx((-aside[0], -aside[1]), abs=0.01)
 
 
-def test_landmarks_in_one_line_leave_the_way_along_it_unknown() -> None:
+def test_landmarks_in_one_line_leave_the_offset_along_it_unknown() -> None:
     found = offset([((1.0, 0.0), (1.0, 0.0)), ((-1.0, 0.0), (-1.0, 0.0))])
     assert found.blind is not None
     assert abs(found.blind[0]) == pytest.approx(1.0)
@@ -126,7 +126,7 @@ def test_a_test_drive_that_meets_a_wall_leads_back() -> None:
     assert (alone.x, alone.y) == pytest.approx((0.0, 0.0), abs=0.01)
 
 
-def test_a_wall_behind_the_clear_distance_is_where_the_new_place_is() -> None:
+def test_a_deployment_that_meets_a_wall_beyond_the_clear_distance_stays_there() -> None:
     alone = OneRobot((-0.9, 0.0), 0.93)
     arrived = alone.until_arrived(Deploy(1, 0.0, 0.95, 0.8))
     assert arrived.ok
@@ -134,14 +134,14 @@ def test_a_wall_behind_the_clear_distance_is_where_the_new_place_is() -> None:
 
 
 @pytest.mark.parametrize("start", [-0.7, -0.9, -1.1])
-def test_the_ruler_sets_the_distance_whatever_it_was(start: float) -> None:
+def test_scale_correction_sets_the_distance_from_any_start(start: float) -> None:
     """Scale correction: break the link, re-establish it, and a margin."""
     alone = OneRobot((start, 0.0), 9.0)
     assert alone.until_arrived(Correct(1, (Sighting(7, math.pi),))).ok
     assert math.dist((alone.x, alone.y), alone.neighbour) == pytest.approx(0.95, abs=0.011)
 
 
-def test_a_robot_that_a_wall_keeps_off_its_place_answers_a_survey_at_once_and_rests_where_it_is() -> None:
+def test_a_robot_that_a_wall_keeps_off_its_point_of_rest_reports_at_once_and_rests_where_it_is() -> None:
     """It arrived pressed against the wall, which then pushed it out by more than it tolerates."""
     alone = OneRobot((-0.9, 0.0), 0.86)
     assert alone.until_arrived(Deploy(1, 0.0, 0.95, 0.7)).ok
@@ -238,7 +238,7 @@ def scrambled(multiple: int, straight: tuple[int, ...]) -> Callable[[int, Link],
         ),
     ],
 )
-def test_scrambling_the_frames_of_robots_and_stations_gives_the_same_places(
+def test_turning_the_frames_of_robots_and_stations_gives_the_same_positions(
     scenario: str, settings: tuple[str, ...], straight: tuple[int, ...]
 ) -> None:
     loaded = load(scenario, (*settings, "robots.sensors.2.distance_sd_fraction=0.0"))
@@ -256,12 +256,12 @@ def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
 
     def kill(world: World) -> None:
         if world.tick in (300, 450):
-            alive = [r for r in world.scene.present_ids().tolist() if r and r not in world.crashed]
+            alive = [r for r in world.scene.present_ids().tolist() if r and r not in world.status.crashed]
             killed.append(alive[len(alive) // 2])
             world.crash(killed[-1], "struck by lightning")
 
     outcome, world = drive(scenario, kill)
-    found = measure(world, scenario.metrics)
+    found = measure(world)
     assert outcome == "completed"
     assert len(killed) == 2
     assert found["coverage_fraction"] >= 0.99
@@ -269,17 +269,17 @@ def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
 
 
 @pytest.mark.parametrize("unlucky", [1, 2, 9])
-def test_a_robot_that_dies_at_the_door_is_followed_by_another(unlucky: int) -> None:
+def test_a_robot_that_dies_at_the_depots_door_is_followed_by_another(unlucky: int) -> None:
     scenario = load("sensor-coverage", (*HALL, "robots.on_crash=continue"))
 
     def kill(world: World) -> None:
-        if world.scene.present[unlucky] and unlucky not in world.crashed:
+        if world.scene.present[unlucky] and unlucky not in world.status.crashed:
             world.crash(unlucky, "struck by lightning")
 
     outcome, world = drive(scenario, kill)
     assert outcome == "completed"
-    assert unlucky in world.crashed
-    assert measure(world, scenario.metrics)["coverage_fraction"] >= 0.99
+    assert unlucky in world.status.crashed
+    assert measure(world)["coverage_fraction"] >= 0.99
 
 
 def test_robots_in_processes_leave_the_same_trace() -> None:

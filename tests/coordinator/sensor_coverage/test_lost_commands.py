@@ -24,6 +24,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     read_request,
     write,
 )
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, decode_snapshot
 from zwerm.agents.sensor_coverage.protocols.transport.deduplication import COPIES_MAX, RequestDeduplicator
 from zwerm.coordinator.sensor_coverage.command_mailbox import RECOVERY_COPIES, ROLL_CALL_COPIES, CommandMailbox
 from zwerm.coordinator.sensor_coverage.coordinator import SensorCoverageCoordinator
@@ -31,19 +32,19 @@ from zwerm.coordinator.sensor_coverage.retry_policy import BURST_TRIES, RetryPol
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
+from zwerm.run.measurement import measure
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Packet
 from zwerm.world.drivers.lockstep import LockStep
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 HALL = ("arena.size_m=[2.2,1.7]", "base.pose=[0.2,0.8,0.0]", "robots.count=18")
 AHEAD = Deploy(1, 0.0, 0.95, 0.8)
 DONE = Arrived(1, True, False, False, 0.95, ())
-BURSTS = 'uplink.models=[{kind="bursts", loss_fraction=0.3, burst_packets=16.0}]'
+BURSTS = 'uplink.models=[{kind="gilbert_elliott", loss_fraction=0.3, burst_packets=16.0}]'
 MANGLED = (
     'uplink.models=[{kind="delay", delay_s=0.2, jitter_s=0.3}, {kind="duplication", fraction=0.3}, '
     '{kind="corruption", bit_error_rate=0.002}]'
@@ -273,7 +274,7 @@ def drive(scenario: Scenario) -> tuple[str, World, SensorCoverageCoordinator]:
 
     link = MemoryLink({node: each.answer for node, each in nodes.items()}, again)
     outcome = LockStep(world, link, programs=link).run()
-    coordinator = nodes[world.count]._controller
+    coordinator = nodes[scenario.robots.count]._controller
     assert isinstance(coordinator, SensorCoverageCoordinator)
     return outcome, world, coordinator
 
@@ -282,7 +283,7 @@ def drive(scenario: Scenario) -> tuple[str, World, SensorCoverageCoordinator]:
 def test_no_robot_is_lost_or_counted_twice_on_a_lossy_uplink(air: str) -> None:
     scenario = load("sensor-coverage", (*HALL, air))
     outcome, world, coordinator = drive(scenario)
-    found: dict[str, Any] = measure(world, scenario.metrics)
+    found: dict[str, Any] = measure(world)
     placed = [robot for robot in coordinator.slots.occupant.values() if robot]
     waiting = list(coordinator.sources.waiting.values())
     out = [robot for robot in world.scene.present_ids().tolist() if robot]
@@ -332,21 +333,24 @@ def test_the_robots_wait_for_a_coordinator_that_is_away_for_300_s() -> None:
 
 def resumed(result: RunResult, from_s: float) -> None:
     """Check that the coordinator, begun anew, has everybody again within two seconds, and goes on to the end."""
-    anew = next(each for each in result.told if each.time_s >= from_s and "complex" in each.told)
-    complex_ = anew.told["complex"]
+    anew = next(each for each in result.snapshots if each.time_s >= from_s)
+    complex_ = decode_snapshot(anew.snapshot)
+    assert isinstance(complex_, ComplexSnapshot)
     assert anew.time_s <= from_s + 2.0
-    assert complex_["cycle"] == 1, "it remembers nothing"
-    assert complex_["paths"], "and somebody is about to go"
-    seen = len({node for each in complex_["edges"] for node in each})
+    assert complex_.cycle == 1, "it remembers nothing"
+    assert complex_.paths, "and somebody is about to go"
+    seen = len({node for each in complex_.edges for node in each})
     assert anew.present.sum() - 1 <= seen <= anew.present.sum() > 3, "all but one who waits at the base"
     assert result.outcome == "completed"
     assert result.metrics["coverage_fraction"] >= 0.99
     assert result.metrics["robots_released"] == result.metrics["robots_deployed"] - 1
     lives = [
-        [each for each in result.told if "complex" in each.told and (each.time_s < from_s) == old]
+        [decode_snapshot(each.snapshot) for each in result.snapshots if (each.time_s < from_s) == old]
         for old in (True, False)
     ]
-    assert result.metrics["deployment_cycles"] == sum(incarnation[-1].told["complex"]["cycle"] for incarnation in lives)
+    assert result.metrics["deployment_cycles"] == sum(
+        life[-1].cycle for life in lives if isinstance(life[-1], ComplexSnapshot)
+    )
 
 
 NOISE = "robots.sensors.0.sd_rad=0.0436332"
@@ -367,7 +371,7 @@ def test_a_coordinator_that_begins_anew_goes_on_within_two_seconds(at_s: float, 
     resumed(run("sensor-coverage", runner="inline", overrides=[*HALL, *more, crash(at_s, ", for_s=3.0")]), at_s + 3.0)
 
 
-def test_a_coordinator_that_begins_anew_in_a_process_of_its_own_asks_the_robots_by_radio() -> None:
+def test_a_coordinator_that_restarts_in_its_own_process_asks_the_robots_by_radio() -> None:
     inline, processes = (
         run("sensor-coverage", runner=each, overrides=[*HALL, crash(35.0, ", for_s=3.0")])
         for each in ("inline", "processes")

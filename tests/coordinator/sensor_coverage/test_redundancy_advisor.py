@@ -78,7 +78,7 @@ def spared(said: Said) -> dict[int | None, RedundantAdvice]:
 
 
 @pytest.mark.parametrize("word", [wheel()[1], ReportNoted(7), CollectReports(), RedundantAdvice(((1, 10), (2, 11)))])
-def test_every_word_crosses_the_uplink_and_a_damaged_one_says_nothing(word: AdviceMessage) -> None:
+def test_every_advice_message_survives_the_wire_and_a_corrupt_one_is_ignored(word: AdviceMessage) -> None:
     payload = write(word)
     assert read(payload) == word
     for slot in range(len(payload)):
@@ -89,7 +89,7 @@ def test_every_word_crosses_the_uplink_and_a_damaged_one_says_nothing(word: Advi
 # --- the coordinator ------------------------------------------------------------------------------------------------
 
 
-def test_the_hub_of_a_wheel_is_told_upon_which_lists_it_can_be_spared_and_nobody_else_is() -> None:
+def test_the_advisor_advises_the_hub_of_a_wheel_with_list_versions_and_no_other_robot() -> None:
     centre = Centre()
     said = centre.hear(wheel().items())
     assert [to for to, word in said if isinstance(word, ReportNoted)] == list(range(7))
@@ -106,7 +106,7 @@ def test_the_hub_of_a_wheel_is_told_upon_which_lists_it_can_be_spared_and_nobody
         (3, {"listed": (1, 2, 4, 5)}),  # one sees the other, and not the other way around
     ],
 )
-def test_nobody_is_told_to_leave_who_is_not_willing_or_whose_neighbours_are_not_those_it_sees(
+def test_the_advisor_advises_no_robot_that_is_unwilling_or_whose_neighbours_differ_from_its_view(
     node: int, change: dict[str, object]
 ) -> None:
     centre, words = Centre(), wheel()
@@ -115,11 +115,11 @@ def test_nobody_is_told_to_leave_who_is_not_willing_or_whose_neighbours_are_not_
     assert not spared(centre.hear(words.items(), ticks=1 + QUIET_TICKS))
 
 
-def test_nobody_is_told_to_leave_whom_a_hole_would_follow() -> None:
+def test_the_advisor_advises_no_robot_whose_departure_opens_a_hole() -> None:
     assert not spared(Centre().hear(wheel(steps=(1, 5)).items(), ticks=1 + QUIET_TICKS))
 
 
-def test_of_two_that_can_be_spared_and_see_each_other_one_is_told() -> None:
+def test_the_advisor_advises_one_of_two_redundant_robots_that_see_each_other() -> None:
     twins = {n: each for n, each in wheel().items() if n}
     twins = {
         n: StandingReport(5, each.version, (0, *each.listed[1:], 7), each.fenced, True, False)
@@ -130,7 +130,7 @@ def test_of_two_that_can_be_spared_and_see_each_other_one_is_told() -> None:
     assert len(spared(Centre().hear(twins.items(), ticks=1 + QUIET_TICKS))) == 1
 
 
-def test_a_late_word_of_a_robot_undoes_none_that_is_newer() -> None:
+def test_the_advisor_ignores_a_late_older_report() -> None:
     centre, words = Centre(), wheel()
     centre.hear(words.items())
     new = StandingReport(6, 20, words[0].listed, (), True, False)
@@ -140,7 +140,7 @@ def test_a_late_word_of_a_robot_undoes_none_that_is_newer() -> None:
     assert not spared(centre.hear(ticks=QUIET_TICKS))
 
 
-def test_one_that_begins_anew_asks_all_and_then_those_that_others_see_and_it_has_not_heard() -> None:
+def test_a_restarted_advisor_asks_all_robots_and_then_visible_robots_without_a_report() -> None:
     centre, words = Centre(), wheel()
     assert centre.hear() == [(None, CollectReports())]
     assert centre.hear(ticks=ASK_TICKS) == [(BASE, CollectReports())]
@@ -158,7 +158,7 @@ def told(robot: AdviceClient, tick: int, standing: StandingReport | None) -> lis
     return [read(write(each.message)) for each in robot.outgoing()]
 
 
-def test_a_robot_says_how_it_stands_once_that_lasts_and_again_until_it_was_noted() -> None:
+def test_a_robot_reports_once_its_report_has_settled_and_repeats_it_until_it_is_noted() -> None:
     robot, standing = AdviceClient(DT_S), StandingReport(0, 3, (1, 2), (), True, True)
     said = {tick: words for tick in range(100) if (words := told(robot, tick, standing))}
     assert list(said)[:3] == [SETTLED_TICKS, SETTLED_TICKS + REPEAT_TICKS, SETTLED_TICKS + 3 * REPEAT_TICKS]
@@ -180,7 +180,7 @@ def test_a_robot_says_how_it_stands_once_that_lasts_and_again_until_it_was_noted
     assert new.listed == (1,)
 
 
-def test_a_robot_believes_a_verdict_for_a_while_and_while_it_sees_nobody_else() -> None:
+def test_advice_expires_and_holds_only_for_the_neighbours_that_it_names() -> None:
     robot = AdviceClient(DT_S)
     assert robot.advice(0, (1, 2)) is None
     robot.receive(CENTRE, RedundantAdvice(((1, 10), (2, 11))), 0)
@@ -188,7 +188,7 @@ def test_a_robot_believes_a_verdict_for_a_while_and_while_it_sees_nobody_else() 
     assert robot.advice(1, (1, 2, 3)) is robot.advice(1, (1,)) is robot.advice(ADVICE_TICKS, (1, 2)) is None
 
 
-def test_neighbours_grant_upon_a_verdict_only_if_it_names_their_lists_as_they_are() -> None:
+def test_neighbours_grant_a_lock_by_advice_only_if_it_names_their_present_lists() -> None:
     robots = {node: LeaveLock(node, 10.0, 0.0, 0.0) for node in (0, 1)}
     for node, robot in robots.items():
         robot.update([1 - node], 1.0)
@@ -298,13 +298,13 @@ def leave_as_told(late: int, locks: bool) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("late", [0, 80])
-def test_who_leaves_upon_a_verdict_never_opens_a_hole_whatever_the_uplink_does(late: int) -> None:
+def test_departures_by_advice_never_open_a_hole_on_a_lossy_uplink(late: int) -> None:
     left, changed = leave_as_told(late, locks=True)
     assert left > 8
     assert changed == 0
 
 
-def test_without_locks_late_verdicts_open_holes() -> None:
+def test_without_locks_late_advice_opens_holes() -> None:
     assert leave_as_told(late=80, locks=False)[1] > 0
 
 
@@ -324,7 +324,7 @@ def crash(for_s: float = math.inf) -> str:
     return f'faults=[{{kind="crash", at_s=50.0{back}, nodes=["coordinator"]}}]'
 
 
-def test_robots_that_find_their_way_are_told_who_can_be_spared_the_same_in_processes() -> None:
+def test_a_run_with_an_advisor_leaves_the_same_trace_inline_and_in_processes() -> None:
     inline, processes = (
         run("sensor-coverage", seed=2, runner=each, overrides=HALL) for each in ("inline", "processes")
     )
@@ -335,7 +335,7 @@ def test_robots_that_find_their_way_are_told_who_can_be_spared_the_same_in_proce
     assert inline.metrics["unsafe_removals"] == 0.0
 
 
-def test_somebody_is_spared_and_no_hole_comes_open_while_a_third_of_all_words_is_lost() -> None:
+def test_a_redundant_robot_leaves_by_advice_without_a_hole_at_a_loss_of_30_percent() -> None:
     lossy = [*HALL, "radio.loss=0.3", "uplink.loss=0.3"]
     result = run("sensor-coverage", seed=1, runner="inline", overrides=lossy)
     assert result.outcome == "completed"
@@ -344,7 +344,7 @@ def test_somebody_is_spared_and_no_hole_comes_open_while_a_third_of_all_words_is
     assert result.metrics["unsafe_removals"] == result.metrics["concluded_early"] == 0.0
 
 
-def test_a_deployment_whose_coordinator_dies_goes_on_without_it_and_spares_nobody_any_more() -> None:
+def test_a_deployment_goes_on_without_its_advisor_and_no_robot_leaves_any_more() -> None:
     result = run("sensor-coverage", seed=2, runner="inline", overrides=[*HALL, crash()])
     assert result.crashed == [24]
     assert result.outcome == "completed"
@@ -352,7 +352,7 @@ def test_a_deployment_whose_coordinator_dies_goes_on_without_it_and_spares_nobod
     assert result.metrics["removals"] == 0.0
 
 
-def test_a_coordinator_that_comes_back_with_nothing_in_mind_spares_again() -> None:
+def test_a_restarted_advisor_without_memory_advises_again() -> None:
     result = run("sensor-coverage", seed=2, runner="inline", overrides=[*HALL, crash(for_s=3.0)])
     assert result.restarted == [24]
     assert result.outcome == "completed"

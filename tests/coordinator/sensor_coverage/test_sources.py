@@ -31,7 +31,7 @@ Point = tuple[float, float]
 
 def test_the_robots_are_dealt_out_to_the_depots_in_turn_and_an_empty_one_refuses() -> None:
     world = assemble(load("sensor-coverage-multi-source", ("robots.count=9",)), 1)
-    depots = world._depots
+    depots = world.bodies.depots
     assert depots is not None
     out = []
     for station in (2, 0, 1, 1, 1):
@@ -44,10 +44,10 @@ def test_the_robots_are_dealt_out_to_the_depots_in_turn_and_an_empty_one_refuses
 
 def test_of_robots_released_at_once_one_enters_a_tick() -> None:
     world = assemble(load("sensor-coverage-multi-source", ("robots.count=9",)), 1)
-    assert world._depots is not None
+    assert world.bodies.depots is not None
     for station in (1, 0):
-        world._depots.release(station)
-    entering = [world._depots.entering(world.scene) for _ in range(3)]
+        world.bodies.depots.release(station)
+    entering = [world.bodies.depots.entering(world.scene) for _ in range(3)]
     assert [each and each[0] for each in entering] == [4, 3, None]
 
 
@@ -69,7 +69,7 @@ def test_every_station_is_a_node_and_only_the_coordinator_knows_which() -> None:
         (("robots.count=3",), "robots.count: expected more than the 3 base stations, got 3"),
     ],
 )
-def test_stations_that_cannot_be_are_one_line(settings: tuple[str, ...], line: str) -> None:
+def test_invalid_base_stations_are_one_line(settings: tuple[str, ...], line: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         assemble(load("sensor-coverage-multi-source", settings), 1)
     assert [each.partition(": ")[2] for each in caught.value.mistakes] == [line]
@@ -129,7 +129,7 @@ def test_a_swarms_directions_are_in_the_frame_of_its_station() -> None:
     assert [truth.off(robot) for robot in (1, 4, 5)] == pytest.approx([-2.0] * 3)
 
 
-def test_where_two_swarms_see_each_other_their_frames_become_one_and_all_that_is_remembered_turns() -> None:
+def test_two_frames_merge_where_swarms_see_each_other_and_all_remembered_directions_turn() -> None:
     truth = two_swarms()
     apart = ((0, 2), (0, 3), (2, 3), (1, 4), (1, 5), (4, 5))
     truth.update(*apart)
@@ -149,7 +149,7 @@ def test_where_two_swarms_see_each_other_their_frames_become_one_and_all_that_is
             assert math.remainder(add - truth.bearing(one, other) + 0.3, math.tau) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_three_frames_become_one_in_a_single_look() -> None:
+def test_three_frames_merge_in_a_single_scan() -> None:
     truth = Truth({n: (0.9 * n, 0.1 * (n % 2)) for n in range(3)}, {0: 1.0, 1: -1.0, 2: 2.5})
     for robot in range(3):
         truth.slots.add(robot)
@@ -185,7 +185,7 @@ def test_pushes_from_two_stations_go_at_once_where_their_paths_have_no_landmark_
 
 
 @pytest.mark.parametrize("mover", [5, 4, 3])
-def test_a_path_near_another_waits(mover: int) -> None:
+def test_a_push_whose_path_is_near_another_waits(mover: int) -> None:
     assert assigned(line_of(10), {0: 0.0, 9: 0.0}, [plan(3), plan(mover)])[1:] == []
 
 
@@ -194,7 +194,7 @@ def test_two_pushes_from_one_station_never_go_at_once() -> None:
     assert assigned(star, {0: 0.0}, [plan(4), plan(8)]) == [(0, 1, 2, 3, 4)]
 
 
-def test_what_is_less_wanted_is_done_only_where_nothing_else_can_be() -> None:
+def test_a_plan_of_low_priority_is_assigned_only_without_a_reachable_plan_of_high_priority() -> None:
     two = FlagComplex({0: [1], 1: [0, 2], 2: [1], 5: [6], 6: [5]})
     edges, gaps = [plan(2)], [plan(1), plan(6)]
     assert assigned(two, {0: 0.0, 5: 0.0}, edges, gaps) == [(5, 6), (0, 1, 2)]
@@ -202,7 +202,7 @@ def test_what_is_less_wanted_is_done_only_where_nothing_else_can_be() -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_pushes_at_once_have_no_place_and_no_landmark_in_common(seed: int) -> None:
+def test_concurrent_pushes_have_no_slot_and_no_landmark_in_common(seed: int) -> None:
     random = np.random.default_rng(seed)
     position = random.uniform(0.0, 9.0, (300, 2))
     apart = np.hypot(*(position[:, None] - position[None, :]).transpose(2, 0, 1))
@@ -218,7 +218,7 @@ def test_pushes_at_once_have_no_place_and_no_landmark_in_common(seed: int) -> No
     assert len(paths) > 2
 
 
-def test_stories_told_at_once_end_when_the_last_does_and_wake_for_the_first() -> None:
+def test_concurrent_routines_end_with_the_last_and_wake_for_the_first() -> None:
     def story(times: list[float]):
         for at_s in times:
             yield Wake(at_s=at_s, on_packet=at_s > 2.0)

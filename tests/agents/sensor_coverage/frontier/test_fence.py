@@ -66,7 +66,7 @@ def test_an_edge_between_two_triangles_is_covered_on_both_sides_and_one_below_bo
     assert uncovered(views, complex_, 1, 2) == (-1,)
 
 
-def test_the_fence_of_a_hexagon_is_its_rim_and_a_new_robot_goes_at_60_degrees() -> None:
+def test_the_fence_of_a_hexagon_is_its_boundary_and_a_new_robot_is_placed_at_60_degrees() -> None:
     views, complex_ = swarm(hexagon())
     found = fence(views, complex_, 0.0)
     boundary_edges = [(1, 2), (1, 6), (2, 3), (3, 4), (4, 5), (5, 6)]
@@ -91,13 +91,13 @@ def test_a_chain_on_this_side_of_the_edge_is_no_exception() -> None:
     assert (1, 2) in [side.edge for side in fence(views, complex_, 0.0).sides]
 
 
-def test_robots_that_stand_exactly_in_line_along_a_wall_are_no_exception_to_anything() -> None:
+def test_robots_exactly_in_line_along_a_wall_make_no_exception_edge() -> None:
     views, complex_ = swarm({1: (0.0, 0.0), 2: (0.4, 0.0), 3: (0.9, 0.0), 4: (0.4, 0.5)})
     assert relative(views[3], 1, 2) == 0.0
     assert not is_exception(views, complex_, 1, 2)
 
 
-def test_robots_that_stand_at_one_place_are_no_exception_to_anything() -> None:
+def test_robots_at_the_same_point_make_no_exception_edge() -> None:
     views, complex_ = swarm({1: (0.0, 0.0), 2: (0.9, 0.0), 3: (0.9, 0.0), 4: (0.45, 0.3)})
     assert not is_exception(views, complex_, 2, 3)
 
@@ -113,7 +113,7 @@ def test_a_gap_below_120_degrees_is_bisected() -> None:
     assert nearest_on_side(views, complex_, 1, 2, 1) == 3
 
 
-def test_a_corner_below_60_degrees_is_an_obstacles() -> None:
+def test_a_corner_below_60_degrees_makes_obstacle_edges() -> None:
     """Figure 6(c): j and k do not see each other though they are near, so something stands between them."""
     slots = {1: (0.0, 0.0), 2: (0.9, 0.0), 3: (0.9 * math.cos(0.9), 0.9 * math.sin(0.9))}
     views, complex_ = swarm(slots, blind=((2, 3), (3, 2)))
@@ -122,13 +122,13 @@ def test_a_corner_below_60_degrees_is_an_obstacles() -> None:
     assert Side(1, 2, 1) not in found.sides
 
 
-def test_one_sided_sight_makes_no_edge() -> None:
+def test_a_bearing_from_one_end_only_makes_no_edge() -> None:
     views, complex_ = swarm(hexagon(), blind=((1, 2),))
     assert (1, 2) not in complex_
     assert (1, 2) not in [side.edge for side in fence(views, complex_, 0.15).sides]
 
 
-def test_turning_any_robots_frame_changes_nothing() -> None:
+def test_turning_any_robots_frame_does_not_change_the_fence() -> None:
     random = np.random.default_rng(5)
     slots = {n: (float(x), float(y)) for n, (x, y) in enumerate(random.uniform(0.0, 2.5, (25, 2)))}
     straight, complex_ = swarm(slots)
@@ -158,7 +158,7 @@ def test_a_path_avoids_obstacle_edges_where_the_way_round_is_cheaper() -> None:
     assert reach(complex_, {12: 0.0}, ((11, 12), (2, 11)), 3.0).path(2) == (12, 10, 6, 2)
 
 
-def test_of_several_sources_the_nearest_pushes() -> None:
+def test_the_path_begins_at_the_nearest_of_several_sources() -> None:
     complex_ = FlagComplex({n: [m for m in (n - 1, n + 1) if 0 <= m <= 6] for n in range(7)})
     ways = reach(complex_, {0: 0.0, 6: 0.0}, (), 3.0)
     assert ways.path(2) == (0, 1, 2)

@@ -122,7 +122,7 @@ def test_figure_5_robot_10_is_redundant_and_no_other() -> None:
     assert [swarm.slots.occupant[slot] for slot in add] == [10]
 
 
-def test_figure_5_without_robot_10_nobody_is_redundant() -> None:
+def test_figure_5_without_robot_10_no_robot_is_redundant() -> None:
     position = figure_5().position
     swarm = Swarm({robot: there for robot, there in position.items() if robot != 10}).update()
     assert RelativeHomology().redundant(swarm.scan, swarm.planner.boundary_edges()) == ()
@@ -147,7 +147,7 @@ def triangle() -> Swarm:
     return Swarm({_I: (0.0, 0.0), _J: (HOP_M, 0.0), _K: at(-60.0)})
 
 
-def test_figure_6b_an_edge_whose_ends_touch_a_wall_ahead_is_an_obstacles() -> None:
+def test_figure_6b_an_edge_is_an_obstacle_edge_if_both_ends_touch_a_wall_ahead() -> None:
     swarm = triangle()
     swarm.touch(_I, 80.0)
     swarm.touch(_J, 100.0)
@@ -158,7 +158,7 @@ def test_figure_6b_an_edge_whose_ends_touch_a_wall_ahead_is_an_obstacles() -> No
 
 
 @pytest.mark.parametrize(("wall_deg", "movers"), [(80.0, [_J]), (-60.0, [_I, _J]), (180.0, [_I, _J])])
-def test_figure_6b_where_one_end_touches_a_wall_the_other_goes_and_a_wall_elsewhere_is_none(
+def test_figure_6b_if_one_end_touches_a_wall_ahead_the_other_end_is_the_mover(
     wall_deg: float, movers: list[int]
 ) -> None:
     swarm = triangle()
@@ -168,7 +168,7 @@ def test_figure_6b_where_one_end_touches_a_wall_the_other_goes_and_a_wall_elsewh
     assert (_I, _J) in swarm.robots(swarm.planner.frontier)
 
 
-def test_figure_6c_a_convex_corner_makes_both_of_its_edges_an_obstacles() -> None:
+def test_figure_6c_a_convex_corner_makes_both_of_its_edges_obstacle_edges() -> None:
     """They are 0.9 apart as they stand, and a pillar keeps them from seeing each other."""
     swarm = Swarm({_I: (0.0, 0.0), _J: (0.95, 0.0), _K: at(56.0)})
     views = {slot: dict(view) for slot, view in swarm.scan.views.items()}
@@ -192,7 +192,7 @@ def test_figure_7_an_edge_is_fence_where_all_its_triangles_are_on_one_side(k2: P
 
 
 @pytest.mark.parametrize("turned_seed", [1, 2, 3])
-def test_figure_8a_both_ends_send_the_new_robot_to_the_same_place_60_degrees_off_on_the_free_side(
+def test_figure_8a_both_ends_send_the_new_robot_to_the_same_point_at_60_degrees_on_the_free_side(
     turned_seed: int,
 ) -> None:
     """The sign conventions, end to end: left of the way from i to j is right of the way from j to i."""
@@ -304,7 +304,7 @@ def push_of_figure_9(used_odometry: bool = False) -> tuple[Swarm, list[tuple[int
     return swarm, pushed(swarm.update(), plan, used_odometry)
 
 
-def test_figure_9b_robots_take_each_others_places_and_robot_13_appears_beside_the_source() -> None:
+def test_figure_9b_robots_take_the_slots_ahead_and_robot_13_appears_beside_the_source() -> None:
     swarm, _ = push_of_figure_9()
     now = {swarm.slots.occupant[swarm.slot[n]]: n for n in swarm.position}
     assert {robot: now[robot] for robot in (12, 13, 10, 6)} == {12: 12, 13: 10, 10: 6, 6: 2}
@@ -312,7 +312,7 @@ def test_figure_9b_robots_take_each_others_places_and_robot_13_appears_beside_th
     assert all(now[robot] == robot for robot in (1, 3, 4, 5, 7, 8, 9, 11))
 
 
-def test_figure_9b_every_landmark_is_the_robot_that_will_be_there_seen_from_the_place_to_go_to() -> None:
+def test_figure_9b_landmarks_are_the_future_occupants_as_seen_from_the_goal() -> None:
     swarm, said = push_of_figure_9()
     moves = {robot: command for robot, command in said if isinstance(command, Move)}
     assert sorted(moves) == [6, 10, 13]
@@ -327,7 +327,7 @@ def test_figure_9b_every_landmark_is_the_robot_that_will_be_there_seen_from_the_
             assert each.still == (each.node not in at_place)
 
 
-def test_figure_9b_the_new_robot_corrects_its_distance_to_who_then_stands_at_the_anchor() -> None:
+def test_figure_9b_the_new_robot_corrects_its_distance_to_the_future_occupant_of_the_anchor() -> None:
     _, said = push_of_figure_9()
     ((robot, command),) = [(robot, command) for robot, command in said if isinstance(command, Correct)]
     assert robot == 2
@@ -335,7 +335,7 @@ def test_figure_9b_the_new_robot_corrects_its_distance_to_who_then_stands_at_the
     assert [each.node for each in command.anchors] == [6]
 
 
-def test_who_went_by_odometry_corrects_its_distance_to_who_is_behind_and_is_told_where_that_is() -> None:
+def test_a_robot_that_used_odometry_corrects_its_distance_to_the_robot_behind_by_a_given_bearing() -> None:
     """It may have gone so far that it sees nobody behind it."""
     swarm, said = push_of_figure_9(used_odometry=True)
     commands = [(robot, command) for robot, command in said if isinstance(command, Correct)]

@@ -41,7 +41,7 @@ def the_hole(slots: Positions) -> Hole:
 
 
 @pytest.mark.parametrize("order", [(1, 2, 3, 4), (4, 2, 1, 3), (2, 1, 4, 3)])
-def test_a_hole_is_on_the_left_of_the_way_around_it_whatever_the_ids_are(order: tuple[int, ...]) -> None:
+def test_a_hole_is_on_the_left_of_its_cycle_for_any_order_of_ids(order: tuple[int, ...]) -> None:
     square = rhombus(math.radians(80.0))
     hole = the_hole({order[slot - 1]: at for slot, at in square.items()})
     widths = {corner.slot: math.degrees(corner.width_rad) for corner in hole}
@@ -52,11 +52,11 @@ def test_a_hole_is_on_the_left_of_the_way_around_it_whatever_the_ids_are(order: 
         assert not corner.faces(math.atan2(y, x))
 
 
-def test_a_disc_has_no_hole_and_a_rhombus_with_a_short_diagonal_neither() -> None:
+def test_a_disc_and_a_rhombus_with_a_short_diagonal_have_no_hole() -> None:
     assert holes(*seen(rhombus(math.radians(60.0)))) == []
 
 
-def test_what_was_met_beside_a_hole_does_not_make_it_an_obstacle_and_what_was_met_in_it_does() -> None:
+def test_a_hole_is_an_obstacle_if_a_robot_met_something_in_it_and_not_beside_it() -> None:
     slots = rhombus(math.radians(66.0))
     hole = the_hole(slots)
     assert is_bare(hole, *seen(slots), lambda _: ())
@@ -64,7 +64,7 @@ def test_what_was_met_beside_a_hole_does_not_make_it_an_obstacle_and_what_was_me
     assert not is_bare(hole, *seen(slots), lambda slot: {2: (math.pi / 2.0,)}.get(slot, ()))
 
 
-def test_what_a_robot_that_stands_in_a_hole_met_counts_but_for_what_is_behind_it() -> None:
+def test_an_obstacle_met_by_a_robot_inside_a_hole_counts_unless_it_is_behind_the_robot() -> None:
     """A ring of seven, and an eighth robot within that sees three of them: with those it makes two triangles."""
     ring = {n: (1.05 * math.cos(n * math.tau / 7.0), 1.05 * math.sin(n * math.tau / 7.0)) for n in range(7)}
     within, outside = {**ring, 8: (0.4, 0.0)}, {**ring, 8: (1.7, 0.0)}
@@ -80,7 +80,7 @@ def test_what_a_robot_that_stands_in_a_hole_met_counts_but_for_what_is_behind_it
         assert is_bare(hole, views, complex_, lambda slot: (direction,) if slot == 8 else ()) == bare  # noqa: B023
 
 
-def test_what_a_robot_met_that_two_see_in_a_hole_counts_whatever_its_direction() -> None:
+def test_an_obstacle_met_by_a_robot_that_two_see_in_a_hole_counts_in_any_direction() -> None:
     ring = {n: (1.1 * math.cos(n * math.tau / 7.0), 1.1 * math.sin(n * math.tau / 7.0)) for n in range(7)}
     slots = {**ring, 8: (0.35, 0.22)}
     views, complex_ = seen(slots)
@@ -90,7 +90,7 @@ def test_what_a_robot_met_that_two_see_in_a_hole_counts_whatever_its_direction()
     assert not is_bare(hole, views, complex_, lambda slot: (0.3,) if slot == 8 else ())
 
 
-def test_a_robot_that_goes_in_halves_the_narrow_corners() -> None:
+def test_a_robot_that_drives_into_a_hole_bisects_its_narrow_corners() -> None:
     hole = the_hole(rhombus(math.radians(66.0)))
     add = {side.edge: side for side in sides(hole)}
     assert sorted(add) == [(1, 2), (1, 4), (2, 3), (3, 4)]
@@ -117,7 +117,7 @@ def planner(slots: Positions, wall_at: int | None = None) -> Planner:
 
 
 @pytest.mark.parametrize("wall_at", [None, 2])
-def test_four_robots_that_just_miss_each_other_get_a_fifth_unless_there_is_a_wall(wall_at: int | None) -> None:
+def test_four_robots_just_out_of_range_of_each_other_get_a_fifth_unless_there_is_a_wall(wall_at: int | None) -> None:
     """The corner rule alone would leave them as they are: both of their narrow corners are below 60 degrees and a margin."""
     slots = {0: (-1.7, 0.0), **rhombus(math.radians(65.0))}
     mine = planner(slots, wall_at)
@@ -139,7 +139,7 @@ def _inward(pair: tuple[int, int], sign: int) -> bool:
 # --- a swarm that has come apart ------------------------------------------------------------------------------------
 
 
-def test_a_piece_of_the_swarm_that_is_out_of_sight_is_somewhere_to_go() -> None:
+def test_the_planner_proposes_a_bridge_to_a_component_out_of_sight() -> None:
     """Four in single file; the last two have drifted out of sight of the second, whose place is still known."""
     run_concurrently = {0: (0.0, 0.0), 1: (0.95, 0.0), 2: (1.9, 0.1), 3: (2.8, 0.1)}
     mine = planner(run_concurrently)

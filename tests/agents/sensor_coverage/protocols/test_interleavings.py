@@ -55,12 +55,12 @@ def test_of_five_robots_no_two_neighbours_leave_together_and_no_departure_change
     assert departures > 500
 
 
-def test_nor_do_they_when_locks_and_wishes_run_out() -> None:
+def test_no_departure_is_unsafe_when_locks_and_requests_expire() -> None:
     _, departures = explore(connected_graphs(3), ticks=2)
     assert departures > 100
 
 
-def test_nor_when_robots_lose_their_memory() -> None:
+def test_no_departure_is_unsafe_when_robots_lose_their_memory() -> None:
     _, departures = explore(connected_graphs(3), ticks=2, amnesias=1)
     assert departures > 500
 
@@ -71,14 +71,16 @@ def slots(robots: int) -> list[tuple[int, tuple[int, ...]]]:
     return [(robots - 1, each) for size in range(robots) for each in combinations(others, size)]
 
 
-@pytest.mark.parametrize("place", slots(3))
+@pytest.mark.parametrize("slot", slots(3))
 @pytest.mark.parametrize("comes", [False, True])
-def test_nor_when_one_robot_comes_or_is_moved_meanwhile(slot: tuple[int, tuple[int, ...]], comes: bool) -> None:
+def test_no_departure_is_unsafe_when_one_robot_comes_or_is_moved(
+    slot: tuple[int, tuple[int, ...]], comes: bool
+) -> None:
     _, departures = explore(connected_graphs(3, 3), ticks=1, moving=slot, comes=comes)
     assert departures > 20
 
 
-def test_nor_when_one_of_four_robots_is_moved() -> None:
+def test_no_departure_is_unsafe_when_one_of_four_robots_is_moved() -> None:
     _, departures = explore(connected_graphs(4, 4), moving=(3, (0, 1)))
     assert departures > 100
 
@@ -103,7 +105,7 @@ class Advised(LeaveLock):
         return super().request(now_s, self._versions)
 
 
-def test_nor_when_they_rely_on_what_they_were_told_of_lists_that_were_true_once() -> None:
+def test_no_departure_is_unsafe_when_robots_rely_on_advice_from_old_lists() -> None:
     _, departures = explore(connected_graphs(4), Advised)
     assert departures > 100
     _, moved = explore(connected_graphs(3, 3), Advised, ticks=1, moving=(2, (0,)))
@@ -117,7 +119,7 @@ class Credulous(Advised):
         return super()._answer(requester, LockRequest(request.number, ((self._me, self._version),)), now_s)
 
 
-def test_nor_would_it_be_so_if_neighbours_did_not_look_at_the_versions_of_their_lists() -> None:
+def test_advice_from_old_lists_is_unsafe_if_neighbours_do_not_check_list_versions() -> None:
     with pytest.raises(Violation):
         explore(connected_graphs(4, 4), Credulous, moving=(3, (0, 2)))
 
@@ -216,6 +218,8 @@ class Blind(LeaveLock):
         (Blind, 3, {"moving": (2, (0,)), "comes": True}),
     ],
 )
-def test_without_it_the_search_finds_a_violation(kind: type[LeaveLock], robots: int, budget: dict[str, Any]) -> None:
+def test_the_search_finds_a_violation_without_each_part_of_the_protocol(
+    kind: type[LeaveLock], robots: int, budget: dict[str, Any]
+) -> None:
     with pytest.raises(Violation):
         explore(connected_graphs(robots, robots), kind, **budget)

@@ -82,7 +82,7 @@ def graphs(draw: st.DrawFn) -> Graph:
 
 @settings(max_examples=150, deadline=None)
 @given(st.one_of(graphs(), st.builds(discs, st.integers(0, 2**32), st.integers(4, 25))))
-def test_who_leaves_by_the_criterion_leaves_the_betti_numbers_as_they_were(graph: Graph) -> None:
+def test_a_departure_by_the_link_criterion_changes_no_betti_number(graph: Graph) -> None:
     before = gudhi_betti(graph)
     for node, robot in swarm(graph).items():
         if robot.redundant():
@@ -103,11 +103,11 @@ def test_who_leaves_by_the_criterion_leaves_the_betti_numbers_as_they_were(graph
         (everyone(4), [0, 1, 2, 3]),
     ],
 )
-def test_who_is_redundant_in_small_swarms(graph: Graph, redundant: list[int]) -> None:
+def test_the_link_criterion_finds_the_redundant_robots_of_small_swarms(graph: Graph, redundant: list[int]) -> None:
     assert [node for node, robot in swarm(graph).items() if robot.redundant()] == redundant
 
 
-def test_a_neighbour_whose_list_is_not_known_or_does_not_name_the_robot_makes_it_stay() -> None:
+def test_a_robot_stays_if_a_neighbours_list_is_unknown_or_does_not_name_it() -> None:
     robot = LeaveLock(0, LEASE_S, START_S - LEASE_S)
     robot.update([1, 2], START_S)
     robot.receive(1, NeighbourList(1, (0, 2)), START_S)
@@ -118,7 +118,7 @@ def test_a_neighbour_whose_list_is_not_known_or_does_not_name_the_robot_makes_it
     assert robot.redundant()
 
 
-def test_an_older_list_that_comes_late_says_nothing() -> None:
+def test_a_late_older_neighbour_list_is_ignored() -> None:
     robot = LeaveLock(0, LEASE_S, START_S - LEASE_S)
     robot.update([1], START_S)
     robot.receive(1, NeighbourList(5, ()), START_S)
@@ -129,7 +129,7 @@ def test_an_older_list_that_comes_late_says_nothing() -> None:
 # --- locks ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_robot_leaves_once_all_have_granted() -> None:
+def test_a_robot_leaves_once_all_neighbours_have_granted_its_lock() -> None:
     robots = swarm(everyone(3))
     request = only(robots[0].request(START_S))
     for other in (1, 2):
@@ -144,7 +144,7 @@ def test_a_robot_leaves_once_all_have_granted() -> None:
     assert not robots[1].locked(START_S)
 
 
-def test_a_copy_of_an_ask_is_granted_again_and_holds_no_longer() -> None:
+def test_a_repeated_lock_request_is_granted_again_without_a_longer_lease() -> None:
     robots = swarm(everyone(2))
     request = only(robots[0].request(START_S))
     for late_s in (0.0, 5.0):
@@ -152,7 +152,7 @@ def test_a_copy_of_an_ask_is_granted_again_and_holds_no_longer() -> None:
     assert not robots[1].locked(START_S + LEASE_S)
 
 
-def test_an_ask_that_arrives_after_it_is_over_locks_nobody() -> None:
+def test_a_lock_request_that_arrives_after_its_release_locks_no_robot() -> None:
     robots = swarm(everyone(2))
     request = only(robots[0].request(START_S))
     (over,) = robots[0].give_up()
@@ -161,7 +161,7 @@ def test_an_ask_that_arrives_after_it_is_over_locks_nobody() -> None:
     assert not robots[1].locked(START_S)
 
 
-def test_who_asks_again_asks_those_that_have_not_granted() -> None:
+def test_a_repeated_lock_request_names_the_neighbours_that_have_not_granted() -> None:
     robots = swarm(everyone(3))
     request = only(robots[0].request(START_S))
     robots[0].receive(2, only(robots[2].receive(0, request, START_S)), START_S)
@@ -172,7 +172,7 @@ def test_who_asks_again_asks_those_that_have_not_granted() -> None:
     assert robots[0].request(START_S + 1.0) == []
 
 
-def test_a_list_tells_that_a_wish_is_over_where_that_was_lost() -> None:
+def test_a_neighbour_list_replaces_a_lost_lock_release() -> None:
     robots = swarm(everyone(2))
     robots[1].receive(0, only(robots[0].request(START_S)), START_S)
     robots[1].receive(0, robots[0].neighbour_list(), START_S)
@@ -182,7 +182,7 @@ def test_a_list_tells_that_a_wish_is_over_where_that_was_lost() -> None:
     assert not robots[1].locked(START_S)
 
 
-def test_a_lock_is_granted_to_nobody_else_until_it_ends() -> None:
+def test_a_robot_grants_no_second_lock_before_the_first_ends() -> None:
     robots = swarm({0: [1], 1: [0, 2], 2: [1]})
     first, second = only(robots[0].request(START_S)), only(robots[2].request(START_S))
     robots[1].receive(0, first, START_S)
@@ -190,7 +190,7 @@ def test_a_lock_is_granted_to_nobody_else_until_it_ends() -> None:
     assert only(robots[1].receive(2, second, START_S + LEASE_S)) == LockGrant(second.number)
 
 
-def test_a_wish_ends_long_before_the_locks_and_is_given_up() -> None:
+def test_a_lock_request_expires_before_its_locks_and_is_withdrawn() -> None:
     robots = swarm(everyone(2))
     request = only(robots[0].request(START_S))
     robots[0].receive(1, only(robots[1].receive(0, request, START_S)), START_S)
@@ -200,7 +200,7 @@ def test_a_wish_ends_long_before_the_locks_and_is_given_up() -> None:
     assert only(robots[0].request(START_S + LEASE_S / 2.0)).number > request.number
 
 
-def test_of_two_neighbours_that_ask_at_once_the_larger_id_yields() -> None:
+def test_of_two_neighbours_that_request_locks_together_the_larger_id_yields() -> None:
     robots = swarm(everyone(2))
     asks = [only(robots[node].request(START_S)) for node in (0, 1)]
     assert robots[1].receive(0, asks[0], START_S) == [
@@ -212,7 +212,7 @@ def test_of_two_neighbours_that_ask_at_once_the_larger_id_yields() -> None:
     assert not robots[1].wants
 
 
-def test_an_ask_upon_an_old_list_is_denied_and_the_new_one_told() -> None:
+def test_a_lock_request_with_an_old_list_version_is_denied_with_the_new_list() -> None:
     robots = swarm(everyone(2))
     request = only(robots[0].request(START_S))
     robots[1].update([0, 7], START_S)
@@ -224,7 +224,7 @@ def test_an_ask_upon_an_old_list_is_denied_and_the_new_one_told() -> None:
     assert not robots[0].wants
 
 
-def test_who_sees_somebody_come_or_go_does_not_leave_upon_the_grants_it_has() -> None:
+def test_a_robot_whose_view_changed_does_not_leave_by_earlier_grants() -> None:
     for seen in ([1, 7], []):
         robots = swarm(everyone(2))
         request = only(robots[0].request(START_S))
@@ -234,7 +234,7 @@ def test_who_sees_somebody_come_or_go_does_not_leave_upon_the_grants_it_has() ->
         assert only(robots[0].request(START_S)) == LockRelease(request.number)
 
 
-def test_who_has_left_or_moves_grants_nothing_until_it_stands_again() -> None:
+def test_a_robot_that_left_or_moves_grants_no_lock_until_it_stands_again() -> None:
     robots = swarm(everyone(2))
     robots[1].depart()
     request = only(robots[0].request(START_S))
@@ -243,7 +243,7 @@ def test_who_has_left_or_moves_grants_nothing_until_it_stands_again() -> None:
     assert only(robots[1].receive(0, request, START_S)) == LockGrant(request.number)
 
 
-def test_a_robot_that_lost_its_memory_stands_still_and_grants_nothing_for_a_lease() -> None:
+def test_a_robot_that_lost_its_memory_stands_still_and_grants_no_lock_for_one_lease() -> None:
     robots = swarm(everyone(2))
     request = only(robots[0].request(START_S))
     reborn = LeaveLock(1, LEASE_S, START_S)

@@ -11,17 +11,19 @@ from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.locks import ListRequest
 from zwerm.agents.sensor_coverage.messages.peers import PeerMessage, read, write
+from zwerm.agents.sensor_coverage.messages.snapshots import MembershipSnapshot, decode_snapshot, encode_snapshot
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 from zwerm.deploy.node_specs import node_specs
 from zwerm.link.memory import MemoryLink
 from zwerm.maths.simplicial import FlagComplex, betti
 from zwerm.run.assembly import assemble
+from zwerm.run.measurement import truth_of
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Command
 from zwerm.world.drivers.lockstep import LockStep
-from zwerm.world.metrics.removals import removals
+from zwerm.world.metrics.sensor_coverage import removals
 from zwerm.world.world import World
 
 DT_S = 0.1
@@ -67,13 +69,13 @@ def leave_at_random(seed: int, loss: float, wanting: int = 12, ticks: int = 400)
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.5])
-def test_robots_leave_by_agreement_and_never_open_a_hole(loss: float) -> None:
+def test_robots_that_leave_by_agreement_never_open_a_hole(loss: float) -> None:
     found = [leave_at_random(seed, loss) for seed in range(4)]
     assert sum(left for left, _ in found) > 8
     assert sum(changed for _, changed in found) == 0
 
 
-def test_a_robot_that_has_granted_a_lock_stands_still_until_it_is_over() -> None:
+def test_a_robot_that_granted_a_lock_stands_still_until_the_lock_is_released() -> None:
     first, second = (LeaveNegotiation(node, DT_S, np.random.Generator(np.random.Philox(node)), True) for node in (1, 2))
     ticks = iter(range(100))
 
@@ -116,20 +118,21 @@ def drive(scenario: Scenario, seed: int) -> tuple[World, list[LocalRobot]]:
         held = [each.local_map.slot for each in robots() if each.push is None and each.local_map.slot != NOWHERE]
         assert len(held) == len(set(held))
 
-    LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), look).run()
+    LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), [look]).run()
     return world, robots()
 
 
-def test_robots_are_freed_and_pushed_again_while_words_are_lost_and_nobody_is_lost() -> None:
+def test_redundant_robots_leave_and_are_pushed_again_under_loss_and_no_robot_is_lost() -> None:
     settings = (*HALL, *CLOSE, *LINK, "radio.loss=0.1", "time.duration_s=240.0")
     for seed in range(1, 9):  # not in every run there is anybody to spare
         world, robots = drive(load("sensor-coverage", settings), seed)
-        told = [each.told["removal"] for each in world.audience.told if "removal" in each.told]
+        changes = [decode_snapshot(each.snapshot) for each in world.telemetry.snapshots]
+        left, entered = changes.count(MembershipSnapshot(False)), changes.count(MembershipSnapshot(True))
         redundant = [each.node for each in robots if each.local_map.redundant]
-        assert len(redundant) == sum("out" in each for each in told) - sum("in" in each for each in told)
+        assert len(redundant) == left - entered
         homeless = [each.node for each in robots if each.local_map.slot == NOWHERE]
         assert len(homeless) <= 2, "one waits at the base, and one may be on its way"
-        if any("in" in each for each in told):
+        if entered:
             break
     result = run("sensor-coverage", seed=seed, runner="processes", overrides=settings)
     assert result.trace == world.trace.hex()
@@ -137,17 +140,22 @@ def test_robots_are_freed_and_pushed_again_while_words_are_lost_and_nobody_is_lo
     assert result.metrics["unsafe_removals"] == 0
 
 
-def test_the_checker_finds_a_removal_that_opens_a_hole() -> None:
+def test_the_removal_metric_finds_a_removal_that_opens_a_hole() -> None:
     scenario = load("sensor-coverage", (*LINK, "robots.count=8", "base.pose=[1.0,3.75,0.0]"))
     world = assemble(scenario, 1)
     around = [(2.0 + 0.9 * np.cos(a), 3.75 + 0.9 * np.sin(a)) for a in np.linspace(0.0, 2.0 * np.pi, 7)[:-1]]
     world.scene.position[1:8] = [(2.0, 3.75), *around]
     world.scene.present[:] = True
     world.scene.present[0] = False
+
+    def report(node: int, member: bool) -> None:
+        command = Command(snapshot=encode_snapshot(MembershipSnapshot(member)))
+        world.telemetry.accept(world.scene, node, command)
+
     for node in (1, 2):  # the hub of a wheel, and then one of its rim: a hole comes, and goes
-        world.audience.hear(world.scene, node, Command(told={"removal": {"out": node}}), decides=False)
-        assert removals(world, 1.0) == {"removals": node, "unsafe_removals": node}
-    world.audience.hear(world.scene, 1, Command(told={"removal": {"in": 1}}), decides=False)
-    world.audience.hear(world.scene, 2, Command(told={"removal": {"in": 2}}), decides=False)
-    world.audience.hear(world.scene, 2, Command(told={"removal": {"out": 2}}), decides=False)
-    assert removals(world, 1.0) == {"removals": 3.0, "unsafe_removals": 2.0}
+        report(node, False)
+        assert removals(truth_of(world), 1.0) == {"removals": node, "unsafe_removals": node}
+    report(1, True)
+    report(2, True)
+    report(2, False)
+    assert removals(truth_of(world), 1.0) == {"removals": 3.0, "unsafe_removals": 2.0}

@@ -200,21 +200,19 @@ def after_the_cut(kind: type[PathVectorProtocol], loss: float, delay: int, seed:
 
 
 @pytest.mark.parametrize(("loss", "delay"), [(0.0, 0), (0.3, 2), (0.6, 3), (0.9, 0)])
-def test_after_its_root_is_cut_off_a_gradient_ends_and_counts_no_further_than_there_are_places(
-    loss: float, delay: int
-) -> None:
+def test_after_the_frontier_is_cut_off_routes_end_and_costs_stay_bounded_by_the_slots(loss: float, delay: int) -> None:
     for seed in range(3):
         told = after_the_cut(PathVectorProtocol, loss, delay, seed)
         assert len(told) < 400 * 15, "it ends"
         assert max(told, default=0.0) <= 15 * OBSTACLE_COST
 
 
-def test_a_gradient_that_believes_in_ways_through_itself_counts_on() -> None:
+def test_a_distance_vector_without_slots_counts_to_infinity() -> None:
     assert max(after_the_cut(Gullible, 0.0, 0, seed=1, rounds=100)) > 15 * OBSTACLE_COST
 
 
 @pytest.mark.parametrize("weights", [line(3), {(1, 2): 1.0, (1, 3): 1.0, (2, 3): 1.0}])
-def test_two_robots_do_not_point_at_each_other_when_their_root_goes(weights: dict[Edge, float]) -> None:
+def test_two_robots_do_not_route_through_each_other_when_the_frontier_goes(weights: dict[Edge, float]) -> None:
     network = Network(3, weights)
     network.roots[1] = None
     settled(network, 4)
@@ -226,14 +224,14 @@ def test_two_robots_do_not_point_at_each_other_when_their_root_goes(weights: dic
 # --- what is believed -----------------------------------------------------------------------------------------------
 
 
-def test_a_way_along_an_obstacle_costs_more() -> None:
+def test_a_route_along_an_obstacle_edge_costs_more() -> None:
     network = Network(4, {(1, 2): 1.0, (2, 3): 1.0, (1, 4): 1.0, (3, 4): OBSTACLE_COST})
     network.roots[1] = None
     settled(network, 4)
     assert network.robots[3].route == Route(2.0, (3, 2, 1), since=1)
 
 
-def test_of_equal_ways_that_to_the_smallest_place_at_the_frontier_wins_and_then_that_by_the_smallest() -> None:
+def test_of_equal_routes_the_one_to_the_smallest_slot_wins_and_then_the_one_through_the_smallest() -> None:
     robot = PathVectorProtocol()
     for slot, root in ((5, 4), (3, 4), (2, 7), (1, 8)):
         robot.receive(slot, PathVector(1, slot, Route(1.0, (slot, root), 5)))
@@ -241,14 +239,14 @@ def test_of_equal_ways_that_to_the_smallest_place_at_the_frontier_wins_and_then_
     assert robot.route == Route(2.0, (9, 3, 4), 5)
 
 
-def test_the_base_is_where_ways_begin_and_none_leads_through_it() -> None:
+def test_no_route_leads_through_the_base() -> None:
     robot = PathVectorProtocol()
     robot.receive(0, PathVector(1, 0, Route(1.0, (0, 7), 5)))
     robot.choose(9, None, {0: 1.0}, 9)
     assert robot.route is None
 
 
-def test_the_nearest_of_two_roots_is_told_and_who_stops_being_one_tells_the_other() -> None:
+def test_routes_lead_to_the_nearest_frontier_robot_and_to_the_other_once_it_ends_its_claim() -> None:
     network = Network(5, line(5))
     network.roots.update({1: None, 5: None})
     settled(network, 5)
@@ -258,7 +256,7 @@ def test_the_nearest_of_two_roots_is_told_and_who_stops_being_one_tells_the_othe
     assert network.costs() == {1: 0.0, 2: 1.0, 3: 2.0, 4: 3.0, 5: 4.0}
 
 
-def test_an_older_word_that_comes_late_and_a_copy_change_nothing() -> None:
+def test_a_late_older_path_vector_and_a_copy_change_nothing() -> None:
     robot = PathVectorProtocol()
     robot.receive(4, PathVector(7, 1, Route(0.0, (1,), 5)))
     version = robot.version
@@ -269,7 +267,7 @@ def test_an_older_word_that_comes_late_and_a_copy_change_nothing() -> None:
     assert robot.version == version
 
 
-def test_a_way_belongs_to_a_place_and_outlives_who_told_it() -> None:
+def test_a_route_belongs_to_a_slot_and_outlives_its_occupant() -> None:
     robot = PathVectorProtocol()
     robot.receive(4, PathVector(7, 1, Route(1.0, (1, 5), 5)))
     robot.receive(4, PathVector(8, 6, None))  # it has gone on, and tells of another place
@@ -282,7 +280,7 @@ def test_a_way_belongs_to_a_place_and_outlives_who_told_it() -> None:
     assert robot.route is None
 
 
-def test_all_ways_to_a_place_end_with_the_word_that_it_is_not_at_the_frontier_any_more() -> None:
+def test_all_routes_to_a_slot_end_when_it_is_announced_as_ended() -> None:
     robot = PathVectorProtocol()
     robot.receive(4, PathVector(1, 4, Route(1.0, (4, 7), 5)))
     robot.receive(3, PathVector(1, 3, Route(2.0, (3, 5, 7), 5)))
@@ -295,7 +293,7 @@ def test_all_ways_to_a_place_end_with_the_word_that_it_is_not_at_the_frontier_an
     assert robot.route == Route(3.0, (2, 3, 5, 7), 10)
 
 
-def test_who_claims_something_else_ends_what_it_claimed_before() -> None:
+def test_a_new_frontier_claim_of_a_robot_ends_its_earlier_claim() -> None:
     robot = PathVectorProtocol()
     robot.choose(2, 0.0, {}, 5)
     robot.choose(2, 0.0, {}, 6)
@@ -306,7 +304,7 @@ def test_who_claims_something_else_ends_what_it_claimed_before() -> None:
     assert (robot.route, robot.ended) == (None, ((2, 8),))
 
 
-def test_who_took_a_place_over_and_missed_the_end_of_its_way_is_believed_after_a_while() -> None:
+def test_a_robot_that_took_over_a_slot_and_missed_the_end_of_its_route_renews_its_claim() -> None:
     follower, other = PathVectorProtocol(), PathVectorProtocol()
     follower.receive(4, PathVector(1, 2, Route(0.0, (2,), 5)))
     other.receive(4, PathVector(2, 2, None, ended=((2, 8),)))  # the follower has not heard that
@@ -318,6 +316,6 @@ def test_who_took_a_place_over_and_missed_the_end_of_its_way_is_believed_after_a
         assert (other.route is not None) == (number == 2)
 
 
-def test_a_way_survives_the_wire() -> None:
+def test_a_path_vector_survives_the_wire() -> None:
     for way in (PathVector(1, 2, Route(4.5, (2, 3), 7), ((4, 5),)), PathVector(1, 2, None)):
         assert read(write(way)) == way

@@ -1,9 +1,9 @@
-"""The radio's books: what became of every packet, for every link of a channel and for every cause.
+"""Ledger: counts of sent, delivered and dropped packets, by link of a channel and by cause.
 
-At every tick, for every link: sent = delivered + dropped, by cause + in flight. Of the dropped, some never had a chance: their
-receivers were out of reach. The others are losses. A copy that the medium made counts as
-sent, and as a copy; a damaged packet that arrives counts as delivered, and as damaged. The age of a link's information is
-the time since its newest delivered packet was sent, from its first delivery on.
+At every tick and for every link: sent = delivered + dropped, by cause + in flight. Dropped packets are out of reach (their
+receivers were), or losses. A copy that the medium made counts as sent, and as a copy; a damaged packet that arrives counts as
+delivered, and as damaged. The age of information of a link is the time since its newest delivered packet was sent, from its
+first delivery on.
 """
 
 from typing import Any
@@ -16,12 +16,12 @@ from zwerm.world.scene import Floats, Ints
 
 
 class Ledger:
-    """The books of one channel, among `nodes` nodes."""
+    """The ledger of one channel, among `nodes` nodes."""
 
     def __init__(self, links: Links, nodes: int, dt_s: float) -> None:
         self.copies = 0
         self.damaged = 0
-        self.delay_ticks = 0  # from sending to handing over, of all that were delivered
+        self.delay_ticks = 0  # from sending to delivery, over all delivered packets
         self.node_messages: Ints = np.zeros(nodes, dtype=np.int64)  # transmissions, by sender
         self.node_bytes: Ints = np.zeros(nodes, dtype=np.int64)  # payload of these
         self._links = links
@@ -30,7 +30,7 @@ class Ledger:
         self._delivered = links.integers()
         self._lost: dict[str, Column] = {}  # by cause
         self._out_of_reach: dict[str, Column] = {}
-        # Of the age of information, in ticks: the newest packet's, since when it is, the sum so far, the largest.
+        # Age of information [ticks]: sending of the newest packet, its delivery, the sum of ages, the largest age.
         self._newest = links.integers(-1)
         self._since = links.integers()
         self._age_sum = links.numbers()
@@ -38,11 +38,11 @@ class Ledger:
         self._age_ticks = links.integers()
 
     def send(self, link: Ints) -> None:
-        """Take note of packets sent on `link` (k,)."""
+        """Count packets sent on `link` (k,)."""
         np.add.at(self._sent.values, link, 1)
 
     def drop(self, link: Ints, cause: str, out_of_reach: bool = False) -> None:
-        """Take note of packets dropped on `link` (k,), whose receivers were in reach or out of it."""
+        """Count packets dropped on `link` (k,), with receivers in reach or out of it."""
         if len(link):
             columns = self._out_of_reach if out_of_reach else self._lost
             column = columns.get(cause)
@@ -51,7 +51,7 @@ class Ledger:
             np.add.at(column.values, link, 1)
 
     def deliver(self, link: Ints, sent_tick: Ints, tick: int) -> None:
-        """Take note of packets received at `tick` on `link` (k,) that were sent at `sent_tick` (k,)."""
+        """Count packets received at `tick` on `link` (k,) that were sent at `sent_tick` (k,)."""
         np.add.at(self._delivered.values, link, 1)
         self.delay_ticks += tick * len(link) - int(sent_tick.sum())
         newest = self._newest.values
@@ -61,7 +61,7 @@ class Ledger:
         if not fresher.all():
             link, before = link[fresher], before[fresher]
         since = self._since.values[link]
-        # From `since` to now the age grew by one a tick. Of a link that is here twice both rows write the same.
+        # The age grew by one a tick from `since` to now. Two rows of the same link write the same value.
         ticks = np.where(before < 0, 0, tick - since)
         self._age_sum.values[link] += ticks * (0.5 * (since + tick - 1) - before)
         self._age_ticks.values[link] += ticks
@@ -69,7 +69,7 @@ class Ledger:
         self._age_peak.values[link] = np.maximum(self._age_peak.values[link], peak)
         self._since.values[link] = tick
 
-    # --- what the books say -----------------------------------------------------------------------------------------
+    # --- totals -----------------------------------------------------------------------------------------------------
 
     def sent(self) -> Ints:
         """Return the packets sent, by link."""
@@ -94,32 +94,32 @@ class Ledger:
         return found
 
     def in_flight(self) -> Ints:
-        """Return by link the packets sent that have neither been delivered nor dropped yet."""
+        """Return the packets sent and neither delivered nor dropped yet, by link."""
         left: Ints = self.sent() - self.delivered()
         for dropped in self.dropped().values():
             left = left - dropped
         return left
 
     def imbalance(self, in_flight: Ints) -> list[str]:
-        """Return a line for every link on which the books do not agree with what is in flight (links,) when counted."""
+        """Return a line for every link whose ledger differs from the counted packets in flight (links,)."""
         wrong = np.flatnonzero(self.in_flight() != in_flight)
         return [
-            f"link {self._links.sender[row]} to {self._links.receiver[row]}: the books have {self.in_flight()[row]} packets"
-            f" in flight, the air has {in_flight[row]}"
+            f"link {self._links.sender[row]} to {self._links.receiver[row]}: the ledger has {self.in_flight()[row]} packets"
+            f" in flight, the queue has {in_flight[row]}"
             for row in wrong.tolist()
         ]
 
     def ages_s(self, tick: int) -> tuple[float, float] | None:
         """Return the mean over links of the mean age of information up to `tick`, and the largest age [s].
 
-        None where nothing was ever delivered.
+        None before the first delivery.
         """
         mean_s, peak_s = self.link_ages_s(tick)
         counted = ~np.isnan(mean_s)
         return (float(mean_s[counted].mean()), float(peak_s[counted].max())) if counted.any() else None
 
     def link_ages_s(self, tick: int) -> tuple[Floats, Floats]:
-        """Return by link the mean and the largest age of information up to `tick` [s]; nan where nothing was delivered."""
+        """Return by link the mean and the largest age of information up to `tick` [s]; nan before the first delivery."""
         newest, since = self._of(self._newest), self._of(self._since)
         heard = newest >= 0
         left = np.where(heard, tick - since, 0)
@@ -131,11 +131,11 @@ class Ledger:
         return mean * self._dt_s, np.where(counted, peak, np.nan) * self._dt_s
 
     def order(self) -> Ints:
-        """Return the rows of the links in the order of sender and receiver."""
+        """Return the rows of the links, sorted by sender and receiver."""
         return np.lexsort((self._of_links(self._links.receiver), self._of_links(self._links.sender)))
 
     def by_link(self) -> dict[str, Any]:
-        """Return the books as columns, sorted by sender and receiver, ready for a JSON encoder."""
+        """Return the counts of all links as columns, sorted by sender and receiver, for a JSON encoder."""
         sender, receiver = self._of_links(self._links.sender), self._of_links(self._links.receiver)
         order = self.order()
         return {

@@ -1,0 +1,59 @@
+"""Draw the pictures of the gallery: `python docs/gallery.py`, or `python docs/gallery.py NAME ...` for some scenarios only.
+
+Runs each built-in scenario inline with seed 1 and writes its picture, reduced to a small palette, to `docs/images/gallery/`.
+All of them together take about fifteen minutes of processor time. Run `make pages` afterwards: the page lists the pictures that
+are there.
+"""
+
+import argparse
+import io
+from pathlib import Path
+from typing import Final
+
+from PIL import Image
+
+import zwerm
+from zwerm.scenario.load import built_in
+
+FOLDER: Final = Path(__file__).parent / "images" / "gallery"
+SEED: Final = 1
+WIDTH_MAX: Final = 900  # pixels
+COLOURS: Final = (96, 64, 48, 32, 16)  # tried in this order until the file is small enough
+BYTES_MAX: Final = 150_000
+
+
+def small(path: Path) -> bytes:
+    """Return a PNG with a palette, at most WIDTH_MAX pixels wide and BYTES_MAX large where COLOURS allow it."""
+    with Image.open(path) as picture:
+        picture = picture.convert("RGB")
+        if picture.width > WIDTH_MAX:
+            height = round(picture.height * WIDTH_MAX / picture.width)
+            picture = picture.resize((WIDTH_MAX, height), Image.Resampling.LANCZOS)
+        for colours in COLOURS:
+            file = io.BytesIO()
+            picture.quantize(colours, dither=Image.Dither.NONE).save(file, "PNG", optimize=True)
+            if file.tell() <= BYTES_MAX:
+                break
+    return file.getvalue()
+
+
+def draw(name: str) -> Path:
+    """Run a scenario and write its picture."""
+    path = FOLDER / f"{name}.png"
+    zwerm.run(name, seed=SEED, runner="inline").picture(path)
+    path.write_bytes(small(path))
+    return path
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Draw the pictures of the gallery.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="a built-in scenario; all of them by default")
+    names = parser.parse_args().names or built_in()
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        path = draw(name)
+        print(f"{name}: {path.stat().st_size:,} bytes", flush=True)
+
+
+if __name__ == "__main__":
+    main()
