@@ -30,6 +30,11 @@ _LINES_AT_ONCE: Final = 20_000
 MILESTONES: Final = (90.0, 91.5, 95.0)
 
 
+def milestone(percent: float) -> str:
+    """Return the name of the metric that says when the completion first was so much."""
+    return f"iterations_to_{percent:g}_percent_completion".replace(".", "_")
+
+
 class Completion:
     """The places that the complex does not cover yet; simplices only ever cover more."""
 
@@ -110,7 +115,7 @@ class Exploration(Metric):
     names: ClassVar[Sequence[str]] = (
         "completion_fraction", "iterations", "landmarks", "free_simplices", "landmark_complex_pieces",
         "landmark_complex_holes", "obstacles", "open_frontiers", "concluded_early",
-        *(f"iterations_to_{percent:g}_percent_completion" for percent in MILESTONES),
+        *map(milestone, MILESTONES),
     )  # fmt: skip
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
@@ -140,7 +145,7 @@ class Exploration(Metric):
             completion.add(told.simplices)
             for percent in MILESTONES:
                 if completion.fraction >= percent / 100.0:
-                    reached.setdefault(f"iterations_to_{percent:g}_percent_completion", float(tick))
+                    reached.setdefault(milestone(percent), float(tick))
         complex_ = maximal(simplex for _, _, told in self._reports for simplex in told.simplices)
         pieces, holes = betti(complex_)
         return {
