@@ -79,9 +79,10 @@ class Gossip:
                 held = self._replica.vector.get(stretch.origin, 0)
                 new = self._replica.extend(stretch)
                 if new:
-                    self._learn(stretch, held)
+                    learnt = Stretch(stretch.origin, held, tuple(new))
+                    self._learn(learnt, held)
                     if self._hub:
-                        self._fresh.append(Stretch(stretch.origin, held, tuple(new)))
+                        self._fresh.append(learnt)
                 elif stretch.first > held:
                     self._differs[sender] = tick
             case Vector():

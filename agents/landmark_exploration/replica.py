@@ -12,6 +12,9 @@ from zwerm.agents.landmark_exploration.mixing import mix
 
 INCARNATIONS: Final = 256
 
+# Entries of one log that wait for those before them, about.
+WAITING_MAX: Final = 1_000
+
 # Digests are below this.
 DIGESTS: Final = 1 << 62
 
@@ -36,13 +39,25 @@ class Replica:
         self.logs: dict[int, list[bytes]] = {}
         self.vector: dict[int, int] = {}
         self.digest = 0
+        self._waiting: dict[int, dict[int, bytes]] = {}  # by origin and number, entries after a gap
 
     def extend(self, stretch: Stretch) -> Sequence[bytes]:
-        """Add what is new in a stretch, and return it; nothing where entries before it are missing."""
+        """Add what is new in a stretch, and return all that follows on what was held; entries after a gap wait for it."""
         origin, first, entries = stretch
         held = self.vector.get(origin, 0)
-        new = entries[held - first :] if first <= held else ()
+        if first > held:
+            waiting = self._waiting.setdefault(origin, {})
+            if len(waiting) < WAITING_MAX:
+                waiting.update(enumerate(entries, first))
+            return ()
+        new = list(entries[held - first :])
         if new:
+            ahead = self._waiting.pop(origin, {})
+            while held + len(new) in ahead:
+                new.append(ahead[held + len(new)])
+            later = {number: entry for number, entry in ahead.items() if number > held + len(new)}
+            if later:
+                self._waiting[origin] = later
             self.logs.setdefault(origin, []).extend(new)
             # The digest is the sum of one number for each (origin, count), so that it can be kept up to date.
             if held:

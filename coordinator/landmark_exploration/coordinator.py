@@ -163,8 +163,9 @@ class LandmarkCoordinator:
     def _take(self, sender: int, message: Entries) -> None:
         stretch = Stretch(message.origin, message.first, message.entries)
         held = self.replica.vector.get(stretch.origin, 0)
-        if self.replica.extend(stretch):
-            self.map.read(stretch, held)
+        new = self.replica.extend(stretch)
+        if new:
+            self.map.read(Stretch(stretch.origin, held, tuple(new)), held)
         self._acknowledge[sender] = stretch.origin
 
     def _acknowledge_all(self) -> None:

@@ -66,6 +66,7 @@ tasks = st.builds(
     st.tuples(ids, ids).filter(lambda pair: pair[0] != pair[1]).map(lambda pair: key_of(*pair)),
     st.lists(snapshots, max_size=4).map(tuple),
     st.integers(1, 6),
+    st.just(False),
 )
 
 
