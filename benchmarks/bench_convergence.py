@@ -14,7 +14,7 @@ from csv_rows import add_csv_option, write_csv
 from zwerm.run.assembly import assemble
 from zwerm.scenario.load import load
 from zwerm.world.fields.registry import make_field
-from zwerm.world.metrics.voronoi_coverage import VoronoiCells
+from zwerm.world.geometry.voronoi_cells import VoronoiCells
 from zwerm.world.scene import Floats
 
 GAIN_PER_S = 5.0

@@ -8,10 +8,10 @@ from study_files import GRID, TINY, run_here
 
 from zwerm.errors import ScenarioError
 from zwerm.run.runner import run
-from zwerm.study.plan import make_points
 from zwerm.study.rows import Rows, read_rows
 from zwerm.study.study_runner import run_study
 from zwerm.study.study_tables import Study
+from zwerm.study.trial_plan import make_points
 
 
 def test_a_row_equals_the_result_of_a_run_with_its_seed(write: Callable[..., Study], tmp_path: Path) -> None:

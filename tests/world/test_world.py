@@ -19,7 +19,7 @@ from zwerm.wire.messages import (
     decode_observation,
     encode,
 )
-from zwerm.world.metrics.coverage import area_coverage_fraction, cell_counts, cell_coverage_fraction
+from zwerm.world.metrics.position_coverage import area_coverage_fraction, cell_counts, cell_coverage_fraction
 from zwerm.world.world import World
 
 

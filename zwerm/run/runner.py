@@ -25,8 +25,8 @@ from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.driver import TickObserver
 from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.drivers.realtime import RealTime
-from zwerm.world.metrics.coverage import cell_counts
 from zwerm.world.metrics.observers import Observers
+from zwerm.world.metrics.position_coverage import cell_counts
 from zwerm.world.radio.report import radio_report
 from zwerm.world.scene import Scene
 from zwerm.world.tick.completion import FAILED, INTERRUPTED

@@ -18,7 +18,7 @@ import msgspec
 from msgspec import Struct
 
 from zwerm.errors import ProtocolError
-from zwerm.wire.telemetry import plain_numbers, telemetry_error
+from zwerm.wire.telemetry_rules import plain_numbers, telemetry_error
 
 PROTOCOL_VERSION: Final = 1
 
@@ -266,7 +266,7 @@ def open_answer(payload: bytes) -> Command | Failure:
     """Return the command or failure in `payload`.
 
     Raises ProtocolError with the reasons of `refusal`, or `oversized`; or `not-finite` for a number in the drive or the wake;
-    or `telemetry` for a name or number that breaks the rules of `zwerm.wire.telemetry`.
+    or `telemetry` for a name or number that breaks the rules of `zwerm.wire.telemetry_rules`.
     """
     if len(payload) > MESSAGE_BYTES_MAX:
         raise ProtocolError("oversized", f"{len(payload)} bytes, at most {MESSAGE_BYTES_MAX}")

@@ -3,8 +3,8 @@
 import pytest
 
 from zwerm.agents.runtime.node import Node
-from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, UNSAID, StateBeacon
 from zwerm.agents.sensor_coverage.messages.peers import read, write
