@@ -7,11 +7,10 @@ a frontier and the way there, come from the coordinator, or it chooses and claim
 
 from typing import ClassVar, Final
 
-from zwerm.agents.landmark_exploration import messages
-from zwerm.agents.landmark_exploration.bearings import Snapshot
-from zwerm.agents.landmark_exploration.boundary_trace import inconsistent
-from zwerm.agents.landmark_exploration.entries import observation_entries, status_entries
-from zwerm.agents.landmark_exploration.frontier import (
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.boundary_trace import inconsistent
+from zwerm.agents.landmark_exploration.mapping.cost_utility import Offer, Policy, cost_utility, nearest_frontier
+from zwerm.agents.landmark_exploration.mapping.frontier_status import (
     ABANDONED,
     BOUNDARY,
     CLEAR,
@@ -19,17 +18,18 @@ from zwerm.agents.landmark_exploration.frontier import (
     TIMED_OUT,
     pair_of,
 )
-from zwerm.agents.landmark_exploration.gossip import Gossip, Said
-from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.messages import Message, Order, Register, Report, Vector
+from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, columns, write_told
 from zwerm.agents.landmark_exploration.motion import Drive, Outcome, explore, roam, travel, wander
-from zwerm.agents.landmark_exploration.orders import OrderIntake, Task, landmark_bytes
 from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, Parameters
-from zwerm.agents.landmark_exploration.planning import Offer, Policy, cost_utility, nearest_frontier
-from zwerm.agents.landmark_exploration.registers import Registers
-from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
-from zwerm.agents.landmark_exploration.telemetry import MapTold, columns, write_told
-from zwerm.agents.landmark_exploration.upload import Upload
+from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Message, Order, Register, Report, Vector
+from zwerm.agents.landmark_exploration.sharing.log_entries import observation_entries, status_entries
+from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
+from zwerm.agents.landmark_exploration.sharing.orders import OrderIntake, Task, landmark_bytes
+from zwerm.agents.landmark_exploration.sharing.registers import Registers
+from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
+from zwerm.agents.landmark_exploration.sharing.upload import Upload
 from zwerm.agents.landmark_exploration.view import Slide, View
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError

@@ -11,8 +11,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from zwerm.agents.landmark_exploration.bearings import Snapshot, to_rad
-from zwerm.agents.landmark_exploration.landmark_complex import SHARED_MIN
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot, to_rad
+from zwerm.agents.landmark_exploration.mapping.landmark_complex import SHARED_MIN
 from zwerm.agents.landmark_exploration.view import View, apart_rad
 
 Direction = float | None

@@ -10,11 +10,11 @@ from typing import Annotated, ClassVar, Final
 import numpy as np
 from msgspec import Meta, Struct
 
-from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.map_file import read_map
+from zwerm.agents.landmark_exploration.mapping.cost_utility import path_to, reach
+from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.mapping.map_file import read_map
+from zwerm.agents.landmark_exploration.mapping.map_reports import GoalTold, write_told
 from zwerm.agents.landmark_exploration.motion import Drive, travel, wander
-from zwerm.agents.landmark_exploration.planning import path_to, reach
-from zwerm.agents.landmark_exploration.telemetry import GoalTold, write_told
 from zwerm.agents.landmark_exploration.view import Slide, View
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal
 
 from msgspec import Meta, Struct
 
-from zwerm.agents.landmark_exploration.messages import LARGE_BYTES, SMALL_BYTES
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BYTES, SMALL_BYTES
 
 Ticks = Annotated[int, Meta(ge=1, le=1_000_000)]
 NonNegative = Annotated[float, Meta(ge=0.0)]

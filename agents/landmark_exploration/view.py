@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from zwerm.agents.landmark_exploration.bearings import Snapshot, to_steps
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot, to_steps
 from zwerm.wire.messages import BodyVelocity, Observation
 
 _FULL: Final = 2.0 * math.pi

@@ -1,3 +1,3 @@
 """The coordinator of landmark-based exploration."""
 
-from zwerm.coordinator.landmark_exploration.coordinator import LandmarkCoordinator as LandmarkCoordinator
+from zwerm.coordinator.landmark_exploration.landmark_coordinator import LandmarkCoordinator as LandmarkCoordinator

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from scipy.spatial import cKDTree
 
-from zwerm.agents.landmark_exploration.telemetry import GoalTold, MapTold, read_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import GoalTold, MapTold, read_told
 from zwerm.maths.strong_collapse import betti
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena

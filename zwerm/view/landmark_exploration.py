@@ -13,7 +13,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from zwerm.agents.landmark_exploration.telemetry import MapTold, read_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, read_told
 from zwerm.record.history import Tracks
 from zwerm.view.canvas import Sheet
 from zwerm.view.layer import Layer

@@ -6,9 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwerm.agents.landmark_exploration.bearings import STEPS, Snapshot, is_inside, is_left, to_rad, to_steps
-from zwerm.agents.landmark_exploration.boundary_trace import inconsistent
-from zwerm.agents.landmark_exploration.frontier import (
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import (
+    STEPS,
+    Snapshot,
+    is_inside,
+    is_left,
+    to_rad,
+    to_steps,
+)
+from zwerm.agents.landmark_exploration.mapping.boundary_trace import inconsistent
+from zwerm.agents.landmark_exploration.mapping.frontier_status import (
     BOUNDARY,
     CLEAR,
     REOPENED,

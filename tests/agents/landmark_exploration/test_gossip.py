@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zwerm.agents.landmark_exploration import messages
-from zwerm.agents.landmark_exploration.bearings import Snapshot
-from zwerm.agents.landmark_exploration.entries import observation_entries, status_entries
-from zwerm.agents.landmark_exploration.frontier import BOUNDARY, key_of
-from zwerm.agents.landmark_exploration.gossip import Gossip, Said
-from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.messages import Register
-from zwerm.agents.landmark_exploration.registers import Registers
-from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.frontier_status import BOUNDARY, key_of
+from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Register
+from zwerm.agents.landmark_exploration.sharing.log_entries import observation_entries, status_entries
+from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
+from zwerm.agents.landmark_exploration.sharing.registers import Registers
+from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 
 
 def stretches_of(replica: Replica) -> list[Stretch]:

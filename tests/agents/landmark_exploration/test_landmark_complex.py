@@ -7,8 +7,8 @@ import gudhi
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwerm.agents.landmark_exploration.bearings import Snapshot
-from zwerm.agents.landmark_exploration.landmark_complex import LandmarkComplex
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
 from zwerm.maths.strong_collapse import betti, collapsed
 
 simplices = st.lists(st.frozensets(st.integers(0, 11), max_size=6).map(lambda each: tuple(sorted(each))), max_size=25)

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from zwerm.agents.landmark_exploration import messages
-from zwerm.agents.landmark_exploration.map_file import map_told, write_map
+from zwerm.agents.landmark_exploration.mapping.map_file import map_told, write_map
+from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.errors import ScenarioError
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run

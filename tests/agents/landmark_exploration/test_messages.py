@@ -7,13 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwerm.agents.landmark_exploration import entries, messages
-from zwerm.agents.landmark_exploration.bearings import Snapshot
-from zwerm.agents.landmark_exploration.frontier import BOUNDARY, key_of
-from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.map_file import map_told, read_map, write_map
-from zwerm.agents.landmark_exploration.messages import Report, Vector
-from zwerm.agents.landmark_exploration.orders import (
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.frontier_status import BOUNDARY, key_of
+from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.mapping.map_file import map_told, read_map, write_map
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, write_told
+from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
+from zwerm.agents.landmark_exploration.sharing import log_entries as entries
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Report, Vector
+from zwerm.agents.landmark_exploration.sharing.orders import (
     OrderIntake,
     Task,
     cut,
@@ -22,10 +24,9 @@ from zwerm.agents.landmark_exploration.orders import (
     read_task,
     write_task,
 )
-from zwerm.agents.landmark_exploration.packing import counts_of, pack_entries, pack_vector
-from zwerm.agents.landmark_exploration.replica import Replica, Stretch
-from zwerm.agents.landmark_exploration.telemetry import MapTold, write_told
-from zwerm.agents.landmark_exploration.upload import RETRY_TICKS, Upload
+from zwerm.agents.landmark_exploration.sharing.packing import counts_of, pack_entries, pack_vector
+from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch
+from zwerm.agents.landmark_exploration.sharing.upload import RETRY_TICKS, Upload
 
 ids = st.integers(0, 65_535)
 snapshots = st.dictionaries(ids, st.integers(0, 255), max_size=20).map(

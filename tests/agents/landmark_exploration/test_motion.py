@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from zwerm.agents.landmark_exploration.bearings import Snapshot, to_steps
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot, to_steps
 from zwerm.agents.landmark_exploration.motion import CROSSED_TICKS, Drive, explore, homing, travel, wander
 from zwerm.agents.landmark_exploration.view import Slide, View
 from zwerm.wire.messages import Contact, LandmarkBearing, Observation

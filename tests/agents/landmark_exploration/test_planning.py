@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwerm.agents.landmark_exploration.bearings import Snapshot
-from zwerm.agents.landmark_exploration.frontier import UNEXPLORED, Frontiers, key_of, pair_of
-from zwerm.agents.landmark_exploration.landmark_complex import LandmarkComplex
-from zwerm.agents.landmark_exploration.planning import Offer, cost_utility, nearest_frontier, reach
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.cost_utility import Offer, cost_utility, nearest_frontier, reach
+from zwerm.agents.landmark_exploration.mapping.frontier_status import UNEXPLORED, Frontiers, key_of, pair_of
+from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
 
 LANDMARKS = 9
 observed = st.lists(st.frozensets(st.integers(0, LANDMARKS), min_size=1, max_size=5), min_size=1, max_size=12)

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from zwerm.agents.landmark_exploration.messages import Register
-from zwerm.agents.landmark_exploration.registers import SETTLE_TICKS, Registers
-from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Register
+from zwerm.agents.landmark_exploration.sharing.registers import SETTLE_TICKS, Registers
+from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 
 LEASE, DEAD = 150, 1_500
 

@@ -8,7 +8,7 @@ edge costs 1 / (shared - 1) (section IV-C). The result does not depend on the or
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from zwerm.agents.landmark_exploration.bearings import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
 
 # n_l of section IV-B: so many landmarks fix a bearing-only target.
 SHARED_MIN: Final = 2

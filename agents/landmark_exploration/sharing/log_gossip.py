@@ -8,10 +8,17 @@ waited for: loss costs time only. A hub, the coordinator in the middle of a star
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from zwerm.agents.landmark_exploration.messages import LARGE_BYTES, Beacon, Entries, Message, Register, Vector
-from zwerm.agents.landmark_exploration.packing import counts_of, pack_entries, pack_vector
-from zwerm.agents.landmark_exploration.registers import Registers
-from zwerm.agents.landmark_exploration.replica import Replica, Stretch
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import (
+    LARGE_BYTES,
+    Beacon,
+    Entries,
+    Message,
+    Register,
+    Vector,
+)
+from zwerm.agents.landmark_exploration.sharing.packing import counts_of, pack_entries, pack_vector
+from zwerm.agents.landmark_exploration.sharing.registers import Registers
+from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch
 
 # Ticks between a robot's beacons, and between the vectors it sends.
 BEACON_TICKS: Final = 8

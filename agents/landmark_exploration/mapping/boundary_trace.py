@@ -7,7 +7,7 @@ walk of such edges, the obstacle always to the left. A closed walk has no ends. 
 where the boundary cannot be traced on: no other unresolved frontier ends at a, or none begins at b.
 """
 
-from zwerm.agents.landmark_exploration.frontier import ABANDONED, BOUNDARY, TIMED_OUT, Frontiers, pair_of
+from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, BOUNDARY, TIMED_OUT, Frontiers, pair_of
 
 
 def inconsistent(frontiers: Frontiers) -> list[int]:

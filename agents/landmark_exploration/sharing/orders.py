@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from struct import iter_unpack, pack, unpack_from
 from typing import Final, NamedTuple
 
-from zwerm.agents.landmark_exploration.bearings import Snapshot
-from zwerm.agents.landmark_exploration.entries import snapshot_of
-from zwerm.agents.landmark_exploration.frontier import TIMED_OUT, pair_of
-from zwerm.agents.landmark_exploration.messages import Order
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.frontier_status import TIMED_OUT, pair_of
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Order
+from zwerm.agents.landmark_exploration.sharing.log_entries import snapshot_of
 
 _HEAD: Final = "<HHB"
 _HEAD_BYTES: Final = 5

@@ -7,7 +7,7 @@ IV-A). A status only ever rises, so that statuses from several robots merge by m
 from collections.abc import Iterator
 from typing import Final
 
-from zwerm.agents.landmark_exploration.bearings import HALF, STEPS, Snapshot, is_inside
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import HALF, STEPS, Snapshot, is_inside
 
 UNKNOWN: Final = 0
 UNEXPLORED: Final = 1

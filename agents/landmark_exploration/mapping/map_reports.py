@@ -6,7 +6,7 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
-from zwerm.agents.landmark_exploration.bearings import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
 
 
 class MapTold(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-map"):

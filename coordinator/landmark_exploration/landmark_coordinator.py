@@ -15,15 +15,8 @@ from typing import Any, Final, Protocol
 import msgspec
 from msgspec import Struct
 
-from zwerm.agents.landmark_exploration import messages
-from zwerm.agents.landmark_exploration.boundary_trace import inconsistent
-from zwerm.agents.landmark_exploration.frontier import ABANDONED, REOPENED, TIMED_OUT, pair_of
-from zwerm.agents.landmark_exploration.gossip import Gossip, Said
-from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.messages import LARGE_BYTES, Entries, Report, Vector
-from zwerm.agents.landmark_exploration.orders import Task, cut, landmarks_in, write_task
-from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, CentralStrategy, NonNegative, Ticks
-from zwerm.agents.landmark_exploration.planning import (
+from zwerm.agents.landmark_exploration.mapping.boundary_trace import inconsistent
+from zwerm.agents.landmark_exploration.mapping.cost_utility import (
     Choice,
     Costs,
     Offer,
@@ -33,9 +26,16 @@ from zwerm.agents.landmark_exploration.planning import (
     min_pos,
     nearest_frontier,
 )
-from zwerm.agents.landmark_exploration.registers import Registers
-from zwerm.agents.landmark_exploration.replica import Replica, Stretch, origin_of
-from zwerm.agents.landmark_exploration.telemetry import MapTold, columns, write_told
+from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, REOPENED, TIMED_OUT, pair_of
+from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, columns, write_told
+from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, CentralStrategy, NonNegative, Ticks
+from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BYTES, Entries, Report, Vector
+from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
+from zwerm.agents.landmark_exploration.sharing.orders import Task, cut, landmarks_in, write_task
+from zwerm.agents.landmark_exploration.sharing.registers import Registers
+from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 from zwerm.wire.messages import Command, Observation, Transmission
 
 # Ticks after which a robot that has nothing to explore is considered again: at first, and at most.

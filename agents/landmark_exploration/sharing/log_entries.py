@@ -11,8 +11,8 @@ from collections.abc import Iterable, Sequence
 from struct import iter_unpack, pack
 from typing import Final
 
-from zwerm.agents.landmark_exploration.bearings import STEPS, Snapshot
-from zwerm.agents.landmark_exploration.frontier import CLEAR, UNKNOWN, pair_of
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import STEPS, Snapshot
+from zwerm.agents.landmark_exploration.mapping.frontier_status import CLEAR, UNKNOWN, pair_of
 
 PART: Final = 0
 OBSERVATION: Final = 1

@@ -11,8 +11,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 from typing import NamedTuple, Protocol
 
-from zwerm.agents.landmark_exploration.frontier import Frontiers, pair_of
-from zwerm.agents.landmark_exploration.landmark_complex import LandmarkComplex
+from zwerm.agents.landmark_exploration.mapping.frontier_status import Frontiers, pair_of
+from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
 
 # The vertex before the first of a path: the robot itself.
 HERE = -1

@@ -8,7 +8,7 @@ the same. Entries are opaque bytes here.
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from zwerm.agents.landmark_exploration.mixing import mix
+from zwerm.agents.landmark_exploration.sharing.mixing import mix
 
 INCARNATIONS: Final = 256
 

@@ -7,11 +7,11 @@ So maps made of the same logs are equal, whatever the order in which the logs' e
 from collections.abc import Sequence
 from typing import Any, Final
 
-from zwerm.agents.landmark_exploration import entries
-from zwerm.agents.landmark_exploration.bearings import Snapshot
-from zwerm.agents.landmark_exploration.frontier import Frontiers
-from zwerm.agents.landmark_exploration.landmark_complex import LandmarkComplex
-from zwerm.agents.landmark_exploration.replica import Stretch
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.frontier_status import Frontiers
+from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
+from zwerm.agents.landmark_exploration.sharing import log_entries as entries
+from zwerm.agents.landmark_exploration.sharing.replica import Stretch
 
 # Parts of one observation beyond this are nonsense, and forgotten.
 _PARTS_MAX: Final = 4096

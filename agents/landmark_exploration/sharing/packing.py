@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from zwerm.agents.landmark_exploration.messages import Entries, Vector
-from zwerm.agents.landmark_exploration.replica import Stretch
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, Vector
+from zwerm.agents.landmark_exploration.sharing.replica import Stretch
 
 # Bytes of a packet of entries beside them: checksum, tag, origin, number; and of every entry beside it.
 _ENTRIES_BYTES: Final = 4 + 3 + 5 + 5 + 3

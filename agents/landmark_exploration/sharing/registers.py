@@ -14,7 +14,7 @@ dead. All have to agree for `settle_ticks`, so that a robot in reach that has lo
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from zwerm.agents.landmark_exploration.messages import Register
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Register
 
 # All robots have to agree for so many ticks: a few beacons, of which some may be lost.
 SETTLE_TICKS: Final = 60

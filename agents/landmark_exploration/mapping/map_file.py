@@ -12,11 +12,18 @@ from typing import Annotated, Any, Final
 import msgspec
 from msgspec import Meta, Struct
 
-from zwerm.agents.landmark_exploration.bearings import STEPS, Snapshot
-from zwerm.agents.landmark_exploration.entries import snapshot_of
-from zwerm.agents.landmark_exploration.frontier import CLEAR, LANDMARKS_MAX, REOPENED, UNKNOWN, key_of, pair_of
-from zwerm.agents.landmark_exploration.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.telemetry import MapTold, read_told
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import STEPS, Snapshot
+from zwerm.agents.landmark_exploration.mapping.frontier_status import (
+    CLEAR,
+    LANDMARKS_MAX,
+    REOPENED,
+    UNKNOWN,
+    key_of,
+    pair_of,
+)
+from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, read_told
+from zwerm.agents.landmark_exploration.sharing.log_entries import snapshot_of
 
 FORMAT: Final = "landmark-map/1"
 

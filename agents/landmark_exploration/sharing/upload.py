@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from typing import Final
 
-from zwerm.agents.landmark_exploration.messages import Entries, Vector
-from zwerm.agents.landmark_exploration.packing import counts_of, pack_entries
-from zwerm.agents.landmark_exploration.replica import Replica, Stretch
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, Vector
+from zwerm.agents.landmark_exploration.sharing.packing import counts_of, pack_entries
+from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch
 
 # After so many ticks without an acknowledgement what is not acknowledged is sent again.
 RETRY_TICKS: Final = 5
