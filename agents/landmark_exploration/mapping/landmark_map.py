@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
-from zwerm.agents.landmark_exploration.mapping.frontier_status import Frontiers
+from zwerm.agents.landmark_exploration.mapping.frontier_status import CLEAR, Frontiers
 from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
 from zwerm.agents.landmark_exploration.sharing import log_entries as entries
 from zwerm.agents.landmark_exploration.sharing.replica import Stretch
@@ -49,7 +49,8 @@ class LandmarkMap:
         try:
             if entry[:1] == bytes([entries.STATUSES]):
                 status, keys = entries.read_statuses(entry)
-                self.raise_all(keys, status)
+                if status <= CLEAR:
+                    self.raise_all(keys, status)
                 return
             bearings = entries.read_bearings(entry)
         except ValueError:

@@ -12,7 +12,6 @@ from struct import iter_unpack, pack
 from typing import Final
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import STEPS, Snapshot
-from zwerm.agents.landmark_exploration.mapping.frontier_status import CLEAR, UNKNOWN, pair_of
 
 PART: Final = 0
 OBSERVATION: Final = 1
@@ -40,7 +39,7 @@ def status_entries(keys: Sequence[int], status: int) -> list[bytes]:
     """Return the entries that say that frontiers have a status."""
     return [
         bytes([STATUSES, status])
-        + b"".join(pack("<HH", *pair_of(key)) for key in keys[start : start + FRONTIERS_AT_ONCE])
+        + b"".join(pack("<HH", key >> 16, key & 0xFFFF) for key in keys[start : start + FRONTIERS_AT_ONCE])
         for start in range(0, len(keys), FRONTIERS_AT_ONCE)
     ]
 
@@ -54,7 +53,7 @@ def read_bearings(entry: bytes) -> list[tuple[int, int]]:
 
 def read_statuses(entry: bytes) -> tuple[int, list[int]]:
     """Return the status and the keys of the frontiers that have it. Raises ValueError where it is no such entry."""
-    if len(entry) < 2 or entry[0] != STATUSES or len(entry) % 4 != 2 or not UNKNOWN < entry[1] <= CLEAR:
+    if len(entry) < 2 or entry[0] != STATUSES or len(entry) % 4 != 2:
         raise ValueError("statuses are their kind, a status and 4 bytes for each frontier")
     return entry[1], [a << 16 | b for a, b in iter_unpack("<HH", entry[2:])]
 
