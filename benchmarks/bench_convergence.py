@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from zwerm.assembly import assemble
-from zwerm.scenario import load
-from zwerm.world.coverage import Coverage
-from zwerm.world.fields import make_field
+from zwerm.run.assembly import assemble
+from zwerm.scenario.tables import load
+from zwerm.world.fields.field import make_field
+from zwerm.world.metrics.voronoi_coverage import VoronoiCells
 from zwerm.world.scene import Floats
 
 GAIN_PER_S = 5.0
@@ -23,7 +23,7 @@ PAPER_S = {10: 9.56, 100: 25.1, 1000: 19.33}
 PAPER_ERROR_M = 1e-7
 
 
-def converge(coverage: Coverage, position: Floats, error_m: float, longest_s: float) -> tuple[Floats, list[float]]:
+def converge(coverage: VoronoiCells, position: Floats, error_m: float, longest_s: float) -> tuple[Floats, list[float]]:
     """Return where robots at `position` end when their mean error is below error_m, and the mean error at every step [m]."""
     errors: list[float] = []
     while len(errors) * STEP_S < longest_s:
@@ -35,7 +35,7 @@ def converge(coverage: Coverage, position: Floats, error_m: float, longest_s: fl
     return position, errors
 
 
-def slowest_per_s(coverage: Coverage, position: Floats, by_m: float = 1e-6) -> float:
+def slowest_per_s(coverage: VoronoiCells, position: Floats, by_m: float = 1e-6) -> float:
     """Return the rate of the slowest mode there [1/s], from central differences."""
     columns = []
     for coordinate in range(position.size):
@@ -63,7 +63,7 @@ def main() -> None:
             world = assemble(scenario, seed)
             assert scenario.field is not None
             field = make_field(scenario.field, world.arena.bounds, scenario.folder, scenario.place)
-            coverage = Coverage(world.arena, field)
+            coverage = VoronoiCells(world.arena, field)
             position, errors = converge(coverage, world.scene.position, arguments.error_m, arguments.longest_s)
             tail = next(step for step, error in enumerate(errors) if error < 100.0 * errors[-1])
             measured = math.log(errors[tail] / errors[-1]) / ((len(errors) - 1 - tail) * STEP_S)

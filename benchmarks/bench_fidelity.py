@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from air import DT_S, Radio, ring
 
-from zwerm.protocol import Transmission
+from zwerm.wire.messages import Transmission
 
 Z99 = 2.576
 Row = tuple[str, str, float, float, float]

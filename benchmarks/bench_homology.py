@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 import gudhi
 import numpy as np
 
-from zwerm.simplicial import Edge, FlagComplex, Sparing, edge, relative_cycles, sparing
+from zwerm.maths.simplicial import Edge, FlagComplex, Sparing, edge, relative_cycles, sparing
 
 TARGET_S = 1.0
 CELL = 0.4

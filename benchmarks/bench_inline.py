@@ -9,9 +9,9 @@ import time
 
 import numpy as np
 
-from zwerm.assembly import assemble
-from zwerm.running import run
-from zwerm.scenario import Scenario, load
+from zwerm.run.assembly import assemble
+from zwerm.run.runner import run
+from zwerm.scenario.tables import Scenario, load
 
 TARGETS = {25: 60_000, 100: 90_000}
 

@@ -12,12 +12,12 @@ import statistics
 
 from echo import echo_rate
 
-from zwerm.agents.robot import NICENESS
-from zwerm.assembly import assemble
-from zwerm.deploy.cast import cast
+from zwerm.agents.runtime.process import NICENESS
+from zwerm.deploy.node_specs import cast
 from zwerm.deploy.swarm import LocalSwarm
-from zwerm.running import drive, new_run_id
-from zwerm.scenario import Scenario, load
+from zwerm.run.assembly import assemble
+from zwerm.run.runner import drive, new_run_id
+from zwerm.scenario.tables import Scenario, load
 
 TARGET = 0.7
 

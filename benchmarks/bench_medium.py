@@ -9,7 +9,7 @@ import argparse
 import time
 from dataclasses import dataclass
 
-from zwerm.running import run
+from zwerm.run.runner import run
 
 FIVE_MODELS = (
     'radio.models=[{kind="range", range_m=9}, {kind="line_of_sight"}, {kind="loss", fraction=0.1}, '

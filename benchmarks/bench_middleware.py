@@ -7,11 +7,11 @@ reordered nothing; this counts how many messages that was, both ways.
 
 import argparse
 
-from zwerm.assembly import assemble
-from zwerm.deploy.cast import cast
+from zwerm.deploy.node_specs import cast
 from zwerm.deploy.swarm import LocalSwarm
-from zwerm.running import drive, new_run_id
-from zwerm.scenario import load
+from zwerm.run.assembly import assemble
+from zwerm.run.runner import drive, new_run_id
+from zwerm.scenario.tables import load
 
 
 def main() -> None:

@@ -15,15 +15,15 @@ import msgspec
 import numpy as np
 from bench_homology import swarm
 
-from zwerm.agents.sensor_coverage.redundancy import Message, Redundancy, Sent
-from zwerm.simplicial import FlagComplex, betti, sparing
+from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, LockMessage, Message
+from zwerm.maths.simplicial import FlagComplex, betti, sparing
 
 TICK_S = 0.5
 LEASE_S = 40.0
 RANGE = 1.0
 
 
-class Unlocked(Redundancy):
+class Unlocked(LeaveLock):
     """The control: leaves as soon as it wants to."""
 
     def may_leave(self, now_s: float) -> bool:
@@ -56,7 +56,7 @@ class Radio:
         self.sent = self.bytes = 0
         self._due: dict[int, list[tuple[int, int, Message]]] = {}
 
-    def send(self, now: int, sender: int, around: list[int], outbox: list[Sent]) -> None:
+    def send(self, now: int, sender: int, around: list[int], outbox: list[LockMessage]) -> None:
         for to, message in outbox:
             self.sent += 1
             self.bytes += len(msgspec.msgpack.encode(message))
@@ -73,7 +73,7 @@ class Radio:
 class Troubled:
     """A swarm in which everything happens, and the checker of every departure."""
 
-    def __init__(self, count: int, seed: int, loss: float, kind: type[Redundancy] = Redundancy) -> None:
+    def __init__(self, count: int, seed: int, loss: float, kind: type[LeaveLock] = LeaveLock) -> None:
         self.random = np.random.Generator(np.random.Philox(seed))
         self.radio = Radio(self.random, loss, delay_ticks=6, copies=0.1)
         self.kind = kind
@@ -112,7 +112,7 @@ class Troubled:
         before = robot.tell()
         robot.see(self.lists[node], now_s)
         if robot.tell() != before or (self.tick + node) % 10 == 0:
-            self._send(node, [Sent(None, robot.tell())])
+            self._send(node, [LockMessage(None, robot.tell())])
 
     def _act(self, node: int, now_s: float) -> None:
         robot = self.robots[node]
@@ -167,7 +167,7 @@ class Troubled:
         near = (apart <= RANGE) & ~np.eye(len(apart), dtype=bool) & self.seen[:, None] & self.seen[None, :]
         self.lists = {node: np.flatnonzero(row).tolist() for node, row in enumerate(near)}
 
-    def _send(self, node: int, outbox: list[Sent]) -> None:
+    def _send(self, node: int, outbox: list[LockMessage]) -> None:
         self.radio.send(self.tick, node, self.lists[node], outbox)
 
 
@@ -180,7 +180,7 @@ def freed_by_neighbours(
     """Let neighbours agree until nobody could leave any more; return who left, what was sent, and when the last left [s]."""
     random = np.random.Generator(np.random.Philox(seed))
     radio = Radio(random, loss, delay_ticks=1, copies=0.0)
-    robots = {node: Redundancy(node, LEASE_S, -LEASE_S) for node in lists}
+    robots = {node: LeaveLock(node, LEASE_S, -LEASE_S) for node in lists}
     patience = {node: Patience(random) for node in lists}
     left: list[int] = []
     tick = last = 0
@@ -190,7 +190,9 @@ def freed_by_neighbours(
             before = robot.tell()
             robot.see((other for other in lists[node] if other in robots), now_s)
             if robot.tell() != before or (tick + node) % 20 == 0:
-                radio.send(tick, node, [each for each in lists[node] if each in robots], [Sent(None, robot.tell())])
+                radio.send(
+                    tick, node, [each for each in lists[node] if each in robots], [LockMessage(None, robot.tell())]
+                )
         for sender, receiver, message in radio.arrivals(tick):
             if receiver in robots:
                 answers = robots[receiver].hear(sender, message, now_s)
@@ -240,10 +242,10 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5, help="of the swarms beside relative H2")
     chosen = parser.parse_args()
     print(f"{'loss':>6} {'decisions':>10} {'departures':>10} {'changed b0 or b1':>17} {'messages a decision':>20}")
-    for kind in (Redundancy, Unlocked):
+    for kind in (LeaveLock, Unlocked):
         for loss in chosen.losses:
             each = Troubled(chosen.robots, seed=chosen.seed, loss=loss, kind=kind)
-            each.run(chosen.decisions if kind is Redundancy else chosen.decisions // 10)
+            each.run(chosen.decisions if kind is LeaveLock else chosen.decisions // 10)
             told = f"{loss:>6} {each.decisions:>10,} {each.departures:>10,} {each.violations:>17}"
             print(f"{told} {each.radio.sent / each.decisions:>20.1f}  {kind.__name__}", flush=True)
     if chosen.seeds:

@@ -10,12 +10,12 @@ import statistics
 import time
 from pathlib import Path
 
-from zwerm.assembly import assemble
-from zwerm.deploy.cast import cast
+from zwerm.deploy.node_specs import cast
 from zwerm.deploy.swarm import LocalSwarm
-from zwerm.result import RunResult
-from zwerm.running import drive, new_run_id, run
-from zwerm.scenario import Scenario, load
+from zwerm.run.assembly import assemble
+from zwerm.run.result import RunResult
+from zwerm.run.runner import drive, new_run_id, run
+from zwerm.scenario.tables import Scenario, load
 
 START_S_MAX, PRIVATE_MB_MAX, RATE_MIN = 45.0, 8.0, 3_000.0
 

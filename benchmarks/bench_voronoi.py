@@ -7,13 +7,13 @@ controller's share of it (the same observations answered by the bare controllers
 import argparse
 import time
 
-from zwerm import kept_cell
-from zwerm.agents.node import Node
-from zwerm.assembly import assemble
-from zwerm.deploy.cast import cast
-from zwerm.protocol import decode_observation
-from zwerm.running import run
-from zwerm.scenario import Scenario, load
+from zwerm.agents.runtime.node import Node
+from zwerm.deploy.node_specs import cast
+from zwerm.maths import kept_cell
+from zwerm.run.assembly import assemble
+from zwerm.run.runner import run
+from zwerm.scenario.tables import Scenario, load
+from zwerm.wire.messages import decode_observation
 
 TARGET = 20.0
 

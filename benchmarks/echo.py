@@ -22,7 +22,6 @@ from zenoh.handlers import Callback, FifoChannel
 
 from zwerm.deploy.identity import issue, router_settings
 from zwerm.deploy.supervisor import JOINING_MAX, main_module_hidden, prepare
-from zwerm.keys import EVERY, command_key, observation_key
 from zwerm.link.session import (
     ONE_THREAD,
     TWO_THREADS,
@@ -32,6 +31,7 @@ from zwerm.link.session import (
     set_threads,
     transport_settings,
 )
+from zwerm.wire.keys import EVERY, command_key, observation_key
 
 RUN = "echo"
 BLOCK = zenoh.CongestionControl.BLOCK

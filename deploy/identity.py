@@ -18,9 +18,9 @@ from typing import Any, Final
 import msgspec
 
 from zwerm.errors import LinkError
-from zwerm.keys import EVERY, alive_key, command_key, hello_key, observation_key
 from zwerm.link.session import Credential, Credentials, transport_settings
-from zwerm.protocol import MESSAGE_BYTES_MAX
+from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, observation_key
+from zwerm.wire.messages import MESSAGE_BYTES_MAX
 
 PRIVATE_FILE_MODE: Final = 0o600
 SECRET_BYTES: Final = 24

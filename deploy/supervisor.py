@@ -19,10 +19,10 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
 from typing import Any, Final
 
-from zwerm.agents.robot import main
+from zwerm.agents.runtime.process import main
 from zwerm.errors import LinkError
+from zwerm.link.peer_radio import Station
 from zwerm.link.session import Credential, Credentials
-from zwerm.link.station import Station
 
 # How many may be starting at once: more only get in each other's way.
 JOINING_MAX: Final = 16
@@ -47,7 +47,7 @@ def prepare(robots: int) -> None:
     later swarm too. Raises LinkError where the limit cannot be raised far enough.
     """
     _raise_file_limit(robots * _FILES_PER_ROBOT + 200)
-    multiprocessing.set_forkserver_preload(["zwerm.deploy.nursery"])
+    multiprocessing.set_forkserver_preload(["zwerm.deploy.preload"])
     resource_tracker.ensure_running()
     # The server and every robot inherit the mask: Ctrl-C is for this process, which then ends them in order.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

@@ -15,9 +15,9 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from zwerm.agents.contract import Setup
+from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.identity import issue, renew, router_settings, save
-from zwerm.deploy.private import private_directory
+from zwerm.deploy.runtime_directory import private_directory
 from zwerm.deploy.supervisor import (
     JOIN_DEADLINE_S,
     LEAVE_PATIENCE_S,
@@ -27,10 +27,10 @@ from zwerm.deploy.supervisor import (
     prepare,
 )
 from zwerm.errors import LinkError
+from zwerm.link.peer_radio import Station
 from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials
-from zwerm.link.station import Station
-from zwerm.link.zenoh_world import Member, ZenohWorldLink
-from zwerm.protocol import encode
+from zwerm.link.world import ExpectedNode, ZenohWorldLink
+from zwerm.wire.messages import encode
 
 Members = Mapping[int, tuple[str, Setup]]
 
@@ -94,9 +94,9 @@ class _Swarm(ABC):
             passwords.unlink()
         self._stack.callback(self.link.close)
 
-    def _member(self, credential: Credential) -> Member:
+    def _member(self, credential: Credential) -> ExpectedNode:
         controller, setup = self._members[credential.node]
-        return Member(credential.incarnation, controller, encode(setup), self._paced)
+        return ExpectedNode(credential.incarnation, controller, encode(setup), self._paced)
 
     @abstractmethod
     def _open(self, directory: Path) -> None:

@@ -20,16 +20,17 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from pydantic import BaseModel
 
-from zwerm import protocol, scenario
-from zwerm.agents import registry as controllers
-from zwerm.cli import app
-from zwerm.deploy.cast import PARTS
-from zwerm.running import run
-from zwerm.scenario import OpenTable, Scenario
+from zwerm.agents.runtime import controllers
+from zwerm.cli.app import app
+from zwerm.deploy.node_specs import PARTS
+from zwerm.run.runner import run
+from zwerm.scenario.tables import OpenTable, Scenario
+from zwerm.scenario.tables import tables as scenario
 from zwerm.study.tables import StudyTable
-from zwerm.world import fields
+from zwerm.wire import messages as protocol
 from zwerm.world.faults import FaultTable
 from zwerm.world.faults import schedule as faults
+from zwerm.world.fields.field import field as fields
 from zwerm.world.radio import LinkTable
 from zwerm.world.radio import registry as radio
 from zwerm.world.sensors import registry as sensors

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from support import scenario
 
-from zwerm.draws import Draws
-from zwerm.protocol import Packet, Transmission
-from zwerm.scenario import Scenario
-from zwerm.world.arena import Arena
+from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.tables import Scenario
+from zwerm.wire.messages import Packet, Transmission
+from zwerm.world.arena.arena import Arena
 from zwerm.world.radio.medium import Medium
 from zwerm.world.scene import Scene
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 
-from zwerm.agents.node import Node
-from zwerm.assembly import assemble
-from zwerm.deploy.cast import cast
+from zwerm.agents.runtime.node import Node
+from zwerm.deploy.node_specs import cast
 from zwerm.link.memory import MemoryLink
-from zwerm.scenario import Scenario
-from zwerm.world.lockstep import LockStep
+from zwerm.run.assembly import assemble
+from zwerm.scenario.tables import Scenario
+from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.world import World
 
 HALL = ("arena.size_m=[3.4,2.8]", "base.pose=[0.2,1.4,0.0]", "robots.count=40")

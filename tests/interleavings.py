@@ -14,8 +14,17 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
-from zwerm.agents.sensor_coverage.redundancy import Ask, Deny, Grant, Message, Neighbours, Over, Redundancy, Sent
-from zwerm.simplicial import FlagComplex, betti, bits
+from zwerm.agents.sensor_coverage.protocols.leave_lock import (
+    LeaveLock,
+    LockDenial,
+    LockGrant,
+    LockMessage,
+    LockRelease,
+    LockRequest,
+    Message,
+    NeighbourList,
+)
+from zwerm.maths.simplicial import FlagComplex, betti, bits
 
 LEASE_TICKS = 2
 
@@ -55,13 +64,13 @@ class Violation(Exception):
 class Explorer:
     """The states that a swarm can reach."""
 
-    def __init__(self, graph: Graph, budget: Budget, kind: type[Redundancy] = Redundancy) -> None:
+    def __init__(self, graph: Graph, budget: Budget, kind: type[LeaveLock] = LeaveLock) -> None:
         self.graph = graph
         self.later = _moved(graph, *budget.moving) if budget.moving is not None else graph
         self.mover = budget.moving[0] if budget.moving is not None else -1
         self.budget = budget
         self.kind = kind
-        self._objects: list[Redundancy] = []
+        self._objects: list[LeaveLock] = []
         self._numbers: dict[Any, int] = {}
         self._letters: list[tuple[int, int, Message]] = []
         self._letter_numbers: dict[Any, int] = {}
@@ -152,7 +161,9 @@ class Explorer:
     def _only_forbids(self, state: State, sender: int, receiver: int, message: Message) -> bool:
         """Tell whether all that a message would do is to make its receiver refuse others, which might as well be lost."""
         lock = self._objects[state.robots[receiver]]._lock
-        return isinstance(message, Over) and (lock is None or lock.holder != sender or lock.number > message.number)
+        return isinstance(message, LockRelease) and (
+            lock is None or lock.holder != sender or lock.number > message.number
+        )
 
     def _in_sight(self, state: State, node: int) -> tuple[int, ...]:
         return tuple(other for other in self._graph(state)[node] if state.seen >> other & 1)
@@ -174,7 +185,7 @@ class Explorer:
         moving = AFTER if self.mover < 0 else UNDER_WAY if self.budget.comes else BEFORE
         return State(0, numbers, 0, standing, standing, self.budget.asks, self.budget.amnesias, moving)
 
-    def _number(self, robot: Redundancy) -> int:
+    def _number(self, robot: LeaveLock) -> int:
         key = tuple(tuple(sorted(each.items())) if isinstance(each, dict) else each for each in vars(robot).values())
         if key not in self._numbers:
             self._numbers[key] = len(self._objects)
@@ -187,12 +198,12 @@ class Explorer:
         letters = state.sent
         for to, message in sent:
             for receiver in self._graph(state)[node] if to is None else (to,):
-                if isinstance(message, Grant):
+                if isinstance(message, LockGrant):
                     robots[receiver], _ = self._step(robots[receiver], state.now, None, "hear", node, message)
                     continue
-                if isinstance(message, Neighbours):
-                    message = Neighbours(message.version, message.listed)
-                if not isinstance(message, Deny):
+                if isinstance(message, NeighbourList):
+                    message = NeighbourList(message.version, message.listed)
+                if not isinstance(message, LockDenial):
                     letters |= 1 << self._letter(node, receiver, message)
         return state._replace(robots=tuple(robots), sent=letters)
 
@@ -217,9 +228,9 @@ class Explorer:
     def _still_matters(self, state: State, sender: int, receiver: int, message: Message) -> bool:
         """Tell whether a message can allow anything to those who have asked or will."""
         match message:
-            case Neighbours():
+            case NeighbourList():
                 return receiver in state.asks
-            case Ask():
+            case LockRequest():
                 return sender in state.asks or self._objects[state.robots[sender]].wants
         return True
 
@@ -231,17 +242,17 @@ class Explorer:
             self._bare[number] = self._number(robot)
         return self._bare[number]
 
-    def _ignores(self, robot: Redundancy, sender: int, message: Message) -> bool:
+    def _ignores(self, robot: LeaveLock, sender: int, message: Message) -> bool:
         if self.mover in (robot._me, sender):
             return False
-        if sender not in robot._listed or (not robot._stands and not isinstance(message, Ask)):
+        if sender not in robot._listed or (not robot._stands and not isinstance(message, LockRequest)):
             return True
         match message:
-            case Ask() if not robot._stands:
-                return not any(isinstance(each.message, Grant) for each in _copy(robot).hear(sender, message, 0))
-            case Ask() | Over():
+            case LockRequest() if not robot._stands:
+                return not any(isinstance(each.message, LockGrant) for each in _copy(robot).hear(sender, message, 0))
+            case LockRequest() | LockRelease():
                 return message.number <= robot._over.get(sender, -1)
-            case Neighbours():
+            case NeighbourList():
                 known = robot._lists.get(sender)
                 return known is not None and message.version <= known.version
         return False
@@ -267,7 +278,7 @@ class Explorer:
             before = robot.tell()
             if seen is not None:
                 robot.see(seen, now)
-            told = [] if robot.tell() == before else [Sent(None, robot.tell())]
+            told = [] if robot.tell() == before else [LockMessage(None, robot.tell())]
             match event:
                 case "hear":
                     told += robot.hear(*what, now)
@@ -296,7 +307,7 @@ def _less(asks: tuple[int, ...], node: int) -> tuple[int, ...]:
     return asks[:at] + asks[at + 1 :]
 
 
-def _copy(robot: Redundancy) -> Redundancy:
+def _copy(robot: LeaveLock) -> LeaveLock:
     twin = object.__new__(type(robot))
     vars(twin).update({name: dict(each) if isinstance(each, dict) else each for name, each in vars(robot).items()})
     return twin

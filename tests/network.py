@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import zenoh
 
 from zwerm.deploy.identity import issue, router_settings
-from zwerm.keys import hello_key
+from zwerm.link.node import ZenohNodeLink
 from zwerm.link.session import TWO_THREADS, Credential, Credentials, open_session, set_threads
-from zwerm.link.zenoh_node import ZenohNodeLink
-from zwerm.link.zenoh_world import Member, ZenohWorldLink
-from zwerm.protocol import Hello, encode
+from zwerm.link.world import ExpectedNode, ZenohWorldLink
+from zwerm.wire.keys import hello_key
+from zwerm.wire.messages import Hello, encode
 
 RUN = "test"
 NIL = b"\xc0"
@@ -51,13 +51,13 @@ class Network(NamedTuple):
 
 
 @contextlib.contextmanager
-def network(directory: Path, nodes: int = 3, members: Mapping[int, Member] | None = None) -> Iterator[Network]:
+def network(directory: Path, nodes: int = 3, members: Mapping[int, ExpectedNode] | None = None) -> Iterator[Network]:
     """Open a world's link that expects `members` (all `nodes`, if None) and has credentials for all `nodes`."""
     set_threads(TWO_THREADS)
     endpoint = f"unixsock-stream/{directory}/router"
     credentials = issue(RUN, range(nodes))
     if members is None:
-        members = {node: Member(1, "nobody", NIL) for node in range(nodes)}
+        members = {node: ExpectedNode(1, "nobody", NIL) for node in range(nodes)}
     link = ZenohWorldLink(RUN, members, router_settings(credentials, [endpoint], directory / "passwords"))
     try:
         yield Network(link, credentials, endpoint)

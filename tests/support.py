@@ -8,13 +8,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from zwerm.scenario import Scenario, validate
+from zwerm.scenario.tables import Scenario, validate
 
 ROOT = Path(__file__).parent.parent
 ROBOTS = Path(__file__).parent / "robots"
 
 # The command line, without relying on what is on PATH.
-ZWERM = ["-c", "from zwerm.cli import main; main()"]
+ZWERM = ["-c", "from zwerm.cli.app import main; main()"]
 
 
 def scenario(**tables: Any) -> Scenario:

@@ -5,9 +5,9 @@ python swarm_script.py COUNT CONTROLLER [CONTROLLER_OF_ROBOT_0]
 
 import sys
 
-from zwerm.agents.contract import Setup
+from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.swarm import LocalSwarm
-from zwerm.protocol import Observation, encode
+from zwerm.wire.messages import Observation, encode
 
 
 def say(what: object, *_: object) -> None:

@@ -18,21 +18,21 @@ LINES_MAX = 400
 
 # Code that decides what happens in a run: these folders, and all of the core but what starts a run and tells of it.
 DECIDING = ("agents", "world", "coordinator")
-AROUND_THE_RUN = ("zwerm/__main__.py", "zwerm/cli.py", "zwerm/result.py", "zwerm/running.py")
+AROUND_THE_RUN = ("zwerm/__main__.py", "zwerm/cli/app.py", "zwerm/run/result.py", "zwerm/run/runner.py")
 
 # (file, rule): reason. An exception that no longer excepts anything is a mistake too.
 EXCEPTIONS: dict[tuple[str, str], str] = {
-    ("world/lockstep.py", "wall_clock"): "the barrier's deadline ends a run with the straggler's name",
-    ("world/programs.py", "wall_clock"): "a program that does not die is reported, and not waited for",
-    ("world/realtime.py", "wall_clock"): "pacing by the wall clock is what real time is",
-    ("agents/traps.py", "wall_clock"): "names the clocks that the conformance kit watches; it reads none",
+    ("world/drivers/lockstep.py", "wall_clock"): "the barrier's deadline ends a run with the straggler's name",
+    ("world/tick/process_control.py", "wall_clock"): "a program that does not die is reported, and not waited for",
+    ("world/drivers/realtime.py", "wall_clock"): "pacing by the wall clock is what real time is",
+    ("agents/conformance/purity.py", "wall_clock"): "names the clocks that the conformance kit watches; it reads none",
     (
-        "agents/traps.py",
+        "agents/conformance/purity.py",
         "global_randomness",
     ): "names the random streams that the conformance kit watches; it draws from none",
-    ("zwerm/link/station.py", "wall_clock"): "measures how long packets take on a real network",
-    ("zwerm/twin/running.py", "wall_clock"): "the twin runs in real time, and waits until nodes have met",
-    ("zwerm/link/zenoh_node.py", "wall_clock"): "joining has a deadline; observations and commands do not look at it",
+    ("zwerm/link/peer_radio.py", "wall_clock"): "measures how long packets take on a real network",
+    ("zwerm/twin/twin_runner.py", "wall_clock"): "the twin runs in real time, and waits until nodes have met",
+    ("zwerm/link/node.py", "wall_clock"): "joining has a deadline; observations and commands do not look at it",
 }
 LONG_FILES: dict[str, str] = {}
 
@@ -113,7 +113,7 @@ KEYED_RANDOM = ("Generator", "Philox")
 
 
 def global_randomness(tree: ast.Module) -> Iterator[Finding]:
-    """Randomness is keyed, by zwerm.draws; `hash` of a string changes with PYTHONHASHSEED."""
+    """Randomness is keyed, by zwerm.maths.keyed_random; `hash` of a string changes with PYTHONHASHSEED."""
     yield from ((line, name) for line, name in imported(tree) if name.split(".")[0] in ENTROPY)
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute):
@@ -243,7 +243,7 @@ def test_the_code_keeps_the_rule(rule: Rule, files: Callable[[], list[Path]]) ->
         (bare_imports, "import importlib\nimportlib.import_module('deploy.supervisor')"),
         (imports_beyond_the_robot, "from zwerm.world.scene import Scene"),
         (imports_beyond_the_robot, "import zwerm\nzwerm.run('x')"),
-        (imports_beyond_the_robot, "from zwerm.running import run"),
+        (imports_beyond_the_robot, "from zwerm.run.runner import run"),
         (imports_beyond_the_robot, "def f():\n    from zwerm import coordinator"),
         (wall_clock, "import time"),
         (wall_clock, "from datetime import datetime"),
@@ -275,7 +275,7 @@ def test_a_planted_violation_is_caught(rule: Rule, planted: str) -> None:
     ("rule", "allowed"),
     [
         (bare_imports, "from zwerm.agents import contract"),
-        (imports_beyond_the_robot, "from zwerm.draws import stream"),
+        (imports_beyond_the_robot, "from zwerm.maths.keyed_random import stream"),
         (wall_clock, "deadline = observation.time_s + 1.0"),
         (global_randomness, "def f(random: np.random.Generator): return random.normal()"),
         (set_order, "for x in sorted({1, 2}): pass"),

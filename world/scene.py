@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zwerm.draws import Draws
-from zwerm.world.arena import Arena
+from zwerm.maths.keyed_random import Draws
+from zwerm.world.arena.arena import Arena
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

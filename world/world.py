@@ -9,12 +9,13 @@ The world is deterministic: its state after a tick is a function of the scenario
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, repeat
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from zwerm.draws import Draws
-from zwerm.protocol import (
+from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.tables import Scenario
+from zwerm.wire.messages import (
     SENSOR_FIELDS,
     BodyVelocity,
     Command,
@@ -24,43 +25,48 @@ from zwerm.protocol import (
     WheelSpeeds,
     encode,
 )
-from zwerm.scenario import Scenario
-from zwerm.trace import Trace
-from zwerm.world.answers import Answers
-from zwerm.world.arena import Arena
-from zwerm.world.drives import Drives
+from zwerm.wire.trace import Trace
+from zwerm.world.arena.arena import Arena
+from zwerm.world.arena.entrance import Depots, EntrySchedule
+from zwerm.world.arena.placement import place
+from zwerm.world.bodies.drives import Drives
+from zwerm.world.bodies.physics import Physics
 from zwerm.world.faults import ticks
 from zwerm.world.faults.generator import scheduled
 from zwerm.world.faults.schedule import Schedule, unite
 from zwerm.world.faults.sensing import SensingFault, read
-from zwerm.world.foresight import Foreseen, Readings
-from zwerm.world.inflow import Depots, Inflow
-from zwerm.world.lives import Lives, Order
-from zwerm.world.meters import Meters
-from zwerm.world.physics import Physics
-from zwerm.world.placement import place
+from zwerm.world.metrics.observers import Observers
 from zwerm.world.radio.medium import Medium
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 from zwerm.world.sensors import Sensor
-from zwerm.world.told import Audience
-from zwerm.world.wakes import SIGNATURES, Wakes
-
-if TYPE_CHECKING:
-    from zwerm.world.recording import Recording
+from zwerm.world.tick.command_intake import CommandIntake
+from zwerm.world.tick.node_status import NodeStatus, ProcessAction
+from zwerm.world.tick.precompute import PrecomputedReadings, Readings
+from zwerm.world.tick.telemetry import TelemetrySink
+from zwerm.world.tick.wakes import SIGNATURES, Wakes
 
 Send = Callable[[int, bytes], object]
+
+
+class ExchangeRecorder(Protocol):
+    """Keeps what crossed the link, tick by tick."""
+
+    def exchange(
+        self, tick: int, nodes: Sequence[int], observations: Sequence[bytes], answers: Sequence[bytes], scene: Scene
+    ) -> None:
+        """Keep one tick: the observations sent to `nodes`, their answers (b"" for none), and the scene."""
 
 
 class World:
     """One run's world. Every robot carries the `sensors`; `seed` keys all randomness. `meters` are for whoever drives it."""
 
     def __init__(
-        self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor], meters: Meters | None = None
+        self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor], meters: Observers | None = None
     ) -> None:
         count, body = scenario.robots.count, scenario.robots.body
         self.scenario = scenario
         self.arena = arena
-        self.meters = meters or Meters()
+        self.meters = meters or Observers()
         self.draws = Draws(seed)
         self.tick = 0
         self.count = count
@@ -68,9 +74,9 @@ class World:
         self.crashed: dict[int, str] = {}
         self.failures: dict[int, Failure] = {}
         self.exited: list[int] = []
-        self.audience = Audience()
+        self.audience = TelemetrySink()
         self.trace = Trace()
-        self.recording: Recording | None = None
+        self.recording: ExchangeRecorder | None = None
         self.coordinator = count if scenario.coordinator is not None else None
         self.medium = Medium(scenario, arena, self.draws)
         self._physics = Physics(body, arena.segments, count, scenario.time.dt_s)
@@ -79,7 +85,7 @@ class World:
         self._wakes = Wakes(nodes, scenario.time.dt_s)
         self.fault_tables = scheduled(scenario, seed, arena)
         self.schedule = Schedule(self.fault_tables, scenario, self.draws)
-        self.lives = Lives(nodes, self.schedule.unborn)
+        self.lives = NodeStatus(nodes, self.schedule.unborn)
         for node in self.schedule.unborn:
             self.medium.switch_off(node, "receiver-down")
         self._blinding: list[SensingFault] = []
@@ -94,16 +100,16 @@ class World:
         centre = [] if self.coordinator is None else [self.coordinator]
         alone = scenario.services is not None and scenario.services.path == "gradient"
         self._deciding = [*([] if alone else centre), *stations]
-        self.answers = Answers(self._drives.kind, body.kind, [*centre, *stations], self.medium)
+        self.answers = CommandIntake(self._drives.kind, body.kind, [*centre, *stations], self.medium)
         self.refused = self.answers.refused
         self._present: Bools = np.zeros(count, dtype=np.bool_)
         self._robots: Ints = np.zeros(0, dtype=np.int64)  # those that were observed last
         self._coming: Scene | None = None
-        self._foreseen: Foreseen | None = None
+        self._foreseen: PrecomputedReadings | None = None
         self._nodes: list[int] = []
         self._observations: list[bytes] = []
         self._outboxes: list[tuple[int, tuple[Transmission, ...]]] = []
-        self._inflow = Inflow(scenario.robots.inflow, count) if scenario.robots.inflow else None
+        self._inflow = EntrySchedule(scenario.robots.inflow, count) if scenario.robots.inflow else None
         self._depots = Depots(scenario.base, count, arena, body.radius_m, self.draws) if scenario.base else None
         if self.coordinator is not None:
             self._admit(self.coordinator)
@@ -121,9 +127,9 @@ class World:
 
     # --- one tick, in order -----------------------------------------------------------------------------------------
 
-    def begin(self) -> list[Order]:
+    def begin(self) -> list[ProcessAction]:
         """Let the faults of this tick happen, and return what is to be done to programs before anybody is observed."""
-        orders: list[Order] = []
+        orders: list[ProcessAction] = []
         if self.schedule.faults and self.schedule.turn(self.tick, self.scene, self.dead):
             changes = self.lives.change(*self.schedule.states(self.tick))
             restarts = [node for node in self.schedule.restarts() if not self.lives.down[node]]
@@ -179,7 +185,7 @@ class World:
         self.trace.catch_up()
         self._move_early()
         if self._coming is not None and len(self._robots) and not (self._wakes.sleeping or self._blinding):
-            self._foreseen = Foreseen(self._coming, self._robots, self._sense(self._coming, self._robots))
+            self._foreseen = PrecomputedReadings(self._coming, self._robots, self._sense(self._coming, self._robots))
 
     def accept(self, node: int, payload: bytes) -> None:
         """Take a node's answer to its observation of this tick, or in real time to an earlier one.
@@ -340,7 +346,7 @@ class World:
     def _read(self, sensor: Sensor, scene: Scene, robots: Ints) -> Sequence[Any]:
         return read(sensor, self._blinding, scene, robots) if self._blinding else sensor.read(scene, robots)
 
-    def _happens(self, order: Order) -> bool:
+    def _happens(self, order: ProcessAction) -> bool:
         """Let what an order does to a program have its effect on the world; tell whether there is a program to do it to."""
         deed, node = order
         if deed == "kill":

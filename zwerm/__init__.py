@@ -8,15 +8,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from zwerm.result import RunResult as RunResult
-    from zwerm.running import run as run
-    from zwerm.scenario import load as load
+    from zwerm.run.result import RunResult as RunResult
+    from zwerm.run.runner import run as run
+    from zwerm.scenario.tables import load as load
 
 __version__: Final = "0.1.0"
 
 __all__ = ["RunResult", "__version__", "load", "run"]
 
-_HOMES: Final = {"run": "zwerm.running", "RunResult": "zwerm.result", "load": "zwerm.scenario"}
+_HOMES: Final = {"run": "zwerm.run.runner", "RunResult": "zwerm.run.result", "load": "zwerm.scenario.tables"}
 
 
 def __getattr__(name: str) -> Any:

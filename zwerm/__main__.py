@@ -6,7 +6,7 @@ import sys
 def main() -> None:
     """Load the command line and run it."""
     try:
-        from zwerm.cli import main as command_line
+        from zwerm.cli.app import main as command_line
 
         command_line()
     except KeyboardInterrupt:

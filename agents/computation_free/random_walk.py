@@ -10,9 +10,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from msgspec import Meta, Struct
 
-from zwerm.agents.contract import Controller, Setup
+from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError
-from zwerm.protocol import Command, Observation, WheelSpeeds
+from zwerm.wire.messages import Command, Observation, WheelSpeeds
 
 
 class WalkTable(Struct, frozen=True, forbid_unknown_fields=True):

@@ -8,9 +8,9 @@ from typing import Annotated, Any, ClassVar
 
 from msgspec import Meta, Struct
 
-from zwerm.agents.contract import Controller, Setup
+from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError
-from zwerm.protocol import Command, Observation, WheelSpeeds
+from zwerm.wire.messages import Command, Observation, WheelSpeeds
 
 Speed = Annotated[float, Meta(ge=-1.0, le=1.0)]
 

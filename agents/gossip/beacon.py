@@ -8,10 +8,10 @@ from typing import Annotated, Any, ClassVar, Final
 
 from msgspec import Meta, Struct
 
-from zwerm.agents.contract import Controller, Setup
+from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ProtocolError
-from zwerm.frame import HEAD_BYTES, seal, unseal
-from zwerm.protocol import BodyVelocity, Command, Observation, Transmission, WheelSpeeds
+from zwerm.wire.checksum import HEAD_BYTES, seal, unseal
+from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission, WheelSpeeds
 
 _LAYOUT: Final = Layout(">II")
 

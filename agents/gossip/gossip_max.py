@@ -9,10 +9,10 @@ from typing import Annotated, Any, ClassVar, Final
 
 from msgspec import Meta, Struct
 
-from zwerm.agents.contract import Controller, Setup
+from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ProtocolError
-from zwerm.frame import seal, unseal
-from zwerm.protocol import Command, Observation, Transmission
+from zwerm.wire.checksum import seal, unseal
+from zwerm.wire.messages import Command, Observation, Transmission
 
 _LAYOUT: Final = Layout(">I")
 

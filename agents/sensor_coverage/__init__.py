@@ -1,6 +1,6 @@
 """Sensor coverage with bearings and touch only (Ramaithitima, Whitzer, Bhattacharya, Kumar 2015)."""
 
-from zwerm.agents.sensor_coverage.base import Base
-from zwerm.agents.sensor_coverage.robot import Robot
+from zwerm.agents.sensor_coverage.central_base import CentralBase
+from zwerm.agents.sensor_coverage.central_robot import CentralRobot
 
-__all__ = ["Base", "Robot"]
+__all__ = ["CentralBase", "CentralRobot"]

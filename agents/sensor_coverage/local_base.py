@@ -2,21 +2,21 @@
 
 from typing import Final
 
-from zwerm.agents.contract import Setup
-from zwerm.agents.sensor_coverage.local import LocalRobot
-from zwerm.agents.sensor_coverage.words import (
+from zwerm.agents.runtime.contract import Setup
+from zwerm.agents.sensor_coverage.local_robot import LocalRobot
+from zwerm.agents.sensor_coverage.messages.peers import (
     NOWHERE,
-    Abort,
     Body,
-    Call,
-    Done,
-    End,
-    Offer,
-    State,
-    Token,
+    PushAborted,
+    PushDone,
+    PushToken,
+    RedundantCall,
+    RedundantOffer,
+    RedundantPushEnd,
+    StateBeacon,
     Word,
 )
-from zwerm.protocol import Command, Observation, Wake
+from zwerm.wire.messages import Command, Observation, Wake
 
 # How long to wait for a robot to come out, for a push to end, and without a frontier before all is covered [ticks].
 BIRTH_TICKS: Final = 60
@@ -77,7 +77,7 @@ class LocalBase(LocalRobot):
     def _take_part(self) -> None:
         for to, body in self.post.lost:
             self.vicinity.forget(to)
-            if isinstance(body, Token | Call) and body.push == self._active:
+            if isinstance(body, PushToken | RedundantCall) and body.push == self._active:
                 self._end(False)
         self.post.sent.clear()
         self.post.lost.clear()
@@ -119,7 +119,7 @@ class LocalBase(LocalRobot):
         self._tokens += 1
         self._to_gap = self.vicinity.to_gap
         self._active, self._since, self._first, self._pushed = self._tokens, self.tick, alone, born
-        self.post.write(born, Token(self._active, self._active, (), via))
+        self.post.write(born, PushToken(self._active, self._active, (), via))
 
     def _waits_for_spares(self) -> bool:
         """Tell whether it is time for those who can be spared to leave the complex."""
@@ -141,7 +141,7 @@ class LocalBase(LocalRobot):
             self._tokens += 1
             self._to_gap = self.vicinity.to_gap
             self._active, self._since, self._first, self._pushed = self._tokens, self.tick, False, NOWHERE
-            self.post.write(node, Call(self._active, way))
+            self.post.write(node, RedundantCall(self._active, way))
 
     def _someone_stays(self) -> bool:
         """Tell whether somebody in sight has no place yet, and may be ready soon."""
@@ -210,22 +210,22 @@ class LocalBase(LocalRobot):
             self.outcome = "source-blocked: no robot gets away from the base"
 
     def _read(self, sender: int, body: Body) -> None:
-        if isinstance(body, Token):
-            self.post.write(sender, Abort(body.push, False))
-        elif isinstance(body, Offer):
+        if isinstance(body, PushToken):
+            self.post.write(sender, PushAborted(body.push, False))
+        elif isinstance(body, RedundantOffer):
             self._offers[body.places[0]] = body.places
         elif body.push == self._active:
-            if isinstance(body, Abort):
+            if isinstance(body, PushAborted):
                 self._end(body.tried)
-            elif isinstance(body, Done):
+            elif isinstance(body, PushDone):
                 self._end(True, True)
-            elif isinstance(body, End):
+            elif isinstance(body, RedundantPushEnd):
                 self._end(body.tried, body.done)
 
     def _hear(self, sender: int, word: Word) -> None:
-        new = isinstance(word, State) and sender not in self.vicinity.states
+        new = isinstance(word, StateBeacon) and sender not in self.vicinity.states
         super()._hear(sender, word)
-        if new and isinstance(word, State) and word.place == NOWHERE:
+        if new and isinstance(word, StateBeacon) and word.place == NOWHERE:
             self.speech.again(self.tick)  # it wants to know what the base sees
 
     def _wake(self) -> Wake | None:

@@ -15,9 +15,9 @@ from typing import Annotated, Any, ClassVar
 
 from msgspec import Meta, Struct
 
-from zwerm.agents.contract import Controller, Setup
-from zwerm.kept_cell import KeptCell
-from zwerm.protocol import BodyVelocity, Command, Observation
+from zwerm.agents.runtime.contract import Controller, Setup
+from zwerm.maths.kept_cell import KeptCell
+from zwerm.wire.messages import BodyVelocity, Command, Observation
 
 
 class CoverageTable(Struct, frozen=True, forbid_unknown_fields=True):

@@ -8,7 +8,7 @@ the fit is underdetermined, or may be negative on the cell, the linear estimate 
 import math
 from typing import Final, NamedTuple
 
-from zwerm.polygons import Point, Polygon, estimated_centroid, moments
+from zwerm.maths.polygons import Point, Polygon, estimated_centroid, moments
 
 # A determinant of the normal equations this small, relative to what it could be, leaves the curvature open.
 _SINGULAR: Final = 1e-9
@@ -17,7 +17,7 @@ _SINGULAR: Final = 1e-9
 _ON_SIDE: Final = 1e-9
 
 
-class Sample(NamedTuple):
+class NeighbourSample(NamedTuple):
     """A neighbour's position relative to this robot [m], and the field's value there."""
 
     x: float
@@ -33,7 +33,7 @@ class Curvature(NamedTuple):
     yy: float
 
 
-def bordering(cell: Polygon, samples: list[Sample]) -> list[Sample]:
+def bordering(cell: Polygon, samples: list[NeighbourSample]) -> list[NeighbourSample]:
     """Return those of `samples` whose bisector is a side of `cell`."""
     found = []
     for sample in samples:
@@ -43,7 +43,7 @@ def bordering(cell: Polygon, samples: list[Sample]) -> list[Sample]:
     return found
 
 
-def fit(value: float, gx: float, gy: float, samples: list[Sample]) -> Curvature | None:
+def fit(value: float, gx: float, gy: float, samples: list[NeighbourSample]) -> Curvature | None:
     """Return the curvature that fits the samples best in the sense of least squares, or None where they leave it open.
 
     Each sample's equation is divided by the square of its distance: what is fitted is the curvature seen towards it.

@@ -14,10 +14,10 @@ from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 
 from msgspec import Meta, Struct
 
-from zwerm.agents.contract import Controller, Setup
-from zwerm.agents.voronoi_coverage.quadratic import Sample, bordering, fit, quadratic_centroid
-from zwerm.polygons import estimated_centroid, nearest_point, voronoi_cell
-from zwerm.protocol import BodyVelocity, Command, Observation, Transmission
+from zwerm.agents.runtime.contract import Controller, Setup
+from zwerm.agents.voronoi_coverage.quadratic import NeighbourSample, bordering, fit, quadratic_centroid
+from zwerm.maths.polygons import estimated_centroid, nearest_point, voronoi_cell
+from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 
 CHANNEL: Final = "robots"
 
@@ -26,7 +26,7 @@ _LAYOUT: Final = struct.Struct("<Idddd")
 _SUM: Final = struct.Struct("<I")
 
 
-class Heard(NamedTuple):
+class NeighbourReport(NamedTuple):
     """What a robot last said: when [s], where it was [m] in the frame of the arena, and the field's value there."""
 
     time_s: float
@@ -35,13 +35,13 @@ class Heard(NamedTuple):
     value: float
 
 
-def pack(node: int, heard: Heard) -> bytes:
+def pack(node: int, heard: NeighbourReport) -> bytes:
     """Return the packet that says it."""
     body = _LAYOUT.pack(node, *heard)
     return body + _SUM.pack(zlib.crc32(body))
 
 
-def unpack(payload: bytes) -> tuple[int, Heard] | None:
+def unpack(payload: bytes) -> tuple[int, NeighbourReport] | None:
     """Return who said what, or None for a packet that is not ours, or is damaged."""
     if len(payload) != _LAYOUT.size + _SUM.size:
         return None
@@ -49,10 +49,10 @@ def unpack(payload: bytes) -> tuple[int, Heard] | None:
     if _SUM.unpack(payload[_LAYOUT.size :])[0] != zlib.crc32(body):
         return None
     node, *numbers = _LAYOUT.unpack(body)
-    return (node, Heard(*numbers)) if all(map(math.isfinite, numbers)) else None
+    return (node, NeighbourReport(*numbers)) if all(map(math.isfinite, numbers)) else None
 
 
-class RadioTable(Struct, frozen=True, forbid_unknown_fields=True):
+class RadioCoverageTable(Struct, frozen=True, forbid_unknown_fields=True):
     """The gain k, how often the robot speaks and for how long it remembers [s], how it estimates the field.
 
     It is done while its own error is below `tolerance_m`.
@@ -69,13 +69,13 @@ class RadioCoverage(Controller):
     """Schwager 2006, algorithm 1, over a radio."""
 
     sensors: ClassVar[tuple[str, ...]] = ("pose", "boundary", "field")
-    Parameters: ClassVar[type[Struct]] = RadioTable
+    Parameters: ClassVar[type[Struct]] = RadioCoverageTable
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
         self._table: Any = self.parameters
         self._every_ticks = max(1, round(self._table.every_s / setup.dt_s))
-        self._heard: dict[int, Heard] = {}
+        self._heard: dict[int, NeighbourReport] = {}
 
     def step(self, observation: Observation) -> Command:
         """Return the velocity u = k (C_hat - p) for where the others were heard to be, and speak if it is time to."""
@@ -88,7 +88,7 @@ class RadioCoverage(Controller):
         samples = []
         for _, heard in sorted(self._heard.items()):
             dx, dy = heard.x_m - pose.x_m, heard.y_m - pose.y_m
-            samples.append(Sample(cos * dx + sin * dy, cos * dy - sin * dx, heard.value))
+            samples.append(NeighbourSample(cos * dx + sin * dy, cos * dy - sin * dx, heard.value))
         cell = voronoi_cell(observation.boundary, [(sample.x, sample.y) for sample in samples])
         field = here.value, here.gradient_x, here.gradient_y
         if table.estimate == "quadratic":
@@ -99,7 +99,7 @@ class RadioCoverage(Controller):
         moves = bool(samples) and observation.tick > self._every_ticks
         # Robots take turns, so that not all speak at once.
         speaks = (observation.tick + self.setup.node) % self._every_ticks == 0
-        say = Heard(observation.time_s, pose.x_m, pose.y_m, here.value)
+        say = NeighbourReport(observation.time_s, pose.x_m, pose.y_m, here.value)
         return Command(
             drive=BodyVelocity(table.gain_per_s * x, table.gain_per_s * y) if moves else BodyVelocity(),
             outbox=(Transmission(CHANNEL, pack(self.setup.node, say)),) if speaks else (),

@@ -15,9 +15,9 @@ from typing import Annotated, Any, ClassVar, Final
 
 from msgspec import Meta, Struct
 
-from zwerm.agents.contract import Controller, Setup
-from zwerm.polygons import COINCIDENT_M, Point, Polygon, clip, estimated_centroid, voronoi_cell
-from zwerm.protocol import BodyVelocity, Command, Observation, Wake
+from zwerm.agents.runtime.contract import Controller, Setup
+from zwerm.maths.polygons import COINCIDENT_M, Point, Polygon, clip, estimated_centroid, voronoi_cell
+from zwerm.wire.messages import BodyVelocity, Command, Observation, Wake
 
 PositiveNumber = Annotated[float, Meta(gt=0.0)]
 NonNegativeNumber = Annotated[float, Meta(ge=0.0)]

@@ -1,7 +1,7 @@
 """Controllers that break the contract, each in one way; a new interpreter can import them."""
 
-from zwerm.agents.contract import Controller
-from zwerm.protocol import Command, Observation, WheelSpeeds
+from zwerm.agents.runtime.contract import Controller
+from zwerm.wire.messages import Command, Observation, WheelSpeeds
 
 
 class OrderOfASet(Controller):

@@ -2,8 +2,8 @@
 
 from zlib import crc32
 
-from zwerm.agents.contract import Controller, Setup
-from zwerm.protocol import BodyVelocity, Command, Observation, Transmission, Wake, WheelSpeeds
+from zwerm.agents.runtime.contract import Controller, Setup
+from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission, Wake, WheelSpeeds
 
 
 class Counts(Controller):

@@ -2,8 +2,8 @@
 
 import time
 
-from zwerm.agents.contract import Setup
-from zwerm.protocol import BodyVelocity, Command, Observation, Transmission
+from zwerm.agents.runtime.contract import Setup
+from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 
 
 class Echo:

@@ -4,8 +4,8 @@ import os
 import signal
 import time
 
-from zwerm.agents.contract import Controller
-from zwerm.protocol import Command, Observation, Transmission, Wake, WheelSpeeds
+from zwerm.agents.runtime.contract import Controller
+from zwerm.wire.messages import Command, Observation, Transmission, Wake, WheelSpeeds
 
 
 class Raises(Controller):

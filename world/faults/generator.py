@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwerm.draws import Draws
 from zwerm.errors import ScenarioError
-from zwerm.scenario import OpenTable, Scenario
-from zwerm.world.arena import Arena
+from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.tables import OpenTable, Scenario
+from zwerm.world.arena.arena import Arena
 
 SECONDS_PER_H: Final = 3_600.0
 

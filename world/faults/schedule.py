@@ -12,9 +12,9 @@ from typing import Any, Final
 import numpy as np
 from pydantic import ValidationError
 
-from zwerm.draws import Draws
 from zwerm.errors import ScenarioError
-from zwerm.scenario import OpenTable, Scenario, mistakes
+from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.tables import OpenTable, Scenario, mistakes
 from zwerm.world.faults import FaultTable, ticks
 from zwerm.world.faults.nodes import CrashTable, JoinTable, PauseTable, RestartTable, SlowTable
 from zwerm.world.faults.radio import (
@@ -44,10 +44,10 @@ from zwerm.world.faults.sensing import (
     nonsense as sensing_nonsense,
 )
 from zwerm.world.faults.when import Condition
-from zwerm.world.lives import Order
 from zwerm.world.radio import ROBOTS, UPLINK, LinkModel
 from zwerm.world.radio.registry import node_id
 from zwerm.world.scene import Bools, Ints, Scene
+from zwerm.world.tick.node_status import ProcessAction
 
 KINDS: Final[dict[str, type[FaultTable]]] = {
     "partition": PartitionTable,
@@ -355,10 +355,10 @@ def _model(table: RadioFaultTable, scenario: Scenario, nodes: int) -> LinkModel:
     return model
 
 
-def unite(orders: Sequence[Order], restarts: Sequence[int]) -> list[Order]:
+def unite(orders: Sequence[ProcessAction], restarts: Sequence[int]) -> list[ProcessAction]:
     """Return `orders`, and for each of `restarts` that they do not touch, that it is killed and started."""
     touched = {order.node for order in orders}
     return [
         *orders,
-        *(Order(deed, node) for node in restarts if node not in touched for deed in ("kill", "start")),
+        *(ProcessAction(deed, node) for node in restarts if node not in touched for deed in ("kill", "start")),
     ]

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from zwerm.angles import wrap
-from zwerm.protocol import SENSOR_FIELDS, Bearing, Contact, LandmarkBearing, Neighbour
-from zwerm.scenario import Finite, Fraction, NonNegative, Scenario
+from zwerm.maths.angles import wrap
+from zwerm.scenario.tables import Finite, Fraction, NonNegative, Scenario
+from zwerm.wire.messages import SENSOR_FIELDS, Bearing, Contact, LandmarkBearing, Neighbour
 from zwerm.world.faults import FaultTable, Robots
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 from zwerm.world.sensors import Sensor

@@ -1,8 +1,8 @@
 """Conditions: what a fault may wait for, looked at once a tick until it is met."""
 
-from zwerm.scenario import Scenario
+from zwerm.scenario.tables import Scenario
 from zwerm.world.faults import WhenTable
-from zwerm.world.metrics import area_coverage_fraction, cell_counts, cell_coverage_fraction
+from zwerm.world.metrics.measures import area_coverage_fraction, cell_counts, cell_coverage_fraction
 from zwerm.world.scene import Scene
 
 

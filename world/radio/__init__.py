@@ -12,9 +12,9 @@ from typing import Any, ClassVar, Final, Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from zwerm.draws import Draws
-from zwerm.scenario import Table
-from zwerm.world.arena import Arena
+from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.tables import Table
+from zwerm.world.arena.arena import Arena
 from zwerm.world.radio.links import LinkDraws, Links
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 
@@ -131,7 +131,7 @@ PASSED: Final = Verdict()
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ModelPlace:
     """Where a model stands: what it may know before the first packet."""
 
     links: Links
@@ -154,7 +154,7 @@ class LinkModel(Protocol):
     needs_positions: ClassVar[bool]
     Parameters: ClassVar[type[LinkTable]]
 
-    def __init__(self, parameters: Any, place: Place) -> None:
+    def __init__(self, parameters: Any, place: ModelPlace) -> None:
         """Take an instance of `Parameters`. Raises ValueError, one line, where they make no sense together."""
 
     def judge(self, air: Air, packets: Packets) -> Verdict:

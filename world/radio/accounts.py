@@ -14,7 +14,7 @@ from zwerm.world.radio.links import Column, Links
 from zwerm.world.scene import Floats, Ints
 
 
-class Accounts:
+class Ledger:
     """The books of one channel, among `nodes` nodes."""
 
     def __init__(self, links: Links, nodes: int, dt_s: float) -> None:

@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwerm.draws import key_part
-from zwerm.protocol import Packet, Transmission
+from zwerm.maths.keyed_random import key_part
+from zwerm.wire.messages import Packet, Transmission
 from zwerm.world.radio import Air, LinkModel, Packets, Verdict
-from zwerm.world.radio.accounts import Accounts
+from zwerm.world.radio.accounts import Ledger
 from zwerm.world.radio.links import Links
 from zwerm.world.radio.mail import Mail, Parcel
 from zwerm.world.scene import Ints, Scene
@@ -42,7 +42,7 @@ class Channel:
         self.name = name
         self.models = list(models)
         self.links = links or Links(nodes)
-        self.accounts = Accounts(self.links, nodes, dt_s)
+        self.accounts = Ledger(self.links, nodes, dt_s)
         self.mail = Mail(nodes)
         self._members = members
         self._center = center

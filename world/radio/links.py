@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwerm.draws import Draws, gaussian, splitmix64, unit
+from zwerm.maths.keyed_random import Draws, gaussian, splitmix64, unit
 from zwerm.world.scene import Floats, Ints
 
 # Up to this many nodes the dense table is used: 64 MB at most.

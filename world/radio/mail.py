@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from zwerm.protocol import Packet
+from zwerm.wire.messages import Packet
 from zwerm.world.scene import Bools, Floats, Ints
 
 Objects = NDArray[np.object_]

@@ -10,10 +10,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from zwerm.draws import Draws
-from zwerm.protocol import Packet, Transmission
-from zwerm.scenario import Scenario
-from zwerm.world.arena import Arena
+from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.tables import Scenario
+from zwerm.wire.messages import Packet, Transmission
+from zwerm.world.arena.arena import Arena
 from zwerm.world.radio import ROBOTS, UPLINK, Air, LinkModel, LinkTable, Packets, Verdict
 from zwerm.world.radio.channel import Channel, Outboxes
 from zwerm.world.radio.links import Links

@@ -11,30 +11,42 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from pydantic import ValidationError
 
-from zwerm.draws import Draws
 from zwerm.errors import ScenarioError
-from zwerm.naming import class_named
-from zwerm.scenario import ChannelTable, OpenTable, Scenario, mistakes
-from zwerm.world.arena import Arena
-from zwerm.world.radio import ROBOTS, Air, LinkModel, LinkTable, NodeName, Packets, Place, Verdict
+from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.plugin_names import class_named
+from zwerm.scenario.tables import ChannelTable, OpenTable, Scenario, mistakes
+from zwerm.world.arena.arena import Arena
+from zwerm.world.radio import ROBOTS, Air, LinkModel, LinkTable, ModelPlace, NodeName, Packets, Verdict
 from zwerm.world.radio.links import Links
-from zwerm.world.radio.models.bursts import Bursts
 from zwerm.world.radio.models.collision import Collision
 from zwerm.world.radio.models.corruption import Corruption
 from zwerm.world.radio.models.delay import Delay
 from zwerm.world.radio.models.duplication import Duplication
-from zwerm.world.radio.models.line_of_sight import LineOfSight
+from zwerm.world.radio.models.gilbert_elliott import GilbertElliott
+from zwerm.world.radio.models.line_of_sight import LineOfSightModel
 from zwerm.world.radio.models.loss import Loss
 from zwerm.world.radio.models.path_loss import PathLoss
 from zwerm.world.radio.models.range import DiscRange
 from zwerm.world.radio.models.rate_limit import RateLimit
-from zwerm.world.radio.models.walls import Walls
+from zwerm.world.radio.models.wall_attenuation import WallAttenuation
 from zwerm.world.scene import Bools
 
 BUILT_IN: Final[dict[str, type[LinkModel]]] = {
     model.kind: model
     for model in (
-        *(DiscRange, LineOfSight, PathLoss, Walls, Loss, Bursts, Delay, Duplication, Corruption, RateLimit, Collision),
+        *(
+            DiscRange,
+            LineOfSightModel,
+            PathLoss,
+            WallAttenuation,
+            Loss,
+            GilbertElliott,
+            Delay,
+            Duplication,
+            Corruption,
+            RateLimit,
+            Collision,
+        ),
     )
 }
 
@@ -101,7 +113,9 @@ def make_models(
         counts: Counter[str] = Counter()
         for where, model in [] if table is None else tables_of(table, path):
             counts[model.kind] += 1
-            place = Place(links[name], draws, f"radio/{name}/{model.kind}", _nodes(scenario), scenario.time.dt_s, arena)
+            place = ModelPlace(
+                links[name], draws, f"radio/{name}/{model.kind}", _nodes(scenario), scenario.time.dt_s, arena
+            )
             try:
                 models.append(make_model(model, place, scenario, where, counts[model.kind], name == ROBOTS))
             except ScenarioError as error:
@@ -115,7 +129,7 @@ def make_models(
 
 
 def make_model(
-    table: OpenTable, place: Place, scenario: Scenario, path: str, number: int, has_positions: bool
+    table: OpenTable, place: ModelPlace, scenario: Scenario, path: str, number: int, has_positions: bool
 ) -> LinkModel:
     """Return the `number`-th model of its kind on a channel, as `table` at `path` describes it.
 
@@ -142,7 +156,7 @@ def make_model(
     if wrong:
         raise ScenarioError(wrong)
     try:
-        here = Place(place.links, place.draws, purpose, place.nodes, place.dt_s, place.arena)
+        here = ModelPlace(place.links, place.draws, purpose, place.nodes, place.dt_s, place.arena)
         model = kind(parameters, here)
     except ValueError as error:
         raise ScenarioError([f"{path}: {error}"]) from None

@@ -13,11 +13,11 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
-from zwerm.scenario import Table
-from zwerm.world.arena import Arena
-from zwerm.world.fields import Field
+from zwerm.scenario.tables import Table
+from zwerm.world.arena.arena import Arena
+from zwerm.world.fields.field import Field
+from zwerm.world.geometry.visibility import Visibility
 from zwerm.world.scene import Floats, Ints, Scene
-from zwerm.world.visibility import Visibility
 
 Item = TypeVar("Item")
 

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.angles import wrap
-from zwerm.protocol import Bearing
-from zwerm.scenario import Finite, NonNegative, Positive, Table
+from zwerm.maths.angles import wrap
+from zwerm.scenario.tables import Finite, NonNegative, Positive, Table
+from zwerm.wire.messages import Bearing
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings, portions
 

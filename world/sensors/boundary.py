@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from shapely.geometry import Polygon
 
-from zwerm.scenario import NonNegative, Table
+from zwerm.scenario.tables import NonNegative, Table
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings, in_body_frames
 

@@ -5,8 +5,8 @@ The noise is Gaussian and independent for each tick and robot, plus one bias tha
 
 from typing import ClassVar
 
-from zwerm.angles import wrap
-from zwerm.scenario import Finite, NonNegative, Table
+from zwerm.maths.angles import wrap
+from zwerm.scenario.tables import Finite, NonNegative, Table
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings
 

@@ -6,7 +6,7 @@ A sensor whose `field` is no field of `Observation` returns one tuple of floats 
 from collections.abc import Sequence
 from typing import ClassVar
 
-from zwerm.scenario import Table
+from zwerm.scenario.tables import Table
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Sensor
 

@@ -6,8 +6,8 @@ The noise is Gaussian and independent for each tick and robot: `sd` of the value
 
 from typing import ClassVar
 
-from zwerm.protocol import FieldSample
-from zwerm.scenario import NonNegative, Table
+from zwerm.scenario.tables import NonNegative, Table
+from zwerm.wire.messages import FieldSample
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings, in_body_frames
 

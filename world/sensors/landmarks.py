@@ -10,12 +10,12 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from zwerm.angles import wrap
-from zwerm.protocol import LandmarkBearing
-from zwerm.scenario import NonNegative, Positive, Table
+from zwerm.maths.angles import wrap
+from zwerm.scenario.tables import NonNegative, Positive, Table
+from zwerm.wire.messages import LandmarkBearing
+from zwerm.world.geometry.visibility import WallVerdicts
 from zwerm.world.scene import Bools, Ints, Scene
 from zwerm.world.sensors import Surroundings, portions
-from zwerm.world.visibility import WallVerdicts
 
 # A line of sight ends this fraction of its length short, so that a wall does not hide the landmark that hangs on it.
 _SHORT = 1e-9

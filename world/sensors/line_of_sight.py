@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import ValidationInfo, field_validator
 
-from zwerm.scenario import Fraction, Positive, Table
+from zwerm.scenario.tables import Fraction, Positive, Table
 from zwerm.world.scene import Bools, Ints, Scene
 from zwerm.world.sensors import Surroundings
 
@@ -34,7 +34,7 @@ class LineOfSightTable(Table):
         return combined
 
 
-class LineOfSight:
+class LineOfSightSensor:
     """One bit for each robot."""
 
     field: ClassVar[str] = "line_of_sight"

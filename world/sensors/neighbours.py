@@ -11,12 +11,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.protocol import Neighbour
-from zwerm.scenario import NonNegative, Positive, Table
+from zwerm.scenario.tables import NonNegative, Positive, Table
+from zwerm.wire.messages import Neighbour
+from zwerm.world.geometry.tessellation import Tessellation
+from zwerm.world.geometry.visibility import VisiblePairs
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings, in_body_frames, portions
-from zwerm.world.tessellation import Tessellation
-from zwerm.world.visibility import Sightings
 
 
 class NeighboursTable(Table):
@@ -29,7 +29,7 @@ class NeighboursTable(Table):
     sd_m: NonNegative = 0.0
 
 
-class Neighbours:
+class NeighboursSensor:
     """Relative positions of robots, ascending by id."""
 
     field: ClassVar[str] = "neighbours"
@@ -42,7 +42,7 @@ class Neighbours:
         self._sd_m = parameters.sd_m
         self._visibility = surroundings.visibility
         self._tessellation = Tessellation() if parameters.voronoi else None
-        self._last: tuple[Ints, Ints, Sightings] | None = None
+        self._last: tuple[Ints, Ints, VisiblePairs] | None = None
 
     def read(self, scene: Scene, robots: Ints) -> list[tuple[Neighbour, ...]]:
         """Return where each of `robots` has the robots it sees."""
@@ -55,7 +55,7 @@ class Neighbours:
             y += self._sd_m * scene.draws.normal("sensor.neighbours.y", scene.tick, observer, seen)
         return portions(map(Neighbour, seen.tolist(), x.tolist(), y.tolist()), ends)
 
-    def _sightings(self, scene: Scene, robots: Ints) -> Sightings:
+    def _sightings(self, scene: Scene, robots: Ints) -> VisiblePairs:
         if self._tessellation is None:
             return self._visibility.sightings(scene, robots, *self._sight)
         ids = scene.present_ids()
@@ -78,7 +78,7 @@ class Neighbours:
         return sightings
 
 
-def both_ways(pairs: Ints, robots: Ints, count: int) -> Sightings:
+def both_ways(pairs: Ints, robots: Ints, count: int) -> VisiblePairs:
     """Return both directions of pairs (k, 2) of ids below count, for the observers `robots` (ascending ids)."""
     i, j = pairs.T
     keys = np.concatenate([i * count + j, j * count + i])
@@ -87,4 +87,4 @@ def both_ways(pairs: Ints, robots: Ints, count: int) -> Sightings:
     if len(robots) < count:
         rows = np.isin(observer, robots)
         observer, seen = observer[rows], seen[rows]
-    return Sightings(observer, seen, np.searchsorted(observer, robots, side="right"))
+    return VisiblePairs(observer, seen, np.searchsorted(observer, robots, side="right"))

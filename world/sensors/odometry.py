@@ -11,9 +11,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.angles import wrap
-from zwerm.protocol import Displacement
-from zwerm.scenario import NonNegative, Table
+from zwerm.maths.angles import wrap
+from zwerm.scenario.tables import NonNegative, Table
+from zwerm.wire.messages import Displacement
 from zwerm.world.scene import Floats, Ints, Scene
 from zwerm.world.sensors import Surroundings, in_body_frames
 

@@ -6,9 +6,9 @@ that has this sensor is not lost; algorithms without metric information must do 
 
 from typing import ClassVar
 
-from zwerm.angles import wrap
-from zwerm.protocol import Pose
-from zwerm.scenario import NonNegative, Table
+from zwerm.maths.angles import wrap
+from zwerm.scenario.tables import NonNegative, Table
+from zwerm.wire.messages import Pose
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings
 

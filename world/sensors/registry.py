@@ -11,9 +11,9 @@ from typing import Final
 from pydantic import ValidationError
 
 from zwerm.errors import ScenarioError
-from zwerm.naming import class_named
-from zwerm.protocol import SENSOR_FIELDS, Observation
-from zwerm.scenario import OpenTable, Table, mistakes
+from zwerm.scenario.plugin_names import class_named
+from zwerm.scenario.tables import OpenTable, Table, mistakes
+from zwerm.wire.messages import SENSOR_FIELDS, Observation
 from zwerm.world.sensors import Sensor, Surroundings
 from zwerm.world.sensors.bearings import Bearings
 from zwerm.world.sensors.boundary import Boundary
@@ -21,8 +21,8 @@ from zwerm.world.sensors.compass import Compass
 from zwerm.world.sensors.extra import Extra
 from zwerm.world.sensors.field import FieldSensor
 from zwerm.world.sensors.landmarks import Landmarks
-from zwerm.world.sensors.line_of_sight import LineOfSight
-from zwerm.world.sensors.neighbours import Neighbours
+from zwerm.world.sensors.line_of_sight import LineOfSightSensor
+from zwerm.world.sensors.neighbours import NeighboursSensor
 from zwerm.world.sensors.odometry import Odometry
 from zwerm.world.sensors.pose import PoseSensor
 from zwerm.world.sensors.touch import Touch
@@ -33,8 +33,8 @@ BUILT_IN: Final[dict[str, type[Sensor]]] = {
     "compass": Compass,
     "field": FieldSensor,
     "landmarks": Landmarks,
-    "line_of_sight": LineOfSight,
-    "neighbours": Neighbours,
+    "line_of_sight": LineOfSightSensor,
+    "neighbours": NeighboursSensor,
     "odometry": Odometry,
     "pose": PoseSensor,
     "touch": Touch,
@@ -59,7 +59,7 @@ def find(kind: str) -> type[Sensor]:
         raise ValueError(f"{kind} is no sensor: its `field` must name what it fills, got {name!r}")
     parameters = getattr(found, "Parameters", None)
     if not isinstance(parameters, type) or not issubclass(parameters, Table):
-        raise ValueError(f"{kind} is no sensor: its `Parameters` must be a subclass of zwerm.scenario.Table")
+        raise ValueError(f"{kind} is no sensor: its `Parameters` must be a subclass of zwerm.scenario.tables.Table")
     try:
         inspect.signature(found).bind(None, None)
     except (TypeError, ValueError):

@@ -13,9 +13,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from zwerm.angles import wrap
-from zwerm.protocol import Contact
-from zwerm.scenario import Fraction, Positive, Table
+from zwerm.maths.angles import wrap
+from zwerm.scenario.tables import Fraction, Positive, Table
+from zwerm.wire.messages import Contact
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Surroundings, portions
 

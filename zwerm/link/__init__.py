@@ -36,7 +36,7 @@ class WorldLink(Protocol):
         """Release all that the link holds; idempotent."""
 
 
-class Programs(Protocol):
+class NodeProcesses(Protocol):
     """Whoever runs the nodes' programs, and can do to them what faults demand."""
 
     def kill(self, node: int) -> None:

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from zwerm import __version__
-from zwerm.assembly import prepare
 from zwerm.errors import ScenarioError
-from zwerm.running import Runner
-from zwerm.scenario import Scenario, load
-from zwerm.scenario import built_in as built_in_scenarios
+from zwerm.run.assembly import prepare
+from zwerm.run.runner import Runner
+from zwerm.scenario.tables import Scenario, load
+from zwerm.scenario.tables import built_in as built_in_scenarios
 from zwerm.study.tables import Setting, Study, VariantTable
 
 # What a scenario says of itself and no run depends on.

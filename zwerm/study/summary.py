@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from zwerm.statistics import Sample, condense, half_width
+from zwerm.maths.statistics import Sample, condense, half_width
 from zwerm.study.plan import Point
 from zwerm.study.tables import Published, Setting, Study
 from zwerm.study.trial import Row
-from zwerm.world.lockstep import FAILED
+from zwerm.world.drivers.lockstep import FAILED
 from zwerm.world.scene import Floats
 
 # Metrics of all trials of a point together: of the mean number of robots in each cell, the least and the most.
@@ -24,7 +24,7 @@ CELL_METRICS = {"least_cell_robots": np.argmin, "most_cell_robots": np.argmax}
 
 
 @dataclass(frozen=True)
-class Line:
+class SummaryLine:
     """One metric at one point, beside what the paper says of it."""
 
     variant: str
@@ -100,13 +100,13 @@ class Results:
         """Return (n, cells) the number of robots in each cell at the end of each of n trials, cells row by row."""
         return np.array([row["cell_counts"] for row in self.rows(point) if "cell_counts" in row], dtype=np.float64)
 
-    def line(self, point: Point, metric: str) -> Line:
+    def line(self, point: Point, metric: str) -> SummaryLine:
         """Return a metric of a point beside the paper's."""
         published = self.study.published(point.variant, point.settings).get(metric)
         sample = self.sample(point, metric)
-        return Line(point.variant, point.settings, metric, sample, published, self.study.table.paper.trials)
+        return SummaryLine(point.variant, point.settings, metric, sample, published, self.study.table.paper.trials)
 
-    def lines(self) -> list[Line]:
+    def lines(self) -> list[SummaryLine]:
         """Return every metric of every point beside the paper's."""
         return [self.line(point, metric) for point in self.points for metric in self.study.table.metrics]
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 
 from zwerm.errors import ScenarioError
-from zwerm.scenario import Finite, NonNegative, Table, mistakes, read
+from zwerm.scenario.tables import Finite, NonNegative, Table, mistakes, read
 
 Setting = bool | int | float | str
 

@@ -9,10 +9,10 @@ from typing import Any, Final
 import numpy as np
 
 from zwerm.errors import ZwermError
-from zwerm.result import RunResult
-from zwerm.running import run
+from zwerm.run.result import RunResult
+from zwerm.run.runner import run
 from zwerm.study.plan import Trial
-from zwerm.world.lockstep import FAILED, INTERRUPTED
+from zwerm.world.drivers.lockstep import FAILED, INTERRUPTED
 
 Row = dict[str, Any]
 

@@ -12,8 +12,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.scenario import Positive
-from zwerm.world.radio import Air, LinkTable, Packets, Place, Verdict
+from zwerm.scenario.tables import Positive
+from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 from zwerm.world.scene import Bools, Floats, Ints
 
 
@@ -33,7 +33,7 @@ class Collision:
     needs_positions: ClassVar[bool] = False
     Parameters: ClassVar[type[LinkTable]] = CollisionTable
 
-    def __init__(self, parameters: CollisionTable, place: Place) -> None:
+    def __init__(self, parameters: CollisionTable, place: ModelPlace) -> None:
         if (parameters.airtime_s is None) == (parameters.rate_bytes_s is None):
             raise ValueError("expected either airtime_s or rate_bytes_s")
         self._table = parameters

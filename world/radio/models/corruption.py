@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from zwerm.draws import splitmix64, unit
-from zwerm.world.radio import Air, LinkTable, Packets, Place, Verdict
+from zwerm.maths.keyed_random import splitmix64, unit
+from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 
 
 class CorruptionTable(LinkTable):
@@ -29,7 +29,7 @@ class Corruption:
     needs_positions: ClassVar[bool] = False
     Parameters: ClassVar[type[LinkTable]] = CorruptionTable
 
-    def __init__(self, parameters: CorruptionTable, place: Place) -> None:
+    def __init__(self, parameters: CorruptionTable, place: ModelPlace) -> None:
         self._rate = parameters.bit_error_rate
         self._draws = place.link_draws()
 

@@ -14,8 +14,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from zwerm.scenario import NonNegative
-from zwerm.world.radio import Air, LinkTable, Packets, Place, Verdict
+from zwerm.scenario.tables import NonNegative
+from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 from zwerm.world.scene import Floats
 
 _PARETO_SHAPE = 2.5
@@ -37,7 +37,7 @@ class Delay:
     needs_positions: ClassVar[bool] = False
     Parameters: ClassVar[type[LinkTable]] = DelayTable
 
-    def __init__(self, parameters: DelayTable, place: Place) -> None:
+    def __init__(self, parameters: DelayTable, place: ModelPlace) -> None:
         self._table = parameters
         self._draws = place.link_draws()
 

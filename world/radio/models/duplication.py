@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from zwerm.scenario import Fraction
-from zwerm.world.radio import Air, LinkTable, Packets, Place, Verdict
+from zwerm.scenario.tables import Fraction
+from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 
 
 class DuplicationTable(LinkTable):
@@ -27,7 +27,7 @@ class Duplication:
     needs_positions: ClassVar[bool] = False
     Parameters: ClassVar[type[LinkTable]] = DuplicationTable
 
-    def __init__(self, parameters: DuplicationTable, place: Place) -> None:
+    def __init__(self, parameters: DuplicationTable, place: ModelPlace) -> None:
         self._fraction = parameters.fraction
         self._copies = parameters.copies
         self._draws = place.link_draws()

@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.world.radio import Air, LinkTable, Packets, Place, Verdict
-from zwerm.world.radio.models.standing import Standing
+from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
+from zwerm.world.radio.static_links import StaticLinkValues
 
 
-class LineOfSight:
+class LineOfSightModel:
     """Drops what a wall stands in the way of, at the time of sending."""
 
     kind: ClassVar[str] = "line_of_sight"
@@ -19,8 +19,10 @@ class LineOfSight:
     needs_positions: ClassVar[bool] = True
     Parameters: ClassVar[type[LinkTable]] = LinkTable
 
-    def __init__(self, parameters: LinkTable, place: Place) -> None:
-        self._blocked = Standing(place.links, lambda start, end: place.arena.blocked(start, end).astype(np.float64))
+    def __init__(self, parameters: LinkTable, place: ModelPlace) -> None:
+        self._blocked = StaticLinkValues(
+            place.links, lambda start, end: place.arena.blocked(start, end).astype(np.float64)
+        )
 
     def judge(self, air: Air, packets: Packets) -> Verdict:
         """Test the segment between the two positions against every wall."""

@@ -2,8 +2,8 @@
 
 from typing import ClassVar
 
-from zwerm.scenario import Fraction
-from zwerm.world.radio import Air, LinkTable, Packets, Place, Verdict
+from zwerm.scenario.tables import Fraction
+from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 
 
 class LossTable(LinkTable):
@@ -20,7 +20,7 @@ class Loss:
     needs_positions: ClassVar[bool] = False
     Parameters: ClassVar[type[LinkTable]] = LossTable
 
-    def __init__(self, parameters: LossTable, place: Place) -> None:
+    def __init__(self, parameters: LossTable, place: ModelPlace) -> None:
         self._fraction = parameters.fraction
         self._draws = place.link_draws()
 

@@ -14,8 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.scenario import Finite, NonNegative, Positive
-from zwerm.world.radio import Air, LinkTable, Packets, Place, Verdict
+from zwerm.scenario.tables import Finite, NonNegative, Positive
+from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 from zwerm.world.scene import Floats
 
 
@@ -40,7 +40,7 @@ class PathLoss:
     needs_positions: ClassVar[bool] = True
     Parameters: ClassVar[type[LinkTable]] = PathLossTable
 
-    def __init__(self, parameters: PathLossTable, place: Place) -> None:
+    def __init__(self, parameters: PathLossTable, place: ModelPlace) -> None:
         self._table = parameters
         self._place = place
         self._draws = place.link_draws()

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.scenario import Positive
-from zwerm.world.radio import Air, LinkTable, Packets, Place, Verdict
+from zwerm.scenario.tables import Positive
+from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 
 
 class RangeTable(LinkTable):
@@ -25,7 +25,7 @@ class DiscRange:
     needs_positions: ClassVar[bool] = True
     Parameters: ClassVar[type[LinkTable]] = RangeTable
 
-    def __init__(self, parameters: RangeTable, place: Place) -> None:
+    def __init__(self, parameters: RangeTable, place: ModelPlace) -> None:
         self._range_m = parameters.range_m
 
     def judge(self, air: Air, packets: Packets) -> Verdict:

@@ -9,8 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.scenario import NonNegative, Positive
-from zwerm.world.radio import Air, LinkTable, Packets, Place, Verdict
+from zwerm.scenario.tables import NonNegative, Positive
+from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 from zwerm.world.scene import Floats
 
 
@@ -29,7 +29,7 @@ class RateLimit:
     needs_positions: ClassVar[bool] = False
     Parameters: ClassVar[type[LinkTable]] = RateTable
 
-    def __init__(self, parameters: RateTable, place: Place) -> None:
+    def __init__(self, parameters: RateTable, place: ModelPlace) -> None:
         self._rate_bytes_s = parameters.rate_bytes_s
         self._queue_bytes = parameters.queue_bytes
         self._idle_at_s: Floats = np.zeros(place.nodes)  # when the radio has sent all that it holds

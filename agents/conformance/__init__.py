@@ -1,0 +1,1 @@
+"""The conformance kit: does a controller keep the contract?"""

@@ -1,0 +1,1 @@
+"""What runs a controller: the contract, a node without transport, and the robot process."""

@@ -1,0 +1,76 @@
+"""The contract between a controller and whatever runs it: observation in, command out.
+
+A controller is a plain object. It does no I/O, reads no clock and imports no global randomness; what it may know of
+itself arrives in its `Setup`, what it may know of its surroundings arrives in each `Observation`. `Controller` is a
+convenience: any class with the same constructor and `step` will do.
+"""
+
+from typing import Any, ClassVar, Protocol
+
+import msgspec
+import numpy as np
+from msgspec import Struct
+
+from zwerm.maths.keyed_random import stream
+from zwerm.wire.messages import Command, Observation
+
+
+class NoParameters(Struct, frozen=True, forbid_unknown_fields=True):
+    """For a controller that takes no parameters."""
+
+
+class Body(Struct, frozen=True, forbid_unknown_fields=True):
+    """What a robot knows of its own body."""
+
+    kind: str
+    radius_m: float
+    max_speed_m_s: float
+    max_turn_rad_s: float
+    wheel_base_m: float = 0.0
+
+
+class Setup(Struct, frozen=True, forbid_unknown_fields=True):
+    """All that a node knows before its first observation.
+
+    The `bases`, ids of base stations, only a coordinator knows. `services` tells who provides which service. A node that has
+    lost its memory is a later `incarnation`.
+    """
+
+    node: int
+    role: str
+    dt_s: float
+    sensors: tuple[str, ...]
+    stream_key: bytes
+    body: Body | None = None
+    channels: tuple[str, ...] = ()
+    parameters: dict[str, Any] = {}
+    bases: tuple[int, ...] = ()
+    services: dict[str, str] = {}
+    incarnation: int = 1
+
+
+class Stepper(Protocol):
+    """What a runner needs of a controller."""
+
+    def step(self, observation: Observation) -> Command:
+        """Return the answer to one observation."""
+
+
+class Controller:
+    """Base class of the controllers that ship here.
+
+    `sensors` names the observation fields the controller needs, `Parameters` types what a scenario may set.
+    `self.random` is the node's own stream of randomness, the same in every runner.
+    """
+
+    sensors: ClassVar[tuple[str, ...]] = ()
+    Parameters: ClassVar[type[Struct]] = NoParameters
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        self.parameters: Any = msgspec.convert(setup.parameters, self.Parameters)
+        self.random: np.random.Generator = stream(setup.stream_key)
+
+    def step(self, observation: Observation) -> Command:
+        """Return the answer to one observation."""
+        raise TypeError(f"{type(self).__name__} defines no step()")

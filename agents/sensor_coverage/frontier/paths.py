@@ -1,0 +1,69 @@
+"""Paths to push along: Dijkstra over the graph of who sees whom, from several sources at once.
+
+Edges next to obstacles cost more, since driving is harder there (Ramaithitima et al. 2015, section III-B). Equal costs are
+decided by the ids, so a path is a function of the graph.
+"""
+
+import heapq
+from collections.abc import Collection, Mapping
+from typing import NamedTuple
+
+from zwerm.maths.simplicial import Edge, FlagComplex, edge
+
+
+class Reach(NamedTuple):
+    """The cheapest way to every vertex that can be reached: its cost, and the vertex before it (None at a source)."""
+
+    cost: dict[int, float]
+    before: dict[int, int | None]
+
+    def path(self, vertex: int) -> tuple[int, ...]:
+        """Return the vertices from a source to `vertex`, both included."""
+        found = [vertex]
+        while (previous := self.before[found[-1]]) is not None:
+            found.append(previous)
+        return tuple(reversed(found))
+
+
+def reach(
+    complex_: FlagComplex,
+    sources: Mapping[int, float],
+    obstacle: Collection[Edge],
+    obstacle_cost: float,
+    shut: Collection[int] = (),
+) -> Reach:
+    """Return the cheapest ways from `sources` (vertex: cost to start there). An edge costs 1, one of `obstacle` more.
+
+    Ways may begin at vertices that are `shut`, but none leads there.
+    """
+    cost: dict[int, float] = {}
+    before: dict[int, int | None] = {}
+    heap: list[tuple[float, int, int]] = [(start, vertex, -1) for vertex, start in sorted(sources.items())]
+    heapq.heapify(heap)
+    while heap:
+        spent, vertex, previous = heapq.heappop(heap)
+        if vertex in cost or vertex not in complex_.neighbours:
+            continue
+        cost[vertex], before[vertex] = spent, previous if previous >= 0 else None
+        for each in complex_.neighbours[vertex]:
+            if each not in cost and each not in shut:
+                step = obstacle_cost if edge(vertex, each) in obstacle else 1.0
+                heapq.heappush(heap, (spent + step, each, vertex))
+    return Reach(cost, before)
+
+
+class Dijkstra:
+    """The path service of who knows the whole graph."""
+
+    def __init__(self, obstacle_cost: float) -> None:
+        self._obstacle_cost = obstacle_cost
+
+    def ways(
+        self,
+        complex_: FlagComplex,
+        sources: Mapping[int, float],
+        obstacle: Collection[Edge],
+        shut: Collection[int] = (),
+    ) -> Reach:
+        """Return the cheapest ways from `sources` (place: cost to start there), and to none that is `shut`."""
+        return reach(complex_, sources, obstacle, self._obstacle_cost, shut)

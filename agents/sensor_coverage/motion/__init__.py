@@ -1,0 +1,1 @@
+"""Motion of sensor coverage: visual homing, and the frame of odometry."""

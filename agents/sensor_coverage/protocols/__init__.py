@@ -1,0 +1,1 @@
+"""Protocols between neighbours: path vector, leave lock, census, token push, membership, mailbox."""

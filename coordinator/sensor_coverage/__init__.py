@@ -1,0 +1,1 @@
+"""The coordinator of sensor coverage, and the redundancy advisor."""

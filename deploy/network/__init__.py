@@ -1,0 +1,1 @@
+"""Network namespaces, and impairments of a real network."""

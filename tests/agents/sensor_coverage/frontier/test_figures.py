@@ -1,0 +1,383 @@
+"""Figures 5 to 9 of Ramaithitima et al. 2015 as complexes built by hand, by the ids that their captions and text give.
+
+What is tested are the services as the coordinator has them, from bearings in frames that are turned at random. Figures 6(a),
+6(c), 7 and 8(b) are in `test_fence` too, rule by rule; the test drive of 6(d) is a robot's and in `test_sensor_coverage`.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import pytest
+
+from zwerm.agents.sensor_coverage.frontier.assignment import CheapestFirst
+from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
+from zwerm.agents.sensor_coverage.frontier.planner import Planner, PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.relative_homology import RelativeHomology
+from zwerm.agents.sensor_coverage.frontier.services import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.messages.commands import (
+    Answer,
+    Arrived,
+    Cleared,
+    Correct,
+    Deploy,
+    Emerged,
+    Move,
+    Order,
+    Release,
+    Request,
+    Response,
+    Sighting,
+    read_dispatch,
+    write,
+)
+from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox
+from zwerm.coordinator.sensor_coverage.push_execution import PushExecution
+from zwerm.coordinator.sensor_coverage.sources import Sources
+from zwerm.maths.simplicial import FlagComplex
+from zwerm.wire.messages import Packet
+
+Point = tuple[float, float]
+SIXTY = math.pi / 3.0
+HOP_M = 0.95
+
+
+def at(angle_deg: float, length: float = HOP_M, of: Point = (0.0, 0.0)) -> Point:
+    return of[0] + length * math.cos(math.radians(angle_deg)), of[1] + length * math.sin(math.radians(angle_deg))
+
+
+class Swarm:
+    """Robots at places with their own ids, each frame turned; `base` is the one that stands on a station, if any is."""
+
+    def __init__(
+        self, position: Mapping[int, Point], base: int | None = None, turned_seed: int = 1, range_m: float = 1.0
+    ) -> None:
+        self.position = dict(position)
+        random = np.random.default_rng(turned_seed)
+        self.turned = {robot: float(random.uniform(-3.0, 3.0)) for robot in position}
+        self.places = Slots()
+        for robot in self.position:
+            self.places.found(robot)
+        for robot, here in self.position.items():
+            seen = [
+                Sighting(other, math.remainder(direction(here, there) - self.turned[robot], math.tau))
+                for other, there in self.position.items()
+                if other != robot and math.dist(here, there) <= range_m
+            ]
+            self.places.take(robot, seen)
+        self.places.learn_headings(self.position)
+        views = self.places.views()
+        self.places.learn_references(views)
+        self.place = self.places.place_of()
+        bases = () if base is None else (self.place[base],)
+        self.picture = ScanResult(views, FlagComplex(views), bases)
+        self.planner = Planner(PlannerParameters(), self.places)
+
+    def look(self) -> "Swarm":
+        self.planner.look(self.picture)
+        return self
+
+    def touch(self, robot: int, *towards_deg: float) -> None:
+        """Let a robot touch walls in these directions of the truth."""
+        self.places.walls[self.place[robot]] = [math.radians(each) + self.off(robot) for each in towards_deg]
+
+    def off(self, robot: int) -> float:
+        return self.places.heading[robot] - self.turned[robot]
+
+    def robots(self, edges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+        occupant = self.places.occupant
+        return sorted((min(occupant[i], occupant[j]), max(occupant[i], occupant[j])) for i, j in edges)
+
+    def goal(self, plan: Plan) -> Point:
+        """Where a plan leads, in truth."""
+        robot = self.places.occupant[plan.mover]
+        return at(math.degrees(plan.direction - self.off(robot)), plan.hop_m, self.position[robot])
+
+    def plans(self, *pair: int) -> list[Plan]:
+        first = next(iter(self.planner.plans()))
+        return [each for each in first if self.robots([each.key[:2]])[0] == pair]
+
+    def ways(self, complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
+        return Dijkstra(3.0).ways(complex_, sources, self.planner.obstacle)
+
+
+def direction(here: Point, there: Point) -> float:
+    return math.atan2(there[1] - here[1], there[0] - here[0])
+
+
+# --- figure 5 -------------------------------------------------------------------------------------------------------
+
+
+def figure_5() -> Swarm:
+    """Nine robots in a hexagonal packing, and robot 10 among them."""
+    ring = {n + 1: at(60.0 * n) for n in range(6)}
+    return Swarm({**ring, 7: (0.0, 0.0), 8: at(30.0, 1.645), 9: at(90.0, 1.645), 10: (0.25, 0.1)}).look()
+
+
+def test_figure_5_robot_10_is_redundant_and_no_other() -> None:
+    swarm = figure_5()
+    found = RelativeHomology().redundant(swarm.picture, swarm.planner.rim())
+    assert [swarm.places.occupant[place] for place in found] == [10]
+
+
+def test_figure_5_without_robot_10_nobody_is_redundant() -> None:
+    position = figure_5().position
+    swarm = Swarm({robot: there for robot, there in position.items() if robot != 10}).look()
+    assert RelativeHomology().redundant(swarm.picture, swarm.planner.rim()) == ()
+
+
+# --- figure 6 -------------------------------------------------------------------------------------------------------
+
+_I, _J, _K = 1, 2, 3
+
+
+def test_figure_6a_an_edge_within_other_triangles_of_k_is_an_exception() -> None:
+    k1, k2 = 4, 5
+    swarm = Swarm({_I: (0.7, -0.4), _J: (0.7, 0.4), _K: (0.0, 0.0), k1: (0.9, -0.2), k2: (0.9, 0.2)}).look()
+    assert (_I, _J) not in swarm.robots(side.edge for side in swarm.planner.fence.sides)
+    assert (_I, _J) not in swarm.robots([*swarm.planner.frontier, *swarm.planner.obstacle])
+    alone = Swarm({_I: (0.7, -0.4), _J: (0.7, 0.4), _K: (0.0, 0.0)}).look()
+    assert (_I, _J) in alone.robots(alone.planner.frontier)
+
+
+def triangle() -> Swarm:
+    """Edge {i, j} along x, covered from below by k."""
+    return Swarm({_I: (0.0, 0.0), _J: (HOP_M, 0.0), _K: at(-60.0)})
+
+
+def test_figure_6b_an_edge_whose_ends_touch_a_wall_ahead_is_an_obstacles() -> None:
+    swarm = triangle()
+    swarm.touch(_I, 80.0)
+    swarm.touch(_J, 100.0)
+    swarm.look()
+    assert (_I, _J) in swarm.robots(swarm.planner.obstacle)
+    assert (_I, _J) not in swarm.robots(swarm.planner.frontier)
+    assert swarm.plans(_I, _J) == []
+
+
+@pytest.mark.parametrize(("wall_deg", "movers"), [(80.0, [_J]), (-60.0, [_I, _J]), (180.0, [_I, _J])])
+def test_figure_6b_where_one_end_touches_a_wall_the_other_goes_and_a_wall_elsewhere_is_none(
+    wall_deg: float, movers: list[int]
+) -> None:
+    swarm = triangle()
+    swarm.touch(_I, wall_deg)
+    swarm.look()
+    assert sorted(swarm.places.occupant[plan.mover] for plan in swarm.plans(_I, _J)) == movers
+    assert (_I, _J) in swarm.robots(swarm.planner.frontier)
+
+
+def test_figure_6c_a_convex_corner_makes_both_of_its_edges_an_obstacles() -> None:
+    """They are 0.9 apart as they stand, and a pillar keeps them from seeing each other."""
+    swarm = Swarm({_I: (0.0, 0.0), _J: (0.95, 0.0), _K: at(56.0)})
+    views = {place: dict(view) for place, view in swarm.picture.views.items()}
+    del views[swarm.place[_J]][swarm.place[_K]], views[swarm.place[_K]][swarm.place[_J]]
+    swarm.picture = ScanResult(views, FlagComplex(views), ())
+    swarm.look()
+    assert swarm.robots(swarm.planner.fence.corners) == [(_I, _J), (_I, _K)]
+    goals = [swarm.goal(plan) for plan in (*swarm.plans(_I, _J), *swarm.plans(_I, _K))]
+    assert goals, "what is not in the corner is frontier"
+    assert all(math.dist(goal, at(28.0, 0.8)) > 0.8 for goal in goals), "nobody goes into the corner"
+
+
+# --- figures 7 and 8 ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("k2", "sides"), [((0.6, 0.65), [-1]), ((0.5, -0.6), [])])
+def test_figure_7_an_edge_is_fence_where_all_its_triangles_are_on_one_side(k2: Point, sides: list[int]) -> None:
+    swarm = Swarm({_I: (0.0, 0.0), _J: (0.95, 0.0), 11: (0.4, 0.6), 12: k2}).look()
+    found = [side for side in swarm.planner.fence.sides if swarm.robots([side.edge]) == [(_I, _J)]]
+    assert [side.sign for side in found] == sides
+
+
+@pytest.mark.parametrize("turned_seed", [1, 2, 3])
+def test_figure_8a_both_ends_send_the_new_robot_to_the_same_place_60_degrees_off_on_the_free_side(
+    turned_seed: int,
+) -> None:
+    """The sign conventions, end to end: left of the way from i to j is right of the way from j to i."""
+    position = {_I: (0.2, 0.1), _J: at(20.0, of=(0.2, 0.1)), _K: at(-40.0, of=(0.2, 0.1))}
+    swarm = Swarm(position, turned_seed=turned_seed).look()
+    plans = swarm.plans(_I, _J)
+    assert sorted(swarm.places.occupant[plan.mover] for plan in plans) == [_I, _J]
+    for plan in plans:
+        assert swarm.goal(plan) == pytest.approx(at(80.0, of=(0.2, 0.1)))
+        assert {swarm.places.occupant[each] for each in plan.anchors} == {_I, _J}
+
+
+def test_figure_8b_a_gap_of_100_degrees_is_bisected_from_either_end() -> None:
+    swarm = Swarm({_I: (0.0, 0.0), _J: at(0.0), _K: at(100.0)}).look()
+    for pair in ((_I, _J), (_I, _K)):
+        inward = [plan for plan in swarm.plans(*pair) if swarm.goal(plan)[0] > 0 and swarm.goal(plan)[1] > 0]
+        assert len(inward) == 2
+        for plan in inward:
+            assert swarm.goal(plan) == pytest.approx(at(50.0), abs=1e-6)
+
+
+# --- figure 9 -------------------------------------------------------------------------------------------------------
+
+
+def figure_9() -> Swarm:
+    """Twelve robots in a hexagonal packing: the source is 12, and a wall is below all of the lowest row."""
+    rows = {
+        12: (0, 0), 11: (1, 0), 8: (2, 0), 9: (3, 0),
+        10: (0, 1), 7: (1, 1), 5: (2, 1), 4: (-1, 1),
+        6: (0, 2), 3: (1, 2), 1: (-1, 2),
+        2: (0, 3),
+    }  # fmt: skip
+    position = {robot: (HOP_M * (x + 0.5 * (y % 2)), HOP_M * y * math.sin(SIXTY)) for robot, (x, y) in rows.items()}
+    return Swarm(position, base=12)
+
+
+def assigned(swarm: Swarm) -> Plan:
+    sources = dict.fromkeys(swarm.picture.bases, 0.0)
+    (plan,) = CheapestFirst(swarm.places, 9).assign(swarm.planner.plans(), swarm.picture, sources, swarm.ways)
+    return plan
+
+
+def test_figure_9a_the_path_from_the_source_to_a_frontier_robot_is_12_10_6_2() -> None:
+    """Walls at the flanks leave one way on: upwards, from robot 2."""
+    swarm = figure_9()
+    for robot in (12, 11, 8, 9, 10, 7, 5, 4, 6, 3, 1):
+        swarm.touch(robot, *range(0, 360, 30))
+    swarm.look()
+    plan = assigned(swarm)
+    assert [swarm.places.occupant[place] for place in plan.path] == [12, 10, 6, 2]
+    assert swarm.goal(plan)[1] > swarm.position[2][1] - 1e-9
+    edges = {frozenset(each) for each in swarm.robots(swarm.planner.obstacle)}
+    assert {frozenset((12, 11)), frozenset((11, 8)), frozenset((8, 9))} <= edges
+
+
+def pushed(swarm: Swarm, plan: Plan, loose: bool = False) -> list[tuple[int, Order]]:
+    """Tell a push to its end with robots that do as they are told, robot 13 waiting in the depot; return all orders.
+
+    `loose`: odometry had to say how far to go.
+    """
+    post = CommandMailbox(0.1)
+    base = swarm.picture.bases[0]
+    station = swarm.places.occupant[base]
+    sources = Sources((), swarm.places, post)
+    sources.stations[base] = station
+    pushing = PushExecution(PlannerParameters(), swarm.places, post, sources, swarm.planner)
+    pushing.picture = swarm.picture
+    said: list[tuple[int, Order]] = []
+    story = pushing.push(plan)
+    done = Arrived(0, True, loose, False, 0.95, ())
+    for tick in range(50):
+        try:
+            next(story)
+        except StopIteration:
+            return said
+        answers: list[tuple[int, Response]] = []
+        for sent in post.sent():
+            dispatch = read_dispatch(sent.payload)
+            assert dispatch is not None
+            assert sent.to is not None
+            order = dispatch.order
+            said.append((sent.to, order))
+            if isinstance(order, Release):
+                emerged = Emerged(sightings_of(swarm, station, turned=0.4))
+                answers.append((13, Response(1, 0, 0, 0, 0, emerged)))
+            elif isinstance(order, Deploy):
+                answers += [(sent.to, reply(dispatch, each)) for each in (Cleared(0), done)]
+            elif isinstance(order, Move | Correct):
+                answers.append((sent.to, reply(dispatch, done)))
+        post.take(0.1 * tick, [Packet("uplink", write(each), sender) for sender, each in answers])
+    raise AssertionError("the push never ends")
+
+
+def reply(to: Request, answer: Answer) -> Response:
+    return Response(1, to.life, to.number, to.attempt, 1, answer)
+
+
+def sightings_of(swarm: Swarm, robot: int, turned: float) -> tuple[Sighting, ...]:
+    here = swarm.position[robot]
+    return tuple(
+        Sighting(other, math.remainder(direction(here, there) - turned, math.tau))
+        for other, there in swarm.position.items()
+        if other != robot and math.dist(here, there) <= 1.0
+    )
+
+
+def push_of_figure_9(loose: bool = False) -> tuple[Swarm, list[tuple[int, Order]]]:
+    swarm = figure_9()
+    place = swarm.place
+    upwards = math.pi / 2.0 + swarm.off(2)
+    plan = Plan(
+        (place[2], place[1], 1), place[2], upwards, HOP_M, 0.8, (place[2],), tuple(place[n] for n in (12, 10, 6, 2))
+    )
+    return swarm, pushed(swarm.look(), plan, loose)
+
+
+def test_figure_9b_robots_take_each_others_places_and_robot_13_appears_beside_the_source() -> None:
+    swarm, _ = push_of_figure_9()
+    now = {swarm.places.occupant[swarm.place[n]]: n for n in swarm.position}
+    assert {robot: now[robot] for robot in (12, 13, 10, 6)} == {12: 12, 13: 10, 10: 6, 6: 2}
+    assert [swarm.places.occupant[max(swarm.places.occupant)]] == [2], "robot 2 has a new place"
+    assert all(now[robot] == robot for robot in (1, 3, 4, 5, 7, 8, 9, 11))
+
+
+def test_figure_9b_every_landmark_is_the_robot_that_will_be_there_seen_from_the_place_to_go_to() -> None:
+    swarm, said = push_of_figure_9()
+    moves = {robot: order for robot, order in said if isinstance(order, Move)}
+    assert sorted(moves) == [6, 10, 13]
+    at_place = {13: 10, 10: 6, 6: 2}  # robot: the place where it goes, by the id of who was there
+    turned = {**swarm.turned, 13: 0.4}
+    for robot, order in moves.items():
+        goal = swarm.position[at_place[robot]]
+        assert {each.node for each in order.landmarks} & {2} == set(), "nobody refers to who goes into the unknown"
+        for each in order.landmarks:
+            there = swarm.position[at_place.get(each.node, each.node)]
+            assert each.bearing_rad == pytest.approx(math.remainder(direction(goal, there) - turned[robot], math.tau))
+            assert each.still == (each.node not in at_place)
+
+
+def test_figure_9b_the_new_robot_corrects_its_distance_to_who_then_stands_at_the_anchor() -> None:
+    _, said = push_of_figure_9()
+    ((robot, order),) = [(robot, order) for robot, order in said if isinstance(order, Correct)]
+    assert robot == 2
+    assert isinstance(order, Correct)
+    assert [each.node for each in order.anchors] == [6]
+
+
+def test_who_went_by_odometry_corrects_its_distance_to_who_is_behind_and_is_told_where_that_is() -> None:
+    """It may have gone so far that it sees nobody behind it."""
+    swarm, said = push_of_figure_9(loose=True)
+    orders = [(robot, order) for robot, order in said if isinstance(order, Correct)]
+    assert [(robot, order.anchors[0].node) for robot, order in orders] == [(13, 12), (10, 13), (6, 10), (2, 6)]
+    turned = {**swarm.turned, 13: 0.4}
+    behind = {13: (10, 12), 10: (6, 10), 6: (2, 6)}  # robot: its place and the one behind, by who was there
+    for robot, order in orders[:-1]:
+        place, rear = (swarm.position[each] for each in behind[robot])
+        there = math.remainder(direction(place, rear) - turned[robot], math.tau)
+        assert order.anchors[0].bearing_rad == pytest.approx(there)
+
+
+# --- one-sided sight, and frames ------------------------------------------------------------------------------------
+
+
+def test_the_fence_opens_where_two_robots_do_not_both_see_each_other() -> None:
+    """Four around a hub, 90 degrees apart and near enough to see each other: where one is blind to the next, a side is open."""
+    swarm = Swarm({n: at(90.0 * n, 0.65) for n in range(1, 5)} | {9: (0.0, 0.0)})
+    rim = [(1, 2), (1, 4), (2, 3), (3, 4)]
+    assert swarm.look().robots(side.edge for side in swarm.planner.fence.sides) == rim
+    views = {place: dict(view) for place, view in swarm.picture.views.items()}
+    del views[swarm.place[1]][swarm.place[2]]
+    swarm.picture = ScanResult(views, FlagComplex(views), ())
+    sides = swarm.look().robots(side.edge for side in swarm.planner.fence.sides)
+    assert sides == [(1, 4), (1, 9), (2, 3), (2, 9), (3, 4)]
+    inward = [swarm.goal(plan) for plan in (*swarm.plans(1, 9), *swarm.plans(2, 9))]
+    assert all(math.dist(each, at(135.0, 0.65)) < 0.5 for each in inward), "the open sides are those of the gap"
+
+
+def test_turning_any_robots_frame_changes_no_plan() -> None:
+    random = np.random.default_rng(3)
+    position = {n: (float(x), float(y)) for n, (x, y) in enumerate(random.uniform(0.0, 2.2, (22, 2)))}
+    one, other = (Swarm(position, base=0, turned_seed=seed).look() for seed in (1, 2))
+    for mine, theirs in zip(one.planner.plans(), other.planner.plans(), strict=True):
+        assert [(each.key, each.mover, each.anchors) for each in mine] == [
+            (each.key, each.mover, each.anchors) for each in theirs
+        ]
+        for a, b in zip(mine, theirs, strict=True):
+            assert one.goal(a) == pytest.approx(other.goal(b))
+    assert one.planner.frontier == other.planner.frontier != ()
+    assert one.planner.obstacle == other.planner.obstacle

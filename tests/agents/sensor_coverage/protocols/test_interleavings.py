@@ -1,0 +1,219 @@
+"""Robots that want to leave, under every interleaving: no two neighbours leave together, and no hole or piece comes or goes.
+
+All connected graphs of up to five robots, and every two robots that ask (or one that asks twice), up to symmetry.
+"""
+
+from collections.abc import Iterator
+from itertools import combinations, combinations_with_replacement, permutations
+from typing import Any
+
+import networkx
+import pytest
+from interleavings import Budget, Explorer, Graph, Violation
+
+from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, LockMessage, LockRequest, Message
+
+
+def connected_graphs(largest: int, smallest: int = 2) -> list[Graph]:
+    """Return one of every kind."""
+    atlas = [each for each in networkx.graph_atlas_g() if smallest <= len(each) <= largest]
+    return [{node: tuple(sorted(each[node])) for node in sorted(each)} for each in atlas if networkx.is_connected(each)]
+
+
+def pairs(graph: Graph) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of robots that differ, ids of others aside: `first` is the one that does not yield."""
+    edges = {(a, b) for a, listed in graph.items() for b in listed}
+    symmetries = [
+        each for each in permutations(sorted(graph)) if all((each[a], each[b]) in edges for a, b in sorted(edges))
+    ]
+    done: set[tuple[int, int]] = set()
+    for first, second in combinations_with_replacement(sorted(graph), 2):
+        if (first, second) not in done:
+            done.update((each[first], each[second]) for each in symmetries)
+            yield first, second
+
+
+def explore(graphs: list[Graph], kind: type[LeaveLock] = LeaveLock, **budget: Any) -> tuple[int, int]:
+    """Visit all states, and return how many there were and in how many of them somebody left."""
+    states = departures = 0
+    for graph in graphs:
+        for asks in pairs(graph):
+            explorer = Explorer(graph, Budget(asks, **budget), kind)
+            states += explorer.explore()
+            departures += explorer.departures
+    return states, departures
+
+
+# --- whatever is lost, late, copied or forgotten --------------------------------------------------------------------
+
+
+def test_of_five_robots_no_two_neighbours_leave_together_and_no_departure_changes_b0_or_b1() -> None:
+    states, departures = explore(connected_graphs(5))
+    assert states > 10_000
+    assert departures > 500
+
+
+def test_nor_do_they_when_locks_and_wishes_run_out() -> None:
+    _, departures = explore(connected_graphs(3), ticks=2)
+    assert departures > 100
+
+
+def test_nor_when_robots_lose_their_memory() -> None:
+    _, departures = explore(connected_graphs(3), ticks=2, amnesias=1)
+    assert departures > 500
+
+
+def places(robots: int) -> list[tuple[int, tuple[int, ...]]]:
+    """Return where one of the robots may be moved to: all that it can see there."""
+    others = range(robots - 1)
+    return [(robots - 1, each) for size in range(robots) for each in combinations(others, size)]
+
+
+@pytest.mark.parametrize("place", places(3))
+@pytest.mark.parametrize("comes", [False, True])
+def test_nor_when_one_robot_comes_or_is_moved_meanwhile(place: tuple[int, tuple[int, ...]], comes: bool) -> None:
+    _, departures = explore(connected_graphs(3, 3), ticks=1, moving=place, comes=comes)
+    assert departures > 20
+
+
+def test_nor_when_one_of_four_robots_is_moved() -> None:
+    _, departures = explore(connected_graphs(4, 4), moving=(3, (0, 1)))
+    assert departures > 100
+
+
+# --- when somebody else finds who may leave ---------------------------------------------------------------------------
+
+
+class Advised(LeaveLock):
+    """Relies on lists upon which it was told at some time that it may leave, whatever it has heard or seen since."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self._verdict: tuple[tuple[int, int], ...] = ()
+
+    def hear(self, sender: int, message: Message, now_s: float) -> list[LockMessage]:
+        sent = super().hear(sender, message, now_s)
+        if self.redundant():
+            self._verdict = tuple((node, self._lists[node].version) for node in self._listed)
+        return sent
+
+    def ask(self, now_s: float, versions: tuple[tuple[int, int], ...] | None = None) -> list[LockMessage]:
+        return super().ask(now_s, self._verdict)
+
+
+def test_nor_when_they_rely_on_what_they_were_told_of_lists_that_were_true_once() -> None:
+    _, departures = explore(connected_graphs(4), Advised)
+    assert departures > 100
+    _, moved = explore(connected_graphs(3, 3), Advised, ticks=1, moving=(2, (0,)))
+    assert moved > 20
+
+
+class Credulous(Advised):
+    """Grants a lock whatever list it is asked upon."""
+
+    def _answer(self, asker: int, ask: LockRequest, now_s: float) -> list[LockMessage]:
+        return super()._answer(asker, LockRequest(ask.number, ((self._me, self._version),)), now_s)
+
+
+def test_nor_would_it_be_so_if_neighbours_did_not_look_at_the_versions_of_their_lists() -> None:
+    with pytest.raises(Violation):
+        explore(connected_graphs(4, 4), Credulous, moving=(3, (0, 2)))
+
+
+# --- and each part of the protocol is needed ------------------------------------------------------------------------
+
+
+class Unlocked(LeaveLock):
+    """Leaves as soon as it is redundant by the lists it knows."""
+
+    def may_leave(self, now_s: float) -> bool:
+        return self.wants
+
+
+class Impatient(LeaveLock):
+    """Does not wait for the last grant."""
+
+    def may_leave(self, now_s: float) -> bool:
+        wish = self._wish
+        return wish is not None and not self.locked(now_s) and len(wish.granted) >= len(self._listed) - 1
+
+
+class AnyVersion(LeaveLock):
+    """Grants a lock whatever list it is asked upon."""
+
+    def _answer(self, asker: int, ask: LockRequest, now_s: float) -> list[LockMessage]:
+        return super()._answer(asker, LockRequest(ask.number, ((self._me, self._version),)), now_s)
+
+
+class Late(LeaveLock):
+    """Leaves as long as it likes after it asked."""
+
+    def _may_still_act(self, wish: Any, now_s: float) -> bool:
+        return wish.version == self._version
+
+
+class Generous(LeaveLock):
+    """Grants locks while it wants to leave itself, and leaves nevertheless."""
+
+    def _answer(self, asker: int, ask: LockRequest, now_s: float) -> list[LockMessage]:
+        wish, self._wish = self._wish, None
+        answer = super()._answer(asker, ask, now_s)
+        self._wish = wish
+        return answer
+
+    def _free_to_act(self, now_s: float) -> bool:
+        return self._stands
+
+
+class Fickle(LeaveLock):
+    """Takes a grant for any number it ever asked under."""
+
+    def hear(self, sender: int, message: Message, now_s: float) -> list[LockMessage]:
+        if self._wish is not None and type(message).__name__ == "Grant":
+            return super().hear(sender, type(message)(self._wish.ask.number), now_s)
+        return super().hear(sender, message, now_s)
+
+
+class Rash(LeaveLock):
+    """Grants locks as soon as it has been restarted."""
+
+    def __init__(self, me: int, lease_s: float, now_s: float) -> None:
+        super().__init__(me, lease_s, now_s)
+        self._quiet_until_s = now_s
+
+
+class Ghost(LeaveLock):
+    """Grants locks when it has left."""
+
+    def _answer(self, asker: int, ask: LockRequest, now_s: float) -> list[LockMessage]:
+        stands, self._stands = self._stands, True
+        answer = super()._answer(asker, ask, now_s)
+        self._stands = stands
+        return answer
+
+
+class Blind(LeaveLock):
+    """Leaves although it sees others than when it asked."""
+
+    def may_leave(self, now_s: float) -> bool:
+        wish = self._wish
+        return wish is not None and not self.locked(now_s) and len(wish.granted) == len(wish.ask.versions)
+
+
+@pytest.mark.parametrize(
+    ("kind", "robots", "budget"),
+    [
+        (Unlocked, 2, {}),
+        (Impatient, 2, {}),
+        (AnyVersion, 4, {"moving": (3, (0, 2))}),
+        (Late, 2, {"ticks": 2, "moving": (1, ())}),
+        (Generous, 2, {}),
+        (Fickle, 2, {"moving": (1, ())}),
+        (Rash, 3, {"ticks": 2, "amnesias": 1, "moving": (2, ())}),
+        (Ghost, 4, {}),
+        (Blind, 3, {"moving": (2, (0,)), "comes": True}),
+    ],
+)
+def test_without_it_the_search_finds_a_violation(kind: type[LeaveLock], robots: int, budget: dict[str, Any]) -> None:
+    with pytest.raises(Violation):
+        explore(connected_graphs(robots, robots), kind, **budget)

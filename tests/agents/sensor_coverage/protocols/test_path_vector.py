@@ -1,0 +1,322 @@
+"""The way to the frontier, on networks that lose, delay, copy and reorder what robots say of it."""
+
+from collections.abc import Iterable
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from zwerm.agents.sensor_coverage.frontier.paths import reach
+from zwerm.agents.sensor_coverage.messages.peers import PathVector, Route, read, write
+from zwerm.agents.sensor_coverage.protocols.path_vector import RENEW_TICKS, PathVectorProtocol
+from zwerm.maths.simplicial import Edge, FlagComplex, edge
+
+OBSTACLE_COST = 3.0
+
+
+class Network:
+    """Robots at places of the same numbers (1 and up), edges with their weights, and every word that is under way."""
+
+    def __init__(
+        self, count: int, weights: dict[Edge, float], kind: type[PathVectorProtocol] = PathVectorProtocol
+    ) -> None:
+        self.weights = dict(weights)
+        self.robots = {place: kind() for place in range(1, count + 1)}
+        self.told = dict.fromkeys(self.robots, 0)
+        self.roots: dict[int, None] = {}
+        self.under_way: list[tuple[int, int, PathVector]] = []
+        self.tick = 0
+
+    def beside(self, place: int) -> dict[int, float]:
+        return {other: self.weights[edge(place, other)] for other in self.robots if edge(place, other) in self.weights}
+
+    def tell(self, place: int) -> None:
+        robot = self.robots[place]
+        self.tick += 1
+        robot.choose(place, 0.0 if place in self.roots else None, self.beside(place), self.tick)
+        self.told[place] += 1
+        way = PathVector(self.told[place], place, robot.route, robot.ended)
+        self.under_way += [(place, other, way) for other in self.beside(place)]
+
+    def deliver(self, sender: int, receiver: int, way: PathVector) -> None:
+        if edge(sender, receiver) in self.weights:
+            self.robots[receiver].hear(sender, way)
+
+    def round(self, places: Iterable[int]) -> None:
+        """Let everyone tell its way, and all hear it: nothing is lost."""
+        for place in places:
+            self.tell(place)
+        arrived, self.under_way = self.under_way, []
+        for each in arrived:
+            self.deliver(*each)
+
+    def costs(self) -> dict[int, float]:
+        return {place: robot.route.cost for place, robot in self.robots.items() if robot.route is not None}
+
+    def true_costs(self) -> dict[int, float]:
+        lists = {place: list(self.beside(place)) for place in self.robots}
+        obstacle = [each for each, weight in self.weights.items() if weight > 1.0]
+        return reach(FlagComplex(lists), dict.fromkeys(self.roots, 0.0), obstacle, OBSTACLE_COST).cost
+
+
+def line(count: int) -> dict[Edge, float]:
+    return {(n, n + 1): 1.0 for n in range(1, count)}
+
+
+def grid(side: int) -> dict[Edge, float]:
+    return {
+        (a + 1, b + 1): OBSTACLE_COST if (a + b) % 5 == 0 else 1.0
+        for a, b in combinations(range(side * side), 2)
+        if abs(a // side - b // side) + abs(a % side - b % side) == 1
+    }
+
+
+def settled(network: Network, rounds: int) -> Network:
+    for _ in range(rounds):
+        network.round(network.robots)
+    return network
+
+
+# --- whatever happens to its messages -------------------------------------------------------------------------------
+
+
+class Lossy(RuleBasedStateMachine):
+    """Words are lost, kept, copied, delivered in any order; edges and roots come and go; robots lose their memory."""
+
+    @initialize(data=st.data(), count=st.integers(2, 6))
+    def build(self, data: st.DataObject, count: int) -> None:
+        self.pairs = list(combinations(range(1, count + 1), 2))
+        chosen = data.draw(st.lists(st.sampled_from(self.pairs), unique=True))
+        self.network = Network(count, {pair: data.draw(st.sampled_from((1.0, OBSTACLE_COST))) for pair in chosen})
+
+    def a_place(self, data: st.DataObject) -> int:
+        return data.draw(st.integers(1, len(self.network.robots)))
+
+    @rule(data=st.data())
+    def tell(self, data: st.DataObject) -> None:
+        self.network.tell(self.a_place(data))
+
+    @precondition(lambda self: self.network.under_way)
+    @rule(data=st.data(), copies=st.integers(0, 2))
+    def deliver_lose_or_copy(self, data: st.DataObject, copies: int) -> None:
+        under_way = self.network.under_way
+        number = data.draw(st.integers(0, len(under_way) - 1))
+        if copies > 0:
+            self.network.deliver(*under_way[number])
+        if copies < 2:
+            under_way.pop(number)
+
+    @rule(data=st.data())
+    def toggle_a_root(self, data: st.DataObject) -> None:
+        place, roots = self.a_place(data), self.network.roots
+        if place in roots:
+            del roots[place]
+        else:
+            roots[place] = None
+
+    @rule(data=st.data(), weight=st.sampled_from((0.0, 1.0, OBSTACLE_COST)))
+    def change_an_edge(self, data: st.DataObject, weight: float) -> None:
+        pair = data.draw(st.sampled_from(self.pairs))
+        if weight:
+            self.network.weights[pair] = weight
+        else:
+            self.network.weights.pop(pair, None)
+
+    @rule(data=st.data())
+    def forget_all_ways(self, data: st.DataObject) -> None:
+        self.network.robots[self.a_place(data)] = PathVectorProtocol()
+
+    @invariant()
+    def no_way_comes_by_a_place_twice_so_nobody_counts_further_than_there_are_places(self) -> None:
+        for place, robot in self.network.robots.items():
+            if robot.route is not None:
+                assert robot.route.places[0] == place
+                assert len(set(robot.route.places)) == len(robot.route.places) <= len(self.network.robots)
+                assert robot.route.cost <= OBSTACLE_COST * (len(robot.route.places) - 1)
+
+    def teardown(self) -> None:
+        """Once nothing is lost any more, ways become the shortest of the graph, and stay so."""
+        if not hasattr(self, "network"):
+            return
+        network = settled(self.network, rounds=2 * len(self.network.robots) + 1)
+        for _ in range(3):
+            network.round(reversed(network.robots))
+            assert network.costs() == network.true_costs()
+            for robot in network.robots.values():
+                if robot.route is not None:
+                    hops = zip(robot.route.places, robot.route.places[1:], strict=False)
+                    assert robot.route.cost == sum(network.weights[edge(*hop)] for hop in hops)
+                    assert robot.route.places[-1] in network.roots
+
+
+Lossy.TestCase.settings = settings(
+    max_examples=150, stateful_step_count=40, deadline=None, suppress_health_check=list(HealthCheck)
+)
+TestAnyFiniteSequenceOfFaults = Lossy.TestCase
+
+
+# --- a root that is cut off -----------------------------------------------------------------------------------------
+
+
+class Gullible(PathVectorProtocol):
+    """Believes in ways through its own place, up to a length: plain distance vector, as a control."""
+
+    def choose(self, place: int, cost: float | None, weights: dict[int, float], tick: int) -> None:  # type: ignore[override]
+        best = None if cost is None else Route(cost, (place,))
+        for beside, weight in weights.items():
+            way = self._ways.get(beside)
+            if way is not None and way.cost < 99.0 and (best is None or way.cost + weight < best.cost):
+                best = Route(way.cost + weight, (place, *way.places))
+        self.route = best
+
+
+def after_the_cut(kind: type[PathVectorProtocol], loss: float, delay: int, seed: int, rounds: int = 400) -> list[float]:
+    """Cut a settled grid's only root off; return the costs told from then on until nobody tells any."""
+    random = np.random.Generator(np.random.Philox(seed))
+    network = Network(16, grid(4), kind)
+    network.roots[1] = None
+    settled(network, 12)
+    assert network.costs() == network.true_costs()
+    network.weights = {pair: weight for pair, weight in network.weights.items() if 1 not in pair}
+    told: list[float] = []
+    queue: list[tuple[int, tuple[int, int, PathVector]]] = []
+    for now in range(rounds):
+        for place in random.permutation(range(2, 17)).tolist():
+            network.tell(place)
+        queue += [(now + int(random.integers(0, delay + 1)), e) for e in network.under_way if random.random() >= loss]
+        network.under_way = []
+        for _, each in [each for each in queue if each[0] <= now]:
+            network.deliver(*each)
+        queue = [each for each in queue if each[0] > now]
+        costs = [cost for place, cost in network.costs().items() if place != 1]
+        if not costs:
+            return told
+        told += costs
+    return told
+
+
+@pytest.mark.parametrize(("loss", "delay"), [(0.0, 0), (0.3, 2), (0.6, 3), (0.9, 0)])
+def test_after_its_root_is_cut_off_a_gradient_ends_and_counts_no_further_than_there_are_places(
+    loss: float, delay: int
+) -> None:
+    for seed in range(3):
+        told = after_the_cut(PathVectorProtocol, loss, delay, seed)
+        assert len(told) < 400 * 15, "it ends"
+        assert max(told, default=0.0) <= 15 * OBSTACLE_COST
+
+
+def test_a_gradient_that_believes_in_ways_through_itself_counts_on() -> None:
+    assert max(after_the_cut(Gullible, 0.0, 0, seed=1, rounds=100)) > 15 * OBSTACLE_COST
+
+
+@pytest.mark.parametrize("weights", [line(3), {(1, 2): 1.0, (1, 3): 1.0, (2, 3): 1.0}])
+def test_two_robots_do_not_point_at_each_other_when_their_root_goes(weights: dict[Edge, float]) -> None:
+    network = Network(3, weights)
+    network.roots[1] = None
+    settled(network, 4)
+    network.weights = {pair: weight for pair, weight in weights.items() if 1 not in pair}
+    settled(network, 2)
+    assert network.robots[2].route is network.robots[3].route is None
+
+
+# --- what is believed -----------------------------------------------------------------------------------------------
+
+
+def test_a_way_along_an_obstacle_costs_more() -> None:
+    network = Network(4, {(1, 2): 1.0, (2, 3): 1.0, (1, 4): 1.0, (3, 4): OBSTACLE_COST})
+    network.roots[1] = None
+    settled(network, 4)
+    assert network.robots[3].route == Route(2.0, (3, 2, 1), since=1)
+
+
+def test_of_equal_ways_that_to_the_smallest_place_at_the_frontier_wins_and_then_that_by_the_smallest() -> None:
+    robot = PathVectorProtocol()
+    for place, root in ((5, 4), (3, 4), (2, 7), (1, 8)):
+        robot.hear(place, PathVector(1, place, Route(1.0, (place, root), 5)))
+    robot.choose(9, None, dict.fromkeys((5, 3, 2, 1), 1.0), 9)
+    assert robot.route == Route(2.0, (9, 3, 4), 5)
+
+
+def test_the_base_is_where_ways_begin_and_none_leads_through_it() -> None:
+    robot = PathVectorProtocol()
+    robot.hear(0, PathVector(1, 0, Route(1.0, (0, 7), 5)))
+    robot.choose(9, None, {0: 1.0}, 9)
+    assert robot.route is None
+
+
+def test_the_nearest_of_two_roots_is_told_and_who_stops_being_one_tells_the_other() -> None:
+    network = Network(5, line(5))
+    network.roots.update({1: None, 5: None})
+    settled(network, 5)
+    assert network.costs() == {1: 0.0, 2: 1.0, 3: 2.0, 4: 1.0, 5: 0.0}
+    del network.roots[5]
+    settled(network, 6)
+    assert network.costs() == {1: 0.0, 2: 1.0, 3: 2.0, 4: 3.0, 5: 4.0}
+
+
+def test_an_older_word_that_comes_late_and_a_copy_change_nothing() -> None:
+    robot = PathVectorProtocol()
+    robot.hear(4, PathVector(7, 1, Route(0.0, (1,), 5)))
+    version = robot.version
+    robot.hear(4, PathVector(6, 1, None))
+    robot.hear(4, PathVector(7, 1, None))
+    robot.choose(2, None, {1: 1.0}, 9)
+    assert robot.route == Route(1.0, (2, 1), 5)
+    assert robot.version == version
+
+
+def test_a_way_belongs_to_a_place_and_outlives_who_told_it() -> None:
+    robot = PathVectorProtocol()
+    robot.hear(4, PathVector(7, 1, Route(1.0, (1, 5), 5)))
+    robot.hear(4, PathVector(8, 6, None))  # it has gone on, and tells of another place
+    robot.choose(2, None, {1: 1.0, 6: 1.0}, 9)
+    assert robot.route == Route(2.0, (2, 1, 5), 5)
+    robot.take_over(1, None)
+    assert robot.route == Route(1.0, (1, 5), 5)
+    robot.hear(9, PathVector(1, 1, None))  # whoever stands there now
+    robot.choose(2, None, {1: 1.0, 6: 1.0}, 9)
+    assert robot.route is None
+
+
+def test_all_ways_to_a_place_end_with_the_word_that_it_is_not_at_the_frontier_any_more() -> None:
+    robot = PathVectorProtocol()
+    robot.hear(4, PathVector(1, 4, Route(1.0, (4, 7), 5)))
+    robot.hear(3, PathVector(1, 3, Route(2.0, (3, 5, 7), 5)))
+    robot.hear(4, PathVector(2, 4, None, ended=((7, 8),)))
+    robot.choose(2, None, {3: 1.0, 4: 1.0}, 9)
+    assert robot.route is None
+    assert robot.ended == ((7, 8),)
+    robot.hear(3, PathVector(2, 3, Route(2.0, (3, 5, 7), 10)))  # it is again
+    robot.choose(2, None, {3: 1.0, 4: 1.0}, 11)
+    assert robot.route == Route(3.0, (2, 3, 5, 7), 10)
+
+
+def test_who_claims_something_else_ends_what_it_claimed_before() -> None:
+    robot = PathVectorProtocol()
+    robot.choose(2, 0.0, {}, 5)
+    robot.choose(2, 0.0, {}, 6)
+    assert robot.route == Route(0.0, (2,), 5)
+    robot.claim(2, 1000.0, 7)
+    assert (robot.route, robot.ended) == (Route(1000.0, (2,), 7), ((2, 6),))
+    robot.choose(2, None, {}, 9)
+    assert (robot.route, robot.ended) == (None, ((2, 8),))
+
+
+def test_who_took_a_place_over_and_missed_the_end_of_its_way_is_believed_after_a_while() -> None:
+    follower, other = PathVectorProtocol(), PathVectorProtocol()
+    follower.hear(4, PathVector(1, 2, Route(0.0, (2,), 5)))
+    other.hear(4, PathVector(2, 2, None, ended=((2, 8),)))  # the follower has not heard that
+    follower.take_over(2, None)
+    for number, tick in ((1, 9), (2, 9 + RENEW_TICKS)):
+        follower.choose(2, 0.0, {}, tick)
+        other.hear(6, PathVector(number, 2, follower.route))
+        other.choose(3, None, {2: 1.0}, tick)
+        assert (other.route is not None) == (number == 2)
+
+
+def test_a_way_survives_the_wire() -> None:
+    for way in (PathVector(1, 2, Route(4.5, (2, 3), 7), ((4, 5),)), PathVector(1, 2, None)):
+        assert read(write(way)) == way

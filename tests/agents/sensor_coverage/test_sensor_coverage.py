@@ -1,0 +1,292 @@
+"""Sensor coverage, run for real in small halls: coverage, noise, failures, frames, outcomes, processes."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from halls import HALL, NOISE, OBSTACLE, Link, drive
+
+from zwerm.agents.runtime.contract import Body, Setup
+from zwerm.agents.sensor_coverage import Robot
+from zwerm.agents.sensor_coverage.messages.commands import (
+    Answer,
+    Arrived,
+    Correct,
+    Deploy,
+    Order,
+    Report,
+    Request,
+    ScanRequest,
+    Sighting,
+    read_reply,
+    write,
+)
+from zwerm.agents.sensor_coverage.motion.homing import offset, slid, unit
+from zwerm.run.runner import run
+from zwerm.scenario.tables import load
+from zwerm.wire.messages import (
+    Bearing,
+    BodyVelocity,
+    Command,
+    Contact,
+    Displacement,
+    Observation,
+    Packet,
+    decode_observation,
+    open_answer,
+)
+from zwerm.wire.messages import encode as to_wire
+from zwerm.world.metrics.measures import measure
+from zwerm.world.world import World
+
+# --- the mathematics of one robot -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("aside", [(0.05, 0.0), (-0.03, 0.04), (0.0, -0.06)])
+def test_homing_tells_how_far_the_place_is(aside: tuple[float, float]) -> None:
+    landmarks = [unit(math.radians(each)) for each in (10, 130, 200, 290)]
+    pairs = []
+    for x, y in landmarks:
+        dx, dy = x - aside[0], y - aside[1]
+        length = math.hypot(dx, dy)
+        pairs.append(((dx / length, dy / length), (x, y)))
+    found = offset(pairs)
+    assert (found.x, found.y) == pytest.approx((-aside[0], -aside[1]), abs=0.01)
+
+
+def test_landmarks_in_one_line_leave_the_way_along_it_unknown() -> None:
+    found = offset([((1.0, 0.0), (1.0, 0.0)), ((-1.0, 0.0), (-1.0, 0.0))])
+    assert found.blind is not None
+    assert abs(found.blind[0]) == pytest.approx(1.0)
+
+
+def test_a_robot_slides_along_a_wall_and_away_from_it() -> None:
+    assert slid(1.0, 1.0, (0.0,)) == pytest.approx((0.0, 1.0))
+    assert slid(-1.0, 1.0, (0.0,)) == pytest.approx((-1.0, 1.0))
+
+
+class OneRobot:
+    """A robot alone with a made-up world: one neighbour in sight within 1 m, one wall across its way."""
+
+    def __init__(self, neighbour: tuple[float, float], wall_x_m: float) -> None:
+        body = Body("holonomic", 0.07, 0.5, 6.0)
+        self.robot = Robot(Setup(1, "robot", 0.1, Robot.sensors, b"0" * 16, body))
+        self.neighbour, self.wall_x_m = neighbour, wall_x_m
+        self.x = self.y = 0.0
+        self.moved = (0.0, 0.0)
+        self.said: list[Answer] = []
+        self.number = 0
+
+    def tick(self, *orders: Order) -> Command:
+        dx, dy = self.neighbour[0] - self.x, self.neighbour[1] - self.y
+        seen = (Bearing(7, math.atan2(dy, dx)),) if math.hypot(dx, dy) <= 1.0 else ()
+        touch = (Contact(0.0, math.pi / 12.0),) if self.x >= self.wall_x_m - 0.075 else ()
+        command = self.robot.step(
+            Observation(
+                0,
+                0.0,
+                tuple(self.packet(each) for each in orders),
+                bearings=seen,
+                touch=touch,
+                odometry=Displacement(*self.moved, 0.0),
+            )
+        )
+        drive = command.drive
+        assert isinstance(drive, BodyVelocity)
+        x = min(self.x + 0.1 * drive.forward_m_s, self.wall_x_m - 0.07)
+        self.moved = (x - self.x, 0.1 * drive.left_m_s)
+        self.x, self.y = x, self.y + self.moved[1]
+        replies = [read_reply(each.payload) for each in command.outbox]
+        self.said += [each.answer for each in replies if each is not None]
+        return command
+
+    def packet(self, order: Order) -> Packet:
+        self.number += 1
+        return Packet("uplink", write(Request(1, self.number, 1, 0, order)), 9)
+
+    def until_arrived(self, order: Order) -> Arrived:
+        for _ in range(30):
+            self.tick()
+        self.tick(order)
+        for _ in range(300):
+            self.tick()
+        found = [each for each in self.said if isinstance(each, Arrived)]
+        assert len(found) == 1
+        return found[0]
+
+
+def test_a_test_drive_that_meets_a_wall_leads_back() -> None:
+    """Figure 6(d)."""
+    alone = OneRobot((-0.9, 0.0), 0.5)
+    arrived = alone.until_arrived(Deploy(1, 0.0, 0.95, 0.8))
+    assert not arrived.ok
+    assert arrived.touched == (0.0,)
+    assert arrived.driven_m == pytest.approx(0.43, abs=0.06)
+    assert (alone.x, alone.y) == pytest.approx((0.0, 0.0), abs=0.01)
+
+
+def test_a_wall_behind_the_clear_distance_is_where_the_new_place_is() -> None:
+    alone = OneRobot((-0.9, 0.0), 0.93)
+    arrived = alone.until_arrived(Deploy(1, 0.0, 0.95, 0.8))
+    assert arrived.ok
+    assert alone.x == pytest.approx(0.86, abs=0.02)
+
+
+@pytest.mark.parametrize("start", [-0.7, -0.9, -1.1])
+def test_the_ruler_sets_the_distance_whatever_it_was(start: float) -> None:
+    """Scale correction: break the link, re-establish it, and a margin."""
+    alone = OneRobot((start, 0.0), 9.0)
+    assert alone.until_arrived(Correct(1, (Sighting(7, math.pi),))).ok
+    assert math.dist((alone.x, alone.y), alone.neighbour) == pytest.approx(0.95, abs=0.011)
+
+
+def test_a_robot_that_a_wall_keeps_off_its_place_answers_a_survey_at_once_and_rests_where_it_is() -> None:
+    """It arrived pressed against the wall, which then pushed it out by more than it tolerates."""
+    alone = OneRobot((-0.9, 0.0), 0.86)
+    assert alone.until_arrived(Deploy(1, 0.0, 0.95, 0.7)).ok
+    arrived_m = alone.x
+    alone.x, alone.wall_x_m = arrived_m - 0.008, alone.wall_x_m - 0.008
+    alone.moved = (-0.008, 0.0)
+    for cycle in (2, 3):
+        alone.said.clear()
+        alone.tick(ScanRequest(cycle, (1,)))
+        for _ in range(40):
+            alone.tick()
+        assert [type(each) for each in alone.said] == [Report]
+        assert alone.x == pytest.approx(arrived_m - 0.008, abs=1e-6)
+
+
+# --- the whole swarm ------------------------------------------------------------------------------------------------
+
+
+# In so small a hall most robots stand at walls; beside an obstacle that fills a tenth of it, all do.
+@pytest.mark.parametrize(
+    ("settings", "ratio_max"), [((), 1.6), ((NOISE,), 1.6), ((OBSTACLE, "base.pose=[0.2,0.4,0.0]"), 2.0)]
+)
+def test_a_small_hall_is_covered_with_no_hole_but_the_obstacle(settings: tuple[str, ...], ratio_max: float) -> None:
+    result = run("sensor-coverage", runner="inline", overrides=[*HALL, *settings])
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.99
+    assert result.metrics["holes"] == result.metrics["obstacles"]
+    assert result.metrics["robots_over_hexagonal"] < ratio_max
+    assert result.metrics["deployment_cycles"] > result.metrics["robots_released"] > 5
+    assert result.robot_ticks < 0.35 * result.ticks * result.metrics["robots_deployed"], "parked robots cost"
+
+
+def test_the_end_of_a_single_file_looks_around_a_corner() -> None:
+    """It stands just before a corridor branches off: no drive into it gets as far as a new place should be."""
+    branch = "arena.polygon=[[0.0,0.0],[2.15,0.0],[2.15,-1.5],[2.65,-1.5],[2.65,0.5],[0.0,0.5]]"
+    result = run("sensor-coverage-narrow", 1, "inline", [branch, "robots.count=12"])
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.99
+
+
+def test_a_station_in_the_middle_of_a_corridor_sends_robots_both_ways() -> None:
+    corridor = "arena.polygon=[[0.0,0.0],[5.0,0.0],[5.0,0.7],[0.0,0.7]]"
+    result = run("sensor-coverage-narrow", 1, "inline", [corridor, "base.pose=[2.4,0.35,0.0]", "robots.count=12"])
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.99
+
+
+def scrambled(multiple: int, straight: tuple[int, ...]) -> Callable[[int, Link], Link]:
+    """Turn the frame of every robot, each by some switches of the touch ring, but for the `straight`."""
+
+    def around(node: int, answer: Link) -> Link:
+        angle = 0.0 if node in straight else math.radians(30.0) * ((node * multiple + 1) % 12)
+        cos, sin = math.cos(angle), math.sin(angle)
+
+        def through(payload: bytes) -> bytes:
+            seen = decode_observation(payload)
+            odometry = seen.odometry
+            mine = Observation(
+                seen.tick,
+                seen.time_s,
+                seen.inbox,
+                bearings=seen.bearings and tuple(Bearing(b.node, b.bearing_rad - angle) for b in seen.bearings),
+                touch=seen.touch and tuple(Contact(c.bearing_rad - angle, c.half_width_rad) for c in seen.touch),
+                odometry=odometry
+                and Displacement(
+                    cos * odometry.forward_m + sin * odometry.left_m,
+                    cos * odometry.left_m - sin * odometry.forward_m,
+                    0.0,
+                ),
+            )
+            command = open_answer(answer(to_wire(mine)))
+            assert isinstance(command, Command)
+            drive = command.drive
+            if isinstance(drive, BodyVelocity):
+                command.drive = BodyVelocity(
+                    cos * drive.forward_m_s - sin * drive.left_m_s, sin * drive.forward_m_s + cos * drive.left_m_s
+                )
+            return to_wire(command)
+
+        return through if angle else answer
+
+    return around
+
+
+@pytest.mark.parametrize(
+    ("scenario", "settings", "straight"),
+    [
+        # The first robot of a station goes ahead: it says where forward is. The last id is the coordinator's.
+        ("sensor-coverage", HALL, (1, 40)),
+        (
+            "sensor-coverage-multi-source",
+            ("arena.size_m=[4.2,2.6]", "robots.count=40", "base.poses=[[0.2,1.3,0.0],[4.0,1.3,3.0]]"),
+            (2, 3, 40),
+        ),
+    ],
+)
+def test_scrambling_the_frames_of_robots_and_stations_gives_the_same_places(
+    scenario: str, settings: tuple[str, ...], straight: tuple[int, ...]
+) -> None:
+    loaded = load(scenario, (*settings, "robots.sensors.2.distance_sd_fraction=0.0"))
+    worlds = [drive(loaded, around=scrambled(multiple, straight) if multiple else None)[1] for multiple in (0, 5, 7)]
+    unturned, *turned = [world.scene.position[world.scene.present] for world in worlds]
+    for there in turned:
+        assert len(there) == len(unturned) > 8
+        for place in unturned:
+            assert np.hypot(*(there - place).T).min() < 0.01
+
+
+def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
+    scenario = load("sensor-coverage", (*HALL, "robots.on_crash=continue"))
+    killed: list[int] = []
+
+    def kill(world: World) -> None:
+        if world.tick in (300, 450):
+            alive = [r for r in world.scene.present_ids().tolist() if r and r not in world.crashed]
+            killed.append(alive[len(alive) // 2])
+            world.crash(killed[-1], "struck by lightning")
+
+    outcome, world = drive(scenario, kill)
+    found = measure(world, scenario.metrics)
+    assert outcome == "completed"
+    assert len(killed) == 2
+    assert found["coverage_fraction"] >= 0.99
+    assert found["holes"] == 0.0
+
+
+@pytest.mark.parametrize("unlucky", [1, 2, 9])
+def test_a_robot_that_dies_at_the_door_is_followed_by_another(unlucky: int) -> None:
+    scenario = load("sensor-coverage", (*HALL, "robots.on_crash=continue"))
+
+    def kill(world: World) -> None:
+        if world.scene.present[unlucky] and unlucky not in world.crashed:
+            world.crash(unlucky, "struck by lightning")
+
+    outcome, world = drive(scenario, kill)
+    assert outcome == "completed"
+    assert unlucky in world.crashed
+    assert measure(world, scenario.metrics)["coverage_fraction"] >= 0.99
+
+
+def test_robots_in_processes_leave_the_same_trace() -> None:
+    settings = ["arena.size_m=[2.2,1.6]", "base.pose=[0.2,0.8,0.0]", "robots.count=14", NOISE]
+    inline = run("sensor-coverage", runner="inline", overrides=settings)
+    processes = run("sensor-coverage", runner="processes", overrides=settings)
+    other = run("sensor-coverage", seed=2, runner="inline", overrides=settings)
+    assert inline.outcome == processes.outcome == "completed"
+    assert inline.trace == processes.trace
+    assert inline.trace != other.trace

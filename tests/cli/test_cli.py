@@ -1,0 +1,149 @@
+"""The command line, as a person meets it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support import ROOT, ZWERM
+
+from zwerm.scenario.tables import built_in
+
+
+def zwerm(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "120", "HOME": str(cwd)}
+    return subprocess.run(
+        [sys.executable, *ZWERM, *arguments], cwd=cwd, env=environment, capture_output=True, text=True, timeout=120
+    )
+
+
+def test_list_names_every_scenario() -> None:
+    ran = zwerm("list")
+    assert ran.returncode == 0
+    for name in built_in():
+        assert f"{name} " in ran.stdout
+
+
+def test_every_built_in_scenario_checks() -> None:
+    ran = zwerm("check", *built_in())
+    assert ran.returncode == 0, ran.stderr
+    assert len(ran.stdout.splitlines()) == len(built_in())
+
+
+def test_check_reports_every_mistake_of_every_stage_with_its_place_rule_and_value(tmp_path: Path) -> None:
+    (tmp_path / "tables.toml").write_text(
+        'arena = { size_m = [3.0, -1.0] }\nrobots = { count = 0, controller = "computation-free", colour = "red" }\n'
+    )
+    (tmp_path / "parts.toml").write_text(
+        "arena = { size_m = [3.0, 3.0], polygon = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] }\n"
+        '[robots]\ncount = 2\ncontroller = "computation-free"\nparameters = { left_0 = 3.0 }\n'
+    )
+    ran = zwerm("check", "tables.toml", "parts.toml", cwd=tmp_path)
+    assert ran.returncode == 2
+    assert ran.stdout == ""
+    said = ran.stderr.splitlines()
+    assert "zwerm: tables.toml: arena.size_m.1: expected > 0, got -1.0" in said
+    assert "zwerm: tables.toml: robots.count: expected >= 1, got 0" in said
+    assert any(line.startswith("zwerm: tables.toml: robots.colour: unknown key") for line in said)
+    assert any(line.startswith("zwerm: parts.toml: arena: expected exactly one of") for line in said)
+    assert "zwerm: parts.toml: robots.sensors: the controller computation-free needs the sensor 'line_of_sight'" in said
+    assert "zwerm: parts.toml: robots.parameters.left_0: expected <= 1.0, got 3.0" in said
+
+
+def test_check_names_a_controller_and_a_sensor_that_do_not_exist_beside_mistakes_in_the_tables(tmp_path: Path) -> None:
+    (tmp_path / "all.toml").write_text(
+        'arena = { size_m = [3.0, 3.0] }\ntime = { dt_s = 0.0 }\n[robots]\ncount = 2\ncontroller = "nobody"\ncuont = 3\n'
+        'sensors = [{ kind = "sonar" }]\nplacement = { kind = "uniform", colour = 1 }\n'
+    )
+    said = zwerm("check", "all.toml", cwd=tmp_path).stderr.splitlines()
+    assert [line.split(": ")[2] for line in said] == [
+        "time.dt_s", "robots.placement.colour", "robots.cuont", "robots.controller", "robots.sensors.0.kind",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["run", "no-such"], "zwerm: no-such: expected a scenario file or the name of a built-in one; built in are "),
+        (["run", "computation-free", "--set", "robots.count=none"], "robots.count: "),
+        (["run", "computation-free", "--set", "robots"], "zwerm: --set robots: expected path=value"),
+        (
+            ["run", "computation-free", "--set", "robots.controller=nobody"],
+            "robots.controller: expected a built-in controller",
+        ),
+        (["run", "computation-free", "--set", "robots.controller=no_such_file:Robot"], "cannot import 'no_such_file'"),
+        (["run", "computation-free", "--set", "robots.count=2000"], "robots.placement: no room for robot"),
+        (["run", "computation-free", "--inline", "--realtime", "0"], "zwerm: realtime: expected a factor > 0, got 0.0"),
+        (
+            ["robot", "--connect", "tcp/127.0.0.1:1", "--credentials", "none.key"],
+            "zwerm: none.key: cannot read credentials",
+        ),
+    ],
+)
+def test_a_mistake_is_one_line_and_status_2(arguments: list[str], line: str) -> None:
+    ran = zwerm(*arguments)
+    assert ran.returncode == 2, ran.stderr
+    assert line in ran.stderr
+    assert "Traceback" not in ran.stderr
+    assert ran.stdout == ""
+
+
+def test_json_is_one_object_with_exactly_the_documented_keys_and_nothing_else(tmp_path: Path) -> None:
+    ran = zwerm(
+        "run", "computation-free", "--inline", "--json", "--seed", "2", "--set", "time.duration_s=1", cwd=tmp_path
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stderr == ""
+    found = json.loads(ran.stdout)
+    assert list(found) == [
+        "scenario", "seed", "runner", "outcome", "trace", "ticks", "sim_s", "wall_s", "robots", "robot_ticks", "metrics",
+        "radio", "middleware_lost", "nodes", "faults",
+    ]  # fmt: skip
+    assert (found["scenario"], found["seed"], found["runner"]) == ("computation-free", 2, "inline")
+    assert (found["outcome"], found["ticks"], found["sim_s"], found["robot_ticks"]) == ("time-limit", 10, 1.0, 250)
+    assert found["radio"] == {
+        "sent": 0, "delivered": 0, "dropped": {}, "in_flight": 0, "bytes": 0, "copies": 0, "damaged": 0, "channels": {},
+    }  # fmt: skip
+    assert found["nodes"] == {"crashed": [], "restarted": [], "paused": [], "slow": [], "late": []}
+    assert found["faults"] == []
+    assert {"cell_coverage_fraction", "area_coverage_fraction"} <= set(found["metrics"])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_for_people_says_how_it_went_and_where_the_picture_is(tmp_path: Path) -> None:
+    ran = zwerm(
+        "run", "computation-free", "--inline", "--set", "time.duration_s=2", "--animate", "run.gif", cwd=tmp_path
+    )
+    assert ran.returncode == 0, ran.stderr
+    for word in (
+        "time-limit",
+        "cell_coverage_fraction",
+        "robot-ticks/s",
+        "trace",
+        "runs/computation-free-seed1.png",
+        "run.gif",
+    ):
+        assert word in ran.stdout
+    assert (tmp_path / "runs/computation-free-seed1.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
+
+
+def test_help_has_examples() -> None:
+    for command in ("list", "check", "run", "world", "robot"):
+        assert f"zwerm {command}" in zwerm(command, "--help").stdout
+    assert zwerm("--version").stdout.startswith("zwerm ")
+
+
+def test_a_run_is_also_drawn_at_the_moments_asked_for_and_kept_where_it_has_none(tmp_path: Path) -> None:
+    hall = ["--set", "arena.size_m=[1.2,1.0]", "--set", "base.pose=[0.2,0.5,0.0]", "--set", "robots.count=8"]
+    moments = ["--picture-at", "2", "--picture-at", "1.5s", "--picture-at", "999"]
+    ran = zwerm("run", "sensor-coverage", "--inline", *hall, *moments, cwd=tmp_path)
+    assert ran.returncode == 2
+    assert "zwerm: cycle 999: expected one that the run told of, which are " in ran.stderr
+    assert "trace" in ran.stdout
+    drawn = sorted(path.name for path in (tmp_path / "runs").iterdir())
+    assert drawn == [f"sensor-coverage-seed1{each}.png" for each in ("-1.5s", "-cycle2", "")]
+    wrong = zwerm("run", "sensor-coverage", "--picture-at", "soon", cwd=tmp_path)
+    assert wrong.returncode == 2
+    assert wrong.stderr == "zwerm: --picture-at: expected a cycle such as 40 or a time such as 120s, got 'soon'\n"

@@ -1,0 +1,303 @@
+"""Processes come, serve and go: none outlives its swarm, however that ends."""
+
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from support import ROBOTS, ROOT, children_of, gone, until
+
+from zwerm.agents.runtime.contract import Setup
+from zwerm.deploy.remote import run_robots
+from zwerm.deploy.supervisor import LEAVE_PATIENCE_S, TERMINATE_PATIENCE_S, interrupts_held
+from zwerm.deploy.swarm import Certificate, LocalSwarm, RemoteSwarm
+from zwerm.errors import LinkError
+from zwerm.link import Arrival, WorldLink
+from zwerm.wire.messages import Failure, Observation, encode, open_answer
+
+ECHO = "small_controllers:Echo"
+PRIVATE_MB_MAX = 8.0
+
+
+def members(count: int, controller: str = ECHO) -> dict[int, tuple[str, Setup]]:
+    return {node: (controller, Setup(node, "robot", 0.1, (), bytes(16))) for node in range(count)}
+
+
+def tick(link: WorldLink, nodes: range, number: int) -> dict[int, Arrival]:
+    """Send every node an observation, and return what arrives, by node."""
+    for node in nodes:
+        link.send(node, encode(Observation(number, 0.0)))
+    arrivals = [link.receive(20.0) for _ in nodes]
+    return {arrival.node: arrival for arrival in arrivals if arrival is not None}
+
+
+def private_mb(pid: int) -> float:
+    """Return the memory [MB] that a process shares with no other."""
+    fields = [line.split() for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:]]
+    return sum(int(field[1]) for field in fields if field[0] in ("Private_Clean:", "Private_Dirty:")) / 1024
+
+
+def test_a_swarm_starts_in_any_order_serves_and_leaves_nothing(nothing_left: None) -> None:
+    count = 20
+    order = random.Random(4).sample(range(count), count)
+    seen: list[tuple[int, int]] = []
+    with LocalSwarm("run", members(count), order=order, progress=lambda *each: seen.append(each)) as swarm:
+        pids = swarm.supervisor.pids
+        assert list(pids) == order
+        assert seen == [(joined, count) for joined in range(1, count + 1)]
+        assert swarm.link.joined == set(range(count))
+        for number in range(3):
+            answers = tick(swarm.link, range(count), number)
+            assert {open_answer(answer.payload or b"").tick for answer in answers.values()} == {number}
+            assert set(answers) == set(range(count))
+        assert max(private_mb(pid) for pid in pids.values()) <= PRIVATE_MB_MAX
+    assert swarm.supervisor.exit_codes == dict.fromkeys(range(count), 0)
+    assert not any(Path(f"/proc/{pid}").exists() for pid in pids.values())
+    swarm.close()
+
+
+def test_swarms_follow_each_other_and_stand_side_by_side_in_one_process(nothing_left: None) -> None:
+    with LocalSwarm("one", members(2)) as one, LocalSwarm("two", members(3)) as two:
+        assert len(tick(one.link, range(2), 1)) == 2
+        assert len(tick(two.link, range(3), 1)) == 3
+    with LocalSwarm("one", members(2)) as one:
+        assert len(tick(one.link, range(2), 1)) == 2
+
+
+def test_an_exception_ends_every_process(nothing_left: None) -> None:
+    swarm = LocalSwarm("run", members(3))
+    with pytest.raises(ZeroDivisionError), swarm:
+        _ = 1 / 0
+    assert swarm.supervisor.exit_codes == {0: 0, 1: 0, 2: 0}
+
+
+def test_a_node_that_does_not_join_in_time_is_named(nothing_left: None) -> None:
+    with pytest.raises(LinkError, match=r"^node 0 did not join within 0.5 s$"):
+        LocalSwarm("run", members(1, "small_controllers:NeverMade"), deadline_s=0.5).__enter__()
+
+
+def test_a_controller_that_raises_is_heard_out_and_its_process_exits_1(nothing_left: None) -> None:
+    with LocalSwarm("run", {**members(2), 1: members(2, "small_controllers:Wordy")[1]}) as swarm:
+        answers = tick(swarm.link, range(2), 5)
+        failure = open_answer(answers[1].payload or b"")
+        assert isinstance(failure, Failure)
+        assert failure.tick == 5
+        assert failure.error.startswith("ValueError: xxx")
+        assert failure.traceback.endswith("\u2620\n")
+        assert swarm.link.receive(20.0) == Arrival(1, None)
+        until(lambda: 1 in swarm.supervisor.exit_codes, "its process ended")
+    assert swarm.supervisor.exit_codes == {0: 0, 1: 1}
+
+
+@pytest.mark.parametrize(
+    ("controller", "error"),
+    [
+        ("Exits", "SystemExit: 0"),
+        ("Recurses", "RecursionError: maximum recursion depth exceeded"),
+        ("Garrulous", "ValueError: the command takes 100033 bytes, at most 65536 are allowed"),
+        ("Unspeakable", r"ValueError: \udcff"),
+    ],
+)
+def test_whatever_a_controller_does_the_world_hears_of_it(nothing_left: None, controller: str, error: str) -> None:
+    with LocalSwarm("run", members(1, f"small_controllers:{controller}")) as swarm:
+        failure = open_answer(tick(swarm.link, range(1), 0)[0].payload or b"")
+        assert isinstance(failure, Failure)
+        assert failure.error.startswith(error)
+    assert swarm.supervisor.exit_codes == {0: 1}
+
+
+def test_robots_leave_by_themselves_when_the_world_vanishes(nothing_left: None) -> None:
+    with LocalSwarm("run", members(2)) as swarm:
+        swarm.link.close()
+        assert swarm.supervisor.wait(20.0)
+        assert swarm.supervisor.exit_codes == {0: 3, 1: 3}
+
+
+def test_a_robot_leaves_on_sigterm_and_ignores_sigint(nothing_left: None) -> None:
+    with LocalSwarm("run", members(2)) as swarm:
+        swarm.supervisor.send_signal(0, signal.SIGINT)
+        swarm.supervisor.send_signal(1, signal.SIGTERM)
+        assert swarm.link.receive(20.0) == Arrival(1, None)
+        assert set(tick(swarm.link, range(1), 0)) == {0}
+    assert swarm.supervisor.exit_codes == {0: 0, 1: 0}
+
+
+def test_robots_that_do_not_come_back_or_are_stopped_are_killed_at_the_end(nothing_left: None) -> None:
+    with LocalSwarm("run", {**members(3), 1: members(2, "small_controllers:Spins")[1]}) as swarm:
+        swarm.link.send(1, encode(Observation(0, 0.0)))
+        swarm.supervisor.send_signal(2, signal.SIGSTOP)
+        swarm.link.dismiss("over")
+        swarm.supervisor.stop(0.5)
+        assert swarm.supervisor.exit_codes == {0: 0, 1: -signal.SIGKILL, 2: -signal.SIGKILL}
+
+
+def test_ctrl_c_is_held_back_during_what_must_not_be_cut_short() -> None:
+    steps = []
+
+    def start_something() -> None:
+        with interrupts_held():
+            signal.raise_signal(signal.SIGINT)
+            steps.append("went on")
+
+    with pytest.raises(KeyboardInterrupt):
+        start_something()
+    assert steps == ["went on"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+# --- a program of its own, ended from outside -----------------------------------------------------------------------
+
+
+def below(pid: int) -> set[int]:
+    """Return the ids of all living descendants of `pid`."""
+    children = children_of(pid)
+    return children | {each for child in children for each in below(child)}
+
+
+@contextmanager
+def program(tmp: Path, count: int, *controllers: str) -> Iterator[subprocess.Popen[str]]:
+    """Run swarm_script.py in a process group and with a temporary directory of its own."""
+    running = subprocess.Popen(
+        [sys.executable, str(ROOT / "tests" / "swarm_script.py"), str(count), *controllers],
+        env=os.environ | {"PYTHONPATH": f"{ROOT}:{ROBOTS}", "TMPDIR": str(tmp)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        yield running
+    finally:
+        running.kill()
+        running.communicate()
+
+
+def read_until(running: subprocess.Popen[str], line: str) -> None:
+    """Read what the program prints up to `line`."""
+    assert running.stdout is not None
+    for printed in running.stdout:
+        if printed.strip() == line:
+            return
+    pytest.fail(f"the program ended before it printed {line!r}")
+
+
+@pytest.mark.parametrize("when", ["1", "17", "joined"])
+def test_ctrl_c_while_starting_or_running_leaves_no_process_socket_or_directory(private_tmp: Path, when: str) -> None:
+    with program(private_tmp, 20, ECHO) as running:
+        read_until(running, when)
+        started = below(running.pid)
+        assert len(started) > 2
+        began_s = time.monotonic()
+        os.killpg(running.pid, signal.SIGINT)
+        _, said = running.communicate(timeout=30)
+        assert time.monotonic() - began_s < LEAVE_PATIENCE_S + TERMINATE_PATIENCE_S, "nobody had to be killed"
+        assert said.splitlines()[-1] == "KeyboardInterrupt"
+        assert said.count("Traceback") == 1, "only of the program itself"
+        until(lambda: gone(started), "all processes ended")
+        assert [path for path in private_tmp.iterdir() if not path.name.startswith("pymp-")] == []
+
+
+@pytest.mark.parametrize("when", ["2", "joined"])
+def test_no_robot_survives_the_kill_of_its_program_not_even_one_that_hangs_or_is_stopped(
+    private_tmp: Path, when: str
+) -> None:
+    with program(private_tmp, 20, ECHO, "small_controllers:Spins") as running:
+        read_until(running, when)
+        started = below(running.pid)
+        server = next(pid for pid in children_of(running.pid) if children_of(pid))
+        statuses = {pid: Path(f"/proc/{pid}/status").read_text() for pid in children_of(server)}
+        with_session = [pid for pid, status in statuses.items() if "\nThreads:\t1\n" not in status]
+        os.kill(with_session[0], signal.SIGSTOP)
+        running.kill()
+        until(lambda: gone(started), "all processes ended")
+
+
+def test_a_controller_that_cannot_be_found_is_one_line_and_no_swarm(private_tmp: Path) -> None:
+    with program(private_tmp, 1, "no_such_module:Robot") as running:
+        _, said = running.communicate(timeout=30)
+    lines = said.splitlines()
+    assert lines[0] == "zwerm: cannot import 'no_such_module': No module named 'no_such_module'"
+    assert lines[-1] == "zwerm.errors.LinkError: node 0 ended with exit code 2 before it joined"
+    assert said.count("Traceback") == 1, "only of the program itself"
+
+
+# --- robots started elsewhere ---------------------------------------------------------------------------------------
+
+
+def certificate(directory: Path) -> Certificate:
+    """Return a new certificate for localhost, signed by itself."""
+    made = Certificate(directory / "cert.pem", directory / "key.pem", directory / "cert.pem")
+    subprocess.run(
+        f"openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 -subj /CN=localhost"
+        f" -addext subjectAltName=DNS:localhost -addext basicConstraints=critical,CA:FALSE"
+        f" -keyout {made.private_key} -out {made.certificate}".split(),
+        check=True,
+        capture_output=True,
+    )
+    return made
+
+
+@pytest.mark.parametrize("place", ["tcp/127.0.0.1", "tls/localhost", "quic/localhost"])
+def test_robots_started_elsewhere_join_over_a_network_and_leave_with_the_world(nothing_left: None, place: str) -> None:
+    directory = Path(tempfile.gettempdir())
+    keys, endpoint = directory / "keys", f"{place}:{free_port()}"
+    tls = None if place.startswith("tcp") else certificate(directory)
+    ticked: list[set[int]] = []
+    errors: list[Exception] = []
+
+    def world() -> None:
+        try:
+            with RemoteSwarm("run", members(3), listen=[endpoint], credentials_file=keys, tls=tls) as swarm:
+                ticked.extend(set(tick(swarm.link, range(3), number)) for number in range(2))
+        except Exception as error:
+            errors.append(error)
+
+    serving = threading.Thread(target=world)
+    serving.start()
+    until(lambda: errors or (keys.exists() and keys.stat().st_size), "credentials written")
+    assert errors == []
+    assert run_robots(endpoint, keys, "0-2", deadline_s=20.0) == {0: 0, 1: 0, 2: 0}
+    serving.join(20.0)
+    assert errors == []
+    assert ticked == [{0, 1, 2}, {0, 1, 2}]
+    assert not keys.exists()
+
+
+def test_a_world_whose_robots_do_not_come_says_which(private_tmp: Path) -> None:
+    swarm = RemoteSwarm(
+        "run",
+        members(3),
+        listen=[f"tcp/127.0.0.1:{free_port()}"],
+        credentials_file=private_tmp / "keys",
+        deadline_s=0.2,
+    )
+    with pytest.raises(LinkError, match=r"^3 nodes did not join within 0.2 s, first node 0$"):
+        swarm.__enter__()
+    assert list(private_tmp.iterdir()) == []
+
+
+def test_a_world_that_cannot_listen_says_so_in_one_line(private_tmp: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        endpoint = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        with pytest.raises(LinkError, match=r"^the world cannot listen: ") as refused:
+            RemoteSwarm("run", members(1), listen=[endpoint], credentials_file=private_tmp / "keys").__enter__()
+    assert "\n" not in str(refused.value)
+    assert list(private_tmp.iterdir()) == []
+
+
+def free_port() -> int:
+    """Return a port of this machine that nobody listens on, for TCP; nearly surely for UDP."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,366 @@
+"""Links: one suite for every implementation, then what only a link between processes can do."""
+
+import contextlib
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from network import NIL, RUN, Network, ask, hello, network
+from support import until
+
+from zwerm.agents.runtime.contract import Setup
+from zwerm.deploy.swarm import LocalSwarm
+from zwerm.errors import LinkError
+from zwerm.link import Answer, Arrival, WorldLink
+from zwerm.link.memory import MemoryLink
+from zwerm.link.world import ExpectedNode
+from zwerm.wire.keys import command_key
+from zwerm.wire.messages import (
+    MESSAGE_BYTES_MAX,
+    Command,
+    Goodbye,
+    Observation,
+    Packet,
+    Welcome,
+    decode_to_node,
+    decode_welcome,
+    encode,
+    open_answer,
+)
+
+NODES = range(3)
+Open = Callable[[Answer], WorldLink]
+
+
+@pytest.fixture(params=["memory", "zenoh"])
+def open_link(request: pytest.FixtureRequest, private_tmp: Path) -> Iterator[Open]:
+    """Open the world's end of a link to three nodes, each of which is a function from message to message."""
+    with contextlib.ExitStack() as stack:
+
+        def open_memory(answer: Answer) -> WorldLink:
+            return MemoryLink(dict.fromkeys(NODES, answer))
+
+        def open_zenoh(answer: Answer) -> WorldLink:
+            net = stack.enter_context(network(private_tmp))
+            for number in NODES:
+                node = stack.enter_context(contextlib.closing(net.node(number)))
+                node.join()
+                node.listen(lambda payload, send=node.send: send(answer(payload)))
+            return net.link
+
+        yield open_memory if request.param == "memory" else open_zenoh
+
+
+def take(link: WorldLink, count: int) -> dict[int, list[bytes]]:
+    """Receive `count` messages, and return them by node in the order received."""
+    taken: dict[int, list[bytes]] = {node: [] for node in NODES}
+    for _ in range(count):
+        arrival = link.receive(20.0)
+        assert arrival is not None
+        assert arrival.payload is not None
+        taken[arrival.node].append(arrival.payload)
+    return taken
+
+
+def test_thousands_of_messages_arrive_in_the_order_of_each_node_and_exactly_once(open_link: Open) -> None:
+    link = open_link(lambda payload: b"answer " + payload)
+    count = 2_000
+    for number in range(count):
+        for node in NODES:
+            link.send(node, f"{node} {number}".encode())
+    taken = take(link, count * len(NODES) // 2)
+    while sum(map(len, taken.values())) < count * len(NODES):
+        for node, payload in link.receive_many(100, 20.0):
+            assert payload is not None
+            taken[node].append(payload)
+    for node in NODES:
+        assert taken[node] == [f"answer {node} {number}".encode() for number in range(count)]
+    assert link.receive(0.05) is None
+
+
+@pytest.mark.parametrize("size", [0, 1, 65_000, 65_535, MESSAGE_BYTES_MAX, 5 * MESSAGE_BYTES_MAX])
+def test_a_message_of_any_size_arrives_as_it_was_sent(open_link: Open, size: int) -> None:
+    link = open_link(lambda payload: payload[::-1])
+    payload = bytes(number % 251 for number in range(size))
+    for node in NODES:
+        link.send(node, payload)
+    assert take(link, len(NODES)) == {node: [payload[::-1]] for node in NODES}
+
+
+def test_without_messages_receive_returns_none(open_link: Open) -> None:
+    link = open_link(bytes)
+    assert link.receive_many(1, 0.05) == []
+    assert link.receive(0.0) is None
+    assert link.receive(0.05) is None
+
+
+def test_closing_twice_is_closing_once(open_link: Open) -> None:
+    link = open_link(bytes)
+    link.send(0, b"x")
+    link.close()
+    link.close()
+
+
+# --- between processes ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def net(private_tmp: Path) -> Iterator[Network]:
+    with network(private_tmp) as opened:
+        yield opened
+
+
+def test_receive_waits_as_long_as_it_is_told_even_after_a_longer_wait(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    threading.Timer(0.1, node.send, [b"x"]).start()
+    assert net.link.receive(60.0) == Arrival(0, b"x")
+    began_s = time.monotonic()
+    assert net.link.receive(0.2) is None
+    assert 0.2 <= time.monotonic() - began_s < 2.0
+    node.close()
+
+
+def test_many_are_received_once_enough_have_arrived_or_a_node_is_lost(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    for number in range(3):
+        threading.Timer(0.02 * number, node.send, [bytes([number])]).start()
+    assert net.link.receive_many(3, 60.0) == [Arrival(0, bytes([number])) for number in range(3)]
+    began_s = time.monotonic()
+    assert net.link.receive_many(1, 0.1) == []
+    assert 0.1 <= time.monotonic() - began_s < 2.0
+    node.send(b"last words")
+    threading.Timer(0.1, node.close).start()
+    assert net.link.receive_many(3, 60.0) == [Arrival(0, b"last words"), Arrival(0, None)]
+    assert time.monotonic() - began_s < 30.0
+    assert net.link.receive_many(1, 0.1) == [], "a loss hurries once"
+
+
+def test_a_node_that_sends_more_than_anybody_takes_is_held_back(
+    private_tmp: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("zwerm.link.world.CAPACITY", 10)
+    sent = [str(number).encode() for number in range(100)]
+    with network(private_tmp) as net:
+        node = net.node(0)
+        node.join()
+        for payload in sent:
+            node.send(payload)
+        until(lambda: len(net.link._arrivals) == 10, "full")
+        assert [net.link.receive(20.0) for _ in sent] == [Arrival(0, payload) for payload in sent]
+        assert net.link.receive(0.0) is None
+        node.close()
+
+
+def test_a_closed_link_says_so(net: Network) -> None:
+    net.link.close()
+    with pytest.raises(LinkError, match=r"^the world's link is closed"):
+        net.link.receive(1.0)
+
+
+HELLOS = {
+    b"": "malformed",
+    b"\xc1": "malformed",
+    hello(0) + b"\x00": "malformed",
+    hello(0)[:-1]: "malformed",
+    b"\x80": "schema",
+    hello(0).replace(b"hello/1", b"hello/2"): "version",
+    encode(Command()): "schema",
+    encode(Goodbye("x")): "not-joined",
+    hello(1): "identity",
+    hello(-1): "identity",
+    hello(0, 2): "incarnation",
+    hello(0, 0): "incarnation",
+}
+
+
+def test_a_hello_that_is_wrong_is_refused_for_its_reason_and_counted(net: Network) -> None:
+    session = net.session(net.credentials.nodes[0])
+    for payload, reason in HELLOS.items():
+        net.link.refused.clear()
+        assert [decode_welcome(answer) for answer in ask(session, 0, payload)] == [Welcome(refused=reason)], payload
+        assert net.link.refused == {reason: 1}
+    assert net.link.joined == frozenset()
+    assert [decode_welcome(answer).refused for answer in ask(session, 0, hello(0))] == [""]
+    assert net.link.joined == {0}
+    assert [decode_welcome(answer).refused for answer in ask(session, 0, hello(0))] == ["joined"]
+    session.close()
+
+
+def test_a_node_that_is_not_expected_is_refused(private_tmp: Path) -> None:
+    with network(private_tmp, members={0: ExpectedNode(1, "nobody", NIL)}) as net:
+        node = net.node(1)
+        with pytest.raises(LinkError, match=r"^node 1 at unixsock-stream/.*: the world refuses it: unknown$"):
+            node.join()
+        node.close()
+        assert net.link.refused == {"unknown": 1}
+
+
+def test_a_command_from_a_node_that_has_not_joined_is_counted_and_not_heard(net: Network) -> None:
+    session = net.session(net.credentials.nodes[0])
+    session.put(command_key(RUN, 0), b"early")
+    ask(session, 0, hello(0, 9))  # answered after the command has arrived
+    assert net.link.receive(0.0) is None
+    assert net.link.refused == {"not-joined": 1, "incarnation": 1}
+    ask(session, 0, hello(0))
+    session.put(command_key(RUN, 0), b"later")
+    assert net.link.receive(20.0) == Arrival(0, b"later")
+    session.close()  # type: ignore[no-untyped-call]
+
+
+def test_a_node_that_has_not_joined_cannot_hold_up_the_world(net: Network) -> None:
+    session = net.session(net.credentials.nodes[0])
+    over = threading.Event()
+
+    def flood() -> None:
+        while not over.is_set():
+            session.put(command_key(RUN, 0), b"let me in")
+
+    flooding = threading.Thread(target=flood)
+    flooding.start()
+    began_s = time.monotonic()
+    assert net.link.receive(0.2) is None
+    assert time.monotonic() - began_s < 5.0
+    over.set()
+    flooding.join()
+    assert net.link.refused["not-joined"] > 0
+    session.close()  # type: ignore[no-untyped-call]
+
+
+def test_what_is_sent_while_a_node_is_still_joining_is_not_lost(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    for number in range(100):
+        net.link.send(0, bytes([number]))
+    heard: list[bytes] = []
+    done = threading.Event()
+    node.listen(lambda payload: (heard.append(payload), done.set() if len(heard) == 100 else None))
+    assert done.wait(20.0)
+    assert heard == [bytes([number]) for number in range(100)]
+    node.close()
+
+
+def test_zenoh_s_threads_keep_what_python_knows_of_them_from_one_message_to_the_next(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    own, threads, counts = threading.local(), set(), []
+
+    def count(payload: bytes) -> None:
+        own.count = getattr(own, "count", 0) + 1
+        threads.add(threading.get_ident())
+        counts.append(own.count)
+
+    node.listen(count)
+    for _ in range(200):
+        net.link.send(0, b"x")
+    until(lambda: len(counts) == 200, "200 messages")
+    assert counts.count(1) == len(threads) < 200
+    node.close()
+
+
+def test_a_dismissed_node_hears_goodbye_and_its_leaving_is_no_loss(net: Network) -> None:
+    node, other = net.node(0), net.node(1)
+    node.join()
+    other.join()
+    net.link.dismiss("enough")
+    payload = node.receive(20.0)
+    assert payload is not None
+    assert decode_to_node(payload) == Goodbye("enough")
+    node.close()
+    assert net.link.wait_joined(lambda joined: set(joined) == {1}, 20.0)
+    other.send(b"last words")
+    assert net.link.receive(20.0) == Arrival(1, b"last words")
+    assert net.link.receive(0.0) is None
+    other.close()
+
+
+def test_a_node_that_takes_leave_has_been_heard_out_and_its_place_is_free_again(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    for number in range(500):
+        node.send(str(number).encode())
+    assert node.take_leave("tired", 20.0)
+    node.close()
+    for number in range(500):
+        assert net.link.receive(20.0) == Arrival(0, str(number).encode())
+    assert net.link.receive(20.0) == Arrival(0, None)
+    again = net.node(1)
+    again.join()
+    with pytest.raises(LinkError, match=r"^node 1 is still joined as incarnation 1$"):
+        net.link.expect(1, ExpectedNode(2, "nobody", NIL))
+    net.link.expect(0, ExpectedNode(2, "nobody", NIL))
+    stale = net.node(0)
+    with pytest.raises(LinkError, match="refuses it: incarnation"):
+        stale.join()
+    stale.close()
+    again.close()
+
+
+def test_a_node_learns_that_the_world_is_gone(private_tmp: Path) -> None:
+    gone = threading.Event()
+    with network(private_tmp) as net:
+        node = net.node(0, on_lost=gone.set)
+        node.join()
+    assert gone.wait(20.0)
+    node.close()
+
+
+def test_a_message_that_is_far_too_long_is_not_even_put_together(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    node.send(bytes(20 * MESSAGE_BYTES_MAX))
+    node.send(b"short")
+    assert net.link.receive(20.0) == Arrival(0, b"short")
+    node.close()
+
+
+def echo_swarm(count: int) -> LocalSwarm:
+    members = {node: ("small_controllers:Echo", Setup(node, "robot", 0.1, (), bytes(16))) for node in range(count)}
+    return LocalSwarm(RUN, members)
+
+
+def said(link: WorldLink, node: int, tick: int) -> Arrival | None:
+    """Send the node an observation, and return what arrives next."""
+    link.send(node, encode(Observation(tick, 0.0, (Packet("a", b"x"),))))
+    return link.receive(20.0)
+
+
+def test_a_killed_process_is_reported_promptly_and_comes_back_as_a_new_incarnation(nothing_left: None) -> None:
+    with echo_swarm(3) as swarm:
+        assert said(swarm.link, 1, 0) is not None
+        began_s = time.monotonic()
+        swarm.supervisor.kill(1)
+        assert swarm.link.receive(20.0) == Arrival(1, None)
+        assert time.monotonic() - began_s < 2.0
+        assert swarm.link.joined == {0, 2}
+        assert swarm.supervisor.exit_codes == {1: -signal.SIGKILL}
+        swarm.restart(1)
+        answer = said(swarm.link, 1, 7)
+        assert answer is not None
+        assert answer.payload is not None
+        assert open_answer(answer.payload).tick == 7
+        swarm.restart(2)
+        assert swarm.link.receive(20.0) == Arrival(2, None)
+        assert swarm.link.refused == {}
+    assert set(swarm.supervisor.exit_codes.values()) == {0}
+
+
+def test_a_stopped_process_is_not_lost_and_answers_when_it_goes_on(nothing_left: None) -> None:
+    with echo_swarm(2) as swarm:
+        swarm.supervisor.send_signal(0, signal.SIGSTOP)
+        status = Path(f"/proc/{swarm.supervisor.pids[0]}/status")
+        until(lambda: "\nState:\tT" in status.read_text(), "stopped")
+        swarm.link.send(0, encode(Observation(3, 0.0)))
+        answer = said(swarm.link, 1, 3)
+        assert answer is not None
+        assert answer.node == 1
+        assert swarm.link.receive(0.1) is None
+        swarm.supervisor.send_signal(0, signal.SIGCONT)
+        answer = swarm.link.receive(20.0)
+        assert answer is not None
+        assert answer.node == 0
+        assert answer.payload is not None

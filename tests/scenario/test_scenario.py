@@ -1,0 +1,203 @@
+"""Scenarios: what is read, what an override changes, and the exact line for every kind of mistake."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from zwerm.errors import ScenarioError
+from zwerm.scenario.tables import built_in, load, locate
+
+GOOD = """
+[arena]
+size_m = [3, 2.5]
+[robots]
+count = 5
+controller = "computation-free"
+[[robots.sensors]]
+kind = "line_of_sight"
+range_m = 2.0
+"""
+
+
+def written(folder: Path, text: str, name: str = "trial.toml") -> str:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def mistakes_of(path: str, *overrides: str) -> list[str]:
+    with pytest.raises(ScenarioError) as caught:
+        load(path, overrides)
+    assert str(caught.value) == "\n".join(caught.value.mistakes)
+    return [line.removeprefix(f"{path}: ") for line in caught.value.mistakes]
+
+
+def test_a_scenario_is_named_after_its_file_and_its_paths_start_there(tmp_path: Path) -> None:
+    scenario = load(written(tmp_path, GOOD, "Office_2.toml"))
+    assert scenario.name == "Office_2"
+    assert scenario.folder == tmp_path
+    assert scenario.place == str(tmp_path / "Office_2.toml")
+    assert scenario.arena.size_m == (3.0, 2.5)
+    assert scenario.robots.sensors[0].kind == "line_of_sight"
+    assert scenario.robots.sensors[0].parameters == {"range_m": 2.0}
+    assert scenario.time.dt_s == 0.1
+
+
+def test_a_scenario_cannot_be_changed_once_it_is_read(tmp_path: Path) -> None:
+    scenario = load(written(tmp_path, GOOD))
+    with pytest.raises(ValueError, match="frozen"):
+        scenario.robots.count = 6
+
+
+@pytest.mark.parametrize("name", sorted(built_in()))
+def test_every_built_in_scenario_is_without_mistake_and_says_what_it_is(name: str) -> None:
+    scenario = load(name)
+    assert scenario.name == name
+    assert scenario.summary
+
+
+# --- mistakes, each with its exact line -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("assignment", "line"),
+    [
+        ('robots.count="25"', 'robots.count: expected an integer, got "25"'),
+        ("robots.count=many", 'robots.count: expected an integer, got "many"'),
+        ("robots.count=true", "robots.count: expected an integer, got true"),
+        ("robots.count=2.0", "robots.count: expected an integer, got 2.0"),
+        ("robots.count=0", "robots.count: expected >= 1, got 0"),
+        ("robots.count=200000", "robots.count: expected <= 100000, got 200000"),
+        ("robots.cuont=3", "robots.cuont: unknown key"),
+        ("robots.on_crash=explode", 'robots.on_crash: expected "fail" or "continue", got "explode"'),
+        ("robots.body.radius_m=-0.1", "robots.body.radius_m: expected > 0, got -0.1"),
+        ("robots.body.collide=1", "robots.body.collide: expected true or false, got 1"),
+        ("robots.body=car", 'robots.body: expected a table, got "car"'),
+        ("robots.parameters=3", "robots.parameters: expected a table, got 3"),
+        ("robots.sensors=3", "robots.sensors: expected an array, got 3"),
+        ("robots.sensors.0.kind=3", "robots.sensors.0.kind: expected a string, got 3"),
+        ("robots.sensors=[{noise_rad=1}]", "robots.sensors.0.kind: required, and missing"),
+        ("robots.placement.poses=[[1, 2]]", "robots.placement.poses.0: expected 3 items, got [1, 2]"),
+        ("robots.placement.poses=[[1, 2, true]]", "robots.placement.poses.0.2: expected a number, got true"),
+        ("time.dt_s=fast", 'time.dt_s: expected a number, got "fast"'),
+        ("time.dt_s=true", "time.dt_s: expected a number, got true"),
+        ("time.dt_s=inf", "time.dt_s: expected a finite number, got Infinity"),
+        ("time.dt_s=2026-01-01", 'time.dt_s: expected a number, got "2026-01-01"'),
+        ("arena.size_m=[3]", "arena.size_m: expected 2 items, got [3]"),
+        ("arena.size_m=[]", "arena.size_m: expected 2 items, got []"),
+        ("arena.size_m=[3, 3, 3]", "arena.size_m: expected 2 items, got [3, 3, 3]"),
+        ("arena.size_m=3", "arena.size_m: expected an array, got 3"),
+        ("arena.size_m=[3, nan]", "arena.size_m.1: expected a finite number, got NaN"),
+        ("arena.walls=[[[0, 0]]]", "arena.walls.0: expected 2 items at least, got [[0, 0]]"),
+        ("metrics.cells=[5, 0]", "metrics.cells.1: expected >= 1, got 0"),
+        ("folder=elsewhere", "folder: unknown key"),
+        ("summary=5", "summary: expected a string, got 5"),
+        ("name=a b", "name: expected letters, digits, '.', '_' and '-', and no sign first, got \"a b\""),
+        (
+            "robots.inflow={every_s = 1, entry_m = [1, 0, 0, 1]}",
+            "robots.inflow.entry_m: expected [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax, "
+            "got [1, 0, 0, 1]",
+        ),
+        (f"robots.controller={list(range(99))}", None),
+    ],
+)
+def test_a_mistake_is_one_line_with_its_place_the_rule_and_the_value(
+    tmp_path: Path, assignment: str, line: str | None
+) -> None:
+    found = mistakes_of(written(tmp_path, GOOD), assignment)
+    if line is None:
+        line = f"robots.controller: expected a string, got {str(list(range(99)))[:60]}..."
+    assert found == [line]
+
+
+def test_every_mistake_of_a_file_is_reported_at_once(tmp_path: Path) -> None:
+    text = "[time]\ndt_s = 0\nspeed = 1\n[robots]\ncount = -1\n[robots.body]\nmass_kg = 'heavy'\n"
+    assert mistakes_of(written(tmp_path, text)) == [
+        "time.dt_s: expected > 0, got 0",
+        "time.speed: unknown key",
+        "arena: required, and missing",
+        "robots.count: expected >= 1, got -1",
+        "robots.controller: required, and missing",
+        'robots.body.mass_kg: expected a number, got "heavy"',
+    ]
+
+
+def test_a_file_that_is_not_toml_is_one_line(tmp_path: Path) -> None:
+    (line,) = mistakes_of(written(tmp_path, "[arena\n"))
+    assert line.startswith("not TOML: ")
+    assert "line 1" in line
+    path = tmp_path / "latin.toml"
+    path.write_bytes(b'summary = "\xe9"\n')
+    (line,) = mistakes_of(str(path))
+    assert line.startswith("not TOML: ")
+
+
+def test_an_unknown_scenario_is_one_line_with_the_known_ones() -> None:
+    with pytest.raises(ScenarioError) as caught:
+        locate("computation-fee")
+    (line,) = caught.value.mistakes
+    assert line.startswith("computation-fee: expected a scenario file or the name of a built-in one; built in are ")
+    assert "computation-free" in line
+    with pytest.raises(ScenarioError) as caught:
+        locate("gone.toml")
+    assert caught.value.mistakes == ["gone.toml: expected a scenario file or the name of a built-in one"]
+
+
+# --- overrides ------------------------------------------------------------------------------------------------------
+
+
+def test_an_override_is_toml_or_else_a_bare_string(tmp_path: Path) -> None:
+    path = written(tmp_path, GOOD)
+    scenario = load(
+        path,
+        (
+            "robots.count=7",
+            "robots.controller=my_file:Mine",
+            'summary="quoted = text"',
+            "robots.sensors.0.range_m=1.5",
+            "robots.body.kind=holonomic",
+            "radio={range_m = 2, anonymous = true}",
+            " time.dt_s = 0.05",
+        ),
+    )
+    assert scenario.robots.count == 7
+    assert scenario.robots.controller == "my_file:Mine"
+    assert scenario.summary == "quoted = text"
+    assert scenario.robots.sensors[0].parameters == {"range_m": 1.5}
+    assert scenario.robots.body.kind == "holonomic"
+    assert scenario.radio is not None
+    assert scenario.radio.anonymous
+    assert scenario.time.dt_s == 0.05
+    assert load(path).robots.count == 5
+
+
+@pytest.mark.parametrize(
+    ("assignment", "line"),
+    [
+        ("robots.count", "--set robots.count: expected path=value"),
+        ("=3", "--set =3: expected path=value"),
+        (
+            "robots.sensors.1.kind=pose",
+            "--set robots.sensors.1.kind=pose: robots.sensors.1: expected an index below 1, got 1",
+        ),
+        (
+            "robots.sensors.first=pose",
+            "--set robots.sensors.first=pose: robots.sensors.first: expected an index below 1, got first",
+        ),
+        ("arena.size_m.0.x=3", "--set arena.size_m.0.x=3: arena.size_m.0 is no table"),
+        ("robots.count.x.y=3", "--set robots.count.x.y=3: robots.count.x is in no table"),
+    ],
+)
+def test_an_override_that_leads_nowhere_is_one_line(tmp_path: Path, assignment: str, line: str) -> None:
+    path = written(tmp_path, GOOD)
+    with pytest.raises(ScenarioError) as caught:
+        load(path, (assignment,))
+    assert caught.value.mistakes == [line]
+
+
+def test_the_scenario_is_read_without_the_world() -> None:
+    heavy = "import sys, zwerm.scenario.tables; print([m for m in ('numpy', 'pymunk', 'shapely') if m in sys.modules])"
+    run = subprocess.run([sys.executable, "-c", heavy], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"

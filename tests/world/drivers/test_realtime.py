@@ -1,0 +1,96 @@
+"""In real time nobody is waited for: not for a program that starts, and not for one that hangs."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections import Counter
+from pathlib import Path
+
+from support import ROOT, ZWERM, scenario, until
+
+from zwerm.agents.runtime.node import Node
+from zwerm.deploy.node_specs import cast, recast
+from zwerm.deploy.runtime_directory import private_directory
+from zwerm.deploy.swarm import LocalSwarm
+from zwerm.link.memory import MemoryLink
+from zwerm.run.assembly import assemble
+from zwerm.run.runner import new_run_id
+from zwerm.world.drivers.realtime import OWED_MAX, RealTime
+from zwerm.world.world import World
+
+SOON_S = 30.0
+
+
+def test_the_world_goes_on_while_a_program_starts_and_observes_it_once_it_has() -> None:
+    chosen = scenario(faults=[{"kind": "restart", "nodes": [1], "at_s": 0.5}], time={"duration_s": 4.0})
+    world = assemble(chosen, 1)
+    link = MemoryLink(
+        {node: Node(*played).answer for node, played in cast(chosen, 1).items()},
+        lambda node, life: Node(*recast(chosen, 1, node, life)).answer,
+    )
+    tick_15, started, observed = threading.Event(), threading.Event(), Counter[int]()
+    start, send = link.start, link.send
+    waited: list[bool] = []
+
+    def start_when_the_world_has_gone_on(node: int) -> None:
+        waited.append(tick_15.wait(SOON_S))
+        start(node)
+        started.set()
+
+    def counted(node: int, payload: bytes) -> None:
+        observed[node] += 1
+        send(node, payload)
+
+    def on_tick(world: World) -> None:
+        if world.tick == 15:
+            assert observed[1] == 5, "a program that does not run yet is not observed"
+            tick_15.set()
+        elif world.tick == 20:
+            assert started.wait(SOON_S)
+
+    link.start, link.send = start_when_the_world_has_gone_on, counted  # type: ignore[method-assign]
+    assert RealTime(world, link, 20.0, on_tick, link).run() == "time-limit"
+    assert waited == [True]
+    assert world.lives.ever == {"crashed": [1], "restarted": [1]}
+    assert 5 < observed[1] <= 40 - 10
+    assert observed[0] == 40
+
+
+def test_a_hung_robot_is_sent_no_more_than_it_can_owe_and_is_observed_again_when_it_goes_on(nothing_left: None) -> None:
+    chosen = scenario(time={"dt_s": 0.01, "duration_s": 2.0})
+    with LocalSwarm(new_run_id(), cast(chosen, 1), paced=True) as swarm:
+        world, observed = assemble(chosen, 1), Counter[int]()
+        send = swarm.link.send
+
+        def counted(node: int, payload: bytes) -> None:
+            observed[node] += 1
+            send(node, payload)
+
+        def on_tick(world: World) -> None:
+            if world.tick == 10:
+                swarm.pause(2)
+            elif world.tick == 120:
+                assert observed[2] <= 10 + OWED_MAX
+                swarm.resume(2)
+
+        swarm.link.send = counted  # type: ignore[method-assign]
+        driver = RealTime(world, swarm.link, 1.0, on_tick, swarm)
+        assert driver.run() == "time-limit"
+        assert observed[0] == observed[1] == observed[3] == 200
+        assert 10 + OWED_MAX < observed[2] < 200
+        assert driver.deadman_stops >= 1
+
+
+def test_what_a_killed_world_leaves_the_next_run_removes_and_a_living_ones_it_does_not(private_tmp: Path) -> None:
+    command = [sys.executable, *ZWERM, "run", "beacon-twin", "--realtime", "1", "--json"]
+    with subprocess.Popen(command, env=os.environ | {"PYTHONPATH": str(ROOT)}) as world:
+        until(lambda: list(private_tmp.glob("zwerm-*/router")), "the world listens")
+        with private_directory() as own:
+            assert len(list(private_tmp.glob("zwerm-*"))) == 2, "the other one is held"
+            os.kill(world.pid, signal.SIGKILL)
+            world.wait()
+            with private_directory() as another:
+                assert sorted(private_tmp.glob("zwerm-*")) == sorted([own, another])
+    assert list(private_tmp.glob("zwerm-*")) == []

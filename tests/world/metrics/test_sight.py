@@ -1,0 +1,188 @@
+"""What a swarm sees, against areas known by hand."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from shapely.geometry import LineString
+
+from zwerm.run.result import RunResult
+from zwerm.run.runner import run
+from zwerm.scenario.tables import ArenaTable
+from zwerm.view.snapshots import stages
+from zwerm.world.arena.arena import Arena
+from zwerm.world.metrics.measures import deployment_cycles
+from zwerm.world.metrics.sight import SeenArea, hexagonal_packing_robots, holes, obstacles, reachable
+from zwerm.world.tick.telemetry import TelemetryRecord
+
+
+def arena(**table: object) -> Arena:
+    return Arena.from_table(ArenaTable.model_validate(table), Path())
+
+
+def test_a_disc_in_an_open_hall_covers_its_area() -> None:
+    found = SeenArea(arena(size_m=[10.0, 10.0]), 1.0).fraction(np.array([[5.0, 5.0]]))
+    assert found == pytest.approx(math.pi / 100.0, rel=1e-3)
+
+
+def test_what_is_behind_a_wall_is_not_covered() -> None:
+    hall = arena(size_m=[2.0, 2.0], walls=[[[1.0, 0.0], [1.0, 2.0]]])
+    assert SeenArea(hall, 9.0).fraction(np.array([[0.5, 1.0]])) == pytest.approx(0.5, abs=1e-6)
+    assert SeenArea(hall, 9.0).fraction(np.array([[0.5, 1.0], [1.5, 1.0]])) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_what_lies_behind_a_crack_that_no_body_passes_cannot_be_reached_and_corners_can() -> None:
+    """A room of 2 x 2 m, and beyond a crack another of 1 x 2 m; the way there is 0.1 m wide and 0.5 m long."""
+    rooms = arena(
+        polygon=[
+            [0, 0],
+            [2, 0],
+            [2, 0.95],
+            [2.5, 0.95],
+            [2.5, 0],
+            [3.5, 0],
+            [3.5, 2],
+            [2.5, 2],
+            [2.5, 1.05],
+            [2, 1.05],
+            [2, 2],
+            [0, 2],
+        ]
+    )
+    here = np.array([[1.0, 1.0]])
+    assert reachable(rooms, 0.07, here).area == pytest.approx(4.0, abs=0.005)
+    assert reachable(rooms, 0.04, here).area == pytest.approx(rooms.area_m2, abs=0.005)
+    assert reachable(rooms, 0.07, np.array([[1.0, 1.0], [3.0, 1.0]])).area == pytest.approx(6.0, abs=0.01)
+    cut = arena(size_m=[2.0, 2.0], walls=[[[1.0, 0.0], [1.0, 2.0]]])
+    assert reachable(cut, 0.07, np.array([[0.5, 1.0]])).area == pytest.approx(2.0, abs=0.005)
+
+
+def test_the_shadow_of_an_obstacle_is_that_of_a_lamp() -> None:
+    """From (1, 2), a square that spans 1 m across at 1 m away hides a wedge: 2 at the near side, the rest by similarity."""
+    hall = arena(size_m=[4.0, 4.0], obstacles=[[[2.0, 1.5], [3.0, 1.5], [3.0, 2.5], [2.0, 2.5]]])
+    # The wedge between the rays through the near corners, x from 2 to 4, less the square itself.
+    hidden = (1.0 + 3.0) / 2.0 * 2.0 - 1.0
+    found = SeenArea(hall, 20.0).fraction(np.array([[1.0, 2.0]]))
+    assert found == pytest.approx(1.0 - hidden / 15.0, abs=1e-6)
+
+
+def test_a_robot_that_nearly_touches_a_wall_sees_nothing_beyond_it() -> None:
+    hall = arena(size_m=[4.0, 4.0], walls=[[[0.0, 2.0], [4.0, 2.0]]])
+    assert SeenArea(hall, 20.0).fraction(np.array([[2.0, 1.999]])) == pytest.approx(0.5, abs=1e-3)
+
+
+def test_the_ideal_packing_is_the_mean_over_many_ways_to_lay_it() -> None:
+    hall = arena(size_m=[9.0, 7.5])
+    random = np.random.default_rng(3)
+    rows = np.stack(np.meshgrid(np.arange(-20, 20), np.arange(-20, 20)), axis=-1).reshape(-1, 2)
+    lattice = rows @ np.array([[1.0, 0.0], [0.5, math.sqrt(0.75)]])
+    counts = []
+    for _ in range(400):
+        angle = random.uniform(0.0, math.pi)
+        turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+        points = (lattice + random.uniform(0.0, 1.0, 2)) @ turn + (4.5, 3.75)
+        counts.append(hall.contains(points).sum())
+    assert hexagonal_packing_robots(hall, 1.0) == pytest.approx(np.mean(counts), rel=0.01)
+
+
+def test_holes_are_those_of_the_complex_and_obstacles_those_of_the_arena() -> None:
+    ring = np.array([[0, 1], [1, 2], [2, 3], [0, 3]])
+    assert holes(ring, np.arange(4)) == 1
+    assert holes(ring, np.arange(3)) == 0
+    assert obstacles(arena(size_m=[4.0, 4.0], obstacles=[[[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]])) == 1
+
+
+def test_the_complex_of_a_run_can_be_drawn_at_any_cycle(tmp_path: Path) -> None:
+    settings = ["arena.size_m=[2.2,1.6]", "base.pose=[0.2,0.8,0.0]", "robots.count=14"]
+    result = run("sensor-coverage", runner="inline", overrides=settings)
+    told = stages(result.told)
+    assert [each.cycle for each in told] == list(range(1, int(result.metrics["deployment_cycles"]) + 1))
+    assert len(told[1].frontier)
+    assert not len(told[-1].frontier)
+    assert result.picture(tmp_path / "complex.png", cycle=2).stat().st_size > 5_000
+
+
+# --- the metrics of a deployment, each by another way than the one it is computed by -------------------------------
+
+
+@pytest.fixture(scope="module")
+def deployed() -> RunResult:
+    pillar = "arena.obstacles=[[[1.5,1.0],[2.3,1.0],[2.3,1.8],[1.5,1.8]]]"
+    settings = ["arena.size_m=[3.4,2.8]", "base.pose=[0.2,1.4,0.0]", "robots.count=40", pillar, "metrics.every_s=1.0"]
+    result = run("sensor-coverage", runner="inline", overrides=settings)
+    assert result.outcome == "completed"
+    return result
+
+
+def test_robots_deployed_are_those_in_the_arena_and_the_ideal_is_area_over_hexagons(deployed: RunResult) -> None:
+    found = deployed.metrics
+    assert found["robots_deployed"] == deployed.history.arrays().present[-1].sum() == 1 + found["robots_released"]
+    assert found["hexagonal_packing_robots"] == pytest.approx((3.4 * 2.8 - 0.8 * 0.8) * 2.0 / math.sqrt(3.0))
+    assert found["robots_over_hexagonal"] == found["robots_deployed"] / found["hexagonal_packing_robots"]
+
+
+def test_holes_are_what_another_library_finds_in_the_true_complex(deployed: RunResult) -> None:
+    gudhi = pytest.importorskip("gudhi")
+    tracks = deployed.history.arrays()
+    here = tracks.position[-1][tracks.present[-1]]
+    pillar = LineString([(1.5, 1.0), (2.3, 1.0), (2.3, 1.8), (1.5, 1.8), (1.5, 1.0)])
+    tree = gudhi.SimplexTree()
+    for i in range(len(here)):
+        tree.insert([i])
+        for j in range(i):
+            if math.dist(here[i], here[j]) <= 1.0 and not LineString([here[i], here[j]]).crosses(pillar):
+                tree.insert([i, j])
+    tree.expansion(3)
+    tree.compute_persistence(homology_coeff_field=2, persistence_dim_max=True)
+    assert deployed.metrics["holes"] == tree.betti_numbers()[1] == deployed.metrics["obstacles"] == 1.0
+
+
+def test_cycles_are_those_told_of_and_ticks_and_messages_are_shared_out_among_them(deployed: RunResult) -> None:
+    found = deployed.metrics
+    assert found["deployment_cycles"] == stages(deployed.told)[-1].cycle
+    assert found["ticks_per_cycle_mean"] == deployed.ticks / found["deployment_cycles"]
+    sent = sum(sum(channel["messages"]) for channel in deployed.radio["channels"].values())
+    assert found["messages_per_cycle_mean"] == sent / found["deployment_cycles"]
+    assert 0.0 <= found["redundant_robots"] < found["robots_deployed"]
+
+
+def test_cycles_are_counted_over_all_lives_of_who_tells_of_them() -> None:
+    def cycles(*told: dict[str, Any]) -> float:
+        nowhere, nobody = np.zeros((0, 2)), np.zeros(0, dtype=np.bool_)
+        return deployment_cycles([TelemetryRecord(0, 0.0, 3, each, nowhere, nobody) for each in told])[
+            "deployment_cycles"
+        ]
+
+    def complexes(*numbers: int) -> list[dict[str, Any]]:
+        return [{"complex": {"cycle": number}} for number in numbers]
+
+    assert cycles(*complexes(1, 2, 3), {"deployment_cycles": 3}) == 3.0
+    assert cycles(*complexes(1, 2, 3, 1, 2), {"deployment_cycles": 2}) == 3.0 + 2.0
+    assert cycles(*complexes(1, 1, 1, 2)) == 1.0 + 1.0 + 2.0
+    assert cycles(*({"deployment_cycles": number} for number in (1, 2, 2, 5, 1, 4))) == 5.0 + 4.0
+    assert deployment_cycles([]) == {}
+
+
+def test_a_share_of_the_arena_is_in_sight_when_it_is_said_to_be(deployed: RunResult) -> None:
+    found, tracks = deployed.metrics, deployed.history.arrays()
+    times = [found[f"time_to_{percent}_percent_coverage_s"] for percent in (50, 90, 99)]
+    assert times == sorted(times)
+    for percent, time_s in zip((50, 90, 99), times, strict=True):
+        before, after = (
+            SeenArea(deployed.arena, 1.0).fraction(tracks.position[k][tracks.present[k]])
+            for k in (np.searchsorted(tracks.time_s, time_s - 1.0) - 1, np.searchsorted(tracks.time_s, time_s + 1.0))
+        )
+        assert before < percent / 100.0 <= after
+    assert deployed.series["coverage_fraction"][-1] == found["coverage_fraction"]
+    assert deployed.series["robots_deployed"][-1] == found["robots_deployed"]
+
+
+def test_a_share_that_is_never_reached_has_no_time() -> None:
+    settings = ["arena.size_m=[2.2,1.6]", "base.pose=[0.2,0.8,0.0]", "robots.count=14", "time.duration_s=20.0"]
+    found = run("sensor-coverage", runner="inline", overrides=settings).metrics
+    assert found["time_to_50_percent_coverage_s"] < 20.0
+    assert math.isnan(found["time_to_99_percent_coverage_s"])
+    # The coordinator had no time to say how many; the complex that it told of last does.
+    assert found["deployment_cycles"] >= 1.0

@@ -1,0 +1,190 @@
+"""Every packet is accounted for: under any two models, any traffic, sleepers and crashes, on every link at every tick."""
+
+import io
+from collections import Counter
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+from air import DT_S, Radio, ring
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+from support import scenario
+
+from zwerm.cli.radio_table import print_books
+from zwerm.run.runner import run
+from zwerm.wire.messages import Transmission
+from zwerm.world.radio.links import Links
+from zwerm.world.radio.registry import BUILT_IN
+
+MODELS: dict[str, dict[str, Any]] = {
+    "range": {"range_m": 1.2},
+    "line_of_sight": {},
+    "path_loss": {"tx_power_dbm": -50.0},
+    "walls": {"material": "glass", "margin_db": 1.0},
+    "loss": {"fraction": 0.3},
+    "bursts": {"loss_fraction": 0.4, "burst_packets": 3.0},
+    "delay": {"delay_s": 0.05, "jitter_s": 0.2, "distribution": "exponential"},
+    "duplication": {"fraction": 0.5, "copies": 2},
+    "corruption": {"bit_error_rate": 0.02},
+    "rate_limit": {"rate_bytes_s": 60.0, "queue_bytes": 20.0},
+    "collision": {"airtime_s": 0.02},
+}
+WALL = [[50.0, 50.0], [50.0, 60.0]]
+
+
+def table(kind: str, **more: Any) -> dict[str, Any]:
+    return {"kind": kind, **MODELS[kind], **more}
+
+
+def test_every_model_that_exists_is_tried_here() -> None:
+    assert sorted(MODELS) == sorted(BUILT_IN)
+
+
+@pytest.mark.parametrize(("first", "second"), list(product(MODELS, MODELS)))
+def test_the_books_balance_under_every_two_models(first: str, second: str) -> None:
+    radio = Radio(ring(4), [table(first), table(second, senders=[0, 1, 2])], walls=[WALL])
+    outbox = (Transmission("robots", b"broadcast"), Transmission("robots", b"one", to=3))
+    for _ in range(12):  # the medium audits itself at every tick
+        radio.step({0: outbox, 1: outbox[:1], 2: outbox})
+    held_back = radio.medium.summary()
+    summary = radio.all_broadcast(3)
+    for books in (held_back, summary):
+        assert books["sent"] == books["delivered"] + sum(books["dropped"].values()) + books["in_flight"]
+    assert summary["in_flight"] == 0
+    assert summary["sent"] == 12 * (3 * 3 + 2) + 3 * 12 + summary["copies"]
+    assert summary["delivered"] == sum(map(len, radio.received.values()))
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    kinds=st.lists(st.sampled_from(sorted(MODELS)), max_size=4),
+    traffic=st.lists(
+        st.lists(
+            st.tuples(st.integers(0, 4), st.one_of(st.none(), st.integers(0, 4)), st.binary(max_size=20)), max_size=5
+        ),
+        max_size=12,
+    ),
+    asleep=st.sets(st.integers(0, 4)),
+    dies=st.tuples(st.integers(0, 4), st.integers(0, 12), st.integers(0, 12)),
+    seed=st.integers(0, 2**32),
+)
+def test_the_books_balance_whatever_is_sent_and_whoever_sleeps_or_dies(
+    kinds: list[str], traffic: list[Any], asleep: set[int], dies: tuple[int, int, int], seed: int
+) -> None:
+    radio = Radio(ring(5), [table(kind) for kind in kinds], seed, walls=[WALL])
+    node, down_at, up_at = dies
+    sent = 0
+    for number, tick in enumerate(traffic):
+        if number == down_at:
+            radio.medium.switch_off(node, "receiver-crashed")
+        if number == up_at:
+            radio.medium.switch_on(node)
+        outboxes: dict[int, list[Transmission]] = {}
+        for sender, to, payload in tick:
+            if to != sender:
+                outboxes.setdefault(sender, []).append(Transmission("robots", payload, to))
+                sent += 4 if to is None else 1
+        radio.step(outboxes, [each for each in range(5) if each not in asleep])
+    radio.medium.audit()
+    books = radio.medium.summary()
+    assert books["sent"] == sent + books["copies"]
+    assert books["sent"] == books["delivered"] + sum(books["dropped"].values()) + books["in_flight"]
+    assert books["delivered"] == sum(map(len, radio.received.values()))
+
+
+def test_an_audit_finds_a_packet_that_vanishes() -> None:
+    radio = Radio(ring(3))
+    radio.step({0: (Transmission("robots", b"x"),)})
+    radio.medium.channels["robots"].mail.remove_from(0)  # behind the books' back
+    with pytest.raises(
+        AssertionError, match=r"^channel robots: link 0 to 1: the books have 1 packets in flight, the air has 0"
+    ):
+        radio.medium.audit()
+
+
+def test_the_books_by_link_are_sorted_and_add_up_to_the_summary() -> None:
+    radio = Radio(ring(4), [table("loss"), table("duplication")])
+    summary = radio.all_broadcast(50)
+    books = radio.medium.channels["robots"].accounts.by_link()
+    assert list(zip(books["sender"], books["receiver"], strict=True)) == [
+        (a, b) for a in range(4) for b in range(4) if a != b
+    ]
+    assert sum(books["sent"]) == summary["sent"]
+    assert sum(books["delivered"]) == summary["delivered"]
+    assert sum(books["dropped"]["loss"]) == summary["dropped"]["loss"]
+    heard = Counter((packet.sender, node) for node, got in radio.received.items() for _, packet in got)
+    pairs = zip(books["sender"], books["receiver"], strict=True)
+    assert books["delivered"] == [heard[pair] for pair in pairs]
+
+
+def test_the_books_are_a_table_of_every_cause_with_the_links_that_lost_most() -> None:
+    one_way = {"kind": "loss", "fraction": 1.0, "senders": [0], "receivers": [1]}
+    walled = scenario(
+        robots={"count": 3, "controller": "beacon", "sensors": []},
+        radio={"models": [one_way]},
+        faults=[{"kind": "cut", "senders": [2], "receivers": [0], "at_s": 1.0}],
+    )
+    books = run(walled, 1, "inline").radio
+    links = books["channels"]["robots"]["links"]
+    ages = dict(zip(zip(links["sender"], links["receiver"], strict=True), links["age_mean_s"], strict=True))
+    assert ages[0, 1] is None, "nothing was ever delivered"
+    assert ages[1, 0] == pytest.approx(0.1)
+    assert ages[2, 0] > 0.3
+    console = Console(record=True, width=120, file=io.StringIO())
+    print_books(console, books, 2)
+    text = [" ".join(line.split()) for line in console.export_text().splitlines()]
+    assert text[1] == "from to sent delivered loss cut in flight delivered % age mean s age max s"
+    assert text[2].startswith(f"all all 120 {120 - 20 - 10 - 4} 20 10 4 ")
+    assert [line[:14] for line in text[3:5]] == ["0 1 20 0 20 0 ", "2 0 20 10 0 10"]
+    assert text[5:] == ["messages a node: mean 20.0, most 20", "bytes a node: mean 320.0, most 320"]
+
+
+def test_messages_and_bytes_are_counted_once_for_each_sender() -> None:
+    radio = Radio(ring(3))
+    radio.step({0: (Transmission("robots", b"12345"), Transmission("robots", b"1", to=2)), 2: ()})
+    books = radio.medium.channels["robots"].accounts
+    assert books.node_messages.tolist() == [2, 0, 0]
+    assert books.node_bytes.tolist() == [6, 0, 0]
+    assert radio.medium.summary()["bytes"] == 11
+
+
+def test_the_age_of_information_is_what_watching_every_tick_gives() -> None:
+    radio = Radio(ring(3), [table("loss"), table("delay")], seed=5)
+    broadcast = Transmission("robots", b"x")
+    newest: dict[tuple[int, int], int] = {}
+    ages: dict[tuple[int, int], list[int]] = {}
+    sent_tick: dict[tuple[int, int, bytes], int] = {}
+    for tick in range(200):
+        payload = tick.to_bytes(2, "big")
+        outboxes = {} if tick % 3 else {node: (Transmission(broadcast.channel, payload),) for node in range(3)}
+        before = {node: len(got) for node, got in radio.received.items()}
+        for node in outboxes:
+            sent_tick.update({(node, other, payload): tick for other in range(3)})
+        radio.step(outboxes)
+        for node, got in radio.received.items():
+            for _, packet in got[before[node] :]:
+                assert packet.sender is not None
+                link = packet.sender, node
+                newest[link] = max(newest.get(link, -1), sent_tick[packet.sender, node, packet.payload])
+        for link, sent in newest.items():
+            ages.setdefault(link, []).append(tick - sent)
+    found = radio.medium.channels["robots"].accounts.ages_s(200)
+    assert found is not None
+    assert found[0] == pytest.approx(DT_S * np.mean([np.mean(each) for each in ages.values()]))
+    # Looked at just before the next packet came, one tick later than at the tick before.
+    assert found[1] == pytest.approx(DT_S * (max(map(max, ages.values())) + 1))
+
+
+def test_links_are_found_in_a_dense_table_and_in_a_sorted_one_alike() -> None:
+    random = np.random.Generator(np.random.Philox(7))
+    dense, by_key = Links(50), Links(50, dense_nodes_max=0)
+    for _ in range(30):
+        sender, receiver = random.integers(0, 50, (2, 40))
+        a, b = dense.rows(sender, receiver), by_key.rows(sender, receiver)
+        assert (a == b).all()
+        assert (by_key.sender[b] == sender).all()
+        assert (by_key.receiver[b] == receiver).all()
+    assert dense.count == by_key.count

@@ -1,0 +1,59 @@
+"""Sensors as someone outside the project might write them: good ones and broken ones."""
+
+from typing import ClassVar
+
+from zwerm.scenario.tables import Positive, Table
+
+
+class Thermometer:
+    """How far from the left wall, in units of its own."""
+
+    field = "temperature"
+
+    class Parameters(Table):
+        unit_m: Positive
+
+    def __init__(self, parameters, surroundings):
+        self.unit_m = parameters.unit_m
+
+    def read(self, scene, robots):
+        return [(x / self.unit_m,) for x in scene.position[robots, 0].tolist()]
+
+
+class Hygrometer:
+    """Two numbers about nothing."""
+
+    field = "humidity"
+    Parameters: ClassVar[type[Table]] = Table
+
+    def __init__(self, parameters, surroundings):
+        pass
+
+    def read(self, scene, robots):
+        return [(0.5, float(robot)) for robot in robots]
+
+
+class OwnLineOfSight(Hygrometer):
+    """Somebody's replacement of a built-in sensor."""
+
+    field = "line_of_sight"
+
+    def read(self, scene, robots):
+        return [True for _ in robots]
+
+
+class Mailbox(Hygrometer):
+    field = "inbox"
+
+
+class Untyped(Hygrometer):
+    Parameters = dict
+
+
+class Lonely(Hygrometer):
+    def __init__(self):
+        pass
+
+
+class Blind:
+    field = "nothing"

@@ -1,0 +1,175 @@
+"""Sensors from a scenario's tables: the built-in ones, other people's, and every mistake in one line each."""
+
+import sys
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from zwerm.errors import ScenarioError
+from zwerm.scenario.tables import OpenTable
+from zwerm.wire.messages import SENSOR_FIELDS, Observation, decode_observation, encode
+from zwerm.world.fields.field import Linear
+from zwerm.world.sensors import Surroundings
+from zwerm.world.sensors.registry import BUILT_IN, make_sensors
+
+
+@pytest.fixture(autouse=True)
+def _other_peoples_module(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    yield
+    sys.modules.pop("other_peoples", None)
+
+
+@pytest.fixture
+def scene(make_scene):
+    return make_scene([(0.5, 0.5, 0.0), (1.0, 0.5, 1.0), (2.0, 2.0, 2.0)], present=[True, False, True])
+
+
+@pytest.fixture
+def make(scene):
+    def make_all(*tables, **surroundings):
+        around = Surroundings(scene.arena, 3, **surroundings)
+        return make_sensors([OpenTable.model_validate(each) for each in tables], around, "robots.sensors", "x.toml")
+
+    return make_all
+
+
+def mistakes(make, *tables, **surroundings):
+    with pytest.raises(ScenarioError) as caught:
+        make(*tables, **surroundings)
+    return caught.value.mistakes
+
+
+def test_every_built_in_sensor_fills_its_field_with_what_crosses_the_wire(make, scene):
+    landmarks, field = np.array([[1.0, 1.0]]), Linear(0.0, (1.0, 0.0))
+    sensors = make(*({"kind": kind} for kind in BUILT_IN), landmarks=landmarks, field=field)
+    assert {sensor.field for sensor in sensors} == set(SENSOR_FIELDS) - {"extra"}
+    robots = scene.present_ids()
+    readings = {sensor.field: sensor.read(scene, robots) for sensor in sensors}
+    for index in range(2):
+        observation = Observation(tick=0, time_s=0.0, **{name: each[index] for name, each in readings.items()})
+        decoded = decode_observation(encode(observation))
+        assert decoded == observation
+        for name in readings:  # equal, and of the same types: no numpy numbers, no lists
+            assert repr(getattr(decoded, name)) == repr(getattr(observation, name))
+
+
+def test_every_built_in_sensor_reads_nobody_where_nobody_is_asked(make, scene):
+    nobody = np.empty(0, dtype=np.int64)
+    sensors = make(*({"kind": kind} for kind in BUILT_IN), landmarks=np.array([[1.0, 1.0]]), field=Linear(0, (0, 0)))
+    assert [list(sensor.read(scene, nobody)) for sensor in sensors] == [[]] * len(BUILT_IN)
+    scene.present[:] = False
+    assert [list(sensor.read(scene, nobody)) for sensor in sensors] == [[]] * len(BUILT_IN)
+
+
+@pytest.mark.parametrize(
+    ("table", "lines"),
+    [
+        ({"kind": "bearings", "range_m": -1}, ["robots.sensors.0.range_m: expected > 0, got -1"]),
+        ({"kind": "bearings", "range_m": "2"}, ['robots.sensors.0.range_m: expected a number, got "2"']),
+        (
+            {"kind": "touch", "switches": 0, "reach": 0.1, "false_negative": 1.5},
+            [
+                "robots.sensors.0.switches: expected >= 1, got 0",
+                "robots.sensors.0.false_negative: expected <= 1, got 1.5",
+                "robots.sensors.0.reach: unknown key",
+            ],
+        ),
+        (
+            {"kind": "line_of_sight", "false_negative": 0.1, "combined": 0.2},
+            ["robots.sensors.0.combined: expected it alone, or false_negative and false_positive without it, got 0.2"],
+        ),
+        ({"kind": "compass", "sd_rad": float("nan")}, ["robots.sensors.0.sd_rad: expected a finite number, got NaN"]),
+        (
+            {"kind": "landmarks"},
+            ["robots.sensors.0.kind: the landmark sensor needs landmarks, and the scenario has none"],
+        ),
+        ({"kind": "field"}, ["robots.sensors.0.kind: the field sensor needs a field, and the scenario has none"]),
+        (
+            {"kind": "sonar"},
+            [
+                "robots.sensors.0.kind: expected a built-in sensor (bearings, boundary, compass, field, landmarks, "
+                "line_of_sight, neighbours, odometry, pose, touch) or module:Class, got 'sonar'"
+            ],
+        ),
+        (
+            {"kind": "no_such_module:Sensor"},
+            ["robots.sensors.0.kind: cannot import 'no_such_module': No module named 'no_such_module'"],
+        ),
+        (
+            {"kind": "other_peoples:Barometer"},
+            ["robots.sensors.0.kind: module 'other_peoples' has no class 'Barometer'"],
+        ),
+        (
+            {"kind": "other_peoples:Blind"},
+            ["robots.sensors.0.kind: other_peoples:Blind is no sensor: it has no method read(scene, robots)"],
+        ),
+        (
+            {"kind": "other_peoples:Mailbox"},
+            [
+                "robots.sensors.0.kind: other_peoples:Mailbox is no sensor: its `field` must name what it fills, "
+                "got 'inbox'"
+            ],
+        ),
+        (
+            {"kind": "other_peoples:Untyped"},
+            [
+                "robots.sensors.0.kind: other_peoples:Untyped is no sensor: its `Parameters` must be a subclass of "
+                "zwerm.scenario.tables.Table"
+            ],
+        ),
+        (
+            {"kind": "other_peoples:Lonely"},
+            [
+                "robots.sensors.0.kind: other_peoples:Lonely is no sensor: its constructor must take "
+                "(parameters, surroundings)"
+            ],
+        ),
+        (
+            {"kind": "other_peoples:Thermometer", "unit_m": 0},
+            ["robots.sensors.0.unit_m: expected > 0, got 0"],
+        ),
+    ],
+)
+def test_a_mistake_in_a_table_is_one_line(make, table, lines):
+    assert mistakes(make, table) == [f"x.toml: {line}" for line in lines]
+
+
+def test_mistakes_in_several_tables_are_told_at_once(make):
+    assert mistakes(make, {"kind": "pose", "sd_m": -1}, {"kind": "compass"}, {"kind": "sonor:"}) == [
+        "x.toml: robots.sensors.0.sd_m: expected >= 0, got -1",
+        "x.toml: robots.sensors.2.kind: expected a built-in sensor (bearings, boundary, compass, field, landmarks, "
+        "line_of_sight, neighbours, odometry, pose, touch) or module:Class, got 'sonor:'",
+    ]
+
+
+def test_two_sensors_cannot_fill_the_same_field(make):
+    assert mistakes(make, {"kind": "pose"}, {"kind": "bearings"}, {"kind": "pose", "sd_m": 0.1}) == [
+        "x.toml: robots.sensors.2.kind: fills pose, as robots.sensors.0 does, got 'pose'"
+    ]
+    hygrometer = {"kind": "other_peoples:Hygrometer"}
+    assert mistakes(make, hygrometer, hygrometer) == [
+        "x.toml: robots.sensors.1.kind: fills humidity, as robots.sensors.0 does, got 'other_peoples:Hygrometer'"
+    ]
+
+
+def test_other_peoples_sensors_are_gathered_under_their_names(make, scene):
+    sensors = make(
+        {"kind": "other_peoples:Thermometer", "unit_m": 0.5}, {"kind": "compass"}, {"kind": "other_peoples:Hygrometer"}
+    )
+    assert [sensor.field for sensor in sensors] == ["compass_rad", "extra"]
+    readings = sensors[1].read(scene, scene.present_ids())
+    assert readings == [
+        {"temperature": (1.0,), "humidity": (0.5, 0.0)},
+        {"temperature": (4.0,), "humidity": (0.5, 2.0)},
+    ]
+    observation = Observation(tick=0, time_s=0.0, extra=readings[1])
+    assert msgspec.msgpack.decode(encode(observation), type=Observation) == observation
+
+
+def test_somebody_elses_sensor_may_stand_in_for_a_built_in_one(make, scene):
+    (sensor,) = make({"kind": "other_peoples:OwnLineOfSight"})
+    assert sensor.field == "line_of_sight"
+    assert sensor.read(scene, scene.present_ids()) == [True, True]

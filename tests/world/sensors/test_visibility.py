@@ -1,0 +1,151 @@
+"""Who sees whom, against shapely; and that remembering changes nothing but the work."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from shapely.geometry import LineString, MultiLineString, Point
+
+from zwerm.world.arena.arena import Arena
+from zwerm.world.geometry.visibility import Visibility
+from zwerm.world.scene import Bools, Floats
+
+coordinate = st.floats(0.05, 2.95)
+poses = st.lists(st.tuples(coordinate, coordinate, st.just(0.0)), min_size=2, max_size=9)
+sight = st.tuples(st.sampled_from([None, 0.4, 1.0, 2.0]), st.booleans(), st.booleans())
+
+MARGIN_M = 1e-6
+
+
+def judged(scene, range_m, through_walls, robots_occlude):
+    """Return the visible pairs, by shapely; a case too close to call is none."""
+    walls = MultiLineString([segment.reshape(2, 2) for segment in scene.arena.segments])
+    centre = {i: Point(scene.position[i]) for i in scene.present_ids().tolist()}
+    visible = []
+    for i, j in itertools.combinations(centre, 2):
+        line = LineString([centre[i], centre[j]])
+        gaps = [centre[k].distance(line) - scene.radius_m for k in centre if k not in (i, j)]
+        if range_m is not None:
+            assume(abs(line.length - range_m) > MARGIN_M)
+        assume(all(abs(gap) > MARGIN_M for gap in gaps))
+        # Neither a wall's end that only just reaches the line, nor a line whose end only just reaches a wall.
+        ends = [Point(end) for segment in scene.arena.segments for end in segment.reshape(2, 2)]
+        assume(all(line.distance(end) > MARGIN_M for end in ends))
+        assume(all(walls.distance(centre[each]) > MARGIN_M for each in (i, j)))
+        if (
+            (range_m is None or line.length <= range_m)
+            and (through_walls or not line.intersects(walls))
+            and not (robots_occlude and any(gap <= 0.0 for gap in gaps))
+        ):
+            visible.append((i, j))
+    return visible
+
+
+@given(poses=poses, sight=sight, absent=st.integers(0, 20))
+@settings(max_examples=60, deadline=None)
+def test_the_visible_pairs_are_those_that_shapely_finds(make_scene, arena, poses, sight, absent):
+    present = [index != absent for index in range(len(poses))]
+    scene = make_scene(poses, arena, present, radius_m=0.1)
+    expected = judged(scene, *sight)
+    assert list(map(tuple, Visibility().pairs(scene, *sight).tolist())) == expected
+
+
+@given(st.data())
+@settings(max_examples=60, deadline=None)
+def test_what_is_remembered_is_what_would_be_found_afresh(make_scene, walled, data):
+    start = data.draw(st.lists(st.tuples(coordinate, coordinate, st.just(0.0)), min_size=6, max_size=6))
+    scene = make_scene(start, walled, radius_m=0.1)
+    remembering = Visibility()
+    for _ in range(6):
+        for index in data.draw(st.lists(st.integers(0, 5), max_size=3)):
+            scene.position[index] = data.draw(coordinate), data.draw(coordinate)
+        for index in data.draw(st.lists(st.integers(0, 5), max_size=1)):
+            scene.present[index] ^= True
+        scene.tick += 1
+        for each in data.draw(st.lists(sight, max_size=3)):
+            robots = scene.present_ids()[:: data.draw(st.integers(1, 2))]
+            assert np.array_equal(remembering.pairs(scene, *each), Visibility().pairs(scene, *each))
+            for found, fresh in zip(
+                remembering.sightings(scene, robots, *each), Visibility().sightings(scene, robots, *each), strict=True
+            ):
+                assert np.array_equal(found, fresh)
+
+
+class Counting(Arena):
+    """An arena that remembers how many lines it was asked about."""
+
+    lines = 0
+
+    def blocked(self, start: Floats, end: Floats) -> Bools:
+        self.lines += len(start)
+        return super().blocked(start, end)
+
+
+@pytest.fixture
+def counted(walled, make_scene):
+    """A scene of 12 robots in an arena that counts."""
+    places = np.random.default_rng(5).uniform(0.1, 2.9, (12, 2))
+    return make_scene(np.column_stack([places, np.zeros(12)]), Counting(walled.free, walled.walls))
+
+
+def test_a_swarm_that_stands_still_asks_the_arena_nothing(counted):
+    visibility = Visibility()
+    visibility.pairs(counted, 1.5)
+    assert counted.arena.lines > 0
+    counted.arena.lines = 0
+    for tick in range(1, 4):
+        counted.tick, counted.heading = tick, counted.heading + 0.3
+        visibility.pairs(counted, 1.5)
+        visibility.pairs(counted, 1.0, robots_occlude=True)
+        visibility.sightings(counted, counted.present_ids(), 0.5)
+    assert counted.arena.lines == 0
+
+
+def test_one_robot_that_moves_has_only_its_own_lines_looked_at(counted):
+    visibility = Visibility()
+    visibility.pairs(counted)
+    counted.arena.lines = 0
+    counted.position[4] += 0.01
+    visibility.pairs(counted)
+    assert counted.arena.lines == 11
+
+
+def test_two_sensors_with_different_ranges_share_what_the_arena_said(counted):
+    visibility = Visibility()
+    visibility.pairs(counted, 2.0)
+    counted.arena.lines = 0
+    visibility.pairs(counted, 1.0)
+    assert counted.arena.lines == 0
+
+
+def test_the_range_includes_its_edge(make_scene):
+    scene = make_scene([(0.5, 1.0, 0.0), (1.5, 1.0, 0.0), (2.75, 1.0, 0.0)])
+    assert Visibility().pairs(scene, 1.0).tolist() == [[0, 1]]
+    assert Visibility().pairs(scene, 1.25).tolist() == [[0, 1], [1, 2]]
+
+
+def test_many_robots_hide_each_other_as_few_do(make_scene):
+    """More robots than are tried at once: against every third robot of every pair, one by one."""
+    places = np.random.default_rng(2).uniform(0.1, 2.9, (48, 2))
+    scene = make_scene(np.column_stack([places, np.zeros(48)]))
+    points = [Point(place) for place in places]
+    for range_m in (None, 0.9):
+        seen = set(map(tuple, Visibility().pairs(scene, range_m, robots_occlude=True).tolist()))
+        for i, j in itertools.combinations(range(48), 2):
+            line = LineString([points[i], points[j]])
+            hidden = any(points[k].distance(line) <= scene.radius_m for k in range(48) if k not in (i, j))
+            assert ((i, j) in seen) == (not hidden and (range_m is None or line.length <= range_m))
+
+
+def test_sightings_are_both_directions_of_the_pairs_by_observer_and_seen(make_scene, walled):
+    places = np.random.default_rng(3).uniform(0.1, 2.9, (30, 2))
+    scene = make_scene(np.column_stack([places, np.zeros(30)]), walled)
+    visibility = Visibility()
+    pairs = visibility.pairs(scene, 1.0).tolist()
+    robots = np.array([3, 7, 8, 29])
+    observer, seen, ends = visibility.sightings(scene, robots, 1.0)
+    expected = sorted([(i, j) for i, j in pairs if i in robots] + [(j, i) for i, j in pairs if j in robots])
+    assert list(zip(observer.tolist(), seen.tolist(), strict=True)) == expected
+    assert np.diff(ends, prepend=0).tolist() == [sum(i == robot for i, _ in expected) for robot in robots]

@@ -1,0 +1,1 @@
+"""The arena: shapes, maps, placement of robots, and their entrance."""

@@ -1,0 +1,252 @@
+"""The arena: where robots can be, what stops them, and what stops their sight and their radio.
+
+Free space is a polygon (its holes are obstacles) plus walls without thickness. Questions are asked for many points or
+lines at once; the answers are exact to rounding, and no line of sight slips through a corner at which two walls meet.
+Small arenas are answered by comparing everything with everything, large ones through a spatial index. An arena never
+changes. It knows nothing of robots: bodies do not block here. How an arena is read from files stands in `shapes`.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString, MultiPolygon, Polygon
+
+from zwerm.scenario.tables import ArenaTable
+from zwerm.world.arena.shapes import read_shape
+from zwerm.world.geometry.wall_index import WallIndex
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+# Up to this many pairs, comparing all with all is quicker than asking an index (measured).
+_DENSE_LINES = 5_000
+# Up to so many walls, every line is compared with every wall in blocks of that size: the index is slower.
+_FEW_SEGMENTS = 64
+_DENSE_POINTS = 20_000
+_DENSE_WALLS = 8  # so many in all, however many points are asked about
+_ON_WALL_M = 1e-9  # a ray that begins this near a wall, on either side, begins on it
+
+
+class WallContacts(NamedTuple):
+    """Every wall segment near a point: one row per (point, segment) pair, by point and then by segment."""
+
+    point: Ints  # (c,) which of the points
+    segment: Ints  # (c,) which row of Arena.segments
+    nearest: Floats  # (c, 2) the segment's place nearest to the point [m]
+    distance_m: Floats  # (c,)
+
+
+class Arena:
+    """Free space and its walls.
+
+    `free` is the shapely polygon of free space, `walls` the walls without thickness, `segments` (m, 4) every wall as
+    straight pieces x0, y0, x1, y1 [m], collinear neighbours merged; `bounds` is xmin, ymin, xmax, ymax [m]. `is_convex`
+    means that nothing inside can hide anything.
+    """
+
+    def __init__(self, free: Polygon | MultiPolygon, walls: Sequence[LineString] = ()) -> None:
+        self.free = free
+        self.walls = tuple(walls)
+        shapely.prepare(free)
+        rings = [np.asarray(ring.coords)[:, :2] for part in shapely.get_parts(free) for ring in _rings(part)]
+        lines = [np.asarray(wall.coords)[:, :2] for wall in self.walls]
+        pieces = [_segments(ring, closed=True) for ring in rings] + [_segments(line, closed=False) for line in lines]
+        self.segments: Floats = np.ascontiguousarray(np.concatenate(pieces))
+        self.segments.flags.writeable = False
+        self.area_m2 = float(free.area)
+        xmin, ymin, xmax, ymax = map(float, free.bounds)
+        self.bounds = (xmin, ymin, xmax, ymax)
+        self.is_convex = not self.walls and len(rings) == 1 and _is_convex(rings[0])
+        self._px, self._py, self._qx, self._qy = (np.ascontiguousarray(column) for column in self.segments.T)
+        self._ex, self._ey = self._qx - self._px, self._qy - self._py
+        self._length2 = self._ex**2 + self._ey**2
+        self._index = WallIndex(self.segments)
+        self._tree = shapely.STRtree(shapely.linestrings(self.segments.reshape(-1, 2, 2)))
+
+    @classmethod
+    def from_table(cls, table: ArenaTable, folder: Path) -> "Arena":
+        """Return the arena that `table` describes; relative paths start at `folder`, or else where the process runs.
+
+        Raises ScenarioError with every mistake, each `arena.key: rule, got value`.
+        """
+        return cls(*read_shape(table, folder))
+
+    def blocked(self, start: Floats, end: Floats) -> Bools:
+        """Return for each line from start (k, 2) to end (k, 2) whether a wall crosses or touches it, its ends aside."""
+        count = len(start)
+        if self.is_convex or count == 0:
+            return np.zeros(count, dtype=np.bool_)
+        if count * len(self.segments) <= _DENSE_LINES:
+            a, b = start.T[:, :, None], end.T[:, :, None]
+            hit = _crosses(a[0], a[1], b[0], b[1], self._px, self._py, self._qx, self._qy)
+            dense: Bools = np.logical_or.reduce(hit, axis=1)
+            return dense
+        if len(self.segments) <= _FEW_SEGMENTS:
+            step = _DENSE_LINES // len(self.segments)
+            parts = [self.blocked(start[at : at + step], end[at : at + step]) for at in range(0, count, step)]
+            return np.concatenate(parts)
+        blocked = np.zeros(count, dtype=np.bool_)
+        line, wall = self._index.candidates(start, end)
+        a, b = start[line].T, end[line].T
+        crossing = _crosses(a[0], a[1], b[0], b[1], self._px[wall], self._py[wall], self._qx[wall], self._qy[wall])
+        blocked[line[crossing]] = True
+        return blocked
+
+    def ray_length(self, origin: Floats, direction: Floats, limit_m: float) -> Floats:
+        """Return (k,) the distance [m] from origin (k, 2) to a wall along unit vectors direction (k, 2), or limit_m."""
+        count = len(origin)
+        if count * len(self.segments) <= _DENSE_LINES:
+            o, d = origin.T[:, :, None], direction.T[:, :, None]
+            dense: Floats = _meets(o[0], o[1], d[0], d[1], self._px, self._py, self._qx, self._qy).min(axis=1)
+            return np.minimum(dense, limit_m)
+        length = np.full(count, limit_m, dtype=np.float64)
+        box = np.array(self.bounds)
+        farthest = _norm(np.maximum(np.abs(origin - box[:2]), np.abs(origin - box[2:])))
+        reach = np.minimum(limit_m, 1.01 * farthest)  # no wall is farther, and the index takes no infinite lines
+        ray, wall = self._index.candidates(origin, origin + reach[:, None] * direction)
+        o, d = origin[ray].T, direction[ray].T
+        met = _meets(o[0], o[1], d[0], d[1], self._px[wall], self._py[wall], self._qx[wall], self._qy[wall])
+        np.minimum.at(length, ray, met)
+        return length
+
+    def clearance(self, points: Floats) -> Floats:
+        """Return (k,) the distance [m] of points (k, 2) to the nearest wall."""
+        return _norm(self.nearest_wall_points(points) - points)
+
+    def nearest_wall_points(self, points: Floats) -> Floats:
+        """Return (k, 2) the place on a wall nearest to each of points (k, 2) [m]; of equals, the first segment's."""
+        count = len(points)
+        if count * len(self.segments) <= _DENSE_POINTS:
+            x, y = points.T[:, :, None]
+            nx, ny = self._nearest(x, y, np.s_[:])
+            best = np.argmin((nx - x) ** 2 + (ny - y) ** 2, axis=1)
+            rows = np.arange(count)
+            return np.column_stack([nx[rows, best], ny[rows, best]])
+        # The tree's own distances only tell how far to look: what is nearest is then found by the same sums as above.
+        _, distance = self._tree.query_nearest(shapely.points(points), all_matches=False, return_distance=True)
+        point, wall = self._near(points, distance + _ON_WALL_M)
+        x, y = points[point].T
+        nx, ny = self._nearest(x, y, wall)
+        order = np.lexsort((wall, (nx - x) ** 2 + (ny - y) ** 2, point))
+        best = order[np.searchsorted(point, np.arange(count))]
+        return np.column_stack([nx[best], ny[best]])
+
+    def walls_within(self, points: Floats, distance_m: float) -> WallContacts:
+        """Return every pair of a point of points (k, 2) and a wall segment at most distance_m from it."""
+        if len(self.segments) <= _DENSE_WALLS:
+            x, y = points.T[:, :, None]
+            nx, ny = self._nearest(x, y, np.s_[:])
+            apart = np.hypot(nx - x, ny - y)
+            point, wall = (apart <= distance_m).nonzero()
+            return WallContacts(point, wall, np.column_stack([nx[point, wall], ny[point, wall]]), apart[point, wall])
+        point, wall = self._near(points, distance_m)
+        nearest = np.column_stack(self._nearest(points[point, 0], points[point, 1], wall))
+        distance = _norm(nearest - points[point])
+        near = distance <= distance_m
+        return WallContacts(point[near], wall[near], nearest[near], distance[near])
+
+    def contains(self, points: Floats, margin_m: float = 0.0) -> Bools:
+        """Return (k,) whether each of points (k, 2) is in free space and at least margin_m from every wall."""
+        inside: Bools = shapely.contains_xy(self.free, points[:, 0], points[:, 1])
+        if margin_m > 0.0:
+            close = self.walls_within(points, margin_m)
+            inside[close.point[close.distance_m < margin_m]] = False
+        return inside
+
+    def _near(self, points: Floats, distance_m: float | Floats) -> tuple[Ints, Ints]:
+        """Return pairs (point, wall), sorted, among which are all walls within distance_m of points (k, 2)."""
+        x, y = points.T
+        boxes = shapely.box(x - distance_m, y - distance_m, x + distance_m, y + distance_m)
+        point, wall = self._tree.query(boxes)
+        order = np.lexsort((wall, point))
+        return point[order], wall[order]
+
+    def _nearest(self, x: Floats, y: Floats, wall: Ints | slice) -> tuple[Floats, Floats]:
+        px, py, ex, ey = self._px[wall], self._py[wall], self._ex[wall], self._ey[wall]
+        # What np.clip does, without its detours.
+        along = np.minimum(np.maximum(((x - px) * ex + (y - py) * ey) / self._length2[wall], 0.0), 1.0)
+        return px + along * ex, py + along * ey
+
+
+def _norm(vectors: Floats) -> Floats:
+    length: Floats = np.hypot(vectors[:, 0], vectors[:, 1])
+    return length
+
+
+def _rings(polygon: Polygon) -> list[LineString]:
+    return [polygon.exterior, *polygon.interiors]
+
+
+def _segments(line: Floats, closed: bool) -> Floats:
+    """Return (m, 4) the pieces of a line of points (n, 2), without empty ones and with collinear neighbours merged."""
+    line = line[np.r_[True, (np.diff(line, axis=0) != 0.0).any(axis=1)]]
+    if closed:
+        line = line[:-1]
+        line = line[_bends(np.roll(line, 1, axis=0), line, np.roll(line, -1, axis=0))]
+        return np.hstack([line, np.roll(line, -1, axis=0)])
+    keep = np.r_[True, _bends(line[:-2], line[1:-1], line[2:]), True] if len(line) > 2 else np.s_[:]
+    line = line[keep]
+    return np.hstack([line[:-1], line[1:]])
+
+
+def _bends(before: Floats, at: Floats, after: Floats) -> Bools:
+    inward, outward = at - before, after - at
+    cross = inward[:, 0] * outward[:, 1] - inward[:, 1] * outward[:, 0]
+    dot = (inward * outward).sum(axis=1)
+    straight: Bools = (np.abs(cross) <= 1e-12 * np.abs(dot)) & (dot > 0.0)
+    return ~straight
+
+
+def _is_convex(ring: Floats) -> bool:
+    """Return whether a simple closed ring (n, 2) turns one way only; a turn of 1e-9 rad counts as none."""
+    edge = np.diff(ring, axis=0)
+    edge = edge[(edge != 0.0).any(axis=1)]
+    edge /= _norm(edge)[:, None]
+    following = np.roll(edge, -1, axis=0)
+    turn = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]
+    return bool((turn > -1e-9).all() or (turn < 1e-9).all())
+
+
+def _crosses(
+    ax: Floats, ay: Floats, bx: Floats, by: Floats, px: Floats, py: Floats, qx: Floats, qy: Floats
+) -> NDArray[np.bool_]:
+    """Return whether wall pq meets line ab between a and b, elementwise.
+
+    Signs are taken of each wall end by itself, so that two walls with a common end agree about it and leave no gap.
+    """
+    dx, dy = bx - ax, by - ay
+    apx, apy, aqx, aqy = px - ax, py - ay, qx - ax, qy - ay
+    side_p, side_q = dx * apy - dy * apx, dx * aqy - dy * aqx
+    side_a = apx * aqy - apy * aqx
+    bpx, bpy, bqx, bqy = px - bx, py - by, qx - bx, qy - by
+    side_b = bpx * bqy - bpy * bqx
+    hit: Bools = (side_a * side_b < 0.0) & (side_p * side_q <= 0.0)
+    along = (side_p == 0.0) & (side_q == 0.0)  # on one line: they meet where the wall's span and ab's overlap
+    if along.any():
+        length2 = dx * dx + dy * dy
+        at_p, at_q = dx * apx + dy * apy, dx * aqx + dy * aqy
+        hit |= along & (np.maximum(at_p, at_q) > 0.0) & (np.minimum(at_p, at_q) < length2)
+    return hit
+
+
+def _meets(
+    ox: Floats, oy: Floats, dx: Floats, dy: Floats, px: Floats, py: Floats, qx: Floats, qy: Floats
+) -> NDArray[np.float64]:
+    """Return how far along the ray from o towards d wall pq is met, infinity where it is not, elementwise."""
+    opx, opy, oqx, oqy = px - ox, py - oy, qx - ox, qy - oy
+    side_p, side_q = dx * opy - dy * opx, dx * oqy - dy * oqx
+    at_p, at_q = dx * opx + dy * opy, dx * oqx + dy * oqy
+    span = side_p - side_q
+    along = span == 0.0
+    at = at_p + side_p / np.where(along, 1.0, span) * (at_q - at_p)
+    if (
+        along.any()
+    ):  # edge-on: nothing is met beside the ray; in it, the nearer end, or the origin where it lies in the wall
+        edge_on = np.where(at_p * at_q <= 0.0, 0.0, np.minimum(at_p, at_q))
+        at = np.where(along, np.where(side_p == 0.0, edge_on, np.inf), at)
+    return np.where((side_p * side_q <= 0.0) & (at >= -_ON_WALL_M), np.maximum(at, 0.0), np.inf)

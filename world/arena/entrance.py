@@ -1,0 +1,93 @@
+"""Depots, which let robots into the arena one by one, and an exit that takes them out.
+
+From a timed inflow robots enter in id order, every `every_s` seconds, at a random free place of the entry rectangle. While
+there is none, the next robot waits at the door; the interval counts from the last entry. From a base station's depot they
+enter when it releases them, where it stands.
+"""
+
+from collections import deque
+
+import numpy as np
+
+from zwerm.errors import ScenarioError
+from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.tables import BaseTable, InflowTable, PlacementTable
+from zwerm.world.arena.arena import Arena
+from zwerm.world.arena.placement import free_spot, place, placed
+from zwerm.world.scene import Floats, Ints, Scene
+
+
+class EntrySchedule:
+    """The door of a depot of `count` robots, and the way out."""
+
+    def __init__(self, table: InflowTable, count: int) -> None:
+        self._table = table
+        self._count = count
+        self._next_robot = 0
+        self._next_s = 0.0
+
+    def entering(self, scene: Scene) -> tuple[int, Floats, float] | None:
+        """Return (robot, position (2,) [m], heading [rad]) of a robot that enters now, or None."""
+        if self._next_robot >= self._count or scene.time_s < self._next_s - 1e-9:
+            return None
+        taken = scene.position[scene.present]
+        spot = free_spot(
+            self._table.entry_m, scene.arena, taken, scene.radius_m, scene.draws, "entry", self._next_robot, scene.tick
+        )
+        if spot is None:
+            return None
+        robot, self._next_robot = self._next_robot, self._next_robot + 1
+        self._next_s = scene.time_s + self._table.every_s
+        heading = float(scene.draws.uniform("entry-heading", robot)) * 2.0 * np.pi - np.pi
+        return robot, spot, heading
+
+    def leaving(self, scene: Scene) -> Ints:
+        """Return the robots whose whole body is within the exit rectangle."""
+        if self._table.exit_m is None:
+            return np.zeros(0, dtype=np.int64)
+        x0, y0, x1, y1 = self._table.exit_m
+        x, y, r = scene.position[:, 0], scene.position[:, 1], scene.radius_m
+        inside = (x - r >= x0) & (x + r <= x1) & (y - r >= y0) & (y + r <= y1)
+        return np.flatnonzero(inside & scene.present)
+
+
+class Depots:
+    """The base stations, robots 0 to n - 1, and the others, who wait in their depots: dealt out in turn, each in id order."""
+
+    def __init__(self, table: BaseTable, count: int, arena: Arena, radius_m: float, draws: Draws) -> None:
+        """Take the place of every base station. Raises ScenarioError where one cannot be, or no robot is left to wait."""
+        stations = table.stations
+        if stations >= count:
+            raise ScenarioError([f"robots.count: expected more than the {stations} base stations, got {count}"])
+        if table.pose is not None:
+            self.position, self.heading = placed([table.pose], ["base.pose"], arena, radius_m)
+        elif table.poses is not None:
+            keys = [f"base.poses.{station}" for station in range(stations)]
+            self.position, self.heading = placed(table.poses, keys, arena, radius_m)
+        else:
+            self.position, self.heading = place(PlacementTable(), arena, stations, radius_m, draws)
+        self.stations = stations
+        self._waiting = [deque(range(stations + station, count, stations)) for station in range(stations)]
+        self._entering: deque[tuple[int, int]] = deque()
+        self.refused_releases = 0
+
+    def release(self, station: int) -> None:
+        """Let a station's next robot out; a release from an empty depot is refused and counted."""
+        if self._waiting[station]:
+            self._entering.append((station, self._waiting[station].popleft()))
+        else:
+            self.refused_releases += 1
+
+    def entering(self, scene: Scene) -> tuple[int, Floats, float] | None:
+        """Return (robot, position (2,) [m], heading [rad]) of a robot that enters now, at its base, or None.
+
+        One robot enters a tick; of those released at once the others follow.
+        """
+        if not self._entering:
+            return None
+        station, robot = self._entering.popleft()
+        return robot, self.position[station].copy(), float(self.heading[station])
+
+    def leaving(self, scene: Scene) -> Ints:
+        """Return nobody: what a base station released stays out."""
+        return np.zeros(0, dtype=np.int64)

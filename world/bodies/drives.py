@@ -1,0 +1,90 @@
+"""Drives: from what robots command to the velocity their bodies try to have.
+
+A commanded drive persists until the next one. It takes effect a fixed number of ticks after the observation it answers
+(the body's actuation latency), is disturbed by noise, drawn anew every tick, and is then clamped to what the motors can do.
+"""
+
+from collections.abc import Mapping
+from itertools import chain
+from typing import Final
+
+import msgspec
+import numpy as np
+
+from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.tables import BodyTable
+from zwerm.wire.messages import BodyVelocity, WheelSpeeds
+from zwerm.world.scene import Floats
+
+# Ticks of noise drawn at once: draws are keyed by tick, so a block costs less and changes nothing.
+_BLOCK_TICKS: Final = 64
+
+_KINDS: Final[dict[str, type[BodyVelocity] | type[WheelSpeeds]]] = {
+    "differential": WheelSpeeds,
+    "holonomic": BodyVelocity,
+}
+
+
+class Drives:
+    """The drives of a swarm of `count` robots; `kind` is what such a body takes.
+
+    They are `lagging` where a command does not act before the next tick.
+    """
+
+    def __init__(self, body: BodyTable, count: int, draws: Draws) -> None:
+        self._body = body
+        self._draws = draws
+        self.kind: type[BodyVelocity] | type[WheelSpeeds] = _KINDS[body.kind]
+        self._axes = len(self.kind.__struct_fields__)
+        self._commanded: Floats = np.zeros((count, self._axes))
+        self.lagging = body.latency_ticks > 0
+        self._pending = [self._commanded.copy() for _ in range(body.latency_ticks - 1)]
+        self._noise_block = -1
+        self._noise: Floats = np.zeros((_BLOCK_TICKS, count, self._axes))
+        if body.kind == "differential":
+            self._limit: Floats = np.full(2, body.max_speed_m_s)
+        else:
+            self._limit = np.array([body.max_speed_m_s, body.max_speed_m_s, body.max_turn_rad_s])
+
+    def command(self, drives: Mapping[int, BodyVelocity | WheelSpeeds]) -> None:
+        """Take the new drives of some robots, all of this body's `kind`."""
+        axes, numbers = self._axes, chain.from_iterable(map(msgspec.structs.astuple, drives.values()))
+        self._commanded[list(drives)] = np.fromiter(numbers, np.float64, axes * len(drives)).reshape(-1, axes)
+
+    def stop(self, robot: int) -> None:
+        """Cut a robot's motors, whatever is still on its way to them, from the next step on."""
+        for pending in (self._commanded, *self._pending):
+            pending[robot] = 0.0
+
+    def velocities(self, tick: int) -> tuple[Floats, Floats | None, Floats]:
+        """Return (forward [m/s], left [m/s] or None, turn [rad/s]), each (n,), for the step from `tick` to the next.
+
+        To be asked for once a tick: where drives are `lagging`, before those that answer the tick's observations are commanded,
+        and after that where they are not.
+        """
+        if self._pending:
+            self._pending.append(self._commanded.copy())
+            acting = self._pending.pop(0)
+        else:
+            acting = self._commanded
+        if self._body.drive_noise_fraction:
+            acting = acting * self._noise_at(tick)
+        if self._axes == 2:
+            acting = np.minimum(np.maximum(acting, -self._limit), self._limit)
+            left, right = acting[:, 0], acting[:, 1]
+            return (left + right) * 0.5, None, (right - left) / self._body.wheel_base_m
+        speed = np.hypot(acting[:, 0], acting[:, 1])
+        scale = np.minimum(1.0, self._limit[0] / np.maximum(speed, 1e-300))
+        turn = np.minimum(np.maximum(acting[:, 2], -self._limit[2]), self._limit[2])
+        return acting[:, 0] * scale, acting[:, 1] * scale, turn
+
+    def _noise_at(self, tick: int) -> Floats:
+        block, offset = divmod(tick, _BLOCK_TICKS)
+        if block != self._noise_block:
+            ticks = np.arange(block * _BLOCK_TICKS, (block + 1) * _BLOCK_TICKS)[:, None, None]
+            robots = np.arange(len(self._commanded))[:, None]
+            draw = self._draws.uniform("drive-noise", robots, np.arange(self._axes), ticks)
+            self._noise = 1.0 + self._body.drive_noise_fraction * (2.0 * draw - 1.0)
+            self._noise_block = block
+        noise: Floats = self._noise[offset]
+        return noise

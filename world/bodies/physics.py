@@ -1,0 +1,159 @@
+"""Rigid bodies in the plane: pymunk discs pushed by their drives, between walls.
+
+A drive is a velocity that the body's motors track: in every substep it is given to the solver as the force that would reach
+it, so that contacts constrain it before it is integrated. (A velocity set before every substep would be integrated first,
+and would discard what the solver made of friction and of contacts.) Contacts are inelastic; without friction they never
+turn a body. Bodies have no other dynamics: no inertia between substeps, no slip.
+"""
+
+from typing import Final
+
+import numpy as np
+import pymunk
+from pymunk import batch
+
+from zwerm.scenario.tables import BodyTable
+from zwerm.world.scene import Bools, Floats, Ints
+
+# Sweeps of the contact solver a substep: discs in the plane seldom touch more than a few others.
+_SWEEPS: Final = 4
+
+# Left of an overlap after one substep, and the overlap that is left alone [m].
+_OVERLAP_LEFT_FRACTION: Final = 0.1
+_OVERLAP_IGNORED_M: Final = 1e-5
+
+_FORCE: Final = batch.BodyFields.FORCE | batch.BodyFields.TORQUE
+_VELOCITY: Final = batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+_POSE: Final = batch.BodyFields.BODY_ID | batch.BodyFields.POSITION | batch.BodyFields.ANGLE
+
+
+class Physics:
+    """The bodies of one swarm. `position` (n, 2) [m] and `heading` (n,) [rad] are the truth, indexed by robot id."""
+
+    def __init__(self, body: BodyTable, segments: Floats, count: int, dt_s: float) -> None:
+        self.position: Floats = np.zeros((count, 2))
+        self.heading: Floats = np.zeros(count)
+        self._table = body
+        self._substep_s = dt_s / body.substeps
+        self._moment = pymunk.moment_for_circle(body.mass_kg, 0.0, body.radius_m)
+        self._space = _make_space(self._substep_s, body.friction, segments)
+        self._bodies: dict[int, pymunk.Body] = {}
+        # The time in the middle of each substep, and from a change of velocity to the force that makes it.
+        self._middle_s: Floats = np.arange(0.5, body.substeps)[:, None] * self._substep_s
+        self._inertia: Floats = np.array([body.mass_kg, body.mass_kg, self._moment]) / self._substep_s
+        self._poses = batch.Buffer()
+        self._resting = True
+        self._arranged = False
+
+    def add(self, robot: int, position: Floats, heading: float) -> None:
+        """Put a robot's body into the arena."""
+        body = pymunk.Body(self._table.mass_kg, self._moment)
+        body.position = float(position[0]), float(position[1])
+        body.angle = float(heading)
+        disc = pymunk.Circle(body, self._table.radius_m)
+        disc.friction = self._table.friction
+        if not self._table.collide:
+            disc.filter = pymunk.ShapeFilter(group=1)
+        self._space.add(body, disc)
+        self._bodies[robot] = body
+        self.position[robot] = position
+        self.heading[robot] = heading
+        self._arranged = False
+
+    def fix(self, robot: int, position: Floats, heading: float) -> None:
+        """Put a robot into the arena that never moves and that nobody runs into: a base station."""
+        self.position[robot] = position
+        self.heading[robot] = heading
+
+    def remove(self, robot: int) -> None:
+        """Take a robot's body out of the arena; its last pose stays on record."""
+        body = self._bodies.pop(robot)
+        self._space.remove(body, *body.shapes)
+        self._arranged = False
+
+    def _arrange(self) -> None:
+        """Lay out the buffers anew: pymunk's batches are in its own order of bodies, the static one included."""
+        owner = {body.id: robot for robot, body in self._bodies.items()}
+        self._poses.clear()
+        batch.get_space_bodies(self._space, _POSE, self._poses)
+        ids = np.frombuffer(bytes(self._poses.int_buf()), dtype=np.uintp).tolist()
+        rows = [(row, owner[body]) for row, body in enumerate(ids) if body in owner]
+        self._rows = _plain([row for row, _ in rows], len(rows))
+        self._ids = _plain([robot for _, robot in rows], len(self.position))
+        self._pushes: Floats = np.zeros((self._table.substeps, len(ids), 3))
+        self._start: Floats = np.zeros((len(ids), 3))
+        self._push_buffers = [_buffer(pushes) for pushes in self._pushes]
+        self._start_buffer = _buffer(self._start)
+        self._resting = False
+        self._arranged = True
+
+    def advance(self, forward_m_s: Floats, left_m_s: Floats | None, turn_rad_s: Floats) -> Bools:
+        """Integrate one tick under the drives (n,), by robot id; return (n,) which robots moved."""
+        moved: Bools = np.zeros(len(self.position), dtype=np.bool_)
+        if not self._arranged:
+            self._arrange()
+        ids, rows = self._ids, self._rows
+        turn = turn_rad_s[ids]
+        forward = forward_m_s[ids]
+        left = None if left_m_s is None else left_m_s[ids]
+        idle = self._resting and not (forward.any() or turn.any() or (left is not None and left.any()))
+        if idle:
+            return moved
+        # The heading in the middle of each substep, so that an arc is integrated by its chords.
+        angle = self.heading[ids] + self._middle_s * turn
+        pushes = self._pushes
+        if angle.any():
+            cos, sin = np.cos(angle), np.sin(angle)
+            vx, vy = forward * cos, forward * sin
+            if left is not None:
+                vx -= left * sin
+                vy += left * cos
+            pushes[:, rows, 0] = vx
+            pushes[:, rows, 1] = vy
+        else:
+            pushes[:, rows, 0] = forward
+            pushes[:, rows, 1] = 0.0 if left is None else left
+        pushes[:, rows, 2] = turn
+        self._start[:] = pushes[0]
+        # The force of substep s acts on the velocity that substep s + 1 integrates.
+        pushes[:-1] = pushes[1:]
+        pushes *= self._inertia
+        space = self._space
+        batch.set_space_bodies(space, _VELOCITY, self._start_buffer)
+        for buffer in self._push_buffers:
+            batch.set_space_bodies(space, _FORCE, buffer)
+            space.step(self._substep_s)
+        self._poses.clear()
+        batch.get_space_bodies(space, _POSE, self._poses)
+        poses = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 3)[rows]
+        place, angle = poses[:, :2], poses[:, 2]
+        x, y = (self.position[ids] != place).T
+        moved[ids] = x | y | (self.heading[ids] != angle)
+        self.position[ids] = place
+        self.heading[ids] = angle
+        self._resting = not moved.any()
+        return moved
+
+
+def _make_space(substep_s: float, friction: float, segments: Floats) -> pymunk.Space:
+    space = pymunk.Space()
+    space.damping = 0.0  # no velocity outlives a substep: the force of the drive makes it anew
+    space.iterations = _SWEEPS
+    space.collision_slop = _OVERLAP_IGNORED_M
+    space.collision_bias = _OVERLAP_LEFT_FRACTION ** (1.0 / substep_s)
+    for x0, y0, x1, y1 in segments.tolist():
+        wall = pymunk.Segment(space.static_body, (x0, y0), (x1, y1), 0.0)
+        wall.friction = friction
+        space.add(wall)
+    return space
+
+
+def _plain(rows: list[int], count: int) -> slice | Ints:
+    """Return what picks these rows: all of `count` in order, as mostly, in place."""
+    return slice(count) if rows == list(range(count)) else np.array(rows, dtype=np.int64)
+
+
+def _buffer(values: Floats) -> batch.Buffer:
+    buffer = batch.Buffer()
+    buffer.set_float_buf(values)
+    return buffer

@@ -1,0 +1,1 @@
+"""Drivers of the world: lock-step and real time."""

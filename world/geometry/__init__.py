@@ -1,0 +1,1 @@
+"""Geometry that sensors and metrics share: visibility, Voronoi neighbours, walls by cell, quadrature."""

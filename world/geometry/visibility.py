@@ -1,0 +1,233 @@
+"""Who can see whom: the pairs of robots within range whose connecting line is free.
+
+Visibility is mutual and is settled once per unordered pair, for every sensor and for the radio. What was found is kept
+until an end moves: a swarm that stands still asks the arena nothing. Turning on the spot is not moving. With a range
+the work is near-linear in the robots; without one it is quadratic, and with robots that hide each other and no range it
+is cubic. It knows nothing of headings, noise or radio models.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from zwerm.world.arena.arena import Arena
+from zwerm.world.geometry.pairs import every_pair
+from zwerm.world.scene import Bools, Floats, Ints, Scene
+
+# Robots that may hide others are tried against so many lines at a time: it bounds memory and fits the cache.
+_TRIPLES_AT_ONCE = 1 << 15
+
+# Up to so many robots all pairs are measured: that takes less than to grow a tree and search it.
+_FEW_ROBOTS = 128
+
+
+class VisiblePairs(NamedTuple):
+    """Who sees whom, by observer, then by the one seen; robot `robots[r]` has rows `ends[r - 1]` to `ends[r]`."""
+
+    observer: Ints  # (k,) ids
+    seen: Ints  # (k,) ids
+    ends: Ints  # (len(robots),)
+
+
+class WallVerdicts:
+    """What the arena answered about lines between two things, by the line's key, until it is told that an end moved."""
+
+    def __init__(self) -> None:
+        self._keys: Ints = np.empty(0, dtype=np.int64)
+        self._blocked: Bools = np.empty(0, dtype=np.bool_)
+
+    @property
+    def keys(self) -> Ints:
+        """The keys of the lines that are known, ascending."""
+        return self._keys
+
+    def keep(self, still: Bools) -> None:
+        """Forget every line but those of `keys` where `still`."""
+        self._keys, self._blocked = self._keys[still], self._blocked[still]
+
+    def blocked(self, arena: Arena, keys: Ints, start: Floats, end: Floats) -> Bools:
+        """Return (k,) whether a wall blocks the lines `keys` (k,) from start to end (k, 2); only new ones are tried."""
+        if len(self._keys) == 0:
+            blocked = arena.blocked(start, end)
+            self._learn(keys, blocked)
+            return blocked
+        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        blocked = self._blocked[at]
+        new = np.flatnonzero(self._keys[at] != keys)
+        if len(new):
+            blocked[new] = arena.blocked(start[new], end[new])
+            self._learn(keys[new], blocked[new])
+        return blocked
+
+    def _learn(self, keys: Ints, blocked: Bools) -> None:
+        keys, blocked = np.concatenate([self._keys, keys]), np.concatenate([self._blocked, blocked])
+        order = np.argsort(keys, kind="stable")
+        self._keys, self._blocked = keys[order], blocked[order]
+
+
+class NearPairs:
+    """The pairs of robots within a range, for any range and one scene, which is searched once if the ranges are known.
+
+    `known_m` is the longest range that was asked about in an earlier scene: it is searched first, whatever is asked first.
+    """
+
+    def __init__(self, known_m: float = 0.0) -> None:
+        self.asked_m = 0.0
+        self._known_m = known_m
+        self._reach_m = -1.0
+        self._pairs: Ints = np.empty((0, 2), dtype=np.int64)
+        self._apart2: Floats = np.empty(0)
+
+    def within(self, scene: Scene, range_m: float | None) -> Ints:
+        """Return (k, 2) ids i < j of present robots at most range_m apart, ascending."""
+        if range_m is None:
+            ids = scene.present_ids()
+            everyone: Ints = ids[np.column_stack(every_pair(len(ids)))]
+            return everyone
+        self.asked_m = max(self.asked_m, range_m)
+        if range_m > self._reach_m:
+            self._search(scene, max(range_m, self._known_m))
+        found: Ints = self._pairs[self._apart2 <= range_m**2]
+        return found
+
+    def _search(self, scene: Scene, reach_m: float) -> None:
+        ids = scene.present_ids()
+        position = scene.position[ids]
+        # A little too far, so that one rule, the one above, decides at the very edge.
+        farther_m = reach_m * (1.0 + 1e-9)
+        if len(ids) <= _FEW_ROBOTS:
+            first, second = every_pair(len(ids))
+            x, y = position.T
+            apart2 = (x[second] - x[first]) ** 2 + (y[second] - y[first]) ** 2
+            near = np.flatnonzero(apart2 <= farther_m**2)
+            pairs, apart2 = np.column_stack([first[near], second[near]]), apart2[near]
+        else:
+            pairs = cKDTree(position).query_pairs(farther_m, output_type="ndarray")
+            pairs = pairs[np.argsort(pairs[:, 0] * len(ids) + pairs[:, 1])]
+            dx, dy = position[pairs[:, 1]].T - position[pairs[:, 0]].T
+            apart2 = dx**2 + dy**2
+        self._reach_m, self._pairs, self._apart2 = reach_m, ids[pairs], apart2
+
+
+class Visibility:
+    """The visible pairs of one run, remembered from scene to scene."""
+
+    def __init__(self) -> None:
+        self._position: Floats = np.empty((0, 2))
+        self._present: Bools = np.empty(0, dtype=np.bool_)
+        self._verdicts = WallVerdicts()
+        self._near = NearPairs()
+        self._pairs: dict[tuple[float | None, bool, bool], Ints] = {}
+        self._sightings: dict[tuple[float | None, bool, bool], tuple[Ints, Ints]] = {}
+
+    def pairs(
+        self, scene: Scene, range_m: float | None = None, through_walls: bool = False, robots_occlude: bool = False
+    ) -> Ints:
+        """Return (k, 2) ids i < j of the present robots that see each other, ascending; not to be written to.
+
+        They are at most `range_m` apart, no wall blocks the line between their centres, unless `through_walls`, and no
+        third robot's disc touches it, if `robots_occlude`.
+        """
+        self._advance(scene)
+        settings = (range_m, through_walls, robots_occlude)
+        found = self._pairs.get(settings)
+        if found is None:
+            found = self._settle(scene, range_m, through_walls or scene.arena.is_convex, robots_occlude)
+            found.flags.writeable = False
+            self._pairs[settings] = found
+        return found
+
+    def sightings(
+        self,
+        scene: Scene,
+        robots: Ints,
+        range_m: float | None = None,
+        through_walls: bool = False,
+        robots_occlude: bool = False,
+    ) -> VisiblePairs:
+        """Return both directions of `pairs`, for the observers `robots` (ascending ids of present robots)."""
+        pairs = self.pairs(scene, range_m, through_walls, robots_occlude)
+        settings = (range_m, through_walls, robots_occlude)
+        directed = self._sightings.get(settings)
+        if directed is None:
+            count = len(scene.present)
+            keys = np.concatenate([pairs[:, 0] * count + pairs[:, 1], pairs[:, 1] * count + pairs[:, 0]])
+            keys.sort()
+            observer = keys // count
+            seen = keys - observer * count
+            observer.flags.writeable = seen.flags.writeable = False
+            directed = self._sightings[settings] = (observer, seen)
+        observer, seen = directed
+        if len(robots) < np.count_nonzero(scene.present):
+            asked = np.zeros(len(scene.present), dtype=np.bool_)
+            asked[robots] = True
+            rows = asked[observer]
+            observer, seen = observer[rows], seen[rows]
+        return VisiblePairs(observer, seen, np.searchsorted(observer, robots, side="right"))
+
+    def _advance(self, scene: Scene) -> None:
+        """Forget what no longer holds. Positions are compared, so it does not matter which scenes were asked about."""
+        if len(self._present) != len(scene.present):
+            changed = np.ones(len(scene.present), dtype=np.bool_)
+            self._verdicts = WallVerdicts()
+        else:
+            x, y = (scene.position != self._position).T
+            changed = ((x | y) & scene.present) | (scene.present != self._present)
+        if not changed.any():
+            return
+        self._near = NearPairs(self._near.asked_m)
+        self._pairs.clear()
+        self._sightings.clear()
+        keys, count = self._verdicts.keys, len(changed)
+        if len(keys):
+            self._verdicts.keep(~(changed[keys // count] | changed[keys % count]))
+        self._position, self._present = scene.position.copy(), scene.present.copy()
+
+    def _settle(self, scene: Scene, range_m: float | None, through_walls: bool, robots_occlude: bool) -> Ints:
+        pairs = self._near.within(scene, range_m)
+        if not through_walls:
+            start, end = scene.position[pairs[:, 0]], scene.position[pairs[:, 1]]
+            keys = pairs[:, 0] * len(scene.present) + pairs[:, 1]
+            pairs = pairs[~self._verdicts.blocked(scene.arena, keys, start, end)]
+        if robots_occlude:
+            reach_m = None if range_m is None else range_m + scene.radius_m
+            pairs = pairs[~_hidden(scene, pairs, self._near.within(scene, reach_m))]
+        return pairs
+
+
+def _hidden(scene: Scene, pairs: Ints, near: Ints) -> Bools:
+    """Return (k,) whether a third robot's disc touches the line between the robots of each of `pairs` (k, 2).
+
+    `near` (m, 2) holds every pair of robots so near that one of them can hide something from the other.
+    """
+    hider, of = np.concatenate([near[:, ::-1], near]).T
+    order = np.argsort(of, kind="stable")
+    hider = hider[order]
+    ends = np.cumsum(np.bincount(of, minlength=len(scene.present)))
+    degree = np.diff(ends, prepend=0)
+    hidden = np.zeros(len(pairs), dtype=np.bool_)
+    work = np.cumsum(degree[pairs[:, 0]])
+    first = 0
+    while first < len(pairs):
+        done = work[first - 1] if first else 0
+        last = max(first + 1, int(np.searchsorted(work, done + _TRIPLES_AT_ONCE, side="right")))
+        i = pairs[first:last, 0]
+        row = np.repeat(np.arange(first, last), degree[i])
+        # The k-th candidate of each pair: a running count, less where the pair's candidates begin.
+        k = hider[np.arange(len(row)) + np.repeat(ends[i] - (work[first:last] - done), degree[i])]
+        third = k != pairs[row, 1]
+        row, k = row[third], k[third]
+        hidden[row[_touches(scene, pairs[row, 0], pairs[row, 1], k)]] = True
+        first = last
+    return hidden
+
+
+def _touches(scene: Scene, i: Ints, j: Ints, k: Ints) -> Bools:
+    """Return whether the disc of robot k touches the segment between the centres of i and j, elementwise."""
+    x, y = scene.position.T
+    dx, dy, ex, ey = x[j] - x[i], y[j] - y[i], x[k] - x[i], y[k] - y[i]
+    length2 = np.maximum(dx * dx + dy * dy, np.finfo(np.float64).tiny)
+    along = np.clip((ex * dx + ey * dy) / length2, 0.0, 1.0)
+    touches: Bools = (ex - along * dx) ** 2 + (ey - along * dy) ** 2 <= scene.radius_m**2
+    return touches

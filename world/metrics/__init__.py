@@ -1,0 +1,1 @@
+"""Metrics of a run: those of its end, and those sampled during it."""

@@ -1,0 +1,120 @@
+"""What a swarm sees of its arena, and how few robots might have done: the measures of sensor coverage.
+
+A robot covers what is within its range and not behind a wall, as exact polygons but for the disc, which has 256 sides.
+The ideal to compare with is that of Ramaithitima et al. 2015, section V: a hexagonal packing overlaid on the free space,
+its points the range apart. How many of them fall into the free space depends on where the packing lies; the mean over
+all ways is the free area divided by that of a point's cell, and that is what is used here.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import shapely
+
+from zwerm.maths.simplicial import FlagComplex, betti
+from zwerm.world.arena.arena import Arena
+from zwerm.world.scene import Floats, Ints
+
+_QUARTER_SIDES = 64
+# A wall's shadow is cut into pieces that span at most this much of the view [rad].
+_PIECE_RAD = 0.5
+# Bodies in contact may overlap a wall by a little.
+_INSIDE = 0.98
+
+
+def hexagonal_packing_robots(arena: Arena, range_m: float) -> float:
+    """Return the mean number of points in the arena of a hexagonal packing whose points are `range_m` apart."""
+    return float(arena.area_m2 / (math.sqrt(3.0) / 2.0 * range_m**2))
+
+
+class SeenArea:
+    """What robots see of an arena. What is seen from a place is kept while a robot stands there."""
+
+    def __init__(self, arena: Arena, range_m: float) -> None:
+        self.arena, self.range_m = arena, range_m
+        self._from: dict[tuple[float, ...], shapely.Geometry] = {}
+
+    def area(self, position: Floats) -> shapely.Geometry:
+        """Return what is seen from any of position (n, 2)."""
+        self._from = {
+            tuple(each.tolist()): self._from.get(tuple(each.tolist())) or seen_from(each, self.range_m, self.arena)
+            for each in position
+        }
+        return shapely.intersection(shapely.union_all(list(self._from.values())), self.arena.free)
+
+    def fraction(self, position: Floats) -> float:
+        """Return the fraction of the arena that is seen from any of position (n, 2)."""
+        return min(1.0, float(self.area(position).area / self.arena.area_m2)) if len(position) else 0.0
+
+
+def reachable(arena: Arena, radius_m: float, position: Floats) -> shapely.Geometry:
+    """Return the part of the free space that bodies of a radius can get into from any of position (n, 2).
+
+    What lies behind a crack that no body passes is not in it; corners are, though a round body does not fill them.
+    """
+    inner = shapely.buffer(arena.free, -_INSIDE * radius_m)
+    if arena.walls:
+        inner = shapely.difference(inner, shapely.buffer(shapely.union_all(list(arena.walls)), _INSIDE * radius_m))
+    parts = [each for each in shapely.get_parts(inner) if shapely.dwithin(each, shapely.multipoints(position), 1e-3)]
+    grown = shapely.buffer(shapely.union_all(parts), _INSIDE * radius_m, join_style="mitre")
+    return shapely.intersection(grown, arena.free)
+
+
+def seen_from(place: Floats, range_m: float, arena: Arena) -> shapely.Geometry:
+    """Return what is seen from a place (2,) within `range_m`: the disc, less the shadows of the walls."""
+    disc = shapely.buffer(shapely.Point(place), range_m, quad_segs=_QUARTER_SIDES)
+    walls = arena.segments[arena.walls_within(place[None, :], range_m).segment]
+    shadows = [piece for x0, y0, x1, y1 in walls.tolist() for piece in _shadow(place, (x0, y0), (x1, y1), range_m)]
+    near = shapely.intersection(disc, arena.free)
+    return shapely.difference(near, shapely.union_all(shadows)) if shadows else near
+
+
+def _shadow(
+    place: Floats, start: tuple[float, float], end: tuple[float, float], range_m: float
+) -> Sequence[shapely.Polygon]:
+    """Return polygons that cover what a wall hides from a place, as far as `range_m`, or nothing if it is too far."""
+    ax, ay = start[0] - place[0], start[1] - place[1]
+    bx, by = end[0] - place[0], end[1] - place[1]
+    dx, dy = bx - ax, by - ay
+    along = min(1.0, max(0.0, -(ax * dx + ay * dy) / (dx * dx + dy * dy)))
+    cross = ax * by - ay * bx
+    if math.hypot(ax + along * dx, ay + along * dy) >= range_m or abs(cross) < 1e-12:
+        return []
+    turn = math.atan2(cross, ax * bx + ay * by)
+    pieces = math.ceil(abs(turn) / _PIECE_RAD)
+    rays: list[tuple[float, float]] = []
+    walls: list[tuple[float, float]] = []
+    for n in range(pieces + 1):
+        angle = math.atan2(ay, ax) + turn * n / pieces
+        cos, sin = math.cos(angle), math.sin(angle)
+        length = cross / (cos * dy - sin * dx)  # where the ray meets the wall's line
+        walls.append((place[0] + length * cos, place[1] + length * sin))
+        far = max(length, 0.0) + 2.0 * range_m
+        rays.append((place[0] + far * cos, place[1] + far * sin))
+    return [shapely.Polygon([walls[n], walls[n + 1], rays[n + 1], rays[n]]) for n in range(pieces)]
+
+
+def complex_of(pairs: Ints, robots: Iterable[int]) -> FlagComplex:
+    """Return the complex of `robots` that see each other in `pairs` (k, 2)."""
+    lists: dict[int, list[int]] = {robot: [] for robot in robots}
+    for i, j in pairs.tolist():
+        if i in lists and j in lists:
+            lists[i].append(j)
+            lists[j].append(i)
+    return FlagComplex(lists)
+
+
+def holes(pairs: Ints, robots: Ints) -> int:
+    """Return the number of holes (b1) of the complex of `robots` (n,) that see each other in `pairs` (k, 2)."""
+    return betti(complex_of(pairs, robots.tolist()))[1]
+
+
+def obstacles(arena: Arena) -> int:
+    """Return how many obstacles stand free in the arena."""
+    return sum(len(part.interiors) for part in getattr(arena.free, "geoms", (arena.free,))) + len(arena.walls)
+
+
+def living(present: Ints, dead: Sequence[int]) -> Ints:
+    """Return the robots that are there and alive."""
+    return np.setdiff1d(present, np.array(dead, dtype=np.int64))

@@ -1,0 +1,215 @@
+"""A comparison as a figure for a paper: each metric over the first sweep, every variant with its 95 % interval.
+
+Below each panel of means is one of the paired differences from the first variant. Markers are hollow where not every run
+came to a value. With more sweeps than one there is a figure for every setting of the others.
+"""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from zwerm.compare.comparison import COMPLETED, Comparison, SweepPoint
+from zwerm.errors import PictureError
+from zwerm.maths.statistics import Sample
+from zwerm.study.plan import Point
+from zwerm.study.tables import Setting
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's colours (2008), and a marker for each, so that the figure can be told apart in grey.
+STYLES: Final = (("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "^"), ("#CC79A7", "D"), ("#E69F00", "v"))
+# Unless somebody says what to compare, the figure shows the first of each of these that was measured.
+SHOWN: Final = (
+    ("coverage_fraction", "cell_coverage_fraction", "area_coverage_fraction", "mean_error_m", "robots_done_fraction"),
+    ("robots_deployed", "coverage_cost"),
+    ("time_to_90_percent_coverage_s", "convergence_time_s", "deployment_cycles", "sim_s"),
+    ("messages_per_robot_mean",),
+    ("bytes_per_robot_mean",),
+)
+UNITS: Final = {"_m_s": " [m/s]", "_m2": " [m²]", "_m": " [m]", "_s": " [s]", "_fraction": " [fraction]"}
+SUFFIXES: Final = (".png", ".pdf", ".svg")
+WORDS: Final = {COMPLETED: "runs completed [fraction]", "sim_s": "duration of the run [s]"}
+COLUMNS: Final = 3
+PANEL_IN: Final = (3.5, 3.6)
+HEAD_IN: Final = 0.95
+FOOT_IN: Final = 0.3
+DODGE: Final = 0.12
+DPI: Final = 200
+
+
+def check_figure(path: Path) -> Path:
+    """Return the path of a figure.
+
+    Raises PictureError where it is of no kind that can be drawn.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise PictureError(f"{path}: expected a file that ends in {' or '.join(SUFFIXES)}")
+    return path
+
+
+def draw_comparison(path: Path, comparison: Comparison, metrics: Sequence[str] = ()) -> list[Path]:
+    """Draw the comparison at `path` (.png, .pdf or .svg), and return the paths of all figures.
+
+    `metrics` are those to show, by default a choice of what was measured.
+    """
+    by_rest: dict[tuple[tuple[str, Setting], ...], list[SweepPoint]] = {}
+    for place in comparison.places:
+        by_rest.setdefault(tuple(place.settings.items())[1:], []).append(place)
+    chosen = [each for each in metrics if each in comparison.metrics] or _choice(comparison)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    drawn = []
+    for rest, places in by_rest.items():
+        words = ", ".join(f"{axis} = {value}" for axis, value in rest)
+        suffix = re.sub(r"[^A-Za-z0-9.=_-]+", "-", "".join(f"-{axis}={value}" for axis, value in rest))[:100]
+        drawn.append(path.with_name(f"{path.stem}{suffix}{path.suffix}"))
+        _draw(comparison, _in_order(places), [*chosen, COMPLETED], words).savefig(drawn[-1], dpi=DPI)
+    return drawn
+
+
+def _choice(comparison: Comparison) -> list[str]:
+    found = [next((each for each in names if each in comparison.metrics), None) for names in SHOWN]
+    return [each for each in found if each is not None] or comparison.metrics[:COLUMNS]
+
+
+def _draw(comparison: Comparison, places: Sequence[SweepPoint], metrics: Sequence[str], words: str) -> "Figure":
+    from matplotlib.figure import Figure
+
+    columns = min(COLUMNS, len(metrics))
+    rows = math.ceil(len(metrics) / columns)
+    size = (PANEL_IN[0] * columns, PANEL_IN[1] * rows + HEAD_IN + FOOT_IN)
+    figure = Figure(figsize=size)
+    below_head = (0.0, FOOT_IN / size[1], 1.0, 1.0 - (HEAD_IN + FOOT_IN) / size[1])
+    figure.set_layout_engine("constrained", rect=below_head, wspace=0.04)
+    blocks = figure.subfigures(rows, columns, squeeze=False).ravel().tolist()
+    for metric, block in zip(metrics, blocks, strict=False):
+        above, below = block.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+        _draw_metric(above, below, comparison, places, metric)
+    handles, labels = above.get_legend_handles_labels()
+    top = 1.0 - 0.12 / size[1]
+    scenario = comparison.places[0].points[0].scenario
+    title = ": ".join(filter(None, [scenario.name, words]))
+    figure.text(0.01, top, title, va="top", fontsize=12, fontweight="bold")
+    seeds = sorted({seed for place in places for point in place.points for seed in comparison.seeds(point)})
+    about = f"{len(seeds)} seeds a point" if len(seeds) > 1 else "one seed a point"
+    explained = (
+        f"{about}; means with their 95 % intervals; below, the difference from {comparison.variants[0]}, paired by seed. "
+        "A run that failed counts with what it came to."
+    )
+    figure.text(0.01, top - 0.27 / size[1], explained, va="top", fontsize=9)
+    figure.legend(
+        handles, labels, loc="upper left", bbox_to_anchor=(0.0, top - 0.42 / size[1]), ncols=len(labels), frameon=False
+    )
+    if _some_missing(comparison, places, metrics):
+        figure.text(
+            0.01,
+            0.08 / size[1],
+            "Hollow or not there: not every run, or none, came to a value.",
+            va="bottom",
+            fontsize=9,
+        )
+    return figure
+
+
+def _draw_metric(
+    above: "Axes", below: "Axes", comparison: Comparison, places: Sequence[SweepPoint], metric: str
+) -> None:
+    x, ticks = _axis(places)
+    step = min(np.diff(np.unique(x)), default=1.0)
+    below.axhline(0.0, color="0.4", linewidth=0.8)
+    count = len(comparison.variants)
+    for number, variant in enumerate(comparison.variants):
+        colour, marker = STYLES[number % len(STYLES)]
+        style = {
+            "color": colour,
+            "marker": marker,
+            "markersize": 4.5,
+            "linewidth": 1.3,
+            # Nothing lies between two words.
+            "linestyle": "none" if ticks else "solid",
+            "capsize": 2.5,
+            "label": variant,
+        }
+        shifted = x + DODGE * step * (number - (count - 1) / 2.0)
+        points = [place.points[number] for place in places]
+        whole = [_whole(comparison, point, metric) for point in points]
+        _bars(above, shifted, [comparison.sample(point, metric) for point in points], whole, style)
+        if number:
+            differences = [comparison.difference(place, place.points[number], metric) for place in places]
+            both = [_whole(comparison, place.points[0], metric) for place in places]
+            _bars(below, shifted, differences, [one and other for one, other in zip(whole, both, strict=True)], style)
+    above.set_title(label(metric), fontsize=10)
+    if metric.endswith("_fraction") or metric == COMPLETED:
+        low, high = above.get_ylim()
+        limits = max(-0.02, low), min(1.03, max(high, low + 0.02))
+        above.set_yticks([tick for tick in above.get_yticks() if limits[0] <= tick <= 1.0 + 1e-9])
+        above.set_ylim(*limits)
+    below.set_ylabel("difference", fontsize=8)
+    below.set_xlabel(axis_label(next(iter(places[0].settings), "")), fontsize=9)
+    if ticks:
+        slanted = len("".join(ticks)) > 30
+        below.set_xticks(x, ticks, rotation=20 if slanted else 0, ha="right" if slanted else "center")
+    for axes in (above, below):
+        axes.grid(alpha=0.3)
+        axes.tick_params(labelsize=8)
+        axes.spines[["top", "right"]].set_visible(False)
+
+
+def _bars(axes: "Axes", x: Any, samples: Sequence[Sample], whole: Sequence[bool], style: Mapping[str, Any]) -> None:
+    means = np.array([each.mean for each in samples])
+    halves = np.nan_to_num([each.half_width for each in samples])
+    axes.errorbar(x, means, halves, **style)
+    hollow = np.array([not each for each in whole]) & ~np.isnan(means)
+    if hollow.any():
+        plain = {"color": style["color"], "marker": style["marker"], "markersize": style["markersize"]}
+        axes.plot(x[hollow], means[hollow], linestyle="none", markerfacecolor="white", zorder=3, **plain)
+
+
+def _axis(places: Sequence[SweepPoint]) -> tuple[Any, list[str]]:
+    """Return where the places lie on the first sweep, and their names where it is not one of numbers."""
+    values = [_first(place) for place in places]
+    if _numeric(values):
+        return np.array(values, dtype=np.float64), []
+    return np.arange(len(values), dtype=np.float64), [str(each) for each in values]
+
+
+def _in_order(places: Sequence[SweepPoint]) -> list[SweepPoint]:
+    """Return the places as a line goes through them: numbers ascend, whatever order they were given in."""
+    return sorted(places, key=_first) if _numeric([_first(place) for place in places]) else list(places)
+
+
+def _first(place: SweepPoint) -> Any:
+    return next(iter(place.settings.values()), "")
+
+
+def _numeric(values: Sequence[Setting]) -> bool:
+    return all(isinstance(each, int | float) and not isinstance(each, bool) for each in values)
+
+
+def _whole(comparison: Comparison, point: Point, metric: str) -> bool:
+    """Tell whether every run of a point came to a value."""
+    return len(comparison.values(point, metric)) == len(comparison.seeds(point))
+
+
+def _some_missing(comparison: Comparison, places: Sequence[SweepPoint], metrics: Sequence[str]) -> bool:
+    points = [point for place in places for point in place.points]
+    return any(not _whole(comparison, point, metric) for point in points for metric in metrics)
+
+
+def axis_label(axis: str) -> str:
+    """Return a sweep as words where it is of independent loss, on one channel or several alike."""
+    return "messages lost [fraction]" if all(path.endswith(".loss") for path in axis.split("+")) else axis
+
+
+def label(metric: str) -> str:
+    """Return a metric as words, with its unit: `messages_per_robot_mean` is `messages per robot`."""
+    if metric in WORDS:
+        return WORDS[metric]
+    unit = next((suffix for suffix in UNITS if metric.endswith(suffix)), "")
+    words = metric.removesuffix(unit).removesuffix("_mean").replace("_percent_", " % ").replace("_", " ")
+    return words + UNITS.get(unit, "")

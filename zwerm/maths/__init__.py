@@ -1,0 +1,1 @@
+"""Pure mathematics, with numpy at most: angles, keyed random numbers, polygons, simplicial complexes, statistics."""

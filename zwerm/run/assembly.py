@@ -1,0 +1,114 @@
+"""From a scenario to a world ready to run, with every mistake that the typed tables could not see."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from zwerm.agents.runtime.controllers import find, parameters_of
+from zwerm.deploy.node_specs import BASE, COORDINATOR, ROBOT, player
+from zwerm.errors import ControllerError, ScenarioError
+from zwerm.scenario.diagnostics import struct_mistakes
+from zwerm.scenario.tables import Scenario
+from zwerm.world.arena.arena import Arena
+from zwerm.world.fields.field import Field, make_field
+from zwerm.world.metrics.observers import Observers, make_meters
+from zwerm.world.sensors import Sensor, Surroundings
+from zwerm.world.sensors.registry import BUILT_IN, make_sensors
+from zwerm.world.world import World
+
+T = TypeVar("T")
+
+
+def assemble(scenario: Scenario, seed: int) -> World:
+    """Return the world of `scenario`, its robots placed for `seed`.
+
+    Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the placement.
+    """
+    prepared = prepare(scenario)
+    mistakes: list[str] = []
+    world = _attempt(lambda: World(scenario, seed, *prepared), scenario, mistakes)
+    if world is None:
+        raise ScenarioError(mistakes)
+    return world
+
+
+class Prepared(NamedTuple):
+    """All of a world that does not depend on the seed. Sensors and meters are for one run each."""
+
+    arena: Arena
+    sensors: Sequence[Sensor]
+    meters: Observers
+
+
+def prepare(scenario: Scenario) -> Prepared:
+    """Return the arena, the sensors and the meters of `scenario`.
+
+    Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
+    """
+    mistakes: list[str] = []
+    field, table = None, scenario.field
+    sensors, meters = None, None
+    arena = _attempt(lambda: Arena.from_table(scenario.arena, scenario.folder), scenario, mistakes)
+    _attempt(lambda: check_controllers(scenario), scenario, mistakes)
+    if arena is not None and table is not None:
+        bounds = arena.bounds
+        field = _attempt(lambda: make_field(table, bounds, scenario.folder, scenario.place), scenario, mistakes)
+    # What needs the field is not told that there is none where the mistake is in the field's own table.
+    if arena is not None and (field is not None or table is None):
+        sensors = _attempt(lambda: _sensors(scenario, arena, field), scenario, mistakes)
+        meters = _attempt(lambda: make_meters(scenario.metrics, arena, field, scenario.time.dt_s), scenario, mistakes)
+    if arena is None or sensors is None or meters is None or mistakes:
+        raise ScenarioError(mistakes)
+    return Prepared(arena, sensors, meters)
+
+
+def _attempt(make: Callable[[], T], scenario: Scenario, mistakes: list[str]) -> T | None:
+    """Return what `make` makes, or None with its mistakes added to `mistakes`, each led by the scenario's place."""
+    try:
+        return make()
+    except ScenarioError as error:
+        named = scenario.place + ": "
+        mistakes += [line if line.startswith(named) else named + line for line in error.mistakes]
+        return None
+
+
+def _sensors(scenario: Scenario, arena: Arena, field: Field | None) -> Sequence[Sensor]:
+    landmarks = np.array(scenario.landmarks, dtype=np.float64).reshape(-1, 2)
+    surroundings = Surroundings(arena, scenario.robots.count, landmarks=landmarks, field=field)
+    return make_sensors(scenario.robots.sensors, surroundings, "robots.sensors", scenario.place)
+
+
+def check_controllers(scenario: Scenario) -> None:
+    """Find the controllers of robots, base and coordinator, and check what each is given against what it needs.
+
+    Raises ScenarioError with every mistake.
+    """
+    robots, base, coordinator = scenario.robots, scenario.base, scenario.coordinator
+    kinds = [table.kind for table in robots.sensors]
+    # A controller may name what it needs by the sensor's kind or by the field of the observation that it fills.
+    given = [*kinds, *(BUILT_IN[kind].field for kind in kinds if kind in BUILT_IN)]
+    mistakes = _controller_mistakes(scenario, "robots", ROBOT, robots.controller, robots.parameters, given)
+    if base is not None:
+        mistakes += _controller_mistakes(scenario, "base", BASE, base.controller, base.parameters, given)
+    if coordinator is not None:
+        mistakes += _controller_mistakes(
+            scenario, "coordinator", COORDINATOR, coordinator.controller, coordinator.parameters, []
+        )
+    if mistakes:
+        raise ScenarioError(list(dict.fromkeys(mistakes)))
+
+
+def _controller_mistakes(
+    scenario: Scenario, table: str, role: str, controller: str, parameters: dict[str, Any], sensors: Sequence[str]
+) -> list[str]:
+    try:
+        found = find(player(role, controller, scenario.services))
+    except ControllerError as error:
+        return [f"{table}.controller: {error}"]
+    mistakes = [
+        f"robots.sensors: the controller {controller} needs the sensor {sensor!r}"
+        for sensor in getattr(found, "sensors", ())
+        if sensor not in sensors
+    ]
+    return mistakes + struct_mistakes(parameters_of(found), parameters, f"{table}.parameters")

@@ -1,0 +1,122 @@
+"""What a run leaves behind: its outcome, its numbers, and enough of its history to draw it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from zwerm.record.history import History
+from zwerm.scenario.tables import Scenario
+from zwerm.world.arena.arena import Arena
+from zwerm.world.scene import Ints
+from zwerm.world.tick.telemetry import TelemetryRecord
+
+if TYPE_CHECKING:  # pictures need matplotlib
+    from zwerm.view.stills import RunView
+
+
+@dataclass(slots=True)
+class RunResult:
+    """The result of one run. `as_json` is what `zwerm run --json` prints."""
+
+    scenario: Scenario
+    seed: int
+    runner: str
+    outcome: str
+    reason: str
+    trace: str
+    ticks: int
+    sim_s: float
+    wall_s: float
+    robots: int
+    robot_ticks: int
+    metrics: dict[str, float]
+    radio: dict[str, Any]
+    middleware_lost: int
+    crashed: list[int]
+    restarted: list[int]
+    arena: Arena
+    history: History
+    cell_counts: Ints | None = None
+    hindered: dict[str, list[int]] = field(default_factory=dict)
+    faults: list[dict[str, Any]] = field(default_factory=list)
+    missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
+    series: dict[str, list[float]] = field(default_factory=dict)
+    refused: dict[str, int] = field(default_factory=dict)
+    tracebacks: dict[int, str] = field(default_factory=dict)
+    told: list[TelemetryRecord] = field(default_factory=list)
+
+    @property
+    def ok(self) -> bool:
+        """Tell whether the run ended as runs should: completed, or at its time limit."""
+        return self.outcome in ("completed", "time-limit")
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the stable summary of the run, ready for a JSON encoder."""
+        return {
+            "scenario": self.scenario.name,
+            "seed": self.seed,
+            "runner": self.runner,
+            "outcome": self.outcome,
+            "trace": self.trace,
+            "ticks": self.ticks,
+            "sim_s": self.sim_s,
+            "wall_s": self.wall_s,
+            "robots": self.robots,
+            "robot_ticks": self.robot_ticks,
+            "metrics": self.metrics,
+            "radio": self.radio,
+            "middleware_lost": self.middleware_lost,
+            "nodes": {"crashed": self.crashed, "restarted": self.restarted, **self.hindered},
+            "faults": self.faults,
+        }
+
+    def picture(self, path: str | Path, cycle: int | None = None, at_s: float | None = None) -> Path:
+        """Draw the run at its end, at a deployment cycle or at a time [s] as a PNG at `path`, and return the path.
+
+        Raises PictureError where the file cannot be written, or the moment is not of the run.
+        """
+        from zwerm.view.stills import draw_run
+
+        return draw_run(Path(path), self._view(), self.metrics, cycle, at_s)
+
+    def animate(self, path: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
+        """Draw the run as an animation at `path`, .gif or .mp4, and return the path."""
+        from zwerm.view.stills import animate_run
+
+        return animate_run(Path(path), self._view(), progress=progress)
+
+    def _view(self) -> "RunView":
+        from zwerm.view.stills import RunView
+
+        table = self.scenario.metrics
+        return RunView(
+            self.arena,
+            self.history,
+            self.scenario.robots.body.radius_m,
+            self.name,
+            self.ending,
+            table.coverage_radius_m,
+            table.cells,
+            table.sight_range_m,
+            0 if self.scenario.base is None else self.scenario.base.stations,
+            self.told,
+            self.series,
+        )
+
+    @property
+    def name(self) -> str:
+        """The scenario and the seed."""
+        return f"{self.scenario.name}, seed {self.seed}"
+
+    @property
+    def ending(self) -> str:
+        """How many robots there were in the end, and how long the run was."""
+        there = int(self.metrics.get("robots_deployed", self.metrics.get("robots_in_arena", self.robots)))
+        robots = f"{self.robots} robots" if there == self.robots else f"{there} of {self.robots} robots"
+        return f"{robots}, {self.sim_s:g} s"
+
+    @property
+    def title(self) -> str:
+        """One line that names the run, and says how it ended."""
+        return f"{self.name}: {self.ending}"

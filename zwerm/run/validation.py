@@ -1,0 +1,77 @@
+"""Every mistake in a scenario at once, of whichever stage: its tables, or what is made of them.
+
+What is made of tables can only be checked where they are sound. So what is unsound is left out, and the rest is checked as
+if it were the whole; what is then said about a place that was left out, or is around or inside one, is not believed.
+"""
+
+import copy
+from typing import Any
+
+from pydantic import ValidationError
+
+from zwerm.errors import ScenarioError
+from zwerm.run.assembly import assemble, prepare
+from zwerm.scenario.tables import Scenario, load, tables_of, validate
+
+Path = tuple[str, ...]
+
+
+def scenario_mistakes(name: str, overrides: tuple[str, ...] = ()) -> list[str]:
+    """Return one line for every mistake in the scenario `name` with `overrides`: `place: path: rule, got value`."""
+    try:
+        scenario = load(name, overrides)
+    except ScenarioError as error:
+        return list(dict.fromkeys([*error.mistakes, *_mistakes_of_the_rest(name, overrides)]))
+    try:
+        assemble(scenario, seed=1)
+    except ScenarioError as error:
+        return error.mistakes
+    return []
+
+
+def _mistakes_of_the_rest(name: str, overrides: tuple[str, ...]) -> list[str]:
+    try:
+        tables, file = tables_of(name, overrides)
+    except ScenarioError:
+        return []  # there is no rest
+    rest = copy.deepcopy(tables)
+    unsound = _leave_out_unsound(rest)
+    try:
+        prepare(validate(rest, str(file), file.parent))
+    except ScenarioError as error:
+        found = [each.removeprefix(f"{file}: ") for each in error.mistakes]
+        return [f"{file}: {each}" for each in found if not any(_touches(each, path) for path in unsound)]
+    return []
+
+
+def _leave_out_unsound(tables: dict[str, Any]) -> list[Path]:
+    """Take out of `tables` what is unsound, and return where it was; of an array all goes, so that no number shifts."""
+    try:
+        Scenario.model_validate(tables)
+    except ValidationError as error:
+        paths = {_keys(each["loc"]): None for each in error.errors(include_url=False)}
+    else:
+        return []
+    for path in paths:
+        table: Any = tables
+        for key in path[:-1]:
+            table = table.get(key) if isinstance(table, dict) else None
+        if isinstance(table, dict) and path:
+            table.pop(path[-1], None)
+    return list(paths)
+
+
+def _keys(where: tuple[int | str, ...]) -> Path:
+    keys: list[str] = []
+    for key in where:
+        if isinstance(key, int):
+            break
+        keys.append(key)
+    return tuple(keys)
+
+
+def _touches(line: str, path: Path) -> bool:
+    """Tell whether a line is about a place that is, is inside of, or is around `path`."""
+    place = tuple(line.partition(": ")[0].split("."))
+    shared = min(len(place), len(path))
+    return place[:shared] == path[:shared]

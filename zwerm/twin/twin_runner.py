@@ -1,0 +1,188 @@
+"""Running a scenario in real time with its packets on a real network.
+
+The world senses, moves bodies and observes nodes as ever, over a Unix socket that loses nothing. What nodes send each other
+crosses the network, and they hear what came through and nothing else. The world is told what was sent all the same, and
+its models judge it: so every packet has two fates, a modelled and a real one, at the same tick and between the same places.
+"""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from zwerm.deploy.network.impairments import Impairments, Network, translate
+from zwerm.deploy.network.namespaces import Namespaces, address_of, missing
+from zwerm.deploy.node_specs import cast
+from zwerm.deploy.runtime_directory import private_directory
+from zwerm.deploy.swarm import LocalSwarm, Members
+from zwerm.errors import LinkError
+from zwerm.link.peer_radio import MET, LogLine, Station, Transport, read_log
+from zwerm.run.assembly import assemble
+from zwerm.run.runner import NullProgress, ProgressListener, new_run_id
+from zwerm.scenario.tables import Scenario
+from zwerm.world.drivers.lockstep import COMPLETED, INTERRUPTED, TIME_LIMIT
+from zwerm.world.drivers.realtime import RealTime
+from zwerm.world.radio import ROBOTS
+from zwerm.world.world import World
+
+MEET_DEADLINE_S: Final = 30.0
+_LOOK_EVERY_S: Final = 0.02
+
+# How long nodes go on listening after the last tick: TCP may wait seconds before it sends once more.
+DRAIN_S: Final[dict[Transport, float]] = {"udp": 0.5, "tcp": 3.0}
+
+
+@dataclass(slots=True)
+class TwinRun:
+    """One run: the world with its books, what every node's radio noted, and what the network says it did."""
+
+    world: World
+    transport: Transport
+    outcome: str
+    reason: str
+    wall_s: float
+    middleware_lost: int
+    channels: tuple[str, ...]
+    links: dict[str, list[tuple[int, int]]]
+    impairments: Impairments
+    logs: dict[int, list[LogLine]]
+    network_dropped: dict[str, int]  # IP packets, by rule
+    retransmitted: int  # TCP segments
+    segments: int
+
+
+def usable() -> None:
+    """Raise LinkError, with the reason, where this machine cannot have a network of a run's own."""
+    reason = missing()
+    if reason:
+        raise LinkError(f"the twin on a real network {reason}")
+
+
+def run_twin(scenario: Scenario, seed: int, transport: Transport, watcher: ProgressListener | None = None) -> TwinRun:
+    """Run a scenario, one that is `possible` here, with its packets on a network of its own.
+
+    Raises LinkError where this machine cannot have one, and ScenarioError for a mistake in the scenario.
+    """
+    usable()
+    watcher = watcher or NullProgress()
+    world = assemble(scenario, seed)
+    links = {name: channel.pairs() for name, channel in world.medium.channels.items()}
+    impairments = translate(scenario, links)
+    members = cast(scenario, seed)
+    with (
+        Namespaces(sorted(members)) as namespaces,
+        private_directory() as directory,
+    ):
+        stations = _stations(scenario, members, namespaces, transport, directory)
+        logs = {node: Path(station.log) for node, station in stations.items()}
+        with LocalSwarm(new_run_id(), members, progress=watcher.joined, paced=True, stations=stations) as swarm:
+            _wait_until_met(logs)
+            network = Network(namespaces, impairments, transport)
+            network.impair(world.draws)
+            driver = _driver(world, swarm, network, impairments, watcher)
+            before, start = _segments(namespaces, members), time.monotonic()
+            try:
+                outcome, reason = driver.run(), driver.reason
+            except KeyboardInterrupt:
+                outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
+            wall_s = time.monotonic() - start
+            if outcome in (COMPLETED, TIME_LIMIT):
+                time.sleep(DRAIN_S[transport])
+            lines = {node: list(read_log(path)) for node, path in logs.items()}
+            dropped = network.dropped()
+            segments, again = (late - early for late, early in zip(_segments(namespaces, members), before, strict=True))
+    return TwinRun(
+        world=world,
+        transport=transport,
+        outcome=outcome,
+        reason=reason,
+        wall_s=wall_s,
+        middleware_lost=driver.lost,
+        channels=tuple(links),
+        links=links,
+        impairments=impairments,
+        logs=lines,
+        network_dropped=dropped,
+        retransmitted=again,
+        segments=segments,
+    )
+
+
+def _driver(
+    world: World, swarm: LocalSwarm, network: Network, impairments: Impairments, watcher: ProgressListener
+) -> RealTime:
+    """Return what drives the world, and the network along with it."""
+    table = world.scenario.time
+    ticks = round(table.duration_s / table.dt_s)
+
+    def on_sense(world: World) -> None:
+        pairs = [
+            pair
+            for name in world.medium.channels
+            for pair in world.medium.stopped(name, world.scene, impairments.by_place.get(name, ()))
+        ]
+        network.block(pairs)
+
+    def on_tick(world: World) -> None:
+        watcher.ticked(world.tick, ticks)
+
+    return RealTime(world, swarm.link, 1.0, on_tick, swarm, on_sense)
+
+
+def _stations(
+    scenario: Scenario, members: Members, namespaces: Namespaces, transport: Transport, directory: Path
+) -> dict[int, Station]:
+    """Return where each node stands, and whom it hears: all robots each other, and all of them the coordinator."""
+    addresses = {node: address_of(node) for node in members}
+    coordinator = scenario.robots.count if scenario.coordinator is not None else None
+    channels: dict[str, bool] = {}
+    if scenario.radio is not None:
+        channels["robots"] = scenario.radio.anonymous
+    if coordinator is not None:
+        channels["uplink"] = scenario.uplink is not None and scenario.uplink.anonymous
+
+    def heard(node: int) -> list[tuple[str, str]]:
+        found = []
+        if scenario.radio is not None and node != coordinator:
+            found.append((ROBOTS, "*"))
+        if coordinator is not None:
+            found.append(("uplink", "*" if node == coordinator else str(coordinator)))
+        return found
+
+    return {
+        node: Station(
+            node=node,
+            namespace=namespaces.path(node),
+            transport=transport,
+            addresses=addresses,
+            channels=tuple(channels),
+            hears=tuple(heard(node)),
+            anonymous=tuple(name for name, anonymous in channels.items() if anonymous),
+            log=str(directory / f"radio-{node}"),
+        )
+        for node in members
+    }
+
+
+def _wait_until_met(logs: dict[int, Path]) -> None:
+    """Return when every two nodes have heard each other."""
+    end_s = time.monotonic() + MEET_DEADLINE_S
+    waiting = list(logs)
+    while waiting := [node for node in waiting if not any(line.what == MET for line in read_log(logs[node]))]:
+        if time.monotonic() > end_s:
+            raise LinkError(
+                f"the twin on a real network: node {min(waiting)} has not met all others within {MEET_DEADLINE_S:g} s"
+            )
+        time.sleep(_LOOK_EVERY_S)
+
+
+def _segments(namespaces: Namespaces, members: Members) -> tuple[int, int]:
+    """Return the TCP segments that all nodes have sent so far, and those that they sent again."""
+    sent = again = 0
+    for node in members:
+        lines = [line.split() for line in namespaces.run(["cat", "/proc/net/snmp"], node=node).splitlines()]
+        names, values = (line for line in lines if line[0] == "Tcp:")
+        counts = dict(zip(names, values, strict=True))
+        sent += int(counts["OutSegs"])
+        again += int(counts["RetransSegs"])
+    return sent, again

@@ -1,0 +1,50 @@
+"""Frames: a payload with a checksum, for radios that damage bits.
+
+A frame is the CRC-32 of the payload (zlib's polynomial; 4 bytes, big-endian) and then the payload. It finds every error of
+up to 3 bits in payloads of this length, and all but one in 4e9 of the others. It proves nothing about who sent it.
+"""
+
+from struct import pack, unpack_from
+from typing import Any, Final
+from zlib import crc32
+
+import msgspec
+
+from zwerm.errors import ProtocolError
+from zwerm.wire.messages import REFUSABLE
+
+HEAD_BYTES: Final = 4
+
+
+def seal(payload: bytes) -> bytes:
+    """Return the frame that holds `payload`."""
+    return pack(">I", crc32(payload)) + payload
+
+
+def unseal(frame: bytes) -> bytes:
+    """Return the payload of `frame`. Raises ProtocolError, reason `damaged`, where the checksum does not fit."""
+    if len(frame) < HEAD_BYTES:
+        raise ProtocolError("damaged", f"a frame of {len(frame)} bytes, at least {HEAD_BYTES}")
+    payload = frame[HEAD_BYTES:]
+    if unpack_from(">I", frame)[0] != crc32(payload):
+        raise ProtocolError("damaged", "the checksum does not fit")
+    return payload
+
+
+class Sealed:
+    """How messages of the types `messages`, structs or a union of them, cross a radio that damages bits."""
+
+    def __init__(self, messages: Any) -> None:
+        self._encode = msgspec.msgpack.Encoder().encode
+        self._decode = msgspec.msgpack.Decoder(messages).decode
+
+    def write(self, message: Any) -> bytes:
+        """Return the payload of a packet that says this."""
+        return seal(self._encode(message))
+
+    def read(self, payload: bytes) -> Any:
+        """Return what a packet says, or None where that is nothing: it was damaged on its way, or is somebody else's."""
+        try:
+            return self._decode(unseal(payload))
+        except (ProtocolError, *REFUSABLE):
+            return None

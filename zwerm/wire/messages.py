@@ -1,0 +1,292 @@
+"""All that crosses the wire: one `Observation` in, one `Command` out, and the messages that open and end a node's life.
+
+Messages are MessagePack maps with field names, so that any language can join; small parts that come in numbers (a
+bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as `type`, for
+example "command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and trailing
+bytes are refused with a reason that can be counted.
+
+New fields go last, with defaults; a field at its default is left out of a message (those of a drive are not). Angles
+are radians in (-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
+"""
+
+import re
+from collections.abc import Callable
+from math import isfinite
+from typing import Any, Final
+
+import msgspec
+from msgspec import Struct
+
+from zwerm.errors import ProtocolError
+
+PROTOCOL_VERSION: Final = 1
+
+# The largest message a node may send; a larger one is refused before it is decoded.
+MESSAGE_BYTES_MAX: Final = 65_536
+
+
+# What holds numbers and bytes only is part of no cycle: `gc=False` spares the collector counting and visiting it.
+
+
+class _Part(Struct, frozen=True, gc=False, array_like=True, forbid_unknown_fields=True):
+    """A part of a message that may come in numbers: an array on the wire."""
+
+
+class _Message(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True, tag_field="type"):
+    """A whole message: a map on the wire, led by its type and the protocol version."""
+
+
+# --- what a node senses ---------------------------------------------------------------------------------------------
+
+
+class Bearing(_Part, frozen=True):
+    """A robot seen, by its id, in the direction `bearing_rad` of the body frame. No range."""
+
+    node: int
+    bearing_rad: float
+
+
+class LandmarkBearing(_Part, frozen=True):
+    """A landmark seen, by its id, in the direction `bearing_rad` of the body frame. No range."""
+
+    landmark: int
+    bearing_rad: float
+
+
+class Contact(_Part, frozen=True):
+    """One closed touch switch: contact within +-half_width_rad of bearing_rad, in the body frame."""
+
+    bearing_rad: float
+    half_width_rad: float
+
+
+class Neighbour(_Part, frozen=True):
+    """A robot's position relative to this one, in the body frame."""
+
+    node: int
+    x_m: float
+    y_m: float
+
+
+class FieldSample(_Part, frozen=True):
+    """A scalar field's value where the robot stands, and its gradient [1/m] in the body frame."""
+
+    value: float
+    gradient_x: float
+    gradient_y: float
+
+
+class Pose(_Part, frozen=True):
+    """Position and heading in the frame of the arena."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+class Displacement(_Part, frozen=True):
+    """Motion since the node's previous observation, in the body frame it had then."""
+
+    forward_m: float
+    left_m: float
+    turn_rad: float
+
+
+class Packet(_Part, frozen=True):
+    """A radio packet delivered now. `sender` is None where the channel does not tell it."""
+
+    channel: str
+    payload: bytes
+    sender: int | None = None
+
+
+class Observation(_Message, frozen=True, tag=f"observation/{PROTOCOL_VERSION}"):
+    """All that a node learns at one tick. A sensor the scenario does not give the node is None, and not on the wire."""
+
+    tick: int
+    time_s: float
+    inbox: tuple[Packet, ...] = ()
+    line_of_sight: bool | None = None
+    bearings: tuple[Bearing, ...] | None = None
+    touch: tuple[Contact, ...] | None = None
+    landmarks: tuple[LandmarkBearing, ...] | None = None
+    neighbours: tuple[Neighbour, ...] | None = None
+    field: FieldSample | None = None
+    pose: Pose | None = None
+    boundary: tuple[tuple[float, float], ...] | None = None
+    odometry: Displacement | None = None
+    compass_rad: float | None = None
+    extra: dict[str, tuple[float, ...]] | None = None
+
+
+SENSOR_FIELDS: Final = Observation.__struct_fields__[3:]
+
+
+# --- what a node commands -------------------------------------------------------------------------------------------
+
+
+# Drives are sent whole: msgspec leaves out a number only where it is the default's own object, so that equal drives
+# could differ in their bytes, and runs in their traces.
+
+
+class BodyVelocity(Struct, frozen=True, gc=False, forbid_unknown_fields=True, tag_field="kind", tag="velocity"):
+    """Velocity of a holonomic body in its own frame."""
+
+    forward_m_s: float = 0.0
+    left_m_s: float = 0.0
+    turn_rad_s: float = 0.0
+
+
+class WheelSpeeds(Struct, frozen=True, gc=False, forbid_unknown_fields=True, tag_field="kind", tag="wheels"):
+    """Ground speed of the two wheels of a differential drive."""
+
+    left_m_s: float = 0.0
+    right_m_s: float = 0.0
+
+
+class Transmission(_Part, frozen=True):
+    """A radio packet to send: to every node that hears it, or to the one node `to`."""
+
+    channel: str
+    payload: bytes
+    to: int | None = None
+
+
+class Wake(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True):
+    """When the node wants its next observation: at `at_s`, or at the first event it names, if that is earlier.
+
+    With nothing set the node sleeps until the run ends.
+    """
+
+    at_s: float | None = None
+    on_packet: bool = False
+    on_contact: bool = False
+    on_visible: bool = False
+
+
+class Command(
+    Struct,
+    gc=False,
+    forbid_unknown_fields=True,
+    omit_defaults=True,
+    tag_field="type",
+    tag=f"command/{PROTOCOL_VERSION}",
+):
+    """A node's answer to one observation.
+
+    `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation
+    at every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of
+    the task is complete, `gave_up`, unless empty, why it never will be. `told` is what the node has to tell those who
+    watch the run, numbers and more; nobody in the run hears it. `tick` is set by whatever runs the controller: the tick of
+    the observation answered.
+    """
+
+    tick: int = 0
+    drive: BodyVelocity | WheelSpeeds | None = None
+    outbox: tuple[Transmission, ...] = ()
+    wake: Wake | None = None
+    release: bool = False
+    done: bool = False
+    gave_up: str = ""
+    told: dict[str, Any] = {}
+
+
+class Failure(_Message, frozen=True, tag=f"failure/{PROTOCOL_VERSION}"):
+    """A controller raised: the last message of a node, in place of its command."""
+
+    tick: int
+    error: str
+    traceback: str
+
+
+# --- how a node joins and leaves ------------------------------------------------------------------------------------
+
+
+class Hello(_Message, frozen=True, tag=f"hello/{PROTOCOL_VERSION}"):
+    """A node asks to join under the incarnation it was started with."""
+
+    node: int
+    incarnation: int
+
+
+class Welcome(_Message, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
+    """The world's answer to `Hello`: what the node is and what it may know of itself, or why it is refused.
+
+    In a `paced` run, one in real time, observations come whether or not the node has answered the one before.
+    """
+
+    refused: str = ""
+    controller: str = ""
+    setup: msgspec.Raw = msgspec.Raw(b"\xc0")
+    paced: bool = False
+
+
+class Goodbye(_Message, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
+    """The world tells a node that its life is over, and why; the node closes and exits. Or a node says that it leaves."""
+
+    reason: str
+
+
+# --- encode and decode ----------------------------------------------------------------------------------------------
+
+_encoder = msgspec.msgpack.Encoder()
+encode: Final[Callable[[object], bytes]] = _encoder.encode
+
+# For the hot paths; what they raise is turned into a ProtocolError by `refusal`. In a union a message must carry its
+# type.
+decode_observation: Final = msgspec.msgpack.Decoder(Observation).decode
+decode_answer: Final = msgspec.msgpack.Decoder(Command | Failure).decode
+decode_hello: Final = msgspec.msgpack.Decoder(Hello | Goodbye).decode
+decode_welcome: Final = msgspec.msgpack.Decoder(Welcome).decode
+decode_to_node: Final = msgspec.msgpack.Decoder(Observation | Goodbye).decode
+
+# What msgspec says of a message of another type, such as "command/2".
+_OTHER_TYPE = re.compile(r"Invalid value '\w+/([0-9]{1,9})' - at `\$\.type`")
+
+REFUSABLE: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+
+
+def refusal(error: Exception) -> ProtocolError:
+    """Return what a decoder raised as a ProtocolError.
+
+    Its reason is `schema` (unknown or missing field, wrong type, another message), `version`, or `malformed` (not
+    MessagePack, truncated, trailing bytes).
+    """
+    if isinstance(error, msgspec.ValidationError):
+        text = str(error)
+        tag = _OTHER_TYPE.fullmatch(text)
+        return ProtocolError("version" if tag and int(tag[1]) != PROTOCOL_VERSION else "schema", text)
+    return ProtocolError("malformed", str(error))
+
+
+def open_answer(payload: bytes) -> Command | Failure:
+    """Return the command or failure in `payload`.
+
+    Raises ProtocolError with the reasons of `refusal`, or `oversized`, or `not-finite` for a number that is none in the
+    drive or the wake.
+    """
+    if len(payload) > MESSAGE_BYTES_MAX:
+        raise ProtocolError("oversized", f"{len(payload)} bytes, at most {MESSAGE_BYTES_MAX}")
+    try:
+        answer: Command | Failure = decode_answer(payload)
+    except REFUSABLE as error:
+        raise refusal(error) from None
+    if type(answer) is Command:
+        drive, wake = answer.drive, answer.wake
+        # Most drives are finite velocities: those are seen to be without a call.
+        if not (
+            drive is None
+            or (type(drive) is BodyVelocity and isfinite(drive.forward_m_s + drive.left_m_s + drive.turn_rad_s))
+            or is_finite_drive(drive)
+        ):
+            raise ProtocolError("not-finite", repr(drive))
+        if wake is not None and wake.at_s is not None and not isfinite(wake.at_s):
+            raise ProtocolError("not-finite", repr(wake))
+    return answer
+
+
+def is_finite_drive(drive: BodyVelocity | WheelSpeeds) -> bool:
+    """Tell whether every number of `drive` is finite."""
+    if isinstance(drive, BodyVelocity):
+        return isfinite(drive.forward_m_s + drive.left_m_s + drive.turn_rad_s)
+    return isfinite(drive.left_m_s + drive.right_m_s)
