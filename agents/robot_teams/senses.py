@@ -3,7 +3,7 @@
 import math
 from typing import Final, NamedTuple
 
-from zwerm.protocol import Observation
+from zwerm.wire.messages import Observation
 
 # The gap that robots keep between their bodies [m]: more than a touch switch reaches, so that what is touched is a wall.
 GAP_M: Final = 0.03

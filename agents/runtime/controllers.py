@@ -13,6 +13,7 @@ BUILT_IN: Final = {
     "computation-free": "zwerm.agents.computation_free:ComputationFree",
     "gossip-max": "zwerm.agents.gossip:GossipMax",
     "random-walk": "zwerm.agents.computation_free:RandomWalk",
+    "robot-teams": "zwerm.agents.robot_teams:TeamRobot",
     "sensor-coverage": "zwerm.agents.sensor_coverage:Robot",
     "voronoi-coverage": "zwerm.agents.voronoi_coverage:VoronoiCoverage",
     "voronoi-integer": "zwerm.agents.voronoi_coverage:IntegerCoverage",

@@ -1,0 +1,121 @@
+"""The lead's decision at the barrier: the next corridor, a division, or that everything is covered. A pure function.
+
+Latimer et al. 2002, sections 3.3 and 3.4. The next corridor begins at the open end or port nearest to the team. Where a
+robot found a new segment on its own slice, a reverse critical point lies between it and its predecessor: it and those behind
+it take the new cell, the others keep theirs. Robots for which the corridor had no slice divide off too.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
+
+from zwerm.agents.robot_teams.facts import LEFT, RIGHT, End
+from zwerm.agents.robot_teams.messages import Plan, Status, View
+from zwerm.agents.robot_teams.slice_map import SliceMap
+
+FAR: Final = 10**9
+
+# Something open: an end without mate, or an open port, and the direction of the corridor that begins there.
+Item = tuple[End, int, bool]
+
+
+class Task(NamedTuple):
+    """Where a corridor begins."""
+
+    end: End
+    direction: int
+    own_slice: bool
+
+
+class Division(NamedTuple):
+    """The groups into which the team splits."""
+
+    groups: tuple[tuple[int, ...], ...]
+
+
+def open_tasks(slice_map: SliceMap) -> list[Task]:
+    """Return everything that is open: ends without mate with the direction in which to go on, and ports of swept ends."""
+    certificate = slice_map.certificate
+    tasks = []
+    unswept = {end: None for end in certificate.ends_without_mate}
+    for end in unswept:
+        sides = [side for side in (RIGHT, LEFT) if slice_map.arc(end, side) is None]
+        tasks.append(Task(end, sides[0] if len(sides) == 1 else RIGHT, True))
+    tasks += [Task(end, side, False) for end, side in certificate.open_ports if end not in unswept]
+    return tasks
+
+
+def nearest_task(slice_map: SliceMap, start: End, skip: Mapping[Task, int], direction: int) -> tuple[Task, int] | None:
+    """Return the nearest open task and its distance [mm]; of equals, one that goes on in `direction`."""
+    distances = slice_map.distances(start)
+    best: tuple[int, int, Task] | None = None
+    for task in open_tasks(slice_map):
+        if task in skip or task.end not in distances:
+            continue
+        rank = (distances[task.end], int(task.direction != direction), task)
+        if best is None or rank < best:
+            best = rank
+    return None if best is None else (best[2], best[0])
+
+
+def decide(
+    slice_map: SliceMap,
+    view: View,
+    statuses: Mapping[int, Status],
+    last: Plan | None,
+    skip: Mapping[Task, int],
+    divides: bool,
+) -> Plan | Division | None:
+    """Return what the team does next; None where nothing is open that it could reach."""
+    places = {node: _place(slice_map, statuses.get(node)) for node in view.members}
+    order = last.order if last is not None and last.epoch == view.epoch else ()
+    ranked = [*[node for node in order if node in view.members], *[node for node in view.members if node not in order]]
+    if divides and len(ranked) > 1:
+        groups = _groups(slice_map, ranked, statuses, places, skip)
+        if groups is not None:
+            return Division(groups)
+    direction = last.direction if last is not None else RIGHT
+    number = last.number + 1 if last is not None and last.epoch == view.epoch else 1
+    for node in reversed(ranked):
+        place = places[node]
+        found = None if place is None else nearest_task(slice_map, place, skip, direction)
+        if found is None:
+            continue
+        task = found[0]
+        distances = slice_map.distances(task.end)
+        far = {each: distances.get(at, FAR) if (at := places[each]) is not None else FAR for each in ranked}
+        nearest_last = sorted(ranked, key=lambda each: (-far[each], ranked.index(each)))
+        return Plan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(nearest_last))
+    return None
+
+
+def _place(slice_map: SliceMap, status: Status | None) -> End | None:
+    return None if status is None or status.at is None else slice_map.end(status.at)
+
+
+def _groups(
+    slice_map: SliceMap,
+    ranked: Sequence[int],
+    statuses: Mapping[int, Status],
+    places: Mapping[int, End | None],
+    skip: Mapping[Task, int],
+) -> tuple[tuple[int, ...], ...] | None:
+    """Return how the team splits, or None if there is no reason to, or less than two things to do."""
+    starts = [task for task in open_tasks(slice_map) if task not in skip]
+    if len(starts) < 2:
+        return None
+    finders = [index for index, node in enumerate(ranked) if (status := statuses.get(node)) is not None and status.found]
+    if finders:
+        # The finder and those behind it take the new cell; if it is the last of the formation, half of the team does.
+        cut = finders[0] + 1
+        if cut == len(ranked):
+            cut = len(ranked) // 2
+        return tuple(ranked[:cut]), tuple(ranked[cut:])
+    spares = [node for node in ranked if (status := statuses.get(node)) is not None and status.spare]
+    if spares and len(spares) < len(ranked) and len(_slabs(starts)) > 1:
+        return tuple(spares), tuple([node for node in ranked if node not in spares])
+    return None
+
+
+def _slabs(tasks: Sequence[Task]) -> dict[tuple[int, int], None]:
+    """Return the slabs that open tasks lead into, as far as can be told: by the slice on their left, and their direction."""
+    return {(task.end.slice if task.direction == RIGHT else task.end.slice - 1, task.direction): None for task in tasks}

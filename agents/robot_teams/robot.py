@@ -1,0 +1,291 @@
+"""A robot of a team that covers an unknown arena together (Latimer et al. 2002), by pose, touch and radio."""
+
+import math
+from collections.abc import Generator
+from typing import Annotated, Any, ClassVar, Final
+
+import msgspec
+from msgspec import Meta, Struct
+
+from zwerm.agents.robot_teams.fact_exchange import FactExchange
+from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre
+from zwerm.agents.robot_teams.membership import Membership
+from zwerm.agents.robot_teams.messages import HUNTS, READY, Beacon, Plan, Status, decode_beacon, encode_beacon
+from zwerm.agents.robot_teams.pilot import FAILED, IDLE, RUNNING, Pilot
+from zwerm.agents.robot_teams.planning import Division, Task, decide
+from zwerm.agents.robot_teams.senses import Senses, Sensing
+from zwerm.agents.robot_teams.slice_map import SliceMap
+from zwerm.agents.robot_teams.work import Lost, Work
+from zwerm.agents.runtime.contract import Controller, Setup
+from zwerm.errors import ControllerError, ProtocolError
+from zwerm.wire.checksum import seal, unseal
+from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
+
+# In the first second every robot that is heard is met: the robots start together, as one team.
+MUSTER_S: Final = 1.0
+# How long a team waits for one with a smaller lead to unite them [s].
+MERGE_PATIENCE_S: Final = 3.0
+# For how many plans an item that brought nothing new is passed over.
+SKIP_PLANS: Final = 3
+
+
+class TeamTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """The footprint's radius, the slices, the beacons, and when robots are met or given up for lost."""
+
+    footprint_m: Annotated[float, Meta(gt=0.0)] = 0.5
+    spacing_m: Annotated[float, Meta(gt=0.0)] = 0.95
+    origin_m: float = 0.0
+    beacon_s: Annotated[float, Meta(gt=0.0)] = 0.25
+    silence_s: Annotated[float, Meta(gt=0.0)] = 6.0
+    meeting_m: Annotated[float, Meta(ge=0.0)] = 1.1
+    divide: bool = True
+    merge: bool = True
+
+
+class TeamRobot(Controller):
+    """One robot: its pilot, its work, and the protocols of its team."""
+
+    sensors: ClassVar[tuple[str, ...]] = ("pose", "touch", "neighbours")
+    Parameters: ClassVar[type[Struct]] = TeamTable
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        table: TeamTable = self.parameters
+        body = setup.body
+        if body is None or body.kind != "holonomic":
+            raise ControllerError("robot-teams: expected a holonomic body")
+        if table.spacing_m > min(2.0 * table.footprint_m, table.footprint_m + 2.0 * body.radius_m):
+            raise ControllerError(
+                "robot-teams: spacing_m: expected at most 2 footprint_m and at most footprint_m + 2 radius_m, "
+                f"got {table.spacing_m}"
+            )
+        self.map = SliceMap()
+        self.pilot = Pilot(setup.node, body.max_speed_m_s, setup.dt_s, self.random)
+        self.membership = Membership(setup.node, setup.dt_s, table.silence_s)
+        self.exchange = FactExchange(self.map, setup.dt_s)
+        self.plan: Plan | None = None
+        self.refused = 0
+        self._sensing = Sensing(body.radius_m)
+        self._senses: Senses | None = None
+        self.work = Work(
+            self.map, Grid(table.origin_m, table.spacing_m), body.max_speed_m_s * setup.dt_s, self._newest_senses
+        )
+        self._story = self._live()
+        self._waits = True
+        self._number = 0
+        self._epoch = 0
+        self._skip: dict[Task, int] = {}
+        self._plan_digest = -1
+        self._every = max(1, round(table.beacon_s / setup.dt_s))
+        self._urgent = False
+        self._told_count = -1
+        self._done = False
+        self._decided_count = (-1, -1)
+
+    def step(self, observation: Observation) -> Command:
+        """Hear, decide, move, and say."""
+        tick = observation.tick
+        senses = self._senses = self._sensing.read(observation)
+        if observation.inbox:
+            self._hear(observation, senses)
+        view = self.membership.view
+        self.membership.poll(tick)
+        if self.membership.view != view:
+            self._urgent = True
+        if self.plan is not None and self.plan.epoch != self.membership.view.epoch:
+            self.plan = None
+        vx, vy = self._move(senses)
+        if self.work.phase == READY and self.membership.leads:
+            self._decide(tick)
+        outbox = self._say(observation, senses)
+        sensing = self._sensing
+        drive = BodyVelocity(sensing.cos * vx + sensing.sin * vy, sensing.cos * vy - sensing.sin * vx, 0.0)
+        self._done = self.work.phase == READY and self.map.certificate.complete
+        return Command(drive=drive, outbox=outbox, done=self._done, told=self._telemetry(tick))
+
+    # --- moving -------------------------------------------------------------------------------------------------------
+
+    def _move(self, senses: Senses) -> tuple[float, float]:
+        pilot = self.pilot
+        velocity = pilot.step(senses)
+        if pilot.state == RUNNING or (pilot.state == IDLE and not self._waits):
+            return velocity
+        # The manoeuvre ended: the next may begin in the same tick.
+        for _ in range(10):
+            failed = pilot.state == FAILED
+            manoeuvre = self._story.throw(Lost()) if failed else next(self._story)
+            self._waits = manoeuvre is None
+            if manoeuvre is None:
+                if pilot.state != IDLE:
+                    pilot.rest()
+                return velocity
+            pilot.start(manoeuvre)
+            velocity = pilot.step(senses)
+            if pilot.state == RUNNING:
+                break
+        return velocity
+
+    def _live(self) -> Generator[Manoeuvre | None, None, None]:
+        """Find an end, then carry out one plan after the other; after a failure find an end again."""
+        while True:
+            try:
+                if self.work.at is None:
+                    yield from self.work.localise()
+                plan = self.plan
+                if plan is not None and (plan.epoch, plan.number) != (self._epoch, self._number):
+                    self._epoch, self._number = plan.epoch, plan.number
+                    if self.setup.node in plan.order:
+                        yield from self._corridor(plan)
+                if self.work.phase != READY:
+                    self.work.phase = READY
+                    self._urgent = True
+                yield None
+            except Lost:
+                self.work.failures += 1
+                self.work.at = None
+                yield None
+
+    def _corridor(self, plan: Plan) -> Generator[Manoeuvre | None, None, None]:
+        order = plan.order
+        slot = order.index(self.setup.node)
+
+        def finished(index: int) -> bool:
+            node = order[index]
+            status = self.membership.roster.statuses.get(node)
+            return (
+                status is not None
+                and (status.epoch, status.number) == (plan.epoch, plan.number)
+                and status.phase in (HUNTS, READY)
+            )
+
+        def need_not_wait(index: int) -> bool:
+            status = self.membership.roster.statuses.get(order[index])
+            gone = order[index] not in self.membership.view.members
+            overtaken = status is not None and (status.epoch, status.number) > (plan.epoch, plan.number)
+            return gone or overtaken or finished(index)
+
+        yield from self.work.corridor(plan, slot, finished, need_not_wait)
+
+    def _newest_senses(self) -> Senses:
+        assert self._senses is not None
+        return self._senses
+
+    # --- deciding -----------------------------------------------------------------------------------------------------
+
+    def _decide(self, tick: int) -> None:
+        """At the barrier, decide what the team does next."""
+        membership = self.membership
+        view, plan = membership.view, self.plan
+        roster = membership.roster
+        roster.statuses[self.setup.node] = self._status(self._newest_senses(), tick)
+        roster.news_tick[self.setup.node] = tick
+        number = plan.number if plan is not None else 0
+        muster = tick * self.setup.dt_s < MUSTER_S
+        if muster or not roster.ready(view, number):
+            return
+        table: TeamTable = self.parameters
+        if table.merge or tick * self.setup.dt_s < 3.0 * MUSTER_S:
+            if membership.merge(tick):
+                self._urgent = True
+                return
+            if membership.awaits_merging(tick, round(MERGE_PATIENCE_S / self.setup.dt_s)):
+                return
+        if self.map.certificate.complete:
+            return
+        if plan is not None and self._plan_digest == self.map.facts.digest:
+            self._skip[Task(plan.anchor, plan.direction, plan.own_slice)] = SKIP_PLANS
+        decision = decide(self.map, view, roster.statuses, plan, self._skip, table.divide)
+        self._skip = {task: left - 1 for task, left in self._skip.items() if left > 1}
+        if isinstance(decision, Division):
+            membership.divide(decision.groups, tick)
+            self.plan = None
+            self.work.found = self.work.spare = False
+        elif decision is not None:
+            self.plan = decision
+            self._plan_digest = self.map.facts.digest
+        self._urgent = True
+
+    # --- hearing and saying -------------------------------------------------------------------------------------------
+
+    def _hear(self, observation: Observation, senses: Senses) -> None:
+        tick = observation.tick
+        table: TeamTable = self.parameters
+        muster = tick * self.setup.dt_s < MUSTER_S
+        for packet in observation.inbox:
+            try:
+                beacon: Beacon = decode_beacon(unseal(packet.payload))
+            except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
+                self.refused += 1
+                continue
+            near = muster
+            for status in beacon.statuses:
+                if status.node == beacon.sender and not near and (table.merge or table.meeting_m == 0.0):
+                    apart = math.hypot(status.x_mm / 1000.0 - senses.x_m, status.y_mm / 1000.0 - senses.y_m)
+                    near = apart <= table.meeting_m
+            self.membership.receive(beacon, tick, near)
+            if beacon.sender in self.membership.view.members or (near and table.merge):
+                self.exchange.receive(beacon, tick)
+            else:
+                self.exchange.forget(beacon.sender)
+            plan, view = beacon.plan, self.membership.view
+            if plan is not None and plan.epoch == view.epoch and beacon.sender in view.members:
+                mine = self.plan
+                if mine is None or mine.epoch != plan.epoch or plan.number > mine.number:
+                    self.plan = plan
+
+    def _status(self, senses: Senses, tick: int) -> Status:
+        work, plan = self.work, self.plan
+        view = self.membership.view
+        busy = work.phase != READY
+        number = self._number if busy or (plan is not None and plan.epoch == self._epoch) else 0
+        epoch = self._epoch if busy else view.epoch
+        return Status(
+            self.setup.node,
+            tick,
+            round(1000.0 * senses.x_m),
+            round(1000.0 * senses.y_m),
+            epoch,
+            number,
+            work.phase,
+            work.at,
+            work.found,
+            work.spare,
+        )
+
+    def _say(self, observation: Observation, senses: Senses) -> tuple[Transmission, ...]:
+        tick = observation.tick
+        if not self.setup.channels or not (self._urgent or (tick + self.setup.node) % self._every == 0):
+            return ()
+        self._urgent = False
+        membership = self.membership
+        segments, arcs = self.exchange.outgoing(tick)
+        mine = self._status(senses, tick)
+        others = [status for node, status in sorted(membership.roster.statuses.items()) if node != self.setup.node]
+        others = [status for status in others if status.node in membership.view.members]
+        beacon = Beacon(
+            self.setup.node,
+            membership.outgoing(),
+            membership.met(),
+            self.plan,
+            (mine, *others),
+            self.map.facts.digest,
+            len(self.map.facts),
+            segments,
+            arcs,
+        )
+        frame = seal(encode_beacon(beacon))
+        return tuple([Transmission(channel, frame) for channel in self.setup.channels])
+
+    def _telemetry(self, tick: int) -> dict[str, Any]:
+        """Return what those who watch the run may see: the certificate, the map and the team, whenever the map grows."""
+        if len(self.map.facts) == self._told_count:
+            return {}
+        self._told_count = len(self.map.facts)
+        certificate = self.map.certificate
+        return {
+            "complete": certificate.complete,
+            "ends": certificate.ends,
+            "ends_without_mate": len(certificate.ends_without_mate),
+            "open_ports": len(certificate.open_ports),
+            "team": self.membership.view.lead,
+        }
