@@ -6,7 +6,7 @@ were walls. What it finds it offers as facts; the pilot decides what to do next.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.robot_teams.facts import Arc, End
@@ -19,8 +19,14 @@ BLOCKS: Final = 0.02
 OFF_SLICE_M: Final = 0.006
 # How far beyond a slice the centre must be for it to have crossed it [m].
 CROSSED_M: Final = 0.002
+# A sweep that takes longer than this to get around other robots gives up [ticks].
+AROUND_TICKS_MAX: Final = 300
 # How far on the wrong side of its slice a trace may begin [m].
-SLACK_M: Final = 0.08
+SLACK_M: Final = 0.75
+
+
+# Tells at which ends the robots in contact stand.
+Parked = Callable[[Senses], Sequence[End]]
 
 
 class Grid(NamedTuple):
@@ -70,8 +76,9 @@ class Around:
 class Approach:
     """Go straight to an end near by, sliding along walls, and press against the boundary there."""
 
-    def __init__(self, end: End, grid: Grid) -> None:
+    def __init__(self, end: End, grid: Grid, parked: Parked) -> None:
         self.end = end
+        self._parked = parked
         self._x_m, self._y_m = grid.x_m(end.slice), end.y_mm / 1000.0
         self._ticks = 0
 
@@ -80,7 +87,7 @@ class Approach:
         dx, dy = self._x_m - senses.x_m, self._y_m - senses.y_m
         distance = math.hypot(dx, dy)
         self._ticks += 1
-        if distance < 0.03:
+        if distance < 0.03 or (blocks and distance < 0.7 and self.end in self._parked(senses)):
             return None
         return dx / distance, dy / distance
 
@@ -91,10 +98,11 @@ class Approach:
 
 
 class Sweep:
-    """Move along a slice from an end to the other one. `start` None: to the end on side `side`, from anywhere."""
+    """Move along a slice to the end of its segment on side `side`."""
 
-    def __init__(self, k: int, side: int, grid: Grid, step_m: float, start: End | None = None) -> None:
-        self.slice, self.side, self.start = k, side, start
+    def __init__(self, k: int, side: int, grid: Grid, step_m: float, parked: Parked) -> None:
+        self.slice, self.side = k, side
+        self._parked = parked
         self._x_m = grid.x_m(k)
         self._step_m = step_m
         self._last_y_m: float | None = None
@@ -108,6 +116,10 @@ class Sweep:
         side = self.side
         if self._around is not None:
             self.around_ticks += 1
+            hidden = self._hidden(senses)
+            if hidden is not None or self.around_ticks > AROUND_TICKS_MAX:
+                self.end = hidden
+                return None
             way = self._around.direction(senses, blocks, off)
             if way is not None:
                 return way
@@ -120,17 +132,30 @@ class Sweep:
                 self.end = End(self.slice, side, mm(senses.y_m))
                 return None
         if any([ny * side > 0.2 for _, ny in blocks]):
+            for end in self._parked(senses):
+                if (end.slice, end.side) == (self.slice, side) and (end.y_mm / 1000.0 - senses.y_m) * side > 0.0:
+                    self.end = end
+                    return None
             self._around = Around(senses, (0.0, float(side)), LEFT_HAND if senses.tick // 200 % 2 else RIGHT_HAND)
             return self._around.direction(senses, blocks, off)
         vx = max(-0.7, min(0.7, off / self._step_m))
         return vx, side * math.sqrt(1.0 - vx * vx)
 
+    def _hidden(self, senses: Senses) -> End | None:
+        """Return the end of the segment if a robot stands there: beside it the boundary blocks the way as well."""
+        if any([ny * self.side > BLOCKS for _, ny in senses.walls]):
+            for other in senses.robots:
+                if other.gap_m < 0.1 and other.stands and abs(other.x_m - self._x_m) < 0.15:
+                    return End(self.slice, self.side, mm(other.y_m))
+        return None
+
 
 class Trace:
     """Follow the boundary from an end into the slab on the side `direction`, until it crosses a slice."""
 
-    def __init__(self, start: End, direction: int, grid: Grid) -> None:
+    def __init__(self, start: End, direction: int, grid: Grid, parked: Parked) -> None:
         self.start, self.direction = start, direction
+        self._parked = parked
         self._grid = grid
         self._follower = WallFollower(hand_of(start.side, direction), (float(direction), 0.0))
         self._inside = False
@@ -139,7 +164,6 @@ class Trace:
         self._length_m = 0.0
         self._extreme: Vector = (-math.inf, 0.0)
         self._wall_tick = -10
-        self.hidden = False
         self.arc: Arc | None = None
         self.end: End | None = None
 
@@ -163,6 +187,12 @@ class Trace:
         if (self._inside and depth < -CROSSED_M) or depth < -SLACK_M:
             self._arrive(senses, self.start.slice, -1)
             return None
+        if blocks and self._inside:
+            ahead = (self.start.slice + d, self.start.side), (self.start.slice, -self.start.side)
+            for end in self._parked(senses):
+                if (end.slice, end.side) in ahead:
+                    self._stop(end)
+                    return None
         self._last = x, y
         return self._follower.direction(senses.walls, blocks)
 
@@ -172,12 +202,20 @@ class Trace:
             line, (x0, y0) = self._grid.x_m(k), self._last
             if abs(x - x0) > 1e-9:
                 y = y0 + max(0.0, min(1.0, (line - x0) / (x - x0))) * (y - y0)
+        if senses.tick - self._wall_tick <= 1:
+            self._stop(End(k, side, mm(y)))
+            return
+        # A robot hides the end: it stands there, or the arc stays open.
         self.end = End(k, side, mm(y))
-        self.hidden = senses.tick - self._wall_tick > 1
+        for end in self._parked(senses):
+            if (end.slice, end.side) == (k, side):
+                self._stop(end)
+
+    def _stop(self, end: End) -> None:
         depth, extreme_y = self._extreme
-        if not self.hidden:
-            extreme_x = self._x_m + self.direction * max(depth, 0.0)
-            self.arc = Arc(self.start, self.direction, self.end, mm(self._length_m), mm(extreme_x), mm(extreme_y))
+        extreme_x = self._x_m + self.direction * max(depth, 0.0)
+        self.end = end
+        self.arc = Arc(self.start, self.direction, end, mm(self._length_m), mm(extreme_x), mm(extreme_y))
 
 
 class Seek:

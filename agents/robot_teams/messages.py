@@ -41,7 +41,10 @@ class Plan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
 
 
 class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What one robot does: `beat` counts its statuses. `at` is the end where it last was; `found` a new segment on its slice."""
+    """What one robot does: `beat` grows with every status. `at` is the end where it last was.
+
+    Of the corridor: it `found` a new segment on its slice, is `spare`, takes slice `claim`, found `room` for so many robots.
+    """
 
     node: int
     beat: int
@@ -53,6 +56,8 @@ class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     at: End | None
     found: bool
     spare: bool
+    claim: int | None
+    room: int | None
 
 
 class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

@@ -62,8 +62,9 @@ class Retreat:
             x, y = self._trail[self._index]
             dx, dy = x - senses.x_m, y - senses.y_m
             distance = math.hypot(dx, dy)
-            if distance > 0.06:
-                return dx / distance, dy / distance
+            near = 0.06 if self._index == goal else 0.2
+            if distance > near:
+                return _around_robots(senses, (dx / distance, dy / distance))
             if self._index == goal:
                 return None if self._forward else (0.0, 0.0)
             self._index += 1 if self._forward else -1
@@ -72,6 +73,14 @@ class Retreat:
     def blocked(self) -> bool:
         """Whether somebody is in the way forward again."""
         return self._forward and self._still > self._patience
+
+
+def _around_robots(senses: Senses, way: Vector) -> Vector:
+    """Return `way`, turned to the right where a robot is in it."""
+    for other in senses.robots:
+        if other.gap_m < CONTACT_M and way[0] * other.nx + way[1] * other.ny > 0.2:
+            return 0.5 * way[0] + 0.87 * way[1], 0.5 * way[1] - 0.87 * way[0]
+    return way
 
 
 class Pilot:
@@ -161,7 +170,7 @@ class Pilot:
     def _begin_retreat(self, senses: Senses, scale_m: float) -> None:
         self.retreats += 1
         far = scale_m * (0.5 + float(self._random.random()))
-        pause = int((0.5 + 2.0 * float(self._random.random()) * scale_m) / self._dt_s)
+        pause = int((0.5 + min(4.0, scale_m) * float(self._random.random())) / self._dt_s)
         self._trail.append((senses.x_m, senses.y_m))
         self._retreat = Retreat(list(self._trail), far, pause)
 
@@ -206,13 +215,13 @@ class Pilot:
         """Return the velocity along `way`, less what would close more than half of a gap in one tick."""
         vx, vy = way[0] * self._speed_m_s, way[1] * self._speed_m_s
         for other in senses.robots:
-            limit = max(0.0, other.gap_m) / (2.0 * self._dt_s)
+            limit = other.gap_m / (2.0 * self._dt_s)
             closing = vx * other.nx + vy * other.ny
             if closing > limit:
                 vx -= (closing - limit) * other.nx
                 vy -= (closing - limit) * other.ny
         for other in senses.robots:
             closing = vx * other.nx + vy * other.ny
-            if closing > max(0.0, other.gap_m) / (2.0 * self._dt_s) + 1e-9:
+            if closing > max(0.0, other.gap_m) / (2.0 * self._dt_s) + 1e-6:
                 return 0.0, 0.0
         return vx, vy

@@ -69,12 +69,18 @@ def decide(
     places = {node: _place(slice_map, statuses.get(node)) for node in view.members}
     order = last.order if last is not None and last.epoch == view.epoch else ()
     ranked = [*[node for node in order if node in view.members], *[node for node in view.members if node not in order]]
-    if divides and len(ranked) > 1:
+    number = last.number + 1 if last is not None and last.epoch == view.epoch else 1
+    direction = last.direction if last is not None else RIGHT
+    apart = _components(slice_map, ranked, places)
+    if len(apart) > 1:
+        # The maps of robots that began apart are not joined: walk back to the predecessor's slice first, else split.
+        if number == 1 or (last is not None and last.order):
+            return Plan(view.epoch, number, End(0, 0, 0), direction, False, ())
+        return Division(apart)
+    if divides and len(ranked) > 1 and last is not None and last.epoch == view.epoch and last.order:
         groups = _groups(slice_map, ranked, statuses, places, skip)
         if groups is not None:
             return Division(groups)
-    direction = last.direction if last is not None else RIGHT
-    number = last.number + 1 if last is not None and last.epoch == view.epoch else 1
     for node in reversed(ranked):
         place = places[node]
         found = None if place is None else nearest_task(slice_map, place, skip, direction)
@@ -92,6 +98,27 @@ def _place(slice_map: SliceMap, status: Status | None) -> End | None:
     return None if status is None or status.at is None else slice_map.end(status.at)
 
 
+def _components(
+    slice_map: SliceMap, ranked: Sequence[int], places: Mapping[int, End | None]
+) -> tuple[tuple[int, ...], ...]:
+    """Return the members whose ends are joined by known ways, group by group."""
+    groups: list[tuple[dict[End, int], list[int]]] = []
+    for node in reversed(ranked):
+        place = places[node]
+        if place is None:
+            continue
+        for distances, members in groups:
+            if place in distances:
+                members.append(node)
+                break
+        else:
+            groups.append((slice_map.distances(place), [node]))
+    lost = [node for node in ranked if places[node] is None]
+    if groups:
+        groups[0][1].extend(lost)
+    return tuple([tuple(members) for _, members in groups])
+
+
 def _groups(
     slice_map: SliceMap,
     ranked: Sequence[int],
@@ -103,7 +130,9 @@ def _groups(
     starts = [task for task in open_tasks(slice_map) if task not in skip]
     if len(starts) < 2:
         return None
-    finders = [index for index, node in enumerate(ranked) if (status := statuses.get(node)) is not None and status.found]
+    finders = [
+        index for index, node in enumerate(ranked) if (status := statuses.get(node)) is not None and status.found
+    ]
     if finders:
         # The finder and those behind it take the new cell; if it is the last of the formation, half of the team does.
         cut = finders[0] + 1

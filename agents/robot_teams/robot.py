@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Final
 import msgspec
 from msgspec import Meta, Struct
 
+from zwerm.agents.robot_teams.facts import BOTTOM, TOP, End
 from zwerm.agents.robot_teams.fact_exchange import FactExchange
 from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre
 from zwerm.agents.robot_teams.membership import Membership
@@ -15,7 +16,7 @@ from zwerm.agents.robot_teams.pilot import FAILED, IDLE, RUNNING, Pilot
 from zwerm.agents.robot_teams.planning import Division, Task, decide
 from zwerm.agents.robot_teams.senses import Senses, Sensing
 from zwerm.agents.robot_teams.slice_map import SliceMap
-from zwerm.agents.robot_teams.work import Lost, Work
+from zwerm.agents.robot_teams.work import Lost, NoWay, Work
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError, ProtocolError
 from zwerm.wire.checksum import seal, unseal
@@ -24,7 +25,7 @@ from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 # In the first second every robot that is heard is met: the robots start together, as one team.
 MUSTER_S: Final = 1.0
 # How long a team waits for one with a smaller lead to unite them [s].
-MERGE_PATIENCE_S: Final = 3.0
+MERGE_PATIENCE_S: Final = 30.0
 # For how many plans an item that brought nothing new is passed over.
 SKIP_PLANS: Final = 3
 
@@ -40,6 +41,41 @@ class TeamTable(Struct, frozen=True, forbid_unknown_fields=True):
     meeting_m: Annotated[float, Meta(ge=0.0)] = 1.1
     divide: bool = True
     merge: bool = True
+
+
+class CorridorMates:
+    """What a robot knows of its teammates in one corridor, from their statuses."""
+
+    def __init__(self, plan: Plan, node: int, membership: Membership) -> None:
+        self._plan, self._node, self._membership = plan, node, membership
+
+    def _statuses(self) -> list[Status]:
+        plan, statuses = self._plan, self._membership.roster.statuses
+        found = [statuses[node] for node in plan.order if node != self._node and node in statuses]
+        return [status for status in found if (status.epoch, status.number) == (plan.epoch, plan.number)]
+
+    def slot(self, room: int | None) -> int:
+        """Return which slice of the corridor is this robot's, given for how many it found room; negative for none."""
+        rooms = [status.room for status in self._statuses() if status.room is not None]
+        if room is not None:
+            rooms.append(room)
+        order = self._plan.order
+        return order.index(self._node) - max(0, len(order) - min(rooms, default=len(order)))
+
+    def claimed(self, k: int) -> bool:
+        """Tell whether a teammate takes slice k in this corridor."""
+        return any([status.claim == k for status in self._statuses()])
+
+    def awaits_predecessor(self) -> bool:
+        """Tell whether the predecessor has still to sweep its slice."""
+        order, plan = self._plan.order, self._plan
+        index = order.index(self._node) - 1
+        if index < 0 or order[index] not in self._membership.view.members:
+            return False
+        status = self._membership.roster.statuses.get(order[index])
+        if status is None or (status.epoch, status.number) < (plan.epoch, plan.number):
+            return True
+        return (status.epoch, status.number) == (plan.epoch, plan.number) and status.phase not in (HUNTS, READY)
 
 
 class TeamRobot(Controller):
@@ -67,8 +103,13 @@ class TeamRobot(Controller):
         self.refused = 0
         self._sensing = Sensing(body.radius_m)
         self._senses: Senses | None = None
+        self._grid = Grid(table.origin_m, table.spacing_m)
         self.work = Work(
-            self.map, Grid(table.origin_m, table.spacing_m), body.max_speed_m_s * setup.dt_s, self._newest_senses
+            self.map,
+            self._grid,
+            body.max_speed_m_s * setup.dt_s,
+            self._newest_senses,
+            self._parked,
         )
         self._story = self._live()
         self._waits = True
@@ -130,41 +171,36 @@ class TeamRobot(Controller):
         while True:
             try:
                 if self.work.at is None:
-                    yield from self.work.localise()
+                    side = TOP if self.work.failures == 0 or self.random.random() < 0.5 else BOTTOM
+                    yield from self.work.localise(side)
                 plan = self.plan
                 if plan is not None and (plan.epoch, plan.number) != (self._epoch, self._number):
                     self._epoch, self._number = plan.epoch, plan.number
-                    if self.setup.node in plan.order:
-                        yield from self._corridor(plan)
+                    if not plan.order:
+                        yield from self.work.link(plan.direction)
+                    elif self.setup.node in plan.order:
+                        yield from self.work.corridor(plan, CorridorMates(plan, self.setup.node, self.membership))
                 if self.work.phase != READY:
                     self.work.phase = READY
                     self._urgent = True
                 yield None
-            except Lost:
+            except (Lost, NoWay):
                 self.work.failures += 1
                 self.work.at = None
                 yield None
 
-    def _corridor(self, plan: Plan) -> Generator[Manoeuvre | None, None, None]:
-        order = plan.order
-        slot = order.index(self.setup.node)
-
-        def finished(index: int) -> bool:
-            node = order[index]
-            status = self.membership.roster.statuses.get(node)
-            return (
-                status is not None
-                and (status.epoch, status.number) == (plan.epoch, plan.number)
-                and status.phase in (HUNTS, READY)
-            )
-
-        def need_not_wait(index: int) -> bool:
-            status = self.membership.roster.statuses.get(order[index])
-            gone = order[index] not in self.membership.view.members
-            overtaken = status is not None and (status.epoch, status.number) > (plan.epoch, plan.number)
-            return gone or overtaken or finished(index)
-
-        yield from self.work.corridor(plan, slot, finished, need_not_wait)
+    def _parked(self, senses: Senses) -> list[End]:
+        """Return the ends at which robots in contact stand, by their own word."""
+        found = []
+        grid = self._grid
+        for other in senses.robots:
+            status = self.membership.roster.statuses.get(other.node)
+            if other.gap_m > 0.1 or not other.stands or status is None or status.at is None:
+                continue
+            dx, dy = other.x_m - grid.x_m(status.at.slice), other.y_m - status.at.y_mm / 1000.0
+            if dx * dx + dy * dy < 0.01:
+                found.append(status.at)
+        return found
 
     def _newest_senses(self) -> Senses:
         assert self._senses is not None
@@ -250,6 +286,8 @@ class TeamRobot(Controller):
             work.at,
             work.found,
             work.spare,
+            work.claim,
+            work.room,
         )
 
     def _say(self, observation: Observation, senses: Senses) -> tuple[Transmission, ...]:

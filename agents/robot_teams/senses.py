@@ -15,9 +15,11 @@ Vector = tuple[float, float]
 
 
 class Beside(NamedTuple):
-    """A robot in sight: the unit vector towards it, the gap between the bodies, and its motion in the last tick [m]."""
+    """A robot in sight: where it is, the unit vector towards it, the gap to keep, and its motion in the last tick [m]."""
 
     node: int
+    x_m: float
+    y_m: float
     nx: float
     ny: float
     gap_m: float
@@ -67,7 +69,7 @@ class Sensing:
             was = self._last.get(each.node, (x, y))
             places[each.node] = x, y
             gap = apart - 2.0 * self._radius_m - GAP_M
-            robots.append(Beside(each.node, dx / apart, dy / apart, gap, x - was[0], y - was[1]))
+            robots.append(Beside(each.node, x, y, dx / apart, dy / apart, gap, x - was[0], y - was[1]))
         self._last = places
         walls = tuple([self._vector(contact.bearing_rad) for contact in touch or ()])
         return Senses(observation.tick, pose.x_m, pose.y_m, walls, tuple(robots))

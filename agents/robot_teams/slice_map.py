@@ -83,6 +83,12 @@ class SliceMap:
         return self._arcs.get((end, direction))
 
     @property
+    def arcs_known(self) -> bool:
+        """Whether any arc was traced."""
+        self._derive()
+        return bool(self._arcs)
+
+    @property
     def certificate(self) -> Certificate:
         """What is open, sorted."""
         self._derive()

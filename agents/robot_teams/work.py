@@ -5,11 +5,11 @@ They add what they find to the map, and keep `at`, the end where the robot stand
 """
 
 from collections.abc import Callable, Generator
-from typing import Final
+from typing import Final, Protocol
 
-from zwerm.agents.robot_teams.facts import TOP, Arc, End, Segment
-from zwerm.agents.robot_teams.manoeuvres import Approach, Grid, Manoeuvre, Seek, Sweep, Trace
-from zwerm.agents.robot_teams.messages import HUNTS, READY, SWEEPS, TRAVELS, Plan
+from zwerm.agents.robot_teams.facts import LEFT, RIGHT, TOP, End, Segment
+from zwerm.agents.robot_teams.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
+from zwerm.agents.robot_teams.messages import HUNTS, SWEEPS, TRAVELS, Plan
 from zwerm.agents.robot_teams.senses import Senses
 from zwerm.agents.robot_teams.slice_map import SliceMap
 
@@ -21,32 +21,54 @@ STEPS_MAX: Final = 400
 AT_END_M: Final = 0.06
 
 
+class NoWay(Exception):
+    """No known way leads there."""
+
+
 class Lost(Exception):
     """A manoeuvre failed, or led elsewhere than the map says."""
+
+
+class Mates(Protocol):
+    """What a robot knows of its teammates in a corridor."""
+
+    def slot(self, room: int | None) -> int:
+        """Return which slice of the corridor is this robot's, given for how many it found room; negative for none."""
+
+    def claimed(self, k: int) -> bool:
+        """Tell whether a teammate takes slice k in this corridor."""
+
+    def awaits_predecessor(self) -> bool:
+        """Tell whether the predecessor has still to sweep its slice."""
 
 
 class Work:
     """What one robot does and where it stands. `sense` gives its newest senses."""
 
-    def __init__(self, slice_map: SliceMap, grid: Grid, step_m: float, sense: Callable[[], Senses]) -> None:
+    def __init__(
+        self, slice_map: SliceMap, grid: Grid, step_m: float, sense: Callable[[], Senses], parked: Parked
+    ) -> None:
         self.map = slice_map
         self.at: End | None = None
         self.phase = TRAVELS
         self.found = False
         self.spare = False
+        self.claim: int | None = None
+        self.room: int | None = None
         self.failures = 0
         self._grid = grid
         self._step_m = step_m
         self._sense = sense
+        self._parked = parked
 
     # --- finding itself -----------------------------------------------------------------------------------------------
 
-    def localise(self) -> Story:
-        """Find an end from anywhere: go to a slice and up to its upper end; sweep it if it is new."""
+    def localise(self, side: int = TOP) -> Story:
+        """Find an end from anywhere: go to a slice and along it to its end on `side`; sweep it if it is new."""
         self.at = None
         seek = Seek(self._grid)
         yield seek
-        up = Sweep(seek.slice, TOP, self._grid, self._step_m)
+        up = Sweep(seek.slice, side, self._grid, self._step_m, self._parked)
         yield up
         if up.end is None:
             raise Lost
@@ -54,8 +76,22 @@ class Work:
         if known is not None:
             self.at = known
             return
-        self.at = up.end
+        # The formation's first corridor: join the own end to the predecessor's, come back, and sweep.
+        start = self.at = up.end
+        if not self.map.arcs_known:
+            if (yield from self.trace(LEFT)):
+                yield from self.travel(start)
         yield from self.sweep()
+        yield from self._hunt(up.slice, RIGHT)
+
+    def link(self, direction: int) -> Story:
+        """Walk back to the predecessor's slice: what joins the maps of robots that began apart."""
+        self.found = self.spare = False
+        self.phase = HUNTS
+        at = self.at
+        if at is None:
+            raise Lost
+        yield from self._hunt(at.slice, -direction)
 
     # --- single steps -------------------------------------------------------------------------------------------------
 
@@ -65,7 +101,7 @@ class Work:
         if start is None:
             raise Lost
         yield from self._approach(start)
-        sweep = Sweep(start.slice, -start.side, self._grid, self._step_m, start)
+        sweep = Sweep(start.slice, -start.side, self._grid, self._step_m, self._parked)
         yield sweep
         end = sweep.end
         if end is None:
@@ -74,27 +110,27 @@ class Work:
         self.map.add(Segment(start.slice, low, high))
         self.at = self.map.end(end)
 
-    def trace(self, direction: int) -> Generator[Manoeuvre | None, None, Arc]:
-        """Follow the boundary from the end where the robot is to the next; return the arc."""
+    def trace(self, direction: int) -> Generator[Manoeuvre | None, None, bool]:
+        """Follow the boundary from the end where the robot is to the next; tell whether that is on another slice."""
         start = self.at
         if start is None:
             raise Lost
         senses = self._sense()
         depth = (senses.x_m - self._grid.x_m(start.slice)) * direction
-        if not -AT_END_M < depth < 0.6 or abs(senses.y_m - start.y_mm / 1000.0) > 0.6:
+        if abs(depth) > 0.6 or abs(senses.y_m - start.y_mm / 1000.0) > 0.6:
             yield from self._approach(start)
-        trace = Trace(start, direction, self._grid)
+        trace = Trace(start, direction, self._grid, self._parked)
         yield trace
         arc, end = trace.arc, trace.end
         if end is None:
             raise Lost
-        if arc is None:
-            # A robot hid the end: the arc stays open, and the robot goes on if the end is known.
-            self.at = self.map.end(end)
-            raise Lost
-        self.map.add(arc)
+        # Where a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known.
+        if arc is not None:
+            self.map.add(arc)
         self.at = self.map.end(end)
-        return arc
+        if self.at is None:
+            raise Lost
+        return end.slice != start.slice
 
     def travel(self, stop: End) -> Story:
         """Go to a known end by the shortest known way."""
@@ -108,7 +144,7 @@ class Work:
                 return
             route = self.map.route(start, goal)
             if route is None:
-                raise Lost
+                raise NoWay
             step = route[0][1]
             if step.direction == 0:
                 yield from self.sweep()
@@ -120,52 +156,59 @@ class Work:
         senses = self._sense()
         dx, dy = senses.x_m - self._grid.x_m(end.slice), senses.y_m - end.y_mm / 1000.0
         if dx * dx + dy * dy > AT_END_M**2:
-            yield Approach(end, self._grid)
+            yield Approach(end, self._grid, self._parked)
 
     # --- a corridor ---------------------------------------------------------------------------------------------------
 
-    def corridor(self, plan: Plan, slot: int, passed: Callable[[int], bool], swept: Callable[[int], bool]) -> Story:
-        """Take slice `slot` of a corridor (0 for the lag), sweep it, and hunt back to the predecessor's slice.
-
-        `passed(i)` tells whether the robot of slice i has swept it, `swept(i)` whether one need not wait for that any more.
-        """
+    def corridor(self, plan: Plan, mates: "Mates") -> Story:
+        """Take a slice of a corridor, sweep it, and hunt back to the predecessor's slice."""
         self.found = self.spare = False
+        self.claim = self.room = None
         self.phase = TRAVELS
-        direction = plan.direction
-        yield from self.travel(plan.anchor)
-        if not (yield from self._take_slot(plan, slot, passed)):
+        try:
+            yield from self.travel(plan.anchor)
+        except NoWay:
             self.spare = True
             return
-        self.phase = SWEEPS
+        if not (yield from self._take_slot(plan, mates)):
+            self.spare = True
+            return
         mine = self.at
-        assert mine is not None
+        if mine is None:
+            raise Lost
+        self.phase, self.claim = SWEEPS, mine.slice
         if self.map.mate(mine) is None:
             yield from self.sweep()
         self.phase = HUNTS
-        while slot > 0 and not swept(slot - 1):
+        while mates.awaits_predecessor():
             yield None
-        yield from self._hunt(mine.slice, direction)
+        yield from self._hunt(mine.slice, plan.direction)
 
-    def _take_slot(self, plan: Plan, slot: int, passed: Callable[[int], bool]) -> Generator[Manoeuvre | None, None, bool]:
-        """Trace forward, one slice a robot; tell whether there is a slice left for this one."""
-        direction = plan.direction
-        skip = slot if plan.own_slice else slot + 1
+    def _take_slot(self, plan: Plan, mates: "Mates") -> Generator[Manoeuvre | None, None, bool]:
+        """Trace forward, one slice a robot; tell whether there is a slice for this one.
+
+        The robot that finds no more room tells for how many there is; then those in front take the slices that there are.
+        """
         at = self.at
-        assert at is not None
-        if plan.own_slice and slot == 0:
-            return True
-        for index in range(skip):
+        if at is None:
+            raise Lost
+        ends = [at] if plan.own_slice else []
+        while True:
+            wanted = mates.slot(self.room)
+            if wanted < 0:
+                return False
+            if wanted < len(ends):
+                if self.at != ends[wanted]:
+                    yield from self.travel(ends[wanted])
+                return True
+            passes = yield from self.trace(plan.direction)
             at = self.at
             if at is None:
                 raise Lost
-            arc = yield from self.trace(direction)
-            if arc.stop.slice == arc.start.slice:
-                return False
-            holder = index + 1 if plan.own_slice else index
-            at = self.at
-            if at is not None and self.map.mate(at) is not None and not (holder < slot and passed(holder)):
-                return False
-        return True
+            if not passes or (self.map.mate(at) is not None and not mates.claimed(at.slice)):
+                self.room = len(ends)
+            else:
+                ends.append(at)
 
     def _hunt(self, k: int, direction: int) -> Story:
         """Walk round the slab behind slice k, sweeping what is new, until the end reached is swept.
@@ -189,6 +232,3 @@ class Work:
                 self.found = True
             yield from self.sweep()
         raise Lost
-
-
-__all__ = ["READY", "Lost", "Work"]
