@@ -20,7 +20,9 @@ OFF_SLICE_M: Final = 0.006
 # How far beyond a slice the centre must be for it to have crossed it [m].
 CROSSED_M: Final = 0.002
 # A sweep that takes longer than this to get around other robots gives up [ticks].
-AROUND_TICKS_MAX: Final = 300
+AROUND_TICKS_MAX: Final = 100
+# How far it may leave its slice for that [m].
+AROUND_M: Final = 1.2
 # How far on the wrong side of its slice a trace may begin [m].
 SLACK_M: Final = 0.75
 
@@ -117,7 +119,7 @@ class Sweep:
         if self._around is not None:
             self.around_ticks += 1
             hidden = self._hidden(senses)
-            if hidden is not None or self.around_ticks > AROUND_TICKS_MAX:
+            if hidden is not None or self.around_ticks > AROUND_TICKS_MAX or abs(off) > AROUND_M:
                 self.end = hidden
                 return None
             way = self._around.direction(senses, blocks, off)

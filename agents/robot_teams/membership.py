@@ -17,6 +17,8 @@ REPEAT_S: Final = 10.0
 MEETING_S: Final = 60.0
 # How long a member may show a later view of its own before it is dropped [s].
 LEFT_S: Final = 2.0
+# Robots that have just divided do not meet for so long [s].
+PARTED_S: Final = 20.0
 
 
 def later(view: View, than: View) -> bool:
@@ -64,6 +66,8 @@ class Membership:
         self._left_ticks = round(LEFT_S / dt_s)
         self._repeat_ticks = round(REPEAT_S / dt_s)
         self._meeting_ticks = round(MEETING_S / dt_s)
+        self._parted_ticks = round(PARTED_S / dt_s)
+        self._parted: dict[int, int] = {}
         self._latest_epoch = 1
         self._made: dict[View, int] = {}
         self._met: dict[int, tuple[View, int]] = {}
@@ -89,7 +93,7 @@ class Membership:
         if beacon.sender in self.view.members:
             for view in beacon.met:
                 self._meet(view, tick)
-        elif near:
+        elif near and tick - self._parted.get(beacon.sender, -self._parted_ticks) >= self._parted_ticks:
             self._meet(theirs, tick)
         elif theirs.lead in self._met:
             self._met[theirs.lead] = theirs, self._met[theirs.lead][1]
@@ -167,6 +171,9 @@ class Membership:
 
     def _adopt(self, view: View, tick: int) -> None:
         self._latest_epoch = max(self._latest_epoch, view.epoch)
+        for node in self.view.members:
+            if node not in view.members:
+                self._parted[node] = tick
         self.view = view
         self._since = tick
         for node in view.members:

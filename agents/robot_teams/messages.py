@@ -44,6 +44,7 @@ class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """What one robot does: `beat` grows with every status. `at` is the end where it last was.
 
     Of the corridor: it `found` a new segment on its slice, is `spare`, takes slice `claim`, found `room` for so many robots.
+    It is `sweeping` a slice now.
     """
 
     node: int
@@ -58,6 +59,7 @@ class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     spare: bool
     claim: int | None
     room: int | None
+    sweeping: int | None
 
 
 class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

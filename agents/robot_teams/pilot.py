@@ -142,7 +142,7 @@ class Pilot:
         if self._manoeuvre is None:
             if max([ticks for ticks in self._contact_ticks.values()], default=0) * self._dt_s > PRESSED_S:
                 self._contact_ticks.clear()
-                self._begin_retreat(senses, 1.0)
+                self._begin_retreat(senses, 2.0)
             return 0.0, 0.0
         way = self._manoeuvre.step(senses, blocks)
         if way is None:

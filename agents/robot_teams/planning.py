@@ -36,7 +36,7 @@ def open_tasks(slice_map: SliceMap) -> list[Task]:
     """Return everything that is open: ends without mate with the direction in which to go on, and ports of swept ends."""
     certificate = slice_map.certificate
     tasks = []
-    unswept = {end: None for end in certificate.ends_without_mate}
+    unswept = dict.fromkeys(certificate.ends_without_mate)
     for end in unswept:
         sides = [side for side in (RIGHT, LEFT) if slice_map.arc(end, side) is None]
         tasks.append(Task(end, sides[0] if len(sides) == 1 else RIGHT, True))
@@ -89,9 +89,42 @@ def decide(
         task = found[0]
         distances = slice_map.distances(task.end)
         far = {each: distances.get(at, FAR) if (at := places[each]) is not None else FAR for each in ranked}
-        nearest_last = sorted(ranked, key=lambda each: (-far[each], ranked.index(each)))
-        return Plan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(nearest_last))
+        # The nearest goes first, and so farthest: single file.
+        near = sorted(ranked, key=lambda each: (far[each], -ranked.index(each)))[: room(slice_map, task, len(ranked))]
+        if divides and len(near) < len(ranked):
+            rest = tuple([each for each in ranked if each not in near])
+            if _elsewhere(slice_map, task, rest, places, skip):
+                return Division((tuple(near), rest))
+        return Plan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(reversed(near)))
     return None
+
+
+def room(slice_map: SliceMap, task: Task, count: int) -> int:
+    """Return for how many of `count` robots a corridor has room, as far as the map tells: at least one."""
+    k, found = task.end.slice, 1 if task.own_slice else 0
+    if task.own_slice and slice_map.arc(task.end, task.direction) is not None:
+        return 1
+    while found < count:
+        k += task.direction
+        if slice_map.is_swept(k, task.end.y_mm):
+            break
+        found += 1
+    return max(found, 1)
+
+
+def _elsewhere(
+    slice_map: SliceMap,
+    task: Task,
+    rest: Sequence[int],
+    places: Mapping[int, End | None],
+    skip: Mapping[Task, int],
+) -> bool:
+    """Tell whether the rest of a team has something to do in another slab than `task`."""
+    taken = _slabs([task])
+    others = [each for each in open_tasks(slice_map) if not _slabs([each]).keys() & taken.keys()]
+    known = [place for node in rest if (place := places[node]) is not None]
+    reached = slice_map.distances(known[0]) if known else {}
+    return any(each.end in reached and each not in skip for each in others)
 
 
 def _place(slice_map: SliceMap, status: Status | None) -> End | None:
@@ -139,9 +172,6 @@ def _groups(
         if cut == len(ranked):
             cut = len(ranked) // 2
         return tuple(ranked[:cut]), tuple(ranked[cut:])
-    spares = [node for node in ranked if (status := statuses.get(node)) is not None and status.spare]
-    if spares and len(spares) < len(ranked) and len(_slabs(starts)) > 1:
-        return tuple(spares), tuple([node for node in ranked if node not in spares])
     return None
 
 

@@ -1,14 +1,14 @@
 """A robot of a team that covers an unknown arena together (Latimer et al. 2002), by pose, touch and radio."""
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import Annotated, Any, ClassVar, Final
 
 import msgspec
 from msgspec import Meta, Struct
 
-from zwerm.agents.robot_teams.facts import BOTTOM, TOP, End
 from zwerm.agents.robot_teams.fact_exchange import FactExchange
+from zwerm.agents.robot_teams.facts import BOTTOM, TOP, End
 from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre
 from zwerm.agents.robot_teams.membership import Membership
 from zwerm.agents.robot_teams.messages import HUNTS, READY, Beacon, Plan, Status, decode_beacon, encode_beacon
@@ -26,6 +26,8 @@ from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 MUSTER_S: Final = 1.0
 # How long a team waits for one with a smaller lead to unite them [s].
 MERGE_PATIENCE_S: Final = 30.0
+# A robot this near to an end, or to one that stands there, stands at it [m].
+PARKED_M: Final = 0.75
 # For how many plans an item that brought nothing new is passed over.
 SKIP_PLANS: Final = 3
 
@@ -46,8 +48,9 @@ class TeamTable(Struct, frozen=True, forbid_unknown_fields=True):
 class CorridorMates:
     """What a robot knows of its teammates in one corridor, from their statuses."""
 
-    def __init__(self, plan: Plan, node: int, membership: Membership) -> None:
+    def __init__(self, plan: Plan, node: int, membership: Membership, sweeping: Callable[[int], bool]) -> None:
         self._plan, self._node, self._membership = plan, node, membership
+        self.sweeping = sweeping
 
     def _statuses(self) -> list[Status]:
         plan, statuses = self._plan, self._membership.roster.statuses
@@ -172,14 +175,16 @@ class TeamRobot(Controller):
             try:
                 if self.work.at is None:
                     side = TOP if self.work.failures == 0 or self.random.random() < 0.5 else BOTTOM
-                    yield from self.work.localise(side)
+                    yield from self.work.localise(side, self._swept_by_others)
                 plan = self.plan
                 if plan is not None and (plan.epoch, plan.number) != (self._epoch, self._number):
                     self._epoch, self._number = plan.epoch, plan.number
                     if not plan.order:
-                        yield from self.work.link(plan.direction)
+                        yield from self.work.link(plan.direction, self._swept_by_others)
                     elif self.setup.node in plan.order:
-                        yield from self.work.corridor(plan, CorridorMates(plan, self.setup.node, self.membership))
+                        yield from self.work.corridor(
+                            plan, CorridorMates(plan, self.setup.node, self.membership, self._swept_by_others)
+                        )
                 if self.work.phase != READY:
                     self.work.phase = READY
                     self._urgent = True
@@ -188,6 +193,16 @@ class TeamRobot(Controller):
                 self.work.failures += 1
                 self.work.at = None
                 yield None
+
+    def _swept_by_others(self, k: int) -> bool:
+        """Tell whether another robot is sweeping slice k now, by its own word."""
+        roster, tick = self.membership.roster, self._newest_senses().tick
+        silence = self.parameters.silence_s / self.setup.dt_s
+        return any(
+            status.sweeping == k and roster.silent_ticks(node, tick) < silence
+            for node, status in roster.statuses.items()
+            if node != self.setup.node
+        )
 
     def _parked(self, senses: Senses) -> list[End]:
         """Return the ends at which robots in contact stand, by their own word."""
@@ -198,7 +213,7 @@ class TeamRobot(Controller):
             if other.gap_m > 0.1 or not other.stands or status is None or status.at is None:
                 continue
             dx, dy = other.x_m - grid.x_m(status.at.slice), other.y_m - status.at.y_mm / 1000.0
-            if dx * dx + dy * dy < 0.01:
+            if dx * dx + dy * dy < PARKED_M**2:
                 found.append(status.at)
         return found
 
@@ -288,6 +303,7 @@ class TeamRobot(Controller):
             work.spare,
             work.claim,
             work.room,
+            work.sweeping,
         )
 
     def _say(self, observation: Observation, senses: Senses) -> tuple[Transmission, ...]:

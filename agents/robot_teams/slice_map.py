@@ -52,6 +52,7 @@ class SliceMap:
         self._levels: dict[tuple[int, int], list[tuple[int, int, End]]] = {}
         self._mates: dict[End, Step] = {}
         self._arcs: dict[Port, Step] = {}
+        self._by_slice: dict[int, list[Segment]] = {}
         self._certificate = Certificate(0, (), ())
 
     def add(self, fact: Fact) -> bool:
@@ -81,6 +82,12 @@ class SliceMap:
         """Return the way along the arc that leaves a known end on the side `direction`, or None while it is open."""
         self._derive()
         return self._arcs.get((end, direction))
+
+    def is_swept(self, k: int, y_mm: int) -> bool:
+        """Tell whether a swept segment of slice k reaches within the tolerance of the height y."""
+        self._derive()
+        low, high = y_mm - 4 * TOLERANCE_MM, y_mm + 4 * TOLERANCE_MM
+        return any(segment.bottom_mm <= high and segment.top_mm >= low for segment in self._by_slice.get(k, ()))
 
     @property
     def arcs_known(self) -> bool:
@@ -136,8 +143,9 @@ class SliceMap:
         segments, arcs = self.facts.segments, self.facts.arcs
         ends_of_arcs = [end for arc in arcs for end in (arc.start, arc.stop)]
         self._levels = _joined([end for segment in segments for end in segment.ends] + ends_of_arcs)
-        self._mates, self._arcs = {}, {}
+        self._mates, self._arcs, self._by_slice = {}, {}, {}
         for segment in segments:
+            self._by_slice.setdefault(segment.slice, []).append(segment)
             self._mate(segment)
         for arc in arcs:
             self._join(arc)

@@ -7,7 +7,7 @@ They add what they find to the map, and keep `at`, the end where the robot stand
 from collections.abc import Callable, Generator
 from typing import Final, Protocol
 
-from zwerm.agents.robot_teams.facts import LEFT, RIGHT, TOP, End, Segment
+from zwerm.agents.robot_teams.facts import LEFT, RIGHT, End, Segment
 from zwerm.agents.robot_teams.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
 from zwerm.agents.robot_teams.messages import HUNTS, SWEEPS, TRAVELS, Plan
 from zwerm.agents.robot_teams.senses import Senses
@@ -38,6 +38,9 @@ class Mates(Protocol):
     def claimed(self, k: int) -> bool:
         """Tell whether a teammate takes slice k in this corridor."""
 
+    def sweeping(self, k: int) -> bool:
+        """Tell whether another robot is sweeping slice k now."""
+
     def awaits_predecessor(self) -> bool:
         """Tell whether the predecessor has still to sweep its slice."""
 
@@ -55,6 +58,7 @@ class Work:
         self.spare = False
         self.claim: int | None = None
         self.room: int | None = None
+        self.sweeping: int | None = None
         self.failures = 0
         self._grid = grid
         self._step_m = step_m
@@ -63,18 +67,19 @@ class Work:
 
     # --- finding itself -----------------------------------------------------------------------------------------------
 
-    def localise(self, side: int = TOP) -> Story:
+    def localise(self, side: int, swept_by_others: Callable[[int], bool]) -> Story:
         """Find an end from anywhere: go to a slice and along it to its end on `side`; sweep it if it is new."""
-        self.at = None
+        self.at = self.sweeping = None
         seek = Seek(self._grid)
         yield seek
+        self.sweeping = seek.slice
         up = Sweep(seek.slice, side, self._grid, self._step_m, self._parked)
         yield up
         if up.end is None:
             raise Lost
         known = self.map.end(up.end)
         if known is not None:
-            self.at = known
+            self.at, self.sweeping = known, None
             return
         # The formation's first corridor: join the own end to the predecessor's, come back, and sweep.
         start = self.at = up.end
@@ -82,16 +87,16 @@ class Work:
             if (yield from self.trace(LEFT)):
                 yield from self.travel(start)
         yield from self.sweep()
-        yield from self._hunt(up.slice, RIGHT)
+        yield from self._hunt(up.slice, RIGHT, swept_by_others)
 
-    def link(self, direction: int) -> Story:
+    def link(self, direction: int, swept_by_others: Callable[[int], bool]) -> Story:
         """Walk back to the predecessor's slice: what joins the maps of robots that began apart."""
         self.found = self.spare = False
         self.phase = HUNTS
         at = self.at
         if at is None:
             raise Lost
-        yield from self._hunt(at.slice, -direction)
+        yield from self._hunt(at.slice, direction, swept_by_others)
 
     # --- single steps -------------------------------------------------------------------------------------------------
 
@@ -102,12 +107,16 @@ class Work:
             raise Lost
         yield from self._approach(start)
         sweep = Sweep(start.slice, -start.side, self._grid, self._step_m, self._parked)
+        self.sweeping = start.slice
         yield sweep
+        self.sweeping = None
         end = sweep.end
         if end is None:
             raise Lost
         low, high = sorted((start.y_mm, end.y_mm))
-        self.map.add(Segment(start.slice, low, high))
+        known = self.map.end(start)
+        if known is None or self.map.mate(known) is None or self.map.end(end) is None:
+            self.map.add(Segment(start.slice, low, high))
         self.at = self.map.end(end)
 
     def trace(self, direction: int) -> Generator[Manoeuvre | None, None, bool]:
@@ -125,7 +134,8 @@ class Work:
         if end is None:
             raise Lost
         # Where a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known.
-        if arc is not None:
+        known = self.map.end(start)
+        if arc is not None and (known is None or self.map.arc(known, direction) is None):
             self.map.add(arc)
         self.at = self.map.end(end)
         if self.at is None:
@@ -182,7 +192,7 @@ class Work:
         self.phase = HUNTS
         while mates.awaits_predecessor():
             yield None
-        yield from self._hunt(mine.slice, plan.direction)
+        yield from self._hunt(mine.slice, plan.direction, mates.sweeping)
 
     def _take_slot(self, plan: Plan, mates: "Mates") -> Generator[Manoeuvre | None, None, bool]:
         """Trace forward, one slice a robot; tell whether there is a slice for this one.
@@ -210,7 +220,7 @@ class Work:
             else:
                 ends.append(at)
 
-    def _hunt(self, k: int, direction: int) -> Story:
+    def _hunt(self, k: int, direction: int, swept_by_others: Callable[[int], bool]) -> Story:
         """Walk round the slab behind slice k, sweeping what is new, until the end reached is swept.
 
         Fig. 4 (i) and (ii) of the paper are both this loop.
@@ -226,6 +236,10 @@ class Work:
             at = self.at
             if at is None:
                 raise Lost
+            while self.map.mate(at) is None and swept_by_others(at.slice):
+                yield None
+                at = self.map.end(at) or at
+            self.at = at
             if self.map.mate(at) is not None:
                 return
             if at.slice == k:
