@@ -118,9 +118,7 @@ class Sweep:
         side = self.side
         if self._around is not None:
             self.around_ticks += 1
-            hidden = self._hidden(senses)
-            if hidden is not None or self.around_ticks > AROUND_TICKS_MAX or abs(off) > AROUND_M:
-                self.end = hidden
+            if self.around_ticks > AROUND_TICKS_MAX or abs(off) > AROUND_M:
                 return None
             way = self._around.direction(senses, blocks, off)
             if way is not None:
@@ -142,14 +140,6 @@ class Sweep:
             return self._around.direction(senses, blocks, off)
         vx = max(-0.7, min(0.7, off / self._step_m))
         return vx, side * math.sqrt(1.0 - vx * vx)
-
-    def _hidden(self, senses: Senses) -> End | None:
-        """Return the end of the segment if a robot stands there: beside it the boundary blocks the way as well."""
-        if any([ny * self.side > BLOCKS for _, ny in senses.walls]):
-            for other in senses.robots:
-                if other.gap_m < 0.1 and other.stands and abs(other.x_m - self._x_m) < 0.15:
-                    return End(self.slice, self.side, mm(other.y_m))
-        return None
 
 
 class Trace:

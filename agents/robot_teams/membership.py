@@ -44,14 +44,6 @@ class Roster:
         """Return for how long nothing new of a robot has come."""
         return tick - self.news_tick.setdefault(node, tick)
 
-    def ready(self, view: View, number: int) -> bool:
-        """The barrier of a slice: tell whether every member has finished plan `number` of the view."""
-        for node in view.members:
-            status = self.statuses.get(node)
-            if status is None or status.epoch != view.epoch or status.phase != 0 or status.number != number:
-                return False
-        return True
-
 
 class Membership:
     """One robot's view of its team."""
@@ -97,6 +89,12 @@ class Membership:
             self._meet(theirs, tick)
         elif theirs.lead in self._met:
             self._met[theirs.lead] = theirs, self._met[theirs.lead][1]
+
+    def muster(self, tick: int) -> None:
+        """Found the first team: the smallest of all robots that hear each other at the start leads them."""
+        heard = sorted(self.roster.statuses.keys() | {self.node})
+        if heard[0] == self.node and len(heard) > 1 and self.view.epoch == 1:
+            self._adopt(View(2, self.node, tuple(heard)), tick)
 
     def poll(self, tick: int) -> None:
         """Drop silent members, or take the place of a silent lead."""
@@ -145,9 +143,9 @@ class Membership:
         self._adopt(View(self._latest_epoch + 1, self.node, tuple(sorted(members))), tick)
         return True
 
-    def awaits_merging(self, tick: int, patience_ticks: int) -> bool:
-        """Tell whether a team whose lead has a smaller id was met a short time ago: it will unite the two."""
-        return any([view.lead < self.node and tick - since < patience_ticks for view, since in self._met.values()])
+    def merges_soon(self, tick: int, patience_ticks: int) -> bool:
+        """Tell whether a team was met a short time ago: the lead with the smaller id unites the two when all are free."""
+        return any([tick - since < patience_ticks for _, since in self._met.values()])
 
     def _meet(self, view: View, tick: int) -> None:
         if self.node in view.members or view.lead in self.view.members:

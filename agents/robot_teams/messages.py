@@ -71,7 +71,7 @@ class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     sender: int
     views: tuple[View, ...]
     met: tuple[View, ...]
-    plan: Plan | None
+    plans: tuple[Plan, ...]
     statuses: tuple[Status, ...]
     digest: int
     count: int

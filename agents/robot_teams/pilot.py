@@ -113,6 +113,12 @@ class Pilot:
         """Have no manoeuvre: stand, and make way for others."""
         self._manoeuvre, self.state = None, IDLE
 
+    def stand(self, senses: Senses) -> Vector:
+        """Return the velocity of a robot that has nothing left to do: it makes way for others."""
+        if self.state != IDLE:
+            self.rest()
+        return self.step(senses)
+
     def step(self, senses: Senses) -> Vector:
         """Return the velocity [m/s] in the frame of the arena; `state` changes to DONE or FAILED when the manoeuvre ends."""
         here = senses.x_m, senses.y_m
@@ -140,7 +146,7 @@ class Pilot:
                 return way
         self._leave_trail(senses)
         if self._manoeuvre is None:
-            if max([ticks for ticks in self._contact_ticks.values()], default=0) * self._dt_s > PRESSED_S:
+            if max(self._contact_ticks.values(), default=0) * self._dt_s > PRESSED_S:
                 self._contact_ticks.clear()
                 self._begin_retreat(senses, 2.0)
             return 0.0, 0.0
@@ -220,8 +226,14 @@ class Pilot:
             if closing > limit:
                 vx -= (closing - limit) * other.nx
                 vy -= (closing - limit) * other.ny
+        # Walls deflect the motion: what they leave of it must not lead into a body either.
+        wx, wy = vx, vy
+        for nx, ny in senses.walls:
+            into = wx * nx + wy * ny
+            if into > 0.0:
+                wx, wy = wx - into * nx, wy - into * ny
         for other in senses.robots:
-            closing = vx * other.nx + vy * other.ny
-            if closing > max(0.0, other.gap_m) / (2.0 * self._dt_s) + 1e-6:
+            limit = max(0.0, other.gap_m) / (2.0 * self._dt_s) + 1e-6
+            if vx * other.nx + vy * other.ny > limit or wx * other.nx + wy * other.ny > limit:
                 return 0.0, 0.0
         return vx, vy

@@ -1,102 +1,76 @@
-"""The lead's decision at the barrier: the next corridor, a division, or that everything is covered. A pure function.
+"""The lead's decisions: which corridors its free robots form next, and when the team divides. Pure functions.
 
-Latimer et al. 2002, sections 3.3 and 3.4. The next corridor begins at the open end or port nearest to the team. Where a
-robot found a new segment on its own slice, a reverse critical point lies between it and its predecessor: it and those behind
-it take the new cell, the others keep theirs. Robots for which the corridor had no slice divide off too.
+Latimer et al. 2002, sections 3.3 and 3.4. A corridor begins at the open end or port nearest to the team. The robots for which the
+map shows no room in it take the next open cell, if there is one. Where a robot found a new segment on its own slice, a reverse
+critical point lies between it and its predecessor: the team divides, it and those behind it take the new cell.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from zwerm.agents.robot_teams.facts import LEFT, RIGHT, End
-from zwerm.agents.robot_teams.messages import Plan, Status, View
+from zwerm.agents.robot_teams.facts import LEFT, RIGHT, TOP, End
+from zwerm.agents.robot_teams.messages import READY, Plan, Status, View
 from zwerm.agents.robot_teams.slice_map import SliceMap
 
 FAR: Final = 10**9
-
-# Something open: an end without mate, or an open port, and the direction of the corridor that begins there.
-Item = tuple[End, int, bool]
+# The side of the anchor of a plan that only joins the maps of robots that began apart.
+LINK: Final = 0
+# How far beyond the ends of its anchor's segment a corridor reserves its cell [mm].
+BESIDE_MM: Final = 500
 
 
 class Task(NamedTuple):
-    """Where a corridor begins."""
+    """Where a corridor begins: at an end that is not swept (`own_slice`), or at the open port of one that is."""
 
     end: End
     direction: int
     own_slice: bool
 
 
-class Division(NamedTuple):
-    """The groups into which the team splits."""
+class Reservation(NamedTuple):
+    """The part of the arena that a corridor works in: slices `low` to `high`, heights `bottom_mm` to `top_mm`."""
 
-    groups: tuple[tuple[int, ...], ...]
+    low: int
+    high: int
+    bottom_mm: int
+    top_mm: int
+
+    def holds(self, task: Task) -> bool:
+        """Tell whether a task lies in it."""
+        end = task.end
+        slab = end.slice if task.direction == RIGHT else end.slice - 1
+        beside = self.bottom_mm - BESIDE_MM <= end.y_mm <= self.top_mm + BESIDE_MM
+        return beside and self.low <= slab <= self.high
 
 
 def open_tasks(slice_map: SliceMap) -> list[Task]:
     """Return everything that is open: ends without mate with the direction in which to go on, and ports of swept ends."""
     certificate = slice_map.certificate
-    tasks = []
     unswept = dict.fromkeys(certificate.ends_without_mate)
+    tasks = []
     for end in unswept:
         sides = [side for side in (RIGHT, LEFT) if slice_map.arc(end, side) is None]
         tasks.append(Task(end, sides[0] if len(sides) == 1 else RIGHT, True))
-    tasks += [Task(end, side, False) for end, side in certificate.open_ports if end not in unswept]
-    return tasks
+    return tasks + [Task(end, side, False) for end, side in certificate.open_ports if end not in unswept]
 
 
-def nearest_task(slice_map: SliceMap, start: End, skip: Mapping[Task, int], direction: int) -> tuple[Task, int] | None:
-    """Return the nearest open task and its distance [mm]; of equals, one that goes on in `direction`."""
-    distances = slice_map.distances(start)
-    best: tuple[int, int, Task] | None = None
-    for task in open_tasks(slice_map):
-        if task in skip or task.end not in distances:
-            continue
-        rank = (distances[task.end], int(task.direction != direction), task)
-        if best is None or rank < best:
-            best = rank
-    return None if best is None else (best[2], best[0])
-
-
-def decide(
-    slice_map: SliceMap,
-    view: View,
-    statuses: Mapping[int, Status],
-    last: Plan | None,
-    skip: Mapping[Task, int],
-    divides: bool,
-) -> Plan | Division | None:
-    """Return what the team does next; None where nothing is open that it could reach."""
-    places = {node: _place(slice_map, statuses.get(node)) for node in view.members}
-    order = last.order if last is not None and last.epoch == view.epoch else ()
-    ranked = [*[node for node in order if node in view.members], *[node for node in view.members if node not in order]]
-    number = last.number + 1 if last is not None and last.epoch == view.epoch else 1
-    direction = last.direction if last is not None else RIGHT
-    apart = _components(slice_map, ranked, places)
-    if len(apart) > 1:
-        # The maps of robots that began apart are not joined: walk back to the predecessor's slice first, else split.
-        if number == 1 or (last is not None and last.order):
-            return Plan(view.epoch, number, End(0, 0, 0), direction, False, ())
-        return Division(apart)
-    if divides and len(ranked) > 1 and last is not None and last.epoch == view.epoch and last.order:
-        groups = _groups(slice_map, ranked, statuses, places, skip)
-        if groups is not None:
-            return Division(groups)
-    for node in reversed(ranked):
-        place = places[node]
-        found = None if place is None else nearest_task(slice_map, place, skip, direction)
-        if found is None:
-            continue
-        task = found[0]
-        distances = slice_map.distances(task.end)
-        far = {each: distances.get(at, FAR) if (at := places[each]) is not None else FAR for each in ranked}
-        # The nearest goes first, and so farthest: single file.
-        near = sorted(ranked, key=lambda each: (far[each], -ranked.index(each)))[: room(slice_map, task, len(ranked))]
-        if divides and len(near) < len(ranked):
-            rest = tuple([each for each in ranked if each not in near])
-            if _elsewhere(slice_map, task, rest, places, skip):
-                return Division((tuple(near), rest))
-        return Plan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(reversed(near)))
-    return None
+def reservation(slice_map: SliceMap, plan: Plan) -> Reservation:
+    """Return where the robots of a plan work."""
+    anchor, reach = plan.anchor, len(plan.order) * plan.direction
+    if anchor.side == LINK:
+        return Reservation(0, -1, 0, 0)
+    # Slabs are named by the slice on their left. One more to either side: hunts go back, and the next corridor goes on.
+    first = anchor.slice if plan.direction == RIGHT else anchor.slice - 1
+    low, high = sorted((first - plan.direction, first + reach))
+    known = slice_map.end(anchor)
+    mate = None if known is None else slice_map.mate(known)
+    if mate is not None:
+        bottom, top = sorted((anchor.y_mm, mate.stop.y_mm))
+    elif anchor.side == TOP:
+        bottom, top = -FAR, anchor.y_mm
+    else:
+        bottom, top = anchor.y_mm, FAR
+    return Reservation(low, high, bottom, top)
 
 
 def room(slice_map: SliceMap, task: Task, count: int) -> int:
@@ -112,69 +86,109 @@ def room(slice_map: SliceMap, task: Task, count: int) -> int:
     return max(found, 1)
 
 
-def _elsewhere(
+def latest_plans(plans: Sequence[Plan], view: View) -> dict[int, Plan]:
+    """Return for each member of the view its latest plan, if it has one."""
+    latest: dict[int, Plan] = {}
+    for plan in plans:
+        if plan.epoch == view.epoch:
+            for node in plan.order:
+                if node not in latest or plan.number > latest[node].number:
+                    latest[node] = plan
+    return latest
+
+
+def free_members(view: View, plans: Sequence[Plan], statuses: Mapping[int, Status]) -> list[int]:
+    """Return the members that have finished their latest plan: the barrier of a corridor is that all of its robots are free."""
+    latest = latest_plans(plans, view)
+    free = []
+    for node in view.members:
+        status = statuses.get(node)
+        number = latest[node].number if node in latest else 0
+        if status is not None and status.phase == READY and (status.epoch, status.number) == (view.epoch, number):
+            free.append(node)
+    return free
+
+
+def finder(order: Sequence[int], statuses: Mapping[int, Status]) -> int | None:
+    """Return the place in the formation of the first robot that found a new segment on its own slice."""
+    for index, node in enumerate(order):
+        status = statuses.get(node)
+        if status is not None and status.found:
+            return index
+    return None
+
+
+def division(view: View, order: Sequence[int], index: int) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
+    """Return the two groups when robot `index` of a formation found a new cell: it and those behind it, and all others.
+
+    Where the lead of the formation found it, the formation splits in half. None where a group would be empty.
+    """
+    cut = index + 1 if index + 1 < len(order) else len(order) // 2
+    new = tuple(order[:cut])
+    rest = tuple([node for node in view.members if node not in new])
+    return (new, rest) if new and rest else None
+
+
+def assign(
     slice_map: SliceMap,
-    task: Task,
-    rest: Sequence[int],
-    places: Mapping[int, End | None],
-    skip: Mapping[Task, int],
-) -> bool:
-    """Tell whether the rest of a team has something to do in another slab than `task`."""
-    taken = _slabs([task])
-    others = [each for each in open_tasks(slice_map) if not _slabs([each]).keys() & taken.keys()]
-    known = [place for node in rest if (place := places[node]) is not None]
-    reached = slice_map.distances(known[0]) if known else {}
-    return any(each.end in reached and each not in skip for each in others)
+    view: View,
+    plans: Sequence[Plan],
+    statuses: Mapping[int, Status],
+    skip: Collection[Task],
+    one_corridor: bool,
+) -> list[Plan]:
+    """Return new plans for the free members. With `one_corridor` the whole team forms one corridor at a time."""
+    free = free_members(view, plans, statuses)
+    if not free or (one_corridor and len(free) < len(view.members)):
+        return []
+    number = max([plan.number for plan in plans if plan.epoch == view.epoch], default=0)
+    latest = latest_plans(plans, view)
+    active = list({plan.number: plan for node, plan in latest.items() if node not in free}.values())
+    reserved = [reservation(slice_map, plan) for plan in active]
+    places = {node: _place(slice_map, statuses.get(node)) for node in free}
+    if number == 0 and len(free) > 1 and _apart(slice_map, places):
+        return [Plan(view.epoch, 1, End(0, LINK, 0), RIGHT, False, tuple(free))]
+    distances = {node: slice_map.distances(at) for node, at in places.items() if at is not None}
+    swept = {status.sweeping for status in statuses.values()}
+    tasks = [task for task in open_tasks(slice_map) if task not in skip]
+    tasks = [task for task in tasks if not (task.own_slice and task.end.slice in swept)]
+    made: list[Plan] = []
+    waiting = [node for node in free if node in distances]
+    while waiting:
+        best: tuple[int, int, int, Task] | None = None
+        for node in waiting:
+            before = latest.get(node)
+            for task in tasks:
+                far = distances[node].get(task.end, FAR)
+                turns = int(before is not None and before.direction != task.direction)
+                if far == FAR or (best is not None and (far, turns) > best[:2]):
+                    continue
+                if any(each.holds(task) for each in reserved):
+                    continue
+                rank = (far, turns, -node, task)
+                if best is None or rank < best:
+                    best = rank
+        if best is None:
+            break
+        task = best[3]
+        # The nearest goes first, and so farthest: single file. The last in the order is the lead.
+        near = sorted(waiting, key=lambda each: (distances[each].get(task.end, FAR), each))
+        near = [each for each in near if task.end in distances[each]][: room(slice_map, task, len(waiting))]
+        number += 1
+        plan = Plan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(reversed(near)))
+        made.append(plan)
+        reserved.append(reservation(slice_map, plan))
+        waiting = [node for node in waiting if node not in near]
+        if one_corridor:
+            break
+    return made
 
 
 def _place(slice_map: SliceMap, status: Status | None) -> End | None:
     return None if status is None or status.at is None else slice_map.end(status.at)
 
 
-def _components(
-    slice_map: SliceMap, ranked: Sequence[int], places: Mapping[int, End | None]
-) -> tuple[tuple[int, ...], ...]:
-    """Return the members whose ends are joined by known ways, group by group."""
-    groups: list[tuple[dict[End, int], list[int]]] = []
-    for node in reversed(ranked):
-        place = places[node]
-        if place is None:
-            continue
-        for distances, members in groups:
-            if place in distances:
-                members.append(node)
-                break
-        else:
-            groups.append((slice_map.distances(place), [node]))
-    lost = [node for node in ranked if places[node] is None]
-    if groups:
-        groups[0][1].extend(lost)
-    return tuple([tuple(members) for _, members in groups])
-
-
-def _groups(
-    slice_map: SliceMap,
-    ranked: Sequence[int],
-    statuses: Mapping[int, Status],
-    places: Mapping[int, End | None],
-    skip: Mapping[Task, int],
-) -> tuple[tuple[int, ...], ...] | None:
-    """Return how the team splits, or None if there is no reason to, or less than two things to do."""
-    starts = [task for task in open_tasks(slice_map) if task not in skip]
-    if len(starts) < 2:
-        return None
-    finders = [
-        index for index, node in enumerate(ranked) if (status := statuses.get(node)) is not None and status.found
-    ]
-    if finders:
-        # The finder and those behind it take the new cell; if it is the last of the formation, half of the team does.
-        cut = finders[0] + 1
-        if cut == len(ranked):
-            cut = len(ranked) // 2
-        return tuple(ranked[:cut]), tuple(ranked[cut:])
-    return None
-
-
-def _slabs(tasks: Sequence[Task]) -> dict[tuple[int, int], None]:
-    """Return the slabs that open tasks lead into, as far as can be told: by the slice on their left, and their direction."""
-    return {(task.end.slice if task.direction == RIGHT else task.end.slice - 1, task.direction): None for task in tasks}
+def _apart(slice_map: SliceMap, places: Mapping[int, End | None]) -> bool:
+    """Tell whether some of the robots stand at ends between which no way is known."""
+    known = [place for place in places.values() if place is not None]
+    return bool(known) and not slice_map.distances(known[0]).keys() >= dict.fromkeys(known).keys()

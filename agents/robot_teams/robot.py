@@ -13,7 +13,7 @@ from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre
 from zwerm.agents.robot_teams.membership import Membership
 from zwerm.agents.robot_teams.messages import HUNTS, READY, Beacon, Plan, Status, decode_beacon, encode_beacon
 from zwerm.agents.robot_teams.pilot import FAILED, IDLE, RUNNING, Pilot
-from zwerm.agents.robot_teams.planning import Division, Task, decide
+from zwerm.agents.robot_teams.planning import LINK, Task, assign, division, finder, free_members, latest_plans
 from zwerm.agents.robot_teams.senses import Senses, Sensing
 from zwerm.agents.robot_teams.slice_map import SliceMap
 from zwerm.agents.robot_teams.work import Lost, NoWay, Work
@@ -28,8 +28,10 @@ MUSTER_S: Final = 1.0
 MERGE_PATIENCE_S: Final = 30.0
 # A robot this near to an end, or to one that stands there, stands at it [m].
 PARKED_M: Final = 0.75
-# For how many plans an item that brought nothing new is passed over.
-SKIP_PLANS: Final = 3
+# For how long a task that brought nothing new is passed over [s].
+SKIP_S: Final = 30.0
+# The lead decides every so many ticks.
+DECIDE_TICKS: Final = 4
 
 
 class TeamTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -42,6 +44,7 @@ class TeamTable(Struct, frozen=True, forbid_unknown_fields=True):
     silence_s: Annotated[float, Meta(gt=0.0)] = 6.0
     meeting_m: Annotated[float, Meta(ge=0.0)] = 1.1
     divide: bool = True
+    one_corridor: bool = False
     merge: bool = True
 
 
@@ -101,8 +104,9 @@ class TeamRobot(Controller):
         self.map = SliceMap()
         self.pilot = Pilot(setup.node, body.max_speed_m_s, setup.dt_s, self.random)
         self.membership = Membership(setup.node, setup.dt_s, table.silence_s)
+        self._view = self.membership.view
         self.exchange = FactExchange(self.map, setup.dt_s)
-        self.plan: Plan | None = None
+        self.plans: tuple[Plan, ...] = ()
         self.refused = 0
         self._sensing = Sensing(body.radius_m)
         self._senses: Senses | None = None
@@ -119,32 +123,37 @@ class TeamRobot(Controller):
         self._number = 0
         self._epoch = 0
         self._skip: dict[Task, int] = {}
-        self._plan_digest = -1
+        self._judged: dict[int, Plan] = {}
+        self._digests: dict[int, int] = {}
+        self._tried = (-1, -1)
         self._every = max(1, round(table.beacon_s / setup.dt_s))
         self._urgent = False
         self._told_count = -1
         self._done = False
-        self._decided_count = (-1, -1)
 
     def step(self, observation: Observation) -> Command:
         """Hear, decide, move, and say."""
         tick = observation.tick
-        senses = self._senses = self._sensing.read(observation)
+        senses = self._senses = self._sensing.read(observation, self._is_dead)
         if observation.inbox:
             self._hear(observation, senses)
-        view = self.membership.view
+        if tick == round(MUSTER_S / self.setup.dt_s):
+            self.membership.muster(tick)
         self.membership.poll(tick)
-        if self.membership.view != view:
+        if self.membership.view != self._view:
+            self._view = self.membership.view
+            self._judged.clear()
+            self._digests.clear()
+            self._tried = (-1, -1)
             self._urgent = True
-        if self.plan is not None and self.plan.epoch != self.membership.view.epoch:
-            self.plan = None
-        vx, vy = self._move(senses)
-        if self.work.phase == READY and self.membership.leads:
+            self.plans = tuple([plan for plan in self.plans if plan.epoch == self.membership.view.epoch])
+        self._done = self.map.certificate.complete
+        vx, vy = self.pilot.stand(senses) if self._done else self._move(senses)
+        if self.membership.leads:
             self._decide(tick)
         outbox = self._say(observation, senses)
         sensing = self._sensing
         drive = BodyVelocity(sensing.cos * vx + sensing.sin * vy, sensing.cos * vy - sensing.sin * vx, 0.0)
-        self._done = self.work.phase == READY and self.map.certificate.complete
         return Command(drive=drive, outbox=outbox, done=self._done, told=self._telemetry(tick))
 
     # --- moving -------------------------------------------------------------------------------------------------------
@@ -176,12 +185,12 @@ class TeamRobot(Controller):
                 if self.work.at is None:
                     side = TOP if self.work.failures == 0 or self.random.random() < 0.5 else BOTTOM
                     yield from self.work.localise(side, self._swept_by_others)
-                plan = self.plan
+                plan = latest_plans(self.plans, self.membership.view).get(self.setup.node)
                 if plan is not None and (plan.epoch, plan.number) != (self._epoch, self._number):
                     self._epoch, self._number = plan.epoch, plan.number
-                    if not plan.order:
+                    if plan.anchor.side == LINK:
                         yield from self.work.link(plan.direction, self._swept_by_others)
-                    elif self.setup.node in plan.order:
+                    else:
                         yield from self.work.corridor(
                             plan, CorridorMates(plan, self.setup.node, self.membership, self._swept_by_others)
                         )
@@ -217,6 +226,12 @@ class TeamRobot(Controller):
                 found.append(status.at)
         return found
 
+    def _is_dead(self, node: int) -> bool:
+        """Tell whether a robot in sight has been silent for too long to be alive."""
+        tick = 0 if self._senses is None else self._senses.tick
+        silent = self.membership.roster.silent_ticks(node, tick)
+        return bool(self.setup.channels) and silent * self.setup.dt_s > 2.0 * self.parameters.silence_s
+
     def _newest_senses(self) -> Senses:
         assert self._senses is not None
         return self._senses
@@ -224,36 +239,52 @@ class TeamRobot(Controller):
     # --- deciding -----------------------------------------------------------------------------------------------------
 
     def _decide(self, tick: int) -> None:
-        """At the barrier, decide what the team does next."""
-        membership = self.membership
-        view, plan = membership.view, self.plan
-        roster = membership.roster
-        roster.statuses[self.setup.node] = self._status(self._newest_senses(), tick)
-        roster.news_tick[self.setup.node] = tick
-        number = plan.number if plan is not None else 0
-        muster = tick * self.setup.dt_s < MUSTER_S
-        if muster or not roster.ready(view, number):
+        """As the lead, unite with teams that were met, divide, or give the free members something to do."""
+        membership, dt_s = self.membership, self.setup.dt_s
+        if tick % DECIDE_TICKS or tick * dt_s < MUSTER_S:
+            return
+        view, statuses = membership.view, membership.roster.statuses
+        statuses[self.setup.node] = self._status(self._newest_senses(), tick)
+        membership.roster.news_tick[self.setup.node] = tick
+        free = free_members(view, self.plans, statuses)
+        if not free:
             return
         table: TeamTable = self.parameters
-        if table.merge or tick * self.setup.dt_s < 3.0 * MUSTER_S:
-            if membership.merge(tick):
+        everybody = len(free) == len(view.members)
+        if table.merge and membership.met():
+            if everybody and membership.merge(tick):
                 self._urgent = True
                 return
-            if membership.awaits_merging(tick, round(MERGE_PATIENCE_S / self.setup.dt_s)):
+            if membership.merges_soon(tick, round(MERGE_PATIENCE_S / dt_s)):
                 return
-        if self.map.certificate.complete:
+        if self.map.certificate.complete or (len(free), len(self.map.facts)) == self._tried:
             return
-        if plan is not None and self._plan_digest == self.map.facts.digest:
-            self._skip[Task(plan.anchor, plan.direction, plan.own_slice)] = SKIP_PLANS
-        decision = decide(self.map, view, roster.statuses, plan, self._skip, table.divide)
-        self._skip = {task: left - 1 for task, left in self._skip.items() if left > 1}
-        if isinstance(decision, Division):
-            membership.divide(decision.groups, tick)
-            self.plan = None
-            self.work.found = self.work.spare = False
-        elif decision is not None:
-            self.plan = decision
-            self._plan_digest = self.map.facts.digest
+        for plan in dict.fromkeys(latest_plans(self.plans, view).values()):
+            if plan.number not in self._judged and all(node in free for node in plan.order):
+                self._judged[plan.number] = plan
+                if self._digests.pop(plan.number, None) == self.map.facts.digest:
+                    self._skip[Task(plan.anchor, plan.direction, plan.own_slice)] = tick
+                index = finder(plan.order, statuses) if table.divide and plan.anchor.side != LINK else None
+                groups = None if index is None else division(view, plan.order, index)
+                if groups is not None:
+                    membership.divide(groups, tick)
+                    self._forget_plans()
+                    return
+        self._skip = {task: since for task, since in self._skip.items() if (tick - since) * dt_s < SKIP_S}
+        made = assign(self.map, view, self.plans, statuses, self._skip, table.one_corridor)
+        self._tried = (-1, -1)
+        if made:
+            self.plans = (*dict.fromkeys(latest_plans(self.plans, view).values()), *made)
+            for plan in made:
+                self._digests[plan.number] = self.map.facts.digest
+            self._urgent = True
+        elif not self._skip:
+            self._tried = len(free), len(self.map.facts)
+
+    def _forget_plans(self) -> None:
+        self.plans = ()
+        self._judged.clear()
+        self._digests.clear()
         self._urgent = True
 
     # --- hearing and saying -------------------------------------------------------------------------------------------
@@ -261,34 +292,31 @@ class TeamRobot(Controller):
     def _hear(self, observation: Observation, senses: Senses) -> None:
         tick = observation.tick
         table: TeamTable = self.parameters
-        muster = tick * self.setup.dt_s < MUSTER_S
         for packet in observation.inbox:
             try:
                 beacon: Beacon = decode_beacon(unseal(packet.payload))
             except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
                 self.refused += 1
                 continue
-            near = muster
+            near = False
             for status in beacon.statuses:
-                if status.node == beacon.sender and not near and (table.merge or table.meeting_m == 0.0):
+                if status.node == beacon.sender and table.merge:
                     apart = math.hypot(status.x_mm / 1000.0 - senses.x_m, status.y_mm / 1000.0 - senses.y_m)
                     near = apart <= table.meeting_m
             self.membership.receive(beacon, tick, near)
-            if beacon.sender in self.membership.view.members or (near and table.merge):
+            if beacon.sender in self.membership.view.members or near:
                 self.exchange.receive(beacon, tick)
             else:
                 self.exchange.forget(beacon.sender)
-            plan, view = beacon.plan, self.membership.view
-            if plan is not None and plan.epoch == view.epoch and beacon.sender in view.members:
-                mine = self.plan
-                if mine is None or mine.epoch != plan.epoch or plan.number > mine.number:
-                    self.plan = plan
+            view = self.membership.view
+            if beacon.sender in view.members and not self.membership.leads:
+                known = dict.fromkeys((*self.plans, *[plan for plan in beacon.plans if plan.epoch == view.epoch]))
+                self.plans = tuple(dict.fromkeys(latest_plans(tuple(known), view).values()))
 
     def _status(self, senses: Senses, tick: int) -> Status:
-        work, plan = self.work, self.plan
-        view = self.membership.view
+        work, view = self.work, self.membership.view
         busy = work.phase != READY
-        number = self._number if busy or (plan is not None and plan.epoch == self._epoch) else 0
+        number = self._number if busy or self._epoch == view.epoch else 0
         epoch = self._epoch if busy else view.epoch
         return Status(
             self.setup.node,
@@ -320,7 +348,7 @@ class TeamRobot(Controller):
             self.setup.node,
             membership.outgoing(),
             membership.met(),
-            self.plan,
+            self.plans,
             (mine, *others),
             self.map.facts.digest,
             len(self.map.facts),

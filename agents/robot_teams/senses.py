@@ -1,15 +1,19 @@
 """What a robot senses at one tick, in the frame of the arena: its position, the walls it touches, the robots beside it."""
 
 import math
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from zwerm.wire.messages import Observation
 
 # The gap that robots keep between their bodies [m]: more than a touch switch reaches, so that what is touched is a wall.
-GAP_M: Final = 0.03
+GAP_M: Final = 0.04
 
 # A robot that moves less than this in a tick stands [m].
 STANDS_M: Final = 0.004
+
+# A wreck nearer than this, beyond the gap that is kept, is a wall [m].
+DEAD_M: Final = 0.01
 
 Vector = tuple[float, float]
 
@@ -52,8 +56,8 @@ class Sensing:
         self._last: dict[int, Vector] = {}
         self.cos, self.sin = 1.0, 0.0
 
-    def read(self, observation: Observation) -> Senses:
-        """Return the senses of an observation with pose, touch and neighbours."""
+    def read(self, observation: Observation, dead: Callable[[int], bool]) -> Senses:
+        """Return the senses of an observation with pose, touch and neighbours; a `dead` robot in contact is a wall."""
         pose, touch, neighbours = observation.pose, observation.touch, observation.neighbours
         assert pose is not None
         if pose.heading_rad != self._heading_rad:
@@ -61,6 +65,7 @@ class Sensing:
             self._vectors.clear()
             self.cos, self.sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         robots: list[Beside] = []
+        wrecks: list[Vector] = []
         places: dict[int, Vector] = {}
         for each in neighbours or ():
             dx, dy = self.cos * each.x_m - self.sin * each.y_m, self.sin * each.x_m + self.cos * each.y_m
@@ -69,9 +74,11 @@ class Sensing:
             was = self._last.get(each.node, (x, y))
             places[each.node] = x, y
             gap = apart - 2.0 * self._radius_m - GAP_M
+            if gap < DEAD_M and x == was[0] and y == was[1] and dead(each.node):
+                wrecks.append((dx / apart, dy / apart))
             robots.append(Beside(each.node, x, y, dx / apart, dy / apart, gap, x - was[0], y - was[1]))
         self._last = places
-        walls = tuple([self._vector(contact.bearing_rad) for contact in touch or ()])
+        walls = (*[self._vector(contact.bearing_rad) for contact in touch or ()], *wrecks)
         return Senses(observation.tick, pose.x_m, pose.y_m, walls, tuple(robots))
 
     def _vector(self, bearing_rad: float) -> Vector:

@@ -17,6 +17,8 @@ Story = Generator[Manoeuvre | None, None, None]
 
 # A journey or a hunt that takes more steps than this has lost its way.
 STEPS_MAX: Final = 400
+# So often a step of a journey may lead elsewhere than the map says.
+ASTRAY_MAX: Final = 3
 # A robot farther than this from its end approaches it first [m].
 AT_END_M: Final = 0.06
 
@@ -144,6 +146,7 @@ class Work:
 
     def travel(self, stop: End) -> Story:
         """Go to a known end by the shortest known way."""
+        astray = 0
         for _ in range(STEPS_MAX):
             start = None if self.at is None else self.map.end(self.at)
             goal = self.map.end(stop)
@@ -160,7 +163,12 @@ class Work:
                 yield from self.sweep()
             else:
                 yield from self.trace(step.direction)
-        raise Lost
+            at = None if self.at is None else self.map.end(self.at)
+            if at != self.map.end(step.stop):
+                astray += 1
+                if astray > ASTRAY_MAX:
+                    raise NoWay
+        raise NoWay
 
     def _approach(self, end: End) -> Story:
         senses = self._sense()
@@ -209,7 +217,10 @@ class Work:
                 return False
             if wanted < len(ends):
                 if self.at != ends[wanted]:
-                    yield from self.travel(ends[wanted])
+                    try:
+                        yield from self.travel(ends[wanted])
+                    except NoWay:
+                        return False
                 return True
             passes = yield from self.trace(plan.direction)
             at = self.at
