@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.robot_teams.facts import Arc, End
 from zwerm.agents.robot_teams.senses import Senses, Vector
-from zwerm.agents.robot_teams.wall_following import LEFT_HAND, RIGHT_HAND, WallFollower
+from zwerm.agents.robot_teams.wall_following import INTO, LEFT_HAND, RIGHT_HAND, WallFollower
 
 # A contact blocks a sweep if this much of its normal lies along the motion.
 BLOCKS: Final = 0.02
@@ -176,8 +176,13 @@ class Trace:
         if depth > spacing + CROSSED_M:
             self._arrive(senses, self.start.slice + d, 1)
             return None
-        if (self._inside and depth < -CROSSED_M) or depth < -SLACK_M:
-            self._arrive(senses, self.start.slice, -1)
+        if self._inside and depth < -CROSSED_M:
+            # The wall beside the other end lies on the other side; else the robot was only pushed back.
+            if any(ny * self.start.side < INTO for _, ny in senses.walls):
+                self._arrive(senses, self.start.slice, -1)
+                return None
+            self._inside = False
+        if depth < -SLACK_M:
             return None
         if blocks and self._inside:
             ahead = (self.start.slice + d, self.start.side), (self.start.slice, -self.start.side)

@@ -45,18 +45,23 @@ class Retreat:
         self._index = len(trail) - 1
         self._stop = max(0, len(trail) - 1 - math.ceil(far_m / TRAIL_STEP_M))
         self._pause = pause_ticks
-        self._forward = False
+        self._forward = self._paused = False
         self._still = 0
-        self._patience = 60
+        self._ticks = 0
+        self._patience = 40
+        self._leg_ticks = 4 * (len(trail) - 1 - self._stop) + 60
 
     def step(self, senses: Senses, moved_m: float) -> Vector | None:
         """Return where to go, (0, 0) to wait, or None when the robot is back where it began."""
         self._still = self._still + 1 if moved_m < 0.01 else 0
-        if not self._forward and (self._index <= self._stop or self._still > self._patience):
+        self._ticks += 1
+        late = self._still > self._patience or self._ticks > self._leg_ticks
+        if not self._forward and (self._index <= self._stop or late or self._paused):
+            self._paused = True
             self._pause -= 1
             if self._pause > 0:
                 return 0.0, 0.0
-            self._forward, self._still = True, 0
+            self._forward, self._still, self._ticks = True, 0, 0
         goal = len(self._trail) - 1 if self._forward else self._stop
         while True:
             x, y = self._trail[self._index]
@@ -72,7 +77,7 @@ class Retreat:
     @property
     def blocked(self) -> bool:
         """Whether somebody is in the way forward again."""
-        return self._forward and self._still > self._patience
+        return self._forward and (self._still > self._patience or self._ticks > self._leg_ticks)
 
 
 def _around_robots(senses: Senses, way: Vector) -> Vector:

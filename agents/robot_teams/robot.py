@@ -195,12 +195,12 @@ class TeamRobot(Controller):
                             plan, CorridorMates(plan, self.setup.node, self.membership, self._swept_by_others)
                         )
                 if self.work.phase != READY:
-                    self.work.phase = READY
+                    self.work.phase, self.work.sweeping = READY, None
                     self._urgent = True
                 yield None
             except (Lost, NoWay):
                 self.work.failures += 1
-                self.work.at = None
+                self.work.at = self.work.sweeping = None
                 yield None
 
     def _swept_by_others(self, k: int) -> bool:
