@@ -136,8 +136,12 @@ def assign(
     statuses: Mapping[int, Status],
     skip: Collection[Task],
     one_corridor: bool,
+    join_mm: int,
 ) -> list[Plan]:
-    """Return new plans for the free members. With `one_corridor` the whole team forms one corridor at a time."""
+    """Return new plans for the free members. With `one_corridor` the whole team forms one corridor at a time.
+
+    While others are busy, no robot travels farther than `join_mm`: its turn comes nearer.
+    """
     free = free_members(view, plans, statuses)
     if not free or (one_corridor and len(free) < len(view.members)):
         return []
@@ -153,6 +157,7 @@ def assign(
     tasks = [task for task in open_tasks(slice_map) if task not in skip]
     tasks = [task for task in tasks if not (task.own_slice and task.end.slice in swept)]
     made: list[Plan] = []
+    limit = FAR - 1 if not active else join_mm
     waiting = [node for node in free if node in distances]
     while waiting:
         best: tuple[int, int, int, Task] | None = None
@@ -161,7 +166,7 @@ def assign(
             for task in tasks:
                 far = distances[node].get(task.end, FAR)
                 turns = int(before is not None and before.direction != task.direction)
-                if far == FAR or (best is not None and (far, turns) > best[:2]):
+                if far > limit or (best is not None and (far, turns) > best[:2]):
                     continue
                 if any(each.holds(task) for each in reserved):
                     continue
@@ -173,12 +178,15 @@ def assign(
         task = best[3]
         # The nearest goes first, and so farthest: single file. The last in the order is the lead.
         near = sorted(waiting, key=lambda each: (distances[each].get(task.end, FAR), each))
-        near = [each for each in near if task.end in distances[each]][: room(slice_map, task, len(waiting))]
+        reach = max(join_mm, best[0])
+        near = [each for each in near if distances[each].get(task.end, FAR) <= reach]
+        near = near[: room(slice_map, task, len(waiting))]
         number += 1
         plan = Plan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(reversed(near)))
         made.append(plan)
         reserved.append(reservation(slice_map, plan))
         waiting = [node for node in waiting if node not in near]
+        limit = join_mm
         if one_corridor:
             break
     return made

@@ -9,7 +9,7 @@ from msgspec import Meta, Struct
 
 from zwerm.agents.robot_teams.fact_exchange import FactExchange
 from zwerm.agents.robot_teams.facts import BOTTOM, TOP, End
-from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre
+from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre, mm
 from zwerm.agents.robot_teams.membership import Membership
 from zwerm.agents.robot_teams.messages import HUNTS, READY, Beacon, Plan, Status, decode_beacon, encode_beacon
 from zwerm.agents.robot_teams.pilot import FAILED, IDLE, RUNNING, Pilot
@@ -45,6 +45,7 @@ class TeamTable(Struct, frozen=True, forbid_unknown_fields=True):
     meeting_m: Annotated[float, Meta(ge=0.0)] = 1.1
     divide: bool = True
     one_corridor: bool = False
+    join_m: Annotated[float, Meta(gt=0.0)] = 6.0
     merge: bool = True
 
 
@@ -271,7 +272,7 @@ class TeamRobot(Controller):
                     self._forget_plans()
                     return
         self._skip = {task: since for task, since in self._skip.items() if (tick - since) * dt_s < SKIP_S}
-        made = assign(self.map, view, self.plans, statuses, self._skip, table.one_corridor)
+        made = assign(self.map, view, self.plans, statuses, self._skip, table.one_corridor, mm(table.join_m))
         self._tried = (-1, -1)
         if made:
             self.plans = (*dict.fromkeys(latest_plans(self.plans, view).values()), *made)
