@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from zwerm.run.assembly import assemble
-from zwerm.scenario.tables import load
-from zwerm.world.fields.field import make_field
+from zwerm.scenario.load import load
+from zwerm.world.fields.registry import make_field
 from zwerm.world.metrics.voronoi_coverage import VoronoiCells
 from zwerm.world.scene import Floats
 

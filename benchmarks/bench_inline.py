@@ -11,7 +11,8 @@ import numpy as np
 
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import run
-from zwerm.scenario.tables import Scenario, load
+from zwerm.scenario.load import load
+from zwerm.scenario.tables import Scenario
 
 TARGETS = {25: 60_000, 100: 90_000}
 

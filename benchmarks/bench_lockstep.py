@@ -13,11 +13,12 @@ import statistics
 from echo import echo_rate
 
 from zwerm.agents.runtime.process import NICENESS
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import drive, new_run_id
-from zwerm.scenario.tables import Scenario, load
+from zwerm.scenario.load import load
+from zwerm.scenario.tables import Scenario
 
 TARGET = 0.7
 
@@ -32,7 +33,7 @@ SENSORS = (
 
 def lockstep_rate(scenario: Scenario, seed: int) -> float:
     """Return robot-ticks per second of one run in processes, the start of the processes not counted."""
-    with LocalSwarm(new_run_id(), cast(scenario, seed)) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(scenario, seed)) as swarm:
         result = drive(assemble(scenario, seed), swarm.link, seed, "processes")
     if result.middleware_lost or not result.ok:
         raise SystemExit(f"the run failed: {result.outcome}, {result.reason}, {result.middleware_lost} messages lost")

@@ -7,11 +7,11 @@ reordered nothing; this counts how many messages that was, both ways.
 
 import argparse
 
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import drive, new_run_id
-from zwerm.scenario.tables import load
+from zwerm.scenario.load import load
 
 
 def main() -> None:
@@ -21,7 +21,7 @@ def main() -> None:
     options = parser.parse_args()
     ticks = int(options.messages / 2 / options.robots) + 1
     scenario = load("computation-free-scaling", (f"robots.count={options.robots}", f"time.duration_s={ticks * 0.1}"))
-    with LocalSwarm(new_run_id(), cast(scenario, 1)) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(scenario, 1)) as swarm:
         result = drive(assemble(scenario, 1), swarm.link, 1, "processes")
         turned_away = swarm.link.refused.total()
     print(

@@ -10,12 +10,13 @@ import statistics
 import time
 from pathlib import Path
 
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.run.assembly import assemble
 from zwerm.run.result import RunResult
 from zwerm.run.runner import drive, new_run_id, run
-from zwerm.scenario.tables import Scenario, load
+from zwerm.scenario.load import load
+from zwerm.scenario.tables import Scenario
 
 START_S_MAX, PRIVATE_MB_MAX, RATE_MIN = 45.0, 8.0, 3_000.0
 
@@ -59,7 +60,7 @@ def main() -> None:
     scenario, seed = scenario_of(options), options.seed
     world = assemble(scenario, seed)
     start = time.monotonic()
-    with LocalSwarm(new_run_id(), cast(scenario, seed)) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(scenario, seed)) as swarm:
         start_s = time.monotonic() - start
         result = drive(world, swarm.link, seed, "processes")
         memory = [private_mb(pid) for pid in swarm.supervisor.pids.values()]

@@ -8,11 +8,12 @@ import argparse
 import time
 
 from zwerm.agents.runtime.node import Node
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.maths import kept_cell
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import run
-from zwerm.scenario.tables import Scenario, load
+from zwerm.scenario.load import load
+from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import decode_observation
 
 TARGET = 20.0
@@ -28,7 +29,7 @@ def emulator(scenario: Scenario, seed: int) -> tuple[float, float]:
 
 def controller(scenario: Scenario, seed: int) -> float:
     """Return the processor time of one step of a controller, without wire format [us]."""
-    members = cast(scenario, seed)
+    members = node_specs(scenario, seed)
     nodes = {node: Node(name, setup) for node, (name, setup) in members.items()}
     steps = []
     for node, payload in zip(*assemble(scenario, seed).observe(), strict=True):

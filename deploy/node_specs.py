@@ -1,65 +1,51 @@
-"""The cast of a run: for every node, the controller that plays it and what it may know before its first observation."""
+"""Node specifications: the controller class and the Setup of every node of a run."""
 
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 
 from zwerm.agents.runtime.contract import Body, Setup
+from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role, algorithm_of, names
 from zwerm.errors import ControllerError
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.services import ServicesTable
 from zwerm.scenario.tables import Scenario
 
-ROBOT: Final = "robot"
-BASE: Final = "base"
-COORDINATOR: Final = "coordinator"
 
-# What plays a part that is no robot's, by the name that scenarios give it.
-PARTS: Final = {
-    (BASE, "sensor-coverage"): "zwerm.agents.sensor_coverage:Base",
-    (COORDINATOR, "sensor-coverage"): "zwerm.coordinator.sensor_coverage.coordinator:SensorCoverageCoordinator",
-}
+def controller_for(scenario: Scenario, role: Role, name: str) -> str:
+    """Return the class, `module:Class`, that runs on a node of `role` under the name that the scenario gives.
 
-# The same where robots find the path among themselves.
-ALONE: Final = {
-    (ROBOT, "sensor-coverage"): "zwerm.agents.sensor_coverage.local_robot:LocalRobot",
-    (BASE, "sensor-coverage"): "zwerm.agents.sensor_coverage.local_base:LocalBase",
-    (COORDINATOR, "sensor-coverage"): "zwerm.coordinator.sensor_coverage.redundancy_advisor:RedundancyAdvisor",
-}
-
-# The same where a coordinator finds the path, and robots among themselves who can be spared.
-AGREED: Final = {
-    (ROBOT, "sensor-coverage"): "zwerm.agents.sensor_coverage.negotiating_robot:NegotiatingRobot",
-    (BASE, "sensor-coverage"): "zwerm.agents.sensor_coverage.negotiating_robot:NegotiatingBase",
-}
-
-
-def player(role: str, name: str, services: ServicesTable | None = None) -> str:
-    """Return the controller that plays a role under the name that a scenario gives it, with these services.
-
-    Raises ControllerError where no coordinator has that name.
+    Raises ControllerError where the role is the coordinator's or a base station's, and the catalogue has no such name.
     """
-    if role == COORDINATOR and (role, name) not in PARTS and ":" not in name:
-        known = ", ".join(each for part, each in PARTS if part == role)
-        raise ControllerError(f"expected a built-in coordinator ({known}) or module:Class, got {name!r}")
-    players = PARTS
-    if services is not None and services.path == "gradient":
-        players = PARTS | ALONE
-    elif services is not None and services.spares == "link":
-        players = PARTS | AGREED
-    return players.get((role, name), name)
+    row = algorithm_of(name)
+    known = {} if row is None else row.controllers.get(role, {})
+    if name not in known:
+        if role == COORDINATOR and ":" not in name:
+            expected = ", ".join(names(role))
+            raise ControllerError(f"expected a built-in coordinator ({expected}) or module:Class, got {name!r}")
+        return name
+    variant = scenario.variant
+    own = {} if variant is None else variant.controllers.get(role, {})
+    return own.get(name, known[name])
 
 
-def recast(scenario: Scenario, seed: int, node: int, incarnation: int) -> tuple[str, Setup]:
-    """Return (controller, setup) of a node's later life: all is as before, but for a random stream of its own."""
-    controller, setup = cast(scenario, seed)[node]
+def services_of(scenario: Scenario) -> dict[str, str]:
+    """Return the provider of every service: those of the chosen variant, or the algorithm's first."""
+    variant, row = scenario.variant, algorithm_of(scenario.robots.controller)
+    if variant is None and row is not None and row.variants:
+        variant = row.variants[0]
+    return dict(variant.services) if variant is not None else dict(scenario.services or {})
+
+
+def restart_spec(scenario: Scenario, seed: int, node: int, incarnation: int) -> tuple[str, Setup]:
+    """Return (controller, setup) of a node's later incarnation: the same but for the random stream."""
+    controller, setup = node_specs(scenario, seed)[node]
     if incarnation == 1:
         return controller, setup
     key = Draws(seed).stream_key("controller", node, incarnation)
     return controller, msgspec.structs.replace(setup, stream_key=key, incarnation=incarnation)
 
 
-def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
+def node_specs(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
     """Return (controller, setup) by node id.
 
     A node gets the key of its own random stream and no other: from it the run's other draws cannot be told.
@@ -74,15 +60,14 @@ def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
     )
     sensors = tuple(table.kind for table in robots.sensors)
     channels = (("robots",) if scenario.radio is not None else ()) + (("uplink",) if scenario.coordinator else ())
-    chosen = scenario.services or ServicesTable()
-    services = {"path": chosen.path, "redundancy": chosen.spares}
-    players: dict[int, tuple[str, Setup]] = {}
+    services = services_of(scenario)
+    specs: dict[int, tuple[str, Setup]] = {}
 
-    def add(node: int, role: str, controller: str, parameters: dict[str, Any]) -> None:
+    def add(node: int, role: Role, controller: str, parameters: dict[str, Any]) -> None:
         placed = role != COORDINATOR
         key = draws.stream_key("controller", node)
-        players[node] = (
-            player(role, controller, scenario.services),
+        specs[node] = (
+            controller_for(scenario, role, controller),
             Setup(
                 node=node,
                 role=role,
@@ -104,4 +89,4 @@ def cast(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
             add(node, BASE, scenario.base.controller, scenario.base.parameters)
     if scenario.coordinator is not None:
         add(robots.count, COORDINATOR, scenario.coordinator.controller, scenario.coordinator.parameters)
-    return players
+    return specs

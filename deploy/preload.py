@@ -11,11 +11,11 @@ import msgspec  # noqa: F401
 import numpy  # noqa: F401
 import zenoh  # noqa: F401
 
-from zwerm.agents.runtime.controllers import BUILT_IN
 from zwerm.agents.runtime.process import die_with_parent
+from zwerm.catalogue import controller_classes
 
 die_with_parent()
-for path in BUILT_IN.values():
+for path in controller_classes():
     __import__(path.partition(":")[0])
 gc.collect()
 gc.freeze()

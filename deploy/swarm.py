@@ -35,7 +35,7 @@ from zwerm.wire.messages import encode
 Members = Mapping[int, tuple[str, Setup]]
 
 # Of a node's id and incarnation: who plays it.
-Recast = Callable[[int, int], tuple[str, Setup]]
+RestartSpec = Callable[[int, int], tuple[str, Setup]]
 
 
 class Certificate(NamedTuple):
@@ -122,17 +122,17 @@ class LocalSwarm(_Swarm):
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
         unborn: Collection[int] = (),
-        recast: Recast | None = None,
+        restart: RestartSpec | None = None,
         stations: Mapping[int, Station] | None = None,
     ) -> None:
         """`order` is the order of starting; `deadline_s` is given to each process to join; `paced` is real time.
 
-        The nodes in `unborn` are not started before `start` is called; `recast` says who plays a node's next incarnation,
+        The nodes in `unborn` are not started before `start` is called; `restart` says who plays a node's next incarnation,
         the same as before if it is not given. Nodes with a place in `stations` have their radio there.
         """
         super().__init__(run, members, progress, deadline_s, paced)
         self._order = [node for node in (members if order is None else order) if node not in unborn]
-        self._recast = recast
+        self._restart = restart
         self._stations = stations
         self._ran = set(self._order)
         self._stopped: set[int] = set()
@@ -187,8 +187,8 @@ class LocalSwarm(_Swarm):
     def _revive(self, node: int) -> None:
         self.link.wait_joined(lambda joined: node not in joined, LEAVE_PATIENCE_S)
         credential = renew(self._current[node])
-        if self._recast is not None:
-            self._members = {**self._members, node: self._recast(node, credential.incarnation)}
+        if self._restart is not None:
+            self._members = {**self._members, node: self._restart(node, credential.incarnation)}
         self.link.expect(node, self._member(credential))
         self._current[node] = credential
         self.supervisor.restart(credential, self._deadline_s)

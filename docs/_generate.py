@@ -21,16 +21,17 @@ from mkdocs.structure.files import File, Files
 from pydantic import BaseModel
 
 from zwerm.agents.runtime import controllers
+from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, FIELDS, ROBOT, SENSORS, names
 from zwerm.cli.app import app
-from zwerm.deploy.node_specs import PARTS
 from zwerm.run.runner import run
-from zwerm.scenario.tables import OpenTable, Scenario
-from zwerm.scenario.tables import tables as scenario
+from zwerm.scenario import tables as scenario
+from zwerm.scenario.tables import Scenario
+from zwerm.scenario.types import OpenTable
 from zwerm.study.tables import StudyTable
 from zwerm.wire import messages as protocol
 from zwerm.world.faults import FaultTable
 from zwerm.world.faults import schedule as faults
-from zwerm.world.fields.field import field as fields
+from zwerm.world.fields import registry as fields
 from zwerm.world.radio import LinkTable
 from zwerm.world.radio import registry as radio
 from zwerm.world.sensors import registry as sensors
@@ -174,7 +175,7 @@ def built_in_scenarios() -> str:
 def sensor_list() -> str:
     """Return every built-in sensor: what it is, what it fills and what it takes."""
     parts = []
-    for kind, found in sensors.BUILT_IN.items():
+    for kind, found in ((kind, sensors.find(kind)) for kind in SENSORS):
         module = inspect.getmodule(found)
         text = module.__doc__ if module else found.__doc__
         parts.append(f"### `{kind}` {{ #sensor-{kind.replace('_', '-')} }}\n\n{paragraphs(text)}")
@@ -208,7 +209,7 @@ def _kinds(kinds: dict[str, tuple[type, type[BaseModel]]], base: type[BaseModel]
 def field_list() -> str:
     """Return every kind of scalar field and what it takes."""
     parts = []
-    for kind, found in fields.KINDS.items():
+    for kind, found in ((kind, fields.find(kind)) for kind in FIELDS):
         parts.append(f"### `{kind}` {{ #field-{kind} }}\n\n{paragraphs(found.__doc__)}")
         parts.append(rows(found.Parameters.model_json_schema()))
     return "\n\n".join(parts)
@@ -216,13 +217,16 @@ def field_list() -> str:
 
 def controller_list() -> str:
     """Return every built-in controller and what it takes."""
-    return "\n\n".join(_controller(f"`{name}`", f"controller-{name}", name) for name in controllers.BUILT_IN)
+    return "\n\n".join(_controller(f"`{name}`", f"controller-{name}", name) for name in names(ROBOT))
 
 
 def part_list() -> str:
     """Return every built-in base station and coordinator and what it takes."""
     return "\n\n".join(
-        _controller(f"`{name}`, {role}", f"{role}-{name}", where) for (role, name), where in PARTS.items()
+        _controller(f"`{name}`, {role}", f"{role}-{name}", where)
+        for role in (BASE, COORDINATOR)
+        for row in ALGORITHMS
+        for name, where in row.controllers.get(role, {}).items()
     )
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from zwerm.agents.runtime.node import Node
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
 from zwerm.scenario.tables import Scenario
@@ -24,7 +24,7 @@ def drive(
 ) -> tuple[str, World]:
     """Run inline; `on_tick` may meddle with the world, `around` with what a node hears and says."""
     world = assemble(scenario, 1)
-    answers: dict[int, Link] = {n: Node(*each).answer for n, each in cast(scenario, 1).items()}
+    answers: dict[int, Link] = {n: Node(*each).answer for n, each in node_specs(scenario, 1).items()}
     if around is not None:
         answers = {n: around(n, each) for n, each in answers.items()}
     driver = LockStep(world, MemoryLink(answers), on_tick)

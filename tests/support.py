@@ -8,7 +8,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from zwerm.scenario.tables import Scenario, validate
+from zwerm.scenario.load import validate
+from zwerm.scenario.tables import Scenario
 
 ROOT = Path(__file__).parent.parent
 ROBOTS = Path(__file__).parent / "robots"

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from zwerm.catalogue import BASE
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import (
@@ -98,8 +99,8 @@ class World:
         self._any_done = False
         stations = range(scenario.base.stations if scenario.base is not None else 0)
         centre = [] if self.coordinator is None else [self.coordinator]
-        alone = scenario.services is not None and scenario.services.path == "gradient"
-        self._deciding = [*([] if alone else centre), *stations]
+        bases_decide = scenario.variant is not None and scenario.variant.decides == BASE
+        self._deciding = [*([] if bases_decide else centre), *stations]
         self.answers = CommandIntake(self._drives.kind, body.kind, [*centre, *stations], self.medium)
         self.refused = self.answers.refused
         self._present: Bools = np.zeros(count, dtype=np.bool_)

@@ -7,16 +7,16 @@ are first asked for, so that a robot's process does not carry what only the worl
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
+from zwerm.version import __version__
+
 if TYPE_CHECKING:
     from zwerm.run.result import RunResult as RunResult
     from zwerm.run.runner import run as run
-    from zwerm.scenario.tables import load as load
-
-__version__: Final = "0.1.0"
+    from zwerm.scenario.load import load as load
 
 __all__ = ["RunResult", "__version__", "load", "run"]
 
-_HOMES: Final = {"run": "zwerm.run.runner", "RunResult": "zwerm.run.result", "load": "zwerm.scenario.tables"}
+_HOMES: Final = {"run": "zwerm.run.runner", "RunResult": "zwerm.run.result", "load": "zwerm.scenario.load"}
 
 
 def __getattr__(name: str) -> Any:

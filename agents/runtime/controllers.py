@@ -1,25 +1,13 @@
-"""Controllers by name: the built-in table, and `module:Class` for anyone else's."""
+"""Controllers by name: those of the catalogue, and `module:Class` for any other."""
 
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 
 from zwerm.agents.runtime.contract import NoParameters, Setup, Stepper
+from zwerm.catalogue import ROBOT, algorithm_of, names
 from zwerm.errors import ControllerError
 from zwerm.scenario.plugin_names import class_named
-
-BUILT_IN: Final = {
-    "beacon": "zwerm.agents.gossip:Beacon",
-    "computation-free": "zwerm.agents.computation_free:ComputationFree",
-    "gossip-max": "zwerm.agents.gossip:GossipMax",
-    "random-walk": "zwerm.agents.computation_free:RandomWalk",
-    "robot-teams": "zwerm.agents.robot_teams:TeamRobot",
-    "sensor-coverage": "zwerm.agents.sensor_coverage:Robot",
-    "voronoi-coverage": "zwerm.agents.voronoi_coverage:VoronoiCoverage",
-    "voronoi-integer": "zwerm.agents.voronoi_coverage:IntegerCoverage",
-    "voronoi-radio": "zwerm.agents.voronoi_coverage:RadioCoverage",
-    "voronoi-swarmbot": "zwerm.agents.voronoi_coverage:SwarmBotCoverage",
-}
 
 
 def find(name: str) -> type[Any]:
@@ -28,7 +16,9 @@ def find(name: str) -> type[Any]:
     Raises ControllerError, in one line, where there is none or it has no `step`.
     """
     try:
-        found = class_named(BUILT_IN.get(name, name), "controller", sorted(BUILT_IN))
+        row = algorithm_of(name)
+        built_in = {} if row is None else row.controllers.get(ROBOT, {})
+        found = class_named(built_in.get(name, name), "controller", sorted(names(ROBOT)))
     except ValueError as error:
         raise ControllerError(str(error)) from error
     if not callable(getattr(found, "step", None)):

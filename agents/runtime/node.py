@@ -5,15 +5,17 @@ The same object runs behind the memory link and inside a robot process, so both 
 
 import traceback
 from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import msgspec
 
 from zwerm.agents.runtime.contract import Setup, Stepper
 from zwerm.agents.runtime.controllers import make
 from zwerm.link import Answer
-from zwerm.link.peer_radio import PeerRadio
 from zwerm.wire.messages import MESSAGE_BYTES_MAX, Command, Failure, Observation, decode_observation, encode
+
+if TYPE_CHECKING:
+    from zwerm.link.peer_radio import PeerRadio
 
 # So that a failure fits into a message, whatever its characters.
 ERROR_CHARS_MAX: Final = 2_000
@@ -38,7 +40,7 @@ class Node:
         self._controller: Stepper = make(controller, setup)
         self.answer: Answer = self._answering(self._controller.step)
 
-    def go_on_air(self, radio: PeerRadio) -> None:
+    def go_on_air(self, radio: "PeerRadio") -> None:
         """From now on hear what `radio` hears, and nothing else, and send by it what the controller sends."""
         step, began = self._controller.step, radio.begin
 
@@ -65,7 +67,9 @@ class Node:
                 if len(said) > MESSAGE_BYTES_MAX:
                     raise ValueError(f"the command takes {len(said)} bytes, at most {MESSAGE_BYTES_MAX} are allowed")
                 return said
-            except (Exception, SystemExit) as error:
+            except KeyboardInterrupt:  # Ctrl-C, for whoever runs nodes inline
+                raise
+            except BaseException as error:
                 return fail(tick, error)
 
         return answer

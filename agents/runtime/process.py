@@ -1,7 +1,8 @@
 """The robot process: an asyncio loop that lives its life, one Zenoh session, one Node.
 
 Promises: it answers each observation with one command, in order; it ends by itself when the world says goodbye or is
-lost, when its controller fails, on SIGTERM, and with the process that started it. It ignores SIGINT: Ctrl-C is for
+lost, on SIGTERM, and with the process that started it. When its controller fails it ends once the world has confirmed the
+failure: the world never sees its end before the reason. It ignores SIGINT: Ctrl-C is for
 whoever started it.
 
 The loop joins, waits and ends; an observation is answered right where Zenoh delivers it. Handing each one over to the loop's
@@ -40,9 +41,6 @@ EXIT_LOST: Final = 3
 # All robots wait for the world, so it goes first where there are more processes than cores (measured: 100 robots on two cores
 # make a few per cent more ticks). Less than the most, which would leave robots next to nothing beside other work.
 NICENESS: Final = 5
-
-# How long a node whose controller failed waits for the world to have heard why.
-LEAVE_TIMEOUT_S: Final = 5.0
 
 _PR_SET_PDEATHSIG: Final = 1
 
@@ -99,14 +97,26 @@ async def live(
     """
     loop = asyncio.get_running_loop()
     end: asyncio.Future[int] = loop.create_future()
+    may_leave = asyncio.Event()
 
     def finish(code: int) -> None:
         if not end.done():
             end.set_result(code)
+        if code != EXIT_FAILED:  # the world is over or lost, or SIGTERM: nobody is left to hear why
+            may_leave.set()
 
     def finish_from_outside(code: int) -> None:
         with contextlib.suppress(RuntimeError):  # the loop has ended by itself
             loop.call_soon_threadsafe(finish, code)
+
+    def heard() -> None:
+        with contextlib.suppress(RuntimeError):
+            loop.call_soon_threadsafe(may_leave.set)
+
+    async def take_leave(reason: str) -> None:
+        """Return when the world has taken in all that this node has said, however long that takes, or is lost."""
+        link.take_leave(reason, heard)
+        await may_leave.wait()
 
     failed = False
 
@@ -143,8 +153,13 @@ async def live(
         send = link.send
         radio = None if station is None else PeerRadio(run, station)
         welcome = link.join()
-        answer = _node(link, welcome, radio, fail).answer
         loop.add_signal_handler(signal.SIGTERM, finish, 0)
+        try:
+            answer = _node(welcome, radio, fail).answer
+        except ControllerError as error:
+            link.send(encode(Failure(0, str(error), "")))
+            await take_leave("it has no controller")
+            raise
         parent: Any = parent_process()
         if parent is not None:
             # Where the kernel does not do it. At once, because a controller that does not return would hold up the
@@ -156,7 +171,7 @@ async def live(
         link.listen(receive_in_loop if welcome.paced else receive)
         code = await end
         if code == EXIT_FAILED:
-            link.take_leave("its controller failed", LEAVE_TIMEOUT_S)
+            await take_leave("its controller failed")
         return code
     finally:
         link.close()
@@ -164,15 +179,9 @@ async def live(
             radio.close()
 
 
-def _node(link: ZenohNodeLink, welcome: Welcome, radio: PeerRadio | None, on_failure: Callable[[], object]) -> Node:
-    """Make the node that the world describes; where that fails the world hears why."""
-    setup = msgspec.msgpack.decode(welcome.setup, type=Setup)
-    try:
-        node = Node(welcome.controller, setup, on_failure)
-    except ControllerError as error:
-        link.send(encode(Failure(0, str(error), "")))
-        link.take_leave("it has no controller", LEAVE_TIMEOUT_S)
-        raise
+def _node(welcome: Welcome, radio: PeerRadio | None, on_failure: Callable[[], object]) -> Node:
+    """Make the node that the world describes. Raises ControllerError where it has no such controller."""
+    node = Node(welcome.controller, msgspec.msgpack.decode(welcome.setup, type=Setup), on_failure)
     if radio is not None:
         node.go_on_air(radio)
     return node

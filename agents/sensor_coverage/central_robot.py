@@ -93,7 +93,7 @@ class CentralRobot(Controller):
     """A robot of the swarm."""
 
     sensors = ("bearings", "touch", "odometry")
-    RobotParameters = RobotParameters
+    Parameters = RobotParameters
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)

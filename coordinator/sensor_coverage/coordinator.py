@@ -73,7 +73,7 @@ class CoordinatorSetup(Protocol):
 class SensorCoverageCoordinator:
     """Fills an unknown space with robots, from what they tell by radio (Ramaithitima et al. 2015, algorithm 1)."""
 
-    PlannerParameters = PlannerParameters
+    Parameters = PlannerParameters
 
     def __init__(self, setup: CoordinatorSetup) -> None:
         rules: PlannerParameters = msgspec.convert(setup.parameters, PlannerParameters)

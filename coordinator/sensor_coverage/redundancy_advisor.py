@@ -55,7 +55,7 @@ class _Repetition:
 class RedundancyAdvisor:
     """Tells robots that find their way by themselves who of them can be spared, by relative homology."""
 
-    PlannerParameters = PlannerParameters
+    Parameters = PlannerParameters
 
     def __init__(self, setup: CoordinatorSetup) -> None:
         self._dt_s = setup.dt_s

@@ -20,7 +20,8 @@ from zwerm.deploy.network.namespaces import Namespaces, address_of, lacks_netem,
 from zwerm.errors import ScenarioError
 from zwerm.link.peer_radio import HEAD_BYTES, Transport
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.tables import OpenTable, Scenario
+from zwerm.scenario.tables import Scenario
+from zwerm.scenario.types import OpenTable
 from zwerm.world.radio import ROBOTS
 from zwerm.world.radio.registry import BUILT_IN, selected, tables_of
 
@@ -36,6 +37,7 @@ _WIRE_BYTES: Final = {"udp": 14 + 20 + 8, "tcp": 14 + 20 + 32}
 _ZENOH_BYTES: Final = 16
 
 _BY_PLACE: Final = ("range", "line_of_sight", "walls")
+_BY_CHANCE: Final = ("loss", "bursts")
 _OF_A_CABLE: Final = ("delay", "rate_limit")
 _CANNOT: Final = {
     "path_loss": "its chance changes with every distance; say range and loss",
@@ -94,7 +96,7 @@ def possible(scenario: Scenario) -> tuple[Scenario, list[str]]:
                     complaint = "one such model at most"
                 cables.append(model.kind)
             if complaint:
-                wrong.append(f"{path}.kind: not in the twin: {complaint}, got {model.kind!r}")
+                wrong.append(_not_in_the_twin(path, complaint, model))
             elif model.kind == "delay" and (reason := reason or lacks_netem()):
                 skipped.append(f"{path} (delay): {reason}")
             elif path.startswith(f"{name}.models."):
@@ -115,10 +117,10 @@ def possible(scenario: Scenario) -> tuple[Scenario, list[str]]:
 
 def _complaint(model: OpenTable) -> str:
     """Return why no network does what this model does, or an empty string."""
-    if model.kind not in BUILT_IN:
-        return "a model of your own knows no network"
     if model.kind in _CANNOT and not (model.kind == "walls" and model.parameters.get("margin_db") is not None):
         return _CANNOT[model.kind]
+    if model.kind not in (*_BY_PLACE, *_BY_CHANCE, *_OF_A_CABLE):
+        return "no rule of the network is known for this model"
     if model.kind == "delay":
         if model.parameters.get("jitter_s") and model.parameters.get("distribution", "uniform") != "uniform":
             return "netem has jitter of that mean only uniform"
@@ -130,11 +132,18 @@ def _complaint(model: OpenTable) -> str:
 
 
 def translate(scenario: Scenario, links: Mapping[str, Pairs]) -> Impairments:
-    """Return what the network has to do for a scenario that is possible; `links` are all pairs of a channel, by its name."""
+    """Return what the network has to do for a scenario that is possible; `links` are all pairs of a channel, by its name.
+
+    Raises ScenarioError, a line for each, for models that no network does.
+    """
     found = Impairments()
+    wrong: list[str] = []
     for name, every in links.items():
-        table = scenario.radio if name == ROBOTS else scenario.uplink
-        for index, (path, model) in enumerate([] if table is None else tables_of(table, name)):
+        place, table = ("radio", scenario.radio) if name == ROBOTS else ("uplink", scenario.uplink)
+        for index, (path, model) in enumerate([] if table is None else tables_of(table, place)):
+            if complaint := _complaint(model):
+                wrong.append(_not_in_the_twin(path, complaint, model))
+                continue
             parameters: Any = BUILT_IN[model.kind].Parameters.model_validate(model.parameters)
             sends, receives = (
                 selected(names, scenario, path, []) for names in (parameters.senders, parameters.receivers)
@@ -152,7 +161,13 @@ def translate(scenario: Scenario, links: Mapping[str, Pairs]) -> Impairments:
             elif model.kind == "delay":
                 for _, receiver in pairs:
                     found.delays[receiver] = parameters.delay_s + parameters.jitter_s, parameters.jitter_s
+    if wrong:
+        raise ScenarioError([f"{scenario.place}: {line}" for line in wrong])
     return found
+
+
+def _not_in_the_twin(path: str, reason: str, model: OpenTable) -> str:
+    return f"{path}.kind: not in the twin: {reason}, got {model.kind!r}"
 
 
 def _burst(name: str, pairs: Pairs, table: Any) -> Rule:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from support import ROOT, ZWERM
 
-from zwerm.scenario.tables import built_in
+from zwerm.scenario.load import built_in
 
 
 def zwerm(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
@@ -103,7 +103,8 @@ def test_json_is_one_object_with_exactly_the_documented_keys_and_nothing_else(tm
     assert (found["scenario"], found["seed"], found["runner"]) == ("computation-free", 2, "inline")
     assert (found["outcome"], found["ticks"], found["sim_s"], found["robot_ticks"]) == ("time-limit", 10, 1.0, 250)
     assert found["radio"] == {
-        "sent": 0, "delivered": 0, "dropped": {}, "in_flight": 0, "bytes": 0, "copies": 0, "damaged": 0, "channels": {},
+        "sent": 0, "delivered": 0, "dropped": {}, "in_flight": 0, "out_of_reach": 0,
+        "bytes": 0, "copies": 0, "damaged": 0, "channels": {},
     }  # fmt: skip
     assert found["nodes"] == {"crashed": [], "restarted": [], "paused": [], "slow": [], "late": []}
     assert found["faults"] == []

@@ -27,6 +27,9 @@ from zwerm.wire.messages import Failure, Observation, encode, open_answer
 ECHO = "small_controllers:Echo"
 PRIVATE_MB_MAX = 8.0
 
+# Longer than a robot that failed once waited for the world at most.
+PATIENCE_S = 6.0
+
 
 def members(count: int, controller: str = ECHO) -> dict[int, tuple[str, Setup]]:
     return {node: (controller, Setup(node, "robot", 0.1, (), bytes(16))) for node in range(count)}
@@ -87,21 +90,54 @@ def test_a_node_that_does_not_join_in_time_is_named(nothing_left: None) -> None:
 
 def test_a_controller_that_raises_is_heard_out_and_its_process_exits_1(nothing_left: None) -> None:
     with LocalSwarm("run", {**members(2), 1: members(2, "small_controllers:Wordy")[1]}) as swarm:
-        answers = tick(swarm.link, range(2), 5)
-        failure = open_answer(answers[1].payload or b"")
+        # The other node answers after everything else, as it may under load.
+        swarm.supervisor.send_signal(0, signal.SIGSTOP)
+        for node in range(2):
+            swarm.link.send(node, encode(Observation(5, 0.0)))
+        said, end = swarm.link.receive(20.0), swarm.link.receive(20.0)
+        assert said is not None
+        failure = open_answer(said.payload or b"")
         assert isinstance(failure, Failure)
         assert failure.tick == 5
         assert failure.error.startswith("ValueError: xxx")
         assert failure.traceback.endswith("\u2620\n")
-        assert swarm.link.receive(20.0) == Arrival(1, None)
+        assert end == Arrival(1, None)
+        swarm.supervisor.send_signal(0, signal.SIGCONT)
+        answer = swarm.link.receive(20.0)
+        assert answer is not None
+        assert (answer.node, open_answer(answer.payload or b"").tick) == (0, 5)
         until(lambda: 1 in swarm.supervisor.exit_codes, "its process ended")
     assert swarm.supervisor.exit_codes == {0: 0, 1: 1}
+
+
+def test_a_robot_that_failed_stays_until_the_world_has_confirmed_its_failure(nothing_left: None) -> None:
+    with LocalSwarm("run", members(1, "small_controllers:Wordy")) as swarm:
+        with swarm.link._changed:  # the world takes in messages, and confirms nothing
+            swarm.link.send(0, encode(Observation(5, 0.0)))
+            until(lambda: swarm.link._arrivals, "the failure arrived")
+            assert not swarm.supervisor.wait(PATIENCE_S), "no time limit ends its wait"
+        said, end = swarm.link.receive(20.0), swarm.link.receive(20.0)
+        assert said is not None
+        assert isinstance(open_answer(said.payload or b""), Failure)
+        assert end == Arrival(0, None)
+        assert swarm.supervisor.wait(20.0)
+    assert swarm.supervisor.exit_codes == {0: 1}
+
+
+def test_a_robot_that_failed_leaves_on_sigterm_though_the_world_confirms_nothing(nothing_left: None) -> None:
+    with LocalSwarm("run", members(1, "small_controllers:Wordy")) as swarm, swarm.link._changed:
+        swarm.link.send(0, encode(Observation(5, 0.0)))
+        until(lambda: swarm.link._arrivals, "the failure arrived")
+        swarm.supervisor.send_signal(0, signal.SIGTERM)
+        assert swarm.supervisor.wait(20.0)
+    assert swarm.supervisor.exit_codes == {0: 1}
 
 
 @pytest.mark.parametrize(
     ("controller", "error"),
     [
         ("Exits", "SystemExit: 0"),
+        ("Cancels", "CancelledError: not mine to raise"),
         ("Recurses", "RecursionError: maximum recursion depth exceeded"),
         ("Garrulous", "ValueError: the command takes 100033 bytes, at most 65536 are allowed"),
         ("Unspeakable", r"ValueError: \udcff"),

@@ -11,9 +11,11 @@ import pytest
 from support import script
 
 import zwerm
+from zwerm.catalogue import SENSORS
 from zwerm.run.assembly import assemble
 from zwerm.run.result import RunResult
-from zwerm.scenario.tables import Scenario, built_in, validate
+from zwerm.scenario.load import built_in, validate
+from zwerm.scenario.tables import Scenario
 from zwerm.study.tables import StudyTable
 from zwerm.wire.messages import Observation
 from zwerm.world.sensors import registry as sensors
@@ -66,8 +68,8 @@ def test_every_key_of_every_table_is_described(generated: ModuleType, name: str,
 
 def test_every_sensor_and_every_field_of_an_observation_is_described(generated: ModuleType) -> None:
     text = generated.GENERATED["sensors"]()
-    assert set(re.findall(r"^### `(\w+)`", text, re.MULTILINE)) == set(sensors.BUILT_IN)
-    for found in sensors.BUILT_IN.values():
+    assert set(re.findall(r"^### `(\w+)`", text, re.MULTILINE)) == set(SENSORS)
+    for found in map(sensors.find, SENSORS):
         assert f"Fills `{found.field}`" in text
         for key in found.Parameters.model_fields:
             assert f"| `{key}` |" in text

@@ -12,7 +12,7 @@ from PIL import Image
 from support import ROOT
 
 from zwerm.run.assembly import assemble
-from zwerm.scenario.tables import read, validate
+from zwerm.scenario.load import read, validate
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 

@@ -283,7 +283,9 @@ def test_a_node_that_takes_leave_has_been_heard_out_and_its_place_is_free_again(
     node.join()
     for number in range(500):
         node.send(str(number).encode())
-    assert node.take_leave("tired", 20.0)
+    heard = threading.Event()
+    node.take_leave("tired", heard.set)
+    assert heard.wait(20.0)
     node.close()
     for number in range(500):
         assert net.link.receive(20.0) == Arrival(0, str(number).encode())
@@ -298,6 +300,32 @@ def test_a_node_that_takes_leave_has_been_heard_out_and_its_place_is_free_again(
         stale.join()
     stale.close()
     again.close()
+
+
+def test_a_node_that_takes_leave_is_not_heard_out_before_the_world_confirms_it(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    node.send(b"last words")
+    heard = threading.Event()
+    with net.link._changed:  # the world can neither confirm nor take note of a loss
+        node.take_leave("tired", heard.set)
+        assert not heard.wait(0.2)
+    assert heard.wait(20.0)
+    node.close()
+    assert [net.link.receive(20.0) for _ in range(2)] == [Arrival(0, b"last words"), Arrival(0, None)]
+    heard.clear()
+    node.take_leave("again", heard.set)
+    assert heard.is_set(), "a link that is closed has nobody to wait for"
+
+
+def test_closing_ends_the_wait_for_a_world_that_does_not_confirm(net: Network) -> None:
+    node = net.node(0)
+    node.join()
+    heard = threading.Event()
+    with net.link._changed:
+        node.take_leave("tired", heard.set)
+        node.close()
+        assert heard.wait(20.0)
 
 
 def test_a_node_learns_that_the_world_is_gone(private_tmp: Path) -> None:

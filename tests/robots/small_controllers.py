@@ -1,5 +1,6 @@
 """Controllers for tests of links and processes; robot processes find them through sys.path."""
 
+import asyncio
 import time
 
 from zwerm.agents.runtime.contract import Setup
@@ -35,6 +36,13 @@ class Exits(Echo):
 
     def step(self, observation: Observation) -> Command:
         raise SystemExit(0)
+
+
+class Cancels(Echo):
+    """Fails with what is no Exception and ends no process."""
+
+    def step(self, observation: Observation) -> Command:
+        raise asyncio.CancelledError("not mine to raise")
 
 
 class Wordy(Echo):

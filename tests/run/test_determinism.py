@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import pytest
 from support import ROBOTS, ROOT, ZWERM, scenario
 
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.run.assembly import assemble
 from zwerm.run.result import RunResult
@@ -34,7 +34,7 @@ def chattering(**tables: object) -> Scenario:
 
 
 def in_processes(chosen: Scenario, seed: int, order: list[int] | None = None) -> RunResult:
-    with LocalSwarm(new_run_id(), cast(chosen, seed), order=order) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(chosen, seed), order=order) as swarm:
         return drive(assemble(chosen, seed), swarm.link, seed, "processes")
 
 

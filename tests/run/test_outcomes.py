@@ -10,7 +10,7 @@ from halls import HALL, Link, drive
 from support import ROOT, ZWERM
 
 from zwerm.run.runner import run
-from zwerm.scenario.tables import load
+from zwerm.scenario.load import load
 from zwerm.wire.messages import BodyVelocity, Command, decode_observation, encode, open_answer
 from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World

@@ -177,3 +177,22 @@ def test_robots_started_elsewhere_join_over_tcp_and_give_the_same_trace(tmp_path
         _, said = each.communicate(timeout=30)
         assert each.returncode == 0, said
     assert not keys.exists(), "credentials are of no use after the run"
+
+
+@pytest.mark.parametrize(
+    ("program", "imported"),
+    [
+        ("import zwerm.agents.runtime.node", False),
+        ("import zwerm\n    zwerm.run('beacon', runner='inline', overrides=['time.duration_s=0.5'])", False),
+        (
+            "from zwerm.cli.app import app\n"
+            "    app(['run', 'beacon', '--inline', '--json', '--set', 'time.duration_s=0.5'], standalone_mode=False)",
+            False,
+        ),
+        ("import zwerm.agents.runtime.process", True),  # a robot's process does, so the test can tell
+    ],
+)
+def test_without_processes_no_transport_is_imported(tmp_path: Path, program: str, imported: bool) -> None:
+    script = f"import sys\ntry:\n    {program}\nfinally:\n    print('zenoh' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines()[-1:] == [str(imported)], done.stderr

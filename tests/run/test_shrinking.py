@@ -15,7 +15,8 @@ from support import ROOT, ZWERM, scenario
 from zwerm.errors import ScenarioError
 from zwerm.run.runner import run
 from zwerm.run.shrinking import Shrinker, parse_failing, tables_of, with_faults
-from zwerm.scenario.tables import Scenario, load, validate
+from zwerm.scenario.load import load, validate
+from zwerm.scenario.tables import Scenario
 from zwerm.scenario.toml import write_toml
 
 # Robot 4's id reaches 0 by way of 1 or of 2, and by no other.
@@ -135,7 +136,13 @@ def test_a_scenarios_tables_are_written_without_its_defaults() -> None:
         {"name": "x", "arena": {"size_m": [1.0, 2.0]}, "robots": {"count": 1, "controller": "beacon"}}, "x", Path()
     )
     text = write_toml(tables_of(chosen))
-    assert text == 'name = "x"\n\n[arena]\nsize_m = [1.0, 2.0]\n\n[robots]\ncount = 1\ncontroller = "beacon"\n'
+    size = "size_m = [\n    1.0,\n    2.0,\n]"
+    assert text == f'name = "x"\n\n[arena]\n{size}\n\n[robots]\ncount = 1\ncontroller = "beacon"\n'
+
+
+def test_none_is_left_out_wherever_it_stands() -> None:
+    tables = {"a": None, "b": {"c": None, "d": (1, None)}, "e": [{"f": None, "g": 1.0}, {}]}
+    assert tomllib.loads(write_toml(tables)) == {"b": {"d": [1]}, "e": [{"g": 1.0}, {}]}
 
 
 def command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -4,7 +4,7 @@ import pytest
 
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import prepare
-from zwerm.scenario.tables import load
+from zwerm.scenario.load import load
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from zwerm.errors import ScenarioError
-from zwerm.scenario.tables import built_in, load, locate
+from zwerm.scenario.load import built_in, load, locate
 
 GOOD = """
 [arena]

@@ -22,6 +22,8 @@ from zwerm.scenario.tables import Scenario
 from zwerm.twin import twin_runner as running
 from zwerm.twin.packet_comparison import compare, lost_runs
 from zwerm.twin.twin_runner import run_twin
+from zwerm.world.radio.models.loss import Loss
+from zwerm.world.radio.registry import BUILT_IN
 
 WHY_NOT = missing()
 on_a_real_network = pytest.mark.skipif(bool(WHY_NOT), reason=f"the twin on a real network {WHY_NOT}")
@@ -243,7 +245,7 @@ def test_namespaces_vanish_with_an_error_inside(nothing_left: None) -> None:
         ({"radio": {"models": [{"kind": "delay", "jitter_s": 1.0, "distribution": "pareto"}]}},
          "radio.models.0.kind: not in the twin: netem has jitter of that mean only uniform, got 'delay'"),
         ({"radio": {"models": [{"kind": "mine:Own"}]}},
-         "radio.models.0.kind: not in the twin: a model of your own knows no network, got 'mine:Own'"),
+         "radio.models.0.kind: not in the twin: no rule of the network is known for this model, got 'mine:Own'"),
         ({"radio": {"models": [{"kind": "rate_limit", "rate_bytes_s": 1.0, "queue_bytes": 1.0}] * 2}},
          "radio.models.1.kind: not in the twin: one such model at most, got 'rate_limit'"),
         ({"coordinator": {"controller": "radioed:Counts"}, "uplink": {"models": [{"kind": "delay", "delay_s": 1.0}]}},
@@ -259,6 +261,25 @@ def test_what_no_network_could_do_is_refused_with_its_place(tables: dict[str, An
     with pytest.raises(ScenarioError) as caught:
         possible(scenario(**{"radio": {}, **tables}))
     assert caught.value.mistakes == [f"small.toml: {line}"]
+
+
+def test_a_model_without_a_rule_of_the_network_is_refused_by_name_and_never_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(BUILT_IN, "fading", Loss)  # a built-in model that the twin does not know
+    for kind, reason in (
+        ("fading", "no rule of the network is known for this model"),
+        ("mine:Own", "no rule of the network is known for this model"),
+        ("collision", "cables do not collide"),
+    ):
+        chosen = scenario(radio={"loss": 0.1, "models": [{"kind": kind, "fraction": 0.5}]})
+        line = f"small.toml: radio.models.0.kind: not in the twin: {reason}, got '{kind}'"
+        with pytest.raises(ScenarioError) as caught:
+            possible(chosen)
+        assert caught.value.mistakes == [line]
+        with pytest.raises(ScenarioError) as caught:
+            translate(chosen, {"robots": LINKS})
+        assert caught.value.mistakes == [line]
 
 
 def test_a_scenario_without_a_radio_has_no_twin() -> None:

@@ -17,12 +17,15 @@ from shapely.geometry import LineString, Polygon, box
 
 from zwerm.errors import PictureError
 from zwerm.record.history import History
-from zwerm.view.canvas import Sheet, Swarm, gone_at_the_end, outline, readable, round_down
-from zwerm.view.complex_layer import FRONTIER, OBSTACLE, PUSH, ComplexLayer
-from zwerm.view.complex_layer import TRIANGLE as FILL
-from zwerm.view.coverage_curve import growth
-from zwerm.view.snapshots import Snapshot, stages, true_stage
-from zwerm.view.stills import RunView, animate_run, draw_run
+from zwerm.view.animation import animate_run
+from zwerm.view.canvas import Sheet, outline, readable, round_down
+from zwerm.view.composition import Composition
+from zwerm.view.coverage_curve import coverage_curve
+from zwerm.view.run_view import RunView
+from zwerm.view.sensor_coverage import FRONTIER, OBSTACLE, PUSH, ComplexLayer, Snapshot, snapshots, true_snapshot
+from zwerm.view.sensor_coverage import TRIANGLE as FILL
+from zwerm.view.stills import draw_run
+from zwerm.view.swarm_artists import Swarm, gone_at_the_end
 from zwerm.world.arena.arena import Arena
 from zwerm.world.metrics.sight import SeenArea
 from zwerm.world.tick.telemetry import TelemetryRecord
@@ -174,6 +177,8 @@ def test_a_scale_bar_is_a_round_number_of_metres(length_m: float, bar_m: float) 
     assert round_down(length_m) == pytest.approx(bar_m)
 
 
+LAYERS = ("zwerm.view.sensor_coverage:ComplexLayer",)
+
 # --- a deployment ---------------------------------------------------------------------------------------------------
 
 # Three robots at the corners of a triangle; robot 0 is the base, and pushes robot 1, who goes ahead.
@@ -198,19 +203,21 @@ def deployment(cycles: int = 3) -> RunView:
         for cycle in range(1, cycles + 1)
     ]  # fmt: skip
     series = {"time_s": [0.0, 3.0], "coverage_fraction": [0.2, 0.8], "robots_deployed": [1.0, 3.0]}
-    return RunView(ARENA, history, RADIUS_M, "trial", sight_range_m=1.0, bases=1, told=told, series=series)
+    return RunView(
+        ARENA, history, RADIUS_M, "trial", sight_range_m=1.0, bases=1, told=told, series=series, layers=LAYERS
+    )
 
 
-def shown(view: RunView, stage: Snapshot | None) -> Look:
+def shown(view: RunView, snapshot: Snapshot | None) -> Look:
     sheet = Sheet(ARENA, "trial")
-    simplices = ComplexLayer(sheet)
-    simplices.show(stage)
+    ComplexLayer(sheet, view).show_snapshot(snapshot)
     return Look(sheet)
 
 
 def test_the_complex_shows_triangles_frontier_obstacle_and_the_push() -> None:
     view = deployment()
-    first, last = shown(view, view.stage(1)), shown(view, view.stage(3))
+    first, _, third = snapshots(view.told)
+    first, last = shown(view, first), shown(view, third)
     assert first.at(1.0, 0.8) == last.at(1.0, 0.8) == tuple(round(255 * each) for each in to_rgb(FILL["facecolor"]))
     assert first.at(1.25, 0.9) == tuple(round(255 * each) for each in to_rgb(FRONTIER))
     assert last.at(1.25, 0.9) == tuple(round(255 * each) for each in to_rgb(OBSTACLE))
@@ -222,21 +229,21 @@ def test_a_swarm_that_tells_of_no_complex_is_shown_with_the_true_one(tmp_path: P
     # Robot 1 is behind the wall without thickness, robot 4 is out of range, robot 5 dead.
     places = np.array([(1.9, 0.5), (2.1, 0.5), (1.5, 0.5), (1.7, 0.9), (0.3, 1.8), (1.8, 0.6)])
     standing = np.array([True, True, True, True, True, False])
-    stage = true_stage(0.0, places, standing, ARENA, 1.0)
+    stage = true_snapshot(0.0, places, standing, ARENA, 1.0)
     assert sorted(map(sorted, stage.edges.tolist())) == [[0, 2], [0, 3], [2, 3]]
     assert stage.triangles.tolist() == [[0, 2, 3]]
-    assert len(true_stage(0.0, places, np.eye(6, dtype=bool)[0], ARENA, 1.0).edges) == 0
+    assert len(true_snapshot(0.0, places, np.eye(6, dtype=bool)[0], ARENA, 1.0).edges) == 0
     told = deployment()
     untold = replace(told, told=())
-    assert untold.deployed
-    assert not replace(untold, bases=0).deployed
+    assert Composition(untold).layers
+    assert not Composition(replace(untold, bases=0)).layers
     pictures = [draw_run(tmp_path / f"{name}.png", view) for name, view in (("told", told), ("untold", untold))]
     assert len({path.read_bytes() for path in pictures}) == 2
 
 
 def test_several_paths_are_all_shown() -> None:
     told = {"cycle": 1, "edges": [[0, 1], [0, 2]], "frontier": [], "obstacle": [], "paths": [[0, 1], [0, 2]]}
-    [stage] = stages([TelemetryRecord(0, 0.0, 3, {"complex": told}, TRIANGLE, np.ones(3, bool))])
+    [stage] = snapshots([TelemetryRecord(0, 0.0, 3, {"complex": told}, TRIANGLE, np.ones(3, bool))])
     assert stage.paths == ((0, 1), (0, 2))
     assert len(stage.triangles) == 0
     look = shown(deployment(), stage)
@@ -245,15 +252,16 @@ def test_several_paths_are_all_shown() -> None:
 
 def test_the_growth_is_by_cycle_where_there_are_cycles_and_else_by_time() -> None:
     view = deployment()
-    assert view.growth is not None
-    assert view.growth.xlabel == "deployment cycle"
-    assert view.growth.x.tolist() == [0.0, 3.0]
-    assert view.growth.at(1.5) == (1.5, pytest.approx(0.5))
-    assert view.growth.ideal == pytest.approx((8.0 - 0.16) / (math.sqrt(3.0) / 2.0))
-    by_time = growth(view.series, [])
+    curve = Composition(view).curve
+    assert curve is not None
+    assert curve.xlabel == "deployment cycle"
+    assert curve.x.tolist() == [0.0, 3.0]
+    assert curve.at(1.5) == (1.5, pytest.approx(0.5))
+    assert curve.ideal == pytest.approx((8.0 - 0.16) / (math.sqrt(3.0) / 2.0))
+    by_time = coverage_curve(view.series, [], "")
     assert by_time is not None
     assert by_time.xlabel == "time [s]"
-    assert growth({}, []) is None
+    assert coverage_curve({}, [], "") is None
 
 
 def test_a_deployment_is_drawn_at_its_end_at_a_cycle_and_at_a_time(tmp_path: Path) -> None:
@@ -264,11 +272,11 @@ def test_a_deployment_is_drawn_at_its_end_at_a_cycle_and_at_a_time(tmp_path: Pat
         draw_run(tmp_path / "time.png", view, at_s=0.5),
     ]
     assert len({path.read_bytes() for path in pictures}) == 3
-    with pytest.raises(PictureError, match="cycle 4: expected one that the run told of, which are 1 to 3"):
+    with pytest.raises(PictureError, match="cycle 4: expected one that the run reported, which are 1 to 3"):
         draw_run(tmp_path / "none.png", view, cycle=4)
     with pytest.raises(PictureError, match="7 s: expected a time of the run, which lasted 3 s"):
         draw_run(tmp_path / "none.png", view, at_s=7.0)
-    with pytest.raises(PictureError, match="cycle 1: expected one that the run told of, which are none"):
+    with pytest.raises(PictureError, match="stage 1: expected one that the run reported, which are none"):
         draw_run(tmp_path / "none.png", VIEW, cycle=1)
 
 
@@ -278,6 +286,17 @@ def test_an_animation_of_a_deployment_keeps_the_colours_that_its_first_frame_doe
         animation.seek(4)
         colours = {colour for _, colour in animation.convert("RGB").getcolors(1 << 20) or []}
     assert {tuple(round(255 * each) for each in to_rgb(name)) for name in ("white", FRONTIER, PUSH)} <= colours
+
+
+def test_a_layer_of_a_users_own_is_drawn_and_a_wrong_name_is_one_line(tmp_path: Path) -> None:
+    own = replace(VIEW, layers=("own_layers:Crosshair",))
+    with Image.open(draw_run(tmp_path / "own.png", own)) as picture:
+        colours = {colour for _, colour in picture.convert("RGB").getcolors(1 << 20) or []}
+    assert (255, 0, 255) in colours
+    with pytest.raises(PictureError, match="module 'own_layers' has no class 'Other'"):
+        draw_run(tmp_path / "none.png", replace(VIEW, layers=("own_layers:Other",)))
+    with pytest.raises(PictureError, match="own_layers:Line2D is no picture layer"):
+        draw_run(tmp_path / "none.png", replace(VIEW, layers=("own_layers:Line2D",)))
 
 
 def test_robots_that_have_left_are_told_from_those_that_never_came() -> None:

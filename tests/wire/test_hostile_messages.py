@@ -12,7 +12,7 @@ from support import scenario, until
 
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.identity import load
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import RemoteSwarm
 from zwerm.errors import ProtocolError
 from zwerm.link.node import ZenohNodeLink
@@ -125,7 +125,7 @@ class Stranger(threading.Thread):
         own = next(each for each in credentials.nodes if each.node == self._node)
         link = ZenohNodeLink(credentials.run, own, self._endpoint)
         link.join()
-        node = Node(*cast(scenario(), 1)[self._node])
+        node = Node(*node_specs(scenario(), 1)[self._node])
         while (payload := link.receive(20.0)) is not None:
             if not isinstance(decode_to_node(payload), Observation):
                 break
@@ -142,7 +142,7 @@ def run_with_a_stranger(tmp_path: Path, say: Callable[[Node, bytes], list[bytes]
         for number in range(4)
     ]
     chosen = scenario(**tables)
-    swarm = RemoteSwarm(new_run_id(), cast(chosen, 1), listen=[endpoint], credentials_file=keys, deadline_s=20.0)
+    swarm = RemoteSwarm(new_run_id(), node_specs(chosen, 1), listen=[endpoint], credentials_file=keys, deadline_s=20.0)
     starter = threading.Thread(target=_start_when_there, args=(keys, strangers), daemon=True)
     starter.start()
     with swarm:

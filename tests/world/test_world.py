@@ -169,6 +169,7 @@ def test_radio_packets_arrive_one_tick_later_and_every_one_is_accounted_for() ->
         "delivered": 0,
         "dropped": {"out-of-range": 1},
         "in_flight": 2,
+        "out_of_reach": 1,
         "bytes": 0,
         "copies": 0,
         "damaged": 0,
@@ -180,13 +181,14 @@ def test_radio_packets_arrive_one_tick_later_and_every_one_is_accounted_for() ->
     ]
     assert observed[2].inbox == ()
     found = world.medium.summary()
-    assert (found["sent"], found["delivered"], found["in_flight"], found["bytes"]) == (3, 2, 0, 13)
+    assert (found["sent"], found["delivered"], found["in_flight"], found["bytes"]) == (3, 2, 0, 8)
     assert world.medium.channels["robots"].accounts.by_link() == {
         "sender": [0, 0],
         "receiver": [1, 2],
         "sent": [2, 1],
         "delivered": [2, 0],
         "dropped": {"out-of-range": [0, 1]},
+        "out_of_reach": [0, 1],
         "in_flight": [0, 0],
     }
 

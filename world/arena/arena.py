@@ -29,7 +29,7 @@ _DENSE_LINES = 5_000
 _FEW_SEGMENTS = 64
 _DENSE_POINTS = 20_000
 _DENSE_WALLS = 8  # so many in all, however many points are asked about
-_ON_WALL_M = 1e-9  # a ray that begins this near a wall, on either side, begins on it
+_ON_WALL_M = 1e-9  # so much farther than the tree's own distance a nearest wall is looked for
 
 
 class WallContacts(NamedTuple):
@@ -96,27 +96,6 @@ class Arena:
         crossing = _crosses(a[0], a[1], b[0], b[1], self._px[wall], self._py[wall], self._qx[wall], self._qy[wall])
         blocked[line[crossing]] = True
         return blocked
-
-    def ray_length(self, origin: Floats, direction: Floats, limit_m: float) -> Floats:
-        """Return (k,) the distance [m] from origin (k, 2) to a wall along unit vectors direction (k, 2), or limit_m."""
-        count = len(origin)
-        if count * len(self.segments) <= _DENSE_LINES:
-            o, d = origin.T[:, :, None], direction.T[:, :, None]
-            dense: Floats = _meets(o[0], o[1], d[0], d[1], self._px, self._py, self._qx, self._qy).min(axis=1)
-            return np.minimum(dense, limit_m)
-        length = np.full(count, limit_m, dtype=np.float64)
-        box = np.array(self.bounds)
-        farthest = _norm(np.maximum(np.abs(origin - box[:2]), np.abs(origin - box[2:])))
-        reach = np.minimum(limit_m, 1.01 * farthest)  # no wall is farther, and the index takes no infinite lines
-        ray, wall = self._index.candidates(origin, origin + reach[:, None] * direction)
-        o, d = origin[ray].T, direction[ray].T
-        met = _meets(o[0], o[1], d[0], d[1], self._px[wall], self._py[wall], self._qx[wall], self._qy[wall])
-        np.minimum.at(length, ray, met)
-        return length
-
-    def clearance(self, points: Floats) -> Floats:
-        """Return (k,) the distance [m] of points (k, 2) to the nearest wall."""
-        return _norm(self.nearest_wall_points(points) - points)
 
     def nearest_wall_points(self, points: Floats) -> Floats:
         """Return (k, 2) the place on a wall nearest to each of points (k, 2) [m]; of equals, the first segment's."""
@@ -232,21 +211,3 @@ def _crosses(
         at_p, at_q = dx * apx + dy * apy, dx * aqx + dy * aqy
         hit |= along & (np.maximum(at_p, at_q) > 0.0) & (np.minimum(at_p, at_q) < length2)
     return hit
-
-
-def _meets(
-    ox: Floats, oy: Floats, dx: Floats, dy: Floats, px: Floats, py: Floats, qx: Floats, qy: Floats
-) -> NDArray[np.float64]:
-    """Return how far along the ray from o towards d wall pq is met, infinity where it is not, elementwise."""
-    opx, opy, oqx, oqy = px - ox, py - oy, qx - ox, qy - oy
-    side_p, side_q = dx * opy - dy * opx, dx * oqy - dy * oqx
-    at_p, at_q = dx * opx + dy * opy, dx * oqx + dy * oqy
-    span = side_p - side_q
-    along = span == 0.0
-    at = at_p + side_p / np.where(along, 1.0, span) * (at_q - at_p)
-    if (
-        along.any()
-    ):  # edge-on: nothing is met beside the ray; in it, the nearer end, or the origin where it lies in the wall
-        edge_on = np.where(at_p * at_q <= 0.0, 0.0, np.minimum(at_p, at_q))
-        at = np.where(along, np.where(side_p == 0.0, edge_on, np.inf), at)
-    return np.where((side_p * side_q <= 0.0) & (at >= -_ON_WALL_M), np.maximum(at, 0.0), np.inf)

@@ -19,7 +19,9 @@ from shapely.affinity import affine_transform
 from shapely.geometry import Polygon
 
 from zwerm.errors import ScenarioError
-from zwerm.scenario.tables import ArenaTable, Finite, Fraction, Point, Positive, mistakes
+from zwerm.scenario.diagnostics import mistakes
+from zwerm.scenario.tables import ArenaTable
+from zwerm.scenario.types import Finite, Fraction, Point, Positive
 from zwerm.world.arena.raster import component, outline
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,8 @@ from shapely.affinity import scale
 from shapely.geometry import LineString, MultiPolygon, Polygon, box
 
 from zwerm.errors import ScenarioError
-from zwerm.scenario.tables import ArenaTable, Point
+from zwerm.scenario.tables import ArenaTable
+from zwerm.scenario.types import Point
 from zwerm.world.arena.maps import read_map
 
 Space: TypeAlias = Polygon | MultiPolygon

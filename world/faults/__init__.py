@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from zwerm.scenario.tables import ARRAY, NonNegative, Positive, Table
+from zwerm.scenario.types import ARRAY, NonNegative, Positive, Table
 from zwerm.world.radio import NodeName
 
 Nodes = Annotated[list[NodeName], Field(min_length=1)]

@@ -10,8 +10,10 @@ import numpy as np
 
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.tables import OpenTable, Scenario
+from zwerm.scenario.tables import Scenario
+from zwerm.scenario.types import OpenTable
 from zwerm.world.arena.arena import Arena
+from zwerm.world.faults.sensing import contacts_of
 
 SECONDS_PER_H: Final = 3_600.0
 
@@ -100,5 +102,6 @@ def _one(kind: str, stream: np.random.Generator, scenario: Scenario, arena: Aren
         return {"channel": "robots", "senders": [sender], "receivers": [receiver], "both": bool(stream.integers(2))}
     robot = {"robots": [int(stream.integers(count))]}
     if kind == "stuck_touch":
-        return robot | {"switch": int(stream.integers(8)), "closed": bool(stream.integers(2))}
+        switches = len(contacts_of(scenario))
+        return robot | {"switch": int(stream.integers(switches)), "closed": bool(stream.integers(2))}
     return robot

@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from zwerm.scenario.tables import Point, Positive, Rectangle
+from zwerm.scenario.types import Point, Positive, Rectangle
 from zwerm.world.faults import FaultTable, Nodes
 from zwerm.world.radio import Air, LinkTable, Packets, Verdict
 from zwerm.world.scene import Bools, Ints

@@ -5,6 +5,7 @@ begin and end, and where something has changed it says anew who is down, paused 
 what the sensors suffer.
 """
 
+import json
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
@@ -14,7 +15,9 @@ from pydantic import ValidationError
 
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.tables import OpenTable, Scenario, mistakes
+from zwerm.scenario.diagnostics import mistakes
+from zwerm.scenario.tables import Scenario
+from zwerm.scenario.types import OpenTable
 from zwerm.world.faults import FaultTable, ticks
 from zwerm.world.faults.nodes import CrashTable, JoinTable, PauseTable, RestartTable, SlowTable
 from zwerm.world.faults.radio import (
@@ -70,8 +73,9 @@ KINDS: Final[dict[str, type[FaultTable]]] = {
 class Fault:
     """One fault of the schedule: its table, the ids it names, and the ticks from and until which it is in force."""
 
-    def __init__(self, table: FaultTable, scenario: Scenario) -> None:
+    def __init__(self, kind: str, table: FaultTable, scenario: Scenario) -> None:
         dt_s = scenario.time.dt_s
+        self.kind = kind
         self.table = table
         self.purpose = ""  # of the draws that are its own
         self.begins = None if table.at_s is None else ticks(table.at_s, dt_s)
@@ -124,10 +128,19 @@ class Fault:
         return self.ends is None or tick < self.ends
 
     @property
+    def as_written(self) -> str:
+        """Its kind and the keys that the scenario gives, as JSON sorted by key. Defaults are left out."""
+        written = self.table.model_dump(mode="json", exclude_unset=True)
+        return json.dumps({"kind": self.kind, **written}, sort_keys=True)
+
+    @property
     def in_words(self) -> str:
         """What kind it is, and when it is due, if that is known."""
-        kind = next(name for name, each in KINDS.items() if each is type(self.table))
-        return f"{kind} at {self.begins * self._dt_s:g} s" if self.begins is not None else f"{kind} on a condition"
+        return (
+            f"{self.kind} at {self.begins * self._dt_s:g} s"
+            if self.begins is not None
+            else f"{self.kind} on a condition"
+        )
 
     @property
     def endless(self) -> bool:
@@ -158,10 +171,11 @@ class Schedule:
         made: Counter[str] = Counter()
         self._sensing: list[tuple[Fault, SensingFault]] = []
         for fault in self.faults:
-            # Its draws are keyed by what it says, so that no other fault changes them.
-            says = fault.table.model_dump_json()
-            made[says] += 1
-            fault.draw(f"faults/{made[says]}/{says}", draws)
+            # Its draws are keyed by what the scenario gives: no other fault changes them, and neither does a new optional
+            # key of its kind.
+            written = fault.as_written
+            made[written] += 1
+            fault.draw(f"faults/{made[written]}/{written}", draws)
             sensing = SENSING_KINDS.get(type(fault.table))
             if sensing is not None:
                 self._sensing.append((fault, sensing(fault.table, scenario, fault.purpose)))
@@ -262,7 +276,7 @@ def _read(path: str, table: OpenTable, scenario: Scenario, wrong: list[str]) -> 
         return None
     before = len(wrong)
     wrong += [f"{path}{line}" for line in _nonsense(found, scenario)]
-    return None if len(wrong) > before else Fault(found, scenario)
+    return None if len(wrong) > before else Fault(table.kind, found, scenario)
 
 
 def _nonsense(table: FaultTable, scenario: Scenario) -> list[str]:

@@ -22,17 +22,18 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import Finite, Fraction, NonNegative, Scenario
+from zwerm.scenario.tables import Scenario
+from zwerm.scenario.types import Finite, Fraction, NonNegative
 from zwerm.wire.messages import SENSOR_FIELDS, Bearing, Contact, LandmarkBearing, Neighbour
 from zwerm.world.faults import FaultTable, Robots
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 from zwerm.world.sensors import Sensor
 from zwerm.world.sensors.registry import find
+from zwerm.world.sensors.touch import TouchTable
 
 SEEING: Final[dict[str, Any]] = {"bearings": (), "landmarks": (), "neighbours": (), "line_of_sight": False}
 _ITEMS: Final = ("bearings", "landmarks", "neighbours", "touch")
 _YES_OR_NO: Final = (*_ITEMS, "line_of_sight")
-_SWITCHES: Final = 8  # of a touch sensor whose table does not say
 
 # How far away a neighbour that is not there seems to be, at most, where the sensor has no range [m].
 _PHANTOM_M: Final = 1.0
@@ -291,7 +292,7 @@ def nonsense(table: FaultTable, scenario: Scenario) -> list[str]:
 def contacts_of(scenario: Scenario) -> list[Contact]:
     """Return the contact that each closed touch switch is, counter-clockwise from straight ahead."""
     tables = [sensor.parameters for sensor in scenario.robots.sensors if sensor.kind == "touch"]
-    switches = int(tables[0].get("switches", _SWITCHES)) if tables else _SWITCHES
+    switches = TouchTable.model_validate(tables[0] if tables else {}).switches
     sector_rad = 2.0 * math.pi / switches
     bearings = wrap(np.arange(switches) * sector_rad).tolist()
     return [Contact(bearing, sector_rad / 2.0) for bearing in bearings]

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from zwerm.maths.polygons import Polygon
-from zwerm.world.fields.field import Field
+from zwerm.world.fields import Field
 from zwerm.world.scene import Floats, Ints
 
 _NODES: Final = 8

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from zwerm.scenario.tables import MetricsTable
+from zwerm.catalogue import BASE
+from zwerm.scenario.tables import MetricsTable, Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.geometry.visibility import Visibility
 from zwerm.world.metrics.removals import removals
@@ -57,13 +58,19 @@ def measure(world: "World", table: MetricsTable) -> dict[str, float]:
         found["area_coverage_fraction"] = area_coverage_fraction(position, table.coverage_radius_m, world.arena)
     if table.sight_range_m is not None:
         found |= _sight(world, table.sight_range_m)
-        if world.scenario.services is not None and world.scenario.services.leaving:
+        if _robots_leave(world.scenario):
             found |= removals(world, table.sight_range_m)
-    if world.scenario.services is not None and world.scenario.services.path == "gradient":
+    variant = world.scenario.variant
+    if variant is not None and variant.decides == BASE:
         found["concluded_early"] = concluded_early(world)
     if world.schedule.faults:
         found["faults_missed"] = float(len(world.schedule.missed))
     return found | _told(world)
+
+
+def _robots_leave(scenario: Scenario) -> bool:
+    services = {} if scenario.variant is None else scenario.variant.services
+    return services.get("redundancy") == "link" or dict(services) == {"path": "gradient", "redundancy": "coordinator"}
 
 
 def concluded_early(world: "World") -> float:

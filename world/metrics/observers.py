@@ -10,7 +10,7 @@ from typing import Protocol
 from zwerm.errors import ScenarioError
 from zwerm.scenario.tables import MetricsTable
 from zwerm.world.arena.arena import Arena
-from zwerm.world.fields.field import Field
+from zwerm.world.fields import Field
 from zwerm.world.metrics.sight_growth import SightObserver
 from zwerm.world.metrics.voronoi_coverage import VoronoiCoverageObserver
 from zwerm.world.scene import Scene

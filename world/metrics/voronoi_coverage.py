@@ -17,7 +17,7 @@ from zwerm.maths.polygons import Point, Polygon, voronoi_cell
 from zwerm.scenario.tables import VoronoiMetricsTable
 from zwerm.wire.messages import Neighbour
 from zwerm.world.arena.arena import Arena
-from zwerm.world.fields.field import Field
+from zwerm.world.fields import Field
 from zwerm.world.geometry.quadrature import CellIntegrals, integrate
 from zwerm.world.geometry.tessellation import Tessellation
 from zwerm.world.scene import Floats, Ints, Scene

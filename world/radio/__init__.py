@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.tables import Table
+from zwerm.scenario.types import Table
 from zwerm.world.arena.arena import Arena
 from zwerm.world.radio.links import LinkDraws, Links
 from zwerm.world.scene import Bools, Floats, Ints, Scene
@@ -101,10 +101,6 @@ class Packets:
             part(self.attenuation_db),
         )
 
-    def delays_s(self) -> Floats:
-        """Return (k,) how long after sending each packet gets here [s]."""
-        return np.zeros(len(self)) if self.delay_s is None else self.delay_s
-
     def layers(self, air: Air) -> Iterator[Ints]:
         """Yield rows in the order of sending, such that no link appears twice in one array."""
         order = air.rank[self.transmission]
@@ -127,9 +123,6 @@ class Verdict(NamedTuple):
     attenuation_db: Floats | None = None  # (k,) added attenuation [dB]
 
 
-PASSED: Final = Verdict()
-
-
 @dataclass(frozen=True, slots=True)
 class ModelPlace:
     """Where a model stands: what it may know before the first packet."""
@@ -147,7 +140,11 @@ class ModelPlace:
 
 
 class LinkModel(Protocol):
-    """One reason why a packet may not arrive; `needs_positions` means that it makes sense between bodies only."""
+    """One reason why a packet may not arrive; `needs_positions` means that it makes sense between bodies only.
+
+    A model with an attribute `out_of_reach` that is true drops packets to receivers that are out of reach, by no chance. The
+    others lose packets to receivers in reach.
+    """
 
     kind: ClassVar[str]
     cause: ClassVar[str]

@@ -1,6 +1,7 @@
 """The radio's books: what became of every packet, for every link of a channel and for every cause.
 
-At every tick, for every link: sent = delivered + dropped, by cause + in flight. A copy that the medium made counts as
+At every tick, for every link: sent = delivered + dropped, by cause + in flight. Of the dropped, some never had a chance: their
+receivers were out of reach. The others are losses. A copy that the medium made counts as
 sent, and as a copy; a damaged packet that arrives counts as delivered, and as damaged. The age of a link's information is
 the time since its newest delivered packet was sent, from its first delivery on.
 """
@@ -20,15 +21,15 @@ class Ledger:
     def __init__(self, links: Links, nodes: int, dt_s: float) -> None:
         self.copies = 0
         self.damaged = 0
-        self.bytes = 0
         self.delay_ticks = 0  # from sending to handing over, of all that were delivered
         self.node_messages: Ints = np.zeros(nodes, dtype=np.int64)  # transmissions, by sender
-        self.node_bytes: Ints = np.zeros(nodes, dtype=np.int64)
+        self.node_bytes: Ints = np.zeros(nodes, dtype=np.int64)  # payload of these
         self._links = links
         self._dt_s = dt_s
         self._sent = links.integers()
         self._delivered = links.integers()
-        self._dropped: dict[str, Column] = {}
+        self._lost: dict[str, Column] = {}  # by cause
+        self._out_of_reach: dict[str, Column] = {}
         # Of the age of information, in ticks: the newest packet's, since when it is, the sum so far, the largest.
         self._newest = links.integers(-1)
         self._since = links.integers()
@@ -40,12 +41,13 @@ class Ledger:
         """Take note of packets sent on `link` (k,)."""
         np.add.at(self._sent.values, link, 1)
 
-    def drop(self, link: Ints, cause: str) -> None:
-        """Take note of packets lost on `link` (k,)."""
+    def drop(self, link: Ints, cause: str, out_of_reach: bool = False) -> None:
+        """Take note of packets dropped on `link` (k,), whose receivers were in reach or out of it."""
         if len(link):
-            column = self._dropped.get(cause)
+            columns = self._out_of_reach if out_of_reach else self._lost
+            column = columns.get(cause)
             if column is None:
-                column = self._dropped[cause] = self._links.integers()
+                column = columns[cause] = self._links.integers()
             np.add.at(column.values, link, 1)
 
     def deliver(self, link: Ints, sent_tick: Ints, tick: int) -> None:
@@ -79,7 +81,17 @@ class Ledger:
 
     def dropped(self) -> dict[str, Ints]:
         """Return the packets dropped, by cause and link; causes are sorted."""
-        return {cause: self._of(column) for cause, column in sorted(self._dropped.items())}
+        found: dict[str, Ints] = {}
+        for cause, column in sorted([*self._lost.items(), *self._out_of_reach.items()], key=lambda item: item[0]):
+            found[cause] = found[cause] + self._of(column) if cause in found else self._of(column)
+        return found
+
+    def out_of_reach(self) -> Ints:
+        """Return the packets dropped because their receivers were out of reach, by link."""
+        found: Ints = np.zeros(self._links.count, dtype=np.int64)
+        for column in self._out_of_reach.values():
+            found = found + self._of(column)
+        return found
 
     def in_flight(self) -> Ints:
         """Return by link the packets sent that have neither been delivered nor dropped yet."""
@@ -132,6 +144,7 @@ class Ledger:
             "sent": self.sent()[order].tolist(),
             "delivered": self.delivered()[order].tolist(),
             "dropped": {cause: column[order].tolist() for cause, column in self.dropped().items()},
+            "out_of_reach": self.out_of_reach()[order].tolist(),
             "in_flight": self.in_flight()[order].tolist(),
         }
 

@@ -1,7 +1,8 @@
 """A channel of the radio: who may send to whom, and the models that judge each packet, in order.
 
-What a node hears of a packet's sender is the channel's to say. Whatever else stands in a packet's way for a while (a fault,
-a receiver that is switched off) judges before the models.
+What a node hears of a packet's sender is the channel's to say. A receiver that is absent or switched off is judged before the
+models. Faults judge before the models, too, but after those leading ones that find receivers out of reach: what a fault drops
+would have reached its receiver. Neither of the two draws, so their order changes the causes, and not the packets that pass.
 """
 
 from collections.abc import Sequence
@@ -49,6 +50,8 @@ class Channel:
         self.dt_s = dt_s
         self._anonymous = anonymous
         self._audiences: dict[int, Ints] = {}
+        # How many models, from the first on, find receivers out of reach.
+        self._leading = next((at for at, model in enumerate(self.models) if not _is_of_reach(model)), len(self.models))
 
     def carries(self, sender: int, to: int) -> bool:
         """Tell whether `sender` may address `to` at all."""
@@ -78,7 +81,9 @@ class Channel:
                 stopped |= drop
         return sorted(zip(packets.sender[stopped].tolist(), packets.receiver[stopped].tolist(), strict=True))
 
-    def send(self, scene: Scene, outboxes: Outboxes, before: Sequence[LinkModel] = ()) -> None:
+    def send(
+        self, scene: Scene, outboxes: Outboxes, before: Sequence[LinkModel] = (), faults: Sequence[LinkModel] = ()
+    ) -> None:
         """Take what the nodes sent on this channel at this tick, (node, its outbox) in id order, and judge every packet."""
         name, books = self.name, self.accounts
         senders: list[int] = []
@@ -100,22 +105,21 @@ class Channel:
             sent[node] = rank
         if not senders:
             return
-        audience = np.fromiter(map(len, links), np.int64, len(links))
+        audience = list(map(len, links))
         air = Air(scene, self.dt_s, np.array(senders), np.array(ranks), payloads)
         link = np.concatenate(links)
         transmission = np.repeat(np.arange(len(senders)), audience)
         key = key_part(_stamp(air))[transmission]
         books.send(link)
-        books.bytes += int(audience @ air.sizes())
         packets = Packets(self.links, link, transmission, transmission, key)
-        for model in (*before, *self.models):
+        for model in (*before, *self.models[: self._leading], *faults, *self.models[self._leading :]):
             if not len(packets):
                 return
-            packets = self._carry_out(model.judge(air, packets), model.cause, air, packets)
+            packets = self._carry_out(model.judge(air, packets), model, air, packets)
         self._post(air, packets)
 
-    def _carry_out(self, verdict: Verdict, cause: str, air: Air, packets: Packets) -> Packets:
-        """Return what is left of `packets` after a verdict."""
+    def _carry_out(self, verdict: Verdict, model: LinkModel, air: Air, packets: Packets) -> Packets:
+        """Return what is left of `packets` after a verdict of `model`."""
         drop, after_s, copies, payload, attenuation_db = verdict
         if payload is not None:
             packets.payload = payload
@@ -127,7 +131,7 @@ class Channel:
         if copies is not None and copies.any():
             packets = self._copied(air, packets, copies)
         if drop is not None and drop.any():
-            self.accounts.drop(packets.link[drop], cause)
+            self.accounts.drop(packets.link[drop], model.cause, _is_of_reach(model))
             packets = packets.take(np.flatnonzero(~drop))
         return packets
 
@@ -143,7 +147,6 @@ class Channel:
         made.key = np.where(fresh, key_part(stamp), made.key)
         self.accounts.send(made.link[fresh])
         self.accounts.copies += int(np.count_nonzero(fresh))
-        self.accounts.bytes += int(air.sizes()[made.payload[fresh]].sum())
         return made
 
     def _post(self, air: Air, packets: Packets) -> None:
@@ -196,6 +199,11 @@ class Channel:
 
     def _link(self, sender: int, to: int) -> Ints:
         return self.links.rows(np.array([sender]), np.array([to]))
+
+
+def _is_of_reach(model: LinkModel) -> bool:
+    """Tell whether a model drops packets whose receivers are out of reach."""
+    return bool(getattr(model, "out_of_reach", False))
 
 
 def _stamp(air: Air) -> NDArray[np.uint64]:

@@ -27,6 +27,7 @@ class Absent:
     kind: ClassVar[str] = "absent"
     cause: ClassVar[str] = "absent"
     needs_positions: ClassVar[bool] = False
+    out_of_reach: ClassVar[bool] = True
     Parameters: ClassVar[type[LinkTable]] = LinkTable
 
     def judge(self, air: Air, packets: Packets) -> Verdict:
@@ -44,6 +45,7 @@ class SwitchedOff:
     kind: ClassVar[str] = "receiver-down"
     cause: ClassVar[str] = "receiver-down"
     needs_positions: ClassVar[bool] = False
+    out_of_reach: ClassVar[bool] = True
     Parameters: ClassVar[type[LinkTable]] = LinkTable
 
     def __init__(self, nodes: int) -> None:
@@ -109,7 +111,7 @@ class Medium:
     def send(self, scene: Scene, outboxes: Outboxes) -> None:
         """Take what the nodes sent at this tick, (node, its outbox) in id order, and judge every packet."""
         for name, channel in self.channels.items():
-            channel.send(scene, outboxes, (*self._before, *self.faults[name]))
+            channel.send(scene, outboxes, self._before, self.faults[name])
 
     def stopped(self, name: str, scene: Scene, numbers: Sequence[int]) -> list[tuple[int, int]]:
         """Return the pairs of a channel between whom nothing passes now, by faults or by its models with these `numbers`."""
@@ -148,7 +150,10 @@ class Medium:
                 raise AssertionError(f"channel {name}: {wrong[0]}")
 
     def summary(self) -> dict[str, Any]:
-        """Return the books over all channels: packets sent, delivered, dropped by cause, in flight; bytes; and copies."""
+        """Return the books over all channels: packets sent, delivered, dropped by cause, in flight; bytes; and copies.
+
+        `out_of_reach` are those of the dropped whose receivers were out of reach. `bytes` are payload, once a transmission.
+        """
         dropped: dict[str, int] = {}
         for channel in self.channels.values():
             for cause, column in channel.accounts.dropped().items():
@@ -159,7 +164,8 @@ class Medium:
             "delivered": sum(int(each.delivered().sum()) for each in books),
             "dropped": {cause: count for cause, count in sorted(dropped.items()) if count},
             "in_flight": sum(int(each.in_flight().sum()) for each in books),
-            "bytes": sum(each.bytes for each in books),
+            "out_of_reach": sum(int(each.out_of_reach().sum()) for each in books),
+            "bytes": sum(int(each.node_bytes.sum()) for each in books),
             "copies": sum(each.copies for each in books),
             "damaged": sum(each.damaged for each in books),
         }

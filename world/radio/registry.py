@@ -13,8 +13,10 @@ from pydantic import ValidationError
 
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.plugin_names import class_named
-from zwerm.scenario.tables import ChannelTable, OpenTable, Scenario, mistakes
+from zwerm.scenario.tables import ChannelTable, Scenario
+from zwerm.scenario.types import OpenTable
 from zwerm.world.arena.arena import Arena
 from zwerm.world.radio import ROBOTS, Air, LinkModel, LinkTable, ModelPlace, NodeName, Packets, Verdict
 from zwerm.world.radio.links import Links
@@ -60,6 +62,7 @@ class Selected:
 
     def __init__(self, model: LinkModel, senders: Bools, receivers: Bools) -> None:
         self.cause = model.cause
+        self.out_of_reach: bool = getattr(model, "out_of_reach", False)
         self.model = model
         self._senders = senders
         self._receivers = receivers

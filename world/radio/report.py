@@ -29,6 +29,7 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
         "sent": int(books.sent().sum()),
         "delivered": delivered,
         "dropped": {cause: int(column.sum()) for cause, column in books.dropped().items() if column.any()},
+        "out_of_reach": int(books.out_of_reach().sum()),
         "in_flight": int(books.in_flight().sum()),
         "messages": books.node_messages.tolist(),
         "message_bytes": books.node_bytes.tolist(),
@@ -57,8 +58,11 @@ def radio_metrics(medium: Medium, robots: int, tick: int) -> dict[str, float]:
         return {}
     messages = np.sum([each.node_messages[:robots] for each in books], axis=0)
     message_bytes = np.sum([each.node_bytes[:robots] for each in books], axis=0)
-    found = {
-        "delivered_fraction": sum(int(each.delivered().sum()) for each in books) / sent,
+    out_of_reach = sum(int(each.out_of_reach().sum()) for each in books)
+    found = {"out_of_reach_fraction": out_of_reach / sent}
+    if sent > out_of_reach:
+        found["delivered_fraction"] = sum(int(each.delivered().sum()) for each in books) / (sent - out_of_reach)
+    found |= {
         "messages_per_robot_mean": float(messages.mean()),
         "messages_per_robot_max": float(messages.max()),
         "bytes_per_robot_mean": float(message_bytes.mean()),

@@ -5,14 +5,16 @@ robot is told all of it, through walls and at any distance; obstacles are no par
 independent for each tick, robot, corner and axis.
 """
 
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
 from shapely.geometry import Polygon
 
-from zwerm.scenario.tables import NonNegative, Table
+from zwerm.scenario.types import NonNegative, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import Surroundings, in_body_frames
+from zwerm.world.sensors import Sensor, Surroundings, in_body_frames
+
+_SQUARE: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
 
 class BoundaryTable(Table):
@@ -21,7 +23,7 @@ class BoundaryTable(Table):
     sd_m: NonNegative = 0.0
 
 
-class Boundary:
+class Boundary(Sensor):
     """The corners (x, y) [m], the same for every robot but for the frame."""
 
     field: ClassVar[str] = "boundary"
@@ -45,3 +47,19 @@ class Boundary:
             y += self._sd_m * scene.draws.normal("sensor.boundary.y", scene.tick, robots, corner)
         corners = [zip(*each, strict=True) for each in zip(x.tolist(), y.tolist(), strict=True)]
         return list(zip(*corners, strict=True))
+
+    @classmethod
+    def rest(cls) -> tuple[tuple[float, float], ...]:
+        """Return a square about the robot."""
+        return _SQUARE
+
+    @classmethod
+    def stimulus(cls, random: np.random.Generator, count: int) -> tuple[tuple[float, float], ...]:
+        """Return a square about a random place."""
+        x, y = random.uniform(-1.0, 1.0, 2).tolist()
+        return tuple((x + corner_x, y + corner_y) for corner_x, corner_y in _SQUARE)
+
+    @classmethod
+    def extremes(cls) -> tuple[tuple[float, float], ...]:
+        """Return a large square."""
+        return tuple((1e3 * x, 1e3 * y) for x, y in _SQUARE)

@@ -3,12 +3,15 @@
 The noise is Gaussian and independent for each tick and robot, plus one bias that all share.
 """
 
+import math
 from typing import ClassVar
 
+import numpy as np
+
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import Finite, NonNegative, Table
+from zwerm.scenario.types import Finite, NonNegative, Table
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import Surroundings
+from zwerm.world.sensors import Sensor, Surroundings
 
 
 class CompassTable(Table):
@@ -18,7 +21,7 @@ class CompassTable(Table):
     bias_rad: Finite = 0.0
 
 
-class Compass:
+class Compass(Sensor):
     """One heading [rad] in (-pi, pi] for each robot."""
 
     field: ClassVar[str] = "compass_rad"
@@ -34,3 +37,18 @@ class Compass:
             heading += self._sd_rad * scene.draws.normal("sensor.compass", scene.tick, robots)
         answer: list[float] = wrap(heading).tolist()
         return answer
+
+    @classmethod
+    def rest(cls) -> float:
+        """Return a heading of zero."""
+        return 0.0
+
+    @classmethod
+    def stimulus(cls, random: np.random.Generator, count: int) -> float:
+        """Return a random heading."""
+        return float(random.uniform(-math.pi, math.pi))
+
+    @classmethod
+    def extremes(cls) -> float:
+        """Return the heading at the cut."""
+        return math.pi

@@ -1,17 +1,17 @@
-"""The readings of other people's sensors: the observation's field `extra`, a tuple of floats under each sensor's name.
+"""The readings of sensors outside the catalogue: the observation's field `extra`, a tuple of floats by sensor name.
 
-A sensor whose `field` is no field of `Observation` returns one tuple of floats for each robot; this gathers them.
+A sensor whose `field` is no field of `Observation` returns one tuple of floats for each robot. This class gathers them.
 """
 
 from collections.abc import Sequence
 from typing import ClassVar
 
-from zwerm.scenario.tables import Table
+from zwerm.scenario.types import Table
 from zwerm.world.scene import Ints, Scene
 from zwerm.world.sensors import Sensor
 
 
-class Extra:
+class Extra(Sensor):
     """One dictionary for each robot, from sensors' fields to readings. Made by the registry, not by a table."""
 
     field: ClassVar[str] = "extra"

@@ -6,10 +6,12 @@ The noise is Gaussian and independent for each tick and robot: `sd` of the value
 
 from typing import ClassVar
 
-from zwerm.scenario.tables import NonNegative, Table
+import numpy as np
+
+from zwerm.scenario.types import NonNegative, Table
 from zwerm.wire.messages import FieldSample
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import Surroundings, in_body_frames
+from zwerm.world.sensors import Sensor, Surroundings, in_body_frames
 
 
 class FieldTable(Table):
@@ -19,7 +21,7 @@ class FieldTable(Table):
     gradient_sd_per_m: NonNegative = 0.0
 
 
-class FieldSensor:
+class FieldSensor(Sensor):
     """One sample of the field for each robot."""
 
     field: ClassVar[str] = "field"
@@ -43,3 +45,18 @@ class FieldSensor:
             forward = forward + self._gradient_sd_per_m * scene.draws.normal("sensor.field.x", scene.tick, robots)
             left = left + self._gradient_sd_per_m * scene.draws.normal("sensor.field.y", scene.tick, robots)
         return list(map(FieldSample, value.tolist(), forward.tolist(), left.tolist()))
+
+    @classmethod
+    def rest(cls) -> FieldSample:
+        """Return a field of zero."""
+        return FieldSample(0.0, 0.0, 0.0)
+
+    @classmethod
+    def stimulus(cls, random: np.random.Generator, count: int) -> FieldSample:
+        """Return a random sample."""
+        return FieldSample(*random.uniform(-1.0, 1.0, 3).tolist())
+
+    @classmethod
+    def extremes(cls) -> FieldSample:
+        """Return a large sample."""
+        return FieldSample(1e6, -1e6, 0.0)

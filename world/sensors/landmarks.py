@@ -5,17 +5,19 @@ a landmark on a wall is seen from the side it faces. The noise is Gaussian and i
 landmark. Robots do not hide landmarks. A robot that stands still asks the arena nothing.
 """
 
-from typing import ClassVar
+import math
+from collections.abc import Callable, Collection
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import NonNegative, Positive, Table
+from zwerm.scenario.types import NonNegative, Positive, Table
 from zwerm.wire.messages import LandmarkBearing
 from zwerm.world.geometry.visibility import WallVerdicts
 from zwerm.world.scene import Bools, Ints, Scene
-from zwerm.world.sensors import Surroundings, portions
+from zwerm.world.sensors import Sensor, Surroundings, chosen, portions, random_angle
 
 # A line of sight ends this fraction of its length short, so that a wall does not hide the landmark that hangs on it.
 _SHORT = 1e-9
@@ -29,11 +31,13 @@ class LandmarksTable(Table):
     sd_rad: NonNegative = 0.0
 
 
-class Landmarks:
+class Landmarks(Sensor):
     """Bearings to landmarks, ascending by id."""
 
     field: ClassVar[str] = "landmarks"
     Parameters: ClassVar[type[Table]] = LandmarksTable
+    dark: ClassVar[Any] = ()
+    has_items: ClassVar[bool] = True
 
     def __init__(self, parameters: LandmarksTable, surroundings: Surroundings) -> None:
         if len(surroundings.landmarks) == 0:
@@ -84,3 +88,24 @@ class Landmarks:
         start = scene.position[robot]
         end = start + (self._landmarks[landmark] - start) * (1.0 - _SHORT)
         return ~self._verdicts.blocked(scene.arena, robot * len(self._landmarks) + landmark, start, end)
+
+    def phantom(self, robot: int, known: Collection[int], uniform: Callable[[str], float]) -> LandmarkBearing | None:
+        """Return the bearing of another landmark in a random direction."""
+        number = chosen(range(len(self._landmarks)), known, uniform)
+        return None if number is None else LandmarkBearing(number, random_angle(uniform))
+
+    @classmethod
+    def rest(cls) -> tuple[LandmarkBearing, ...]:
+        """Return no bearing."""
+        return ()
+
+    @classmethod
+    def stimulus(cls, random: np.random.Generator, count: int) -> tuple[LandmarkBearing, ...]:
+        """Return `count` bearings in random directions."""
+        bearings = random.uniform(-math.pi, math.pi, count).tolist()
+        return tuple(LandmarkBearing(number, bearing) for number, bearing in enumerate(bearings))
+
+    @classmethod
+    def extremes(cls) -> tuple[LandmarkBearing, ...]:
+        """Return a landmark behind, and one with a large id."""
+        return (LandmarkBearing(0, math.pi), LandmarkBearing(99_999, 0.0))

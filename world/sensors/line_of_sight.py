@@ -5,14 +5,14 @@ robot before it meets a wall, however far away unless there is a range. The nois
 some probability the reading is replaced by a random bit. It is not the distance, nor which robot.
 """
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import ValidationInfo, field_validator
 
-from zwerm.scenario.tables import Fraction, Positive, Table
+from zwerm.scenario.types import Fraction, Positive, Table
 from zwerm.world.scene import Bools, Ints, Scene
-from zwerm.world.sensors import Surroundings
+from zwerm.world.sensors import Sensor, Surroundings
 
 # So many (observer, other) pairs are worked on at a time: few enough for a core's cache (measured).
 _PAIRS_AT_ONCE = 1 << 15
@@ -34,11 +34,14 @@ class LineOfSightTable(Table):
         return combined
 
 
-class LineOfSightSensor:
+class LineOfSightSensor(Sensor):
     """One bit for each robot."""
 
     field: ClassVar[str] = "line_of_sight"
     Parameters: ClassVar[type[Table]] = LineOfSightTable
+    dark: ClassVar[Any] = False
+    sees_beacons: ClassVar[bool] = True
+    has_floats: ClassVar[bool] = False
 
     def __init__(self, parameters: LineOfSightTable, surroundings: Surroundings) -> None:
         self._range_m = np.inf if parameters.range_m is None else parameters.range_m
@@ -116,3 +119,18 @@ class LineOfSightSensor:
         self._across, self._product, self._on_line = np.empty(size), np.empty(size), np.empty(size, dtype=np.bool_)
         self._across_grid, self._product_grid = self._across.reshape(-1, total), self._product.reshape(-1, total)
         self._row, self._column = np.divmod(np.arange(size), total)
+
+    @classmethod
+    def rest(cls) -> bool:
+        """Return False: no robot ahead."""
+        return False
+
+    @classmethod
+    def stimulus(cls, random: np.random.Generator, count: int) -> bool:
+        """Return a random bit."""
+        return bool(random.integers(0, 2))
+
+    @classmethod
+    def extremes(cls) -> bool:
+        """Return True."""
+        return True

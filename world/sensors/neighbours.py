@@ -7,16 +7,21 @@ With `voronoi`, of those only the ones whose Voronoi cells border on the observe
 presumes that a robot can measure (Schwager et al. 2006), and far less to say in a swarm without a range.
 """
 
-from typing import ClassVar
+import math
+from collections.abc import Callable, Collection
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from zwerm.scenario.tables import NonNegative, Positive, Table
+from zwerm.scenario.types import NonNegative, Positive, Table
 from zwerm.wire.messages import Neighbour
 from zwerm.world.geometry.tessellation import Tessellation
 from zwerm.world.geometry.visibility import VisiblePairs
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import Surroundings, in_body_frames, portions
+from zwerm.world.sensors import Sensor, Surroundings, chosen, in_body_frames, portions, random_angle
+
+# Greatest distance of a phantom where the sensor has no range [m].
+_PHANTOM_M: Final = 1.0
 
 
 class NeighboursTable(Table):
@@ -29,11 +34,14 @@ class NeighboursTable(Table):
     sd_m: NonNegative = 0.0
 
 
-class NeighboursSensor:
+class NeighboursSensor(Sensor):
     """Relative positions of robots, ascending by id."""
 
     field: ClassVar[str] = "neighbours"
     Parameters: ClassVar[type[Table]] = NeighboursTable
+    dark: ClassVar[Any] = ()
+    sees_beacons: ClassVar[bool] = True
+    has_items: ClassVar[bool] = True
 
     def __init__(self, parameters: NeighboursTable, surroundings: Surroundings) -> None:
         if parameters.voronoi and parameters.robots_occlude:
@@ -42,6 +50,7 @@ class NeighboursSensor:
         self._sd_m = parameters.sd_m
         self._visibility = surroundings.visibility
         self._tessellation = Tessellation() if parameters.voronoi else None
+        self._count = surroundings.count
         self._last: tuple[Ints, Ints, VisiblePairs] | None = None
 
     def read(self, scene: Scene, robots: Ints) -> list[tuple[Neighbour, ...]]:
@@ -76,6 +85,31 @@ class NeighboursSensor:
         sightings = both_ways(pairs, robots, len(scene.present))
         self._last = (found, robots, sightings) if lasting else None
         return sightings
+
+    def phantom(self, robot: int, known: Collection[int], uniform: Callable[[str], float]) -> Neighbour | None:
+        """Return another robot at a random place within range."""
+        number = chosen(range(self._count), {*known, robot}, uniform)
+        if number is None:
+            return None
+        angle = random_angle(uniform)
+        distance_m = (self._sight[0] or _PHANTOM_M) * math.sqrt(uniform("far"))
+        return Neighbour(number, distance_m * math.cos(angle), distance_m * math.sin(angle))
+
+    @classmethod
+    def rest(cls) -> tuple[Neighbour, ...]:
+        """Return no neighbour."""
+        return ()
+
+    @classmethod
+    def stimulus(cls, random: np.random.Generator, count: int) -> tuple[Neighbour, ...]:
+        """Return `count` neighbours at random places."""
+        places = random.uniform(-2.0, 2.0, (count, 2)).tolist()
+        return tuple(Neighbour(node, x, y) for node, (x, y) in enumerate(places, start=1))
+
+    @classmethod
+    def extremes(cls) -> tuple[Neighbour, ...]:
+        """Return two robots at the own place, and one far away with a large id."""
+        return (Neighbour(1, 0.0, 0.0), Neighbour(2, 0.0, 0.0), Neighbour(99_999, 1e6, -1e6))
 
 
 def both_ways(pairs: Ints, robots: Ints, count: int) -> VisiblePairs:

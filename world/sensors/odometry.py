@@ -7,15 +7,16 @@ stands still: its variance is (fraction x motion)^2, as of a badly calibrated wh
 of many small slips.
 """
 
+import math
 from typing import ClassVar
 
 import numpy as np
 
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import NonNegative, Table
+from zwerm.scenario.types import NonNegative, Table
 from zwerm.wire.messages import Displacement
 from zwerm.world.scene import Floats, Ints, Scene
-from zwerm.world.sensors import Surroundings, in_body_frames
+from zwerm.world.sensors import Sensor, Surroundings, in_body_frames
 
 
 class OdometryTable(Table):
@@ -27,7 +28,7 @@ class OdometryTable(Table):
     turn_sd_per_root_rad: NonNegative = 0.0
 
 
-class Odometry:
+class Odometry(Sensor):
     """One displacement for each robot."""
 
     field: ClassVar[str] = "odometry"
@@ -65,6 +66,22 @@ class Odometry:
             draw = scene.draws.normal("sensor.odometry.turn", scene.tick, robots)
             turn = turn + draw * _sd(np.abs(turn), *self._turn_noise)
         return list(map(Displacement, forward.tolist(), left.tolist(), wrap(turn).tolist()))
+
+    @classmethod
+    def rest(cls) -> Displacement:
+        """Return no motion."""
+        return Displacement(0.0, 0.0, 0.0)
+
+    @classmethod
+    def stimulus(cls, random: np.random.Generator, count: int) -> Displacement:
+        """Return a small random motion."""
+        forward, left, turn = random.uniform(-1.0, 1.0, 3).tolist()
+        return Displacement(0.01 * forward, 0.01 * left, 0.1 * turn)
+
+    @classmethod
+    def extremes(cls) -> Displacement:
+        """Return a large motion."""
+        return Displacement(-1e3, 1e3, math.pi)
 
 
 def _sd(motion: Floats, fraction: float, per_root: float) -> Floats:

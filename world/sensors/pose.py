@@ -4,13 +4,16 @@ The noise is Gaussian and independent for each tick and robot: `sd_m` in x and i
 that has this sensor is not lost; algorithms without metric information must do without it.
 """
 
+import math
 from typing import ClassVar
 
+import numpy as np
+
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import NonNegative, Table
+from zwerm.scenario.types import NonNegative, Table
 from zwerm.wire.messages import Pose
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import Surroundings
+from zwerm.world.sensors import Sensor, Surroundings
 
 
 class PoseTable(Table):
@@ -20,7 +23,7 @@ class PoseTable(Table):
     sd_rad: NonNegative = 0.0
 
 
-class PoseSensor:
+class PoseSensor(Sensor):
     """One pose for each robot."""
 
     field: ClassVar[str] = "pose"
@@ -39,3 +42,19 @@ class PoseSensor:
         if self._sd_rad > 0.0:
             heading = heading + self._sd_rad * scene.draws.normal("sensor.pose.heading", scene.tick, robots)
         return list(map(Pose, x.tolist(), y.tolist(), wrap(heading).tolist()))
+
+    @classmethod
+    def rest(cls) -> Pose:
+        """Return the origin."""
+        return Pose(0.0, 0.0, 0.0)
+
+    @classmethod
+    def stimulus(cls, random: np.random.Generator, count: int) -> Pose:
+        """Return a random pose."""
+        x, y, turn = random.uniform(-1.0, 1.0, 3).tolist()
+        return Pose(x, y, math.pi * turn)
+
+    @classmethod
+    def extremes(cls) -> Pose:
+        """Return a pose far away."""
+        return Pose(-1e6, 1e6, math.pi)

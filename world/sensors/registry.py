@@ -1,4 +1,4 @@
-"""Sensors by name: the built-in table, and `module:Class` for anyone else's.
+"""Sensors by name: those of the catalogue, and `module:Class` for any other.
 
 A scenario's `[[robots.sensors]]` tables go in, sensors that fill different fields of the observation come out, or every
 mistake in the tables at once.
@@ -6,39 +6,17 @@ mistake in the tables at once.
 
 import inspect
 from collections.abc import Sequence
-from typing import Final
 
 from pydantic import ValidationError
 
+from zwerm.catalogue import SENSORS
 from zwerm.errors import ScenarioError
+from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.plugin_names import class_named
-from zwerm.scenario.tables import OpenTable, Table, mistakes
+from zwerm.scenario.types import OpenTable, Table
 from zwerm.wire.messages import SENSOR_FIELDS, Observation
 from zwerm.world.sensors import Sensor, Surroundings
-from zwerm.world.sensors.bearings import Bearings
-from zwerm.world.sensors.boundary import Boundary
-from zwerm.world.sensors.compass import Compass
 from zwerm.world.sensors.extra import Extra
-from zwerm.world.sensors.field import FieldSensor
-from zwerm.world.sensors.landmarks import Landmarks
-from zwerm.world.sensors.line_of_sight import LineOfSightSensor
-from zwerm.world.sensors.neighbours import NeighboursSensor
-from zwerm.world.sensors.odometry import Odometry
-from zwerm.world.sensors.pose import PoseSensor
-from zwerm.world.sensors.touch import Touch
-
-BUILT_IN: Final[dict[str, type[Sensor]]] = {
-    "bearings": Bearings,
-    "boundary": Boundary,
-    "compass": Compass,
-    "field": FieldSensor,
-    "landmarks": Landmarks,
-    "line_of_sight": LineOfSightSensor,
-    "neighbours": NeighboursSensor,
-    "odometry": Odometry,
-    "pose": PoseSensor,
-    "touch": Touch,
-}
 
 _STANDARD = frozenset(SENSOR_FIELDS) - {"extra"}
 _TAKEN = frozenset(Observation.__struct_fields__) - _STANDARD
@@ -49,9 +27,7 @@ def find(kind: str) -> type[Sensor]:
 
     Raises ValueError, in one line, where there is none or it is no sensor.
     """
-    if kind in BUILT_IN:
-        return BUILT_IN[kind]
-    found = class_named(kind, "sensor", BUILT_IN)
+    found = class_named(SENSORS.get(kind, kind), "sensor", SENSORS)
     if not callable(getattr(found, "read", None)):
         raise ValueError(f"{kind} is no sensor: it has no method read(scene, robots)")
     name = getattr(found, "field", None)
@@ -59,12 +35,13 @@ def find(kind: str) -> type[Sensor]:
         raise ValueError(f"{kind} is no sensor: its `field` must name what it fills, got {name!r}")
     parameters = getattr(found, "Parameters", None)
     if not isinstance(parameters, type) or not issubclass(parameters, Table):
-        raise ValueError(f"{kind} is no sensor: its `Parameters` must be a subclass of zwerm.scenario.tables.Table")
+        raise ValueError(f"{kind} is no sensor: its `Parameters` must be a subclass of zwerm.scenario.types.Table")
     try:
         inspect.signature(found).bind(None, None)
     except (TypeError, ValueError):
         raise ValueError(f"{kind} is no sensor: its constructor must take (parameters, surroundings)") from None
-    return found
+    # A class with the same methods need not inherit: it gets the defaults of the base class behind its own attributes.
+    return found if issubclass(found, Sensor) else type(found.__name__, (found, Sensor), {})
 
 
 def make_sensor(table: OpenTable, surroundings: Surroundings, path: str, place: str) -> Sensor:

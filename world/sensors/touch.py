@@ -8,16 +8,17 @@ hard, is not sensed.
 """
 
 import math
+from collections.abc import Callable, Collection
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from zwerm.maths.angles import wrap
-from zwerm.scenario.tables import Fraction, Positive, Table
+from zwerm.scenario.types import Fraction, Positive, Table
 from zwerm.wire.messages import Contact
 from zwerm.world.scene import Ints, Scene
-from zwerm.world.sensors import Surroundings, portions
+from zwerm.world.sensors import Sensor, Surroundings, chosen, portions
 
 
 class TouchTable(Table):
@@ -29,11 +30,14 @@ class TouchTable(Table):
     false_positive: Fraction = 0.0
 
 
-class Touch:
+class Touch(Sensor):
     """The closed switches, counter-clockwise from straight ahead."""
 
     field: ClassVar[str] = "touch"
     Parameters: ClassVar[type[Table]] = TouchTable
+    wake_event: ClassVar[str] = "on_contact"
+    has_items: ClassVar[bool] = True
+    has_floats: ClassVar[bool] = False
 
     def __init__(self, parameters: TouchTable, surroundings: Surroundings) -> None:
         self._reach_m = parameters.reach_m
@@ -42,6 +46,7 @@ class Touch:
         self._switch = np.arange(parameters.switches)
         bearings = wrap(self._switch * self._sector_rad).tolist()
         self._contacts = [Contact(bearing, self._sector_rad / 2.0) for bearing in bearings]
+        self._number = {bearing: number for number, bearing in enumerate(bearings)}
         self._visibility = surroundings.visibility
 
     def read(self, scene: Scene, robots: Ints) -> list[tuple[Contact, ...]]:
@@ -65,3 +70,39 @@ class Touch:
         row, switch = closed.nonzero()
         ends = np.searchsorted(row, np.arange(len(robots)), side="right")
         return portions([self._contacts[each] for each in switch.tolist()], ends)
+
+    @staticmethod
+    def signature(reading: tuple[Contact, ...]) -> tuple[float, ...]:
+        """Return the bearings of the closed switches."""
+        return tuple(contact.bearing_rad for contact in reading)
+
+    def item_id(self, item: Contact) -> int:
+        """Return the number of the switch, counter-clockwise from straight ahead."""
+        return self._number[item.bearing_rad]
+
+    def with_switch(self, reading: tuple[Contact, ...], switch: int, closed: bool) -> tuple[Contact, ...]:
+        """Return `reading` with the switch of this number closed, or open."""
+        others = {self.item_id(contact) for contact in reading} - {switch}
+        numbers = sorted(others | {switch}) if closed else sorted(others)
+        return tuple([self._contacts[number] for number in numbers])
+
+    def phantom(self, robot: int, known: Collection[int], uniform: Callable[[str], float]) -> Contact | None:
+        """Return the contact of another switch."""
+        number = chosen(range(len(self._contacts)), known, uniform)
+        return None if number is None else self._contacts[number]
+
+    @classmethod
+    def rest(cls) -> tuple[Contact, ...]:
+        """Return no contact."""
+        return ()
+
+    @classmethod
+    def stimulus(cls, random: np.random.Generator, count: int) -> tuple[Contact, ...]:
+        """Return at most eight contacts, counter-clockwise."""
+        bearings = random.uniform(-math.pi, math.pi, count).tolist()
+        return tuple(Contact(bearing, math.pi / 8) for bearing in sorted(bearings)[:8])
+
+    @classmethod
+    def extremes(cls) -> tuple[Contact, ...]:
+        """Return contacts all around."""
+        return (Contact(math.pi, math.pi), Contact(0.0, math.pi))

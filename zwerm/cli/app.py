@@ -14,7 +14,6 @@ from typing import Annotated, Literal, NoReturn, Optional
 
 import typer
 
-from zwerm import __version__
 from zwerm.cli.console import RunProgress, print_result, print_scenarios
 from zwerm.cli.options import (
     Animation,
@@ -40,7 +39,8 @@ from zwerm.cli.terminal import (
 from zwerm.cli.trials import COMPARE_HELP, STUDY_HELP, compare, study
 from zwerm.errors import PictureError, ScenarioError
 from zwerm.run.result import RunResult
-from zwerm.scenario.tables import built_in, load, locate
+from zwerm.scenario.load import built_in, load, locate
+from zwerm.version import __version__
 
 app = typer.Typer(
     name="zwerm",

@@ -12,7 +12,10 @@ _UNKNOWN: Final = "-"
 
 
 def print_books(console: Console, radio: Books, links: int) -> None:
-    """Print the books of every channel in `radio`, in all and of the `links` that lost most, and messages and bytes by node."""
+    """Print the books of every channel in `radio`, in all and of the `links` that lost most, and messages and bytes by node.
+
+    "delivered %" is of the packets whose receivers were in reach, and so are losses.
+    """
     for name, books in radio["channels"].items():
         causes = sorted(books["dropped"], key=lambda cause: (-books["dropped"][cause], cause))
         table = Table(title=f"channel {name}", title_justify="left", box=None, padding=(0, 2, 0, 0))
@@ -43,7 +46,8 @@ def print_books(console: Console, radio: Books, links: int) -> None:
 
 def _cells(books: Books, dropped: list[int]) -> list[str]:
     sent = books["sent"]
-    share = f"{100.0 * books['delivered'] / sent:.1f}" if sent else _UNKNOWN
+    in_reach = sent - books["out_of_reach"]
+    share = f"{100.0 * books['delivered'] / in_reach:.1f}" if in_reach else _UNKNOWN
     ages = [_UNKNOWN if age is None else f"{age:.3g}" for age in (books["age_mean_s"], books["age_max_s"])]
     return [str(sent), str(books["delivered"]), *map(str, dropped), str(books["in_flight"]), share, *ages]
 
@@ -57,5 +61,5 @@ def _worst(columns: Books, causes: list[str], count: int) -> list[Books]:
         }
         for row in range(len(columns["sender"]))
     ]
-    rows.sort(key=lambda each: -sum(each["causes"]))
+    rows.sort(key=lambda each: each["out_of_reach"] - sum(each["causes"]))
     return sorted(rows[:count], key=lambda each: (each["sender"], each["receiver"]))

@@ -17,7 +17,7 @@ from typing import Final
 from zwerm.compare.variants import Sweep
 from zwerm.errors import ScenarioError
 from zwerm.maths.statistics import Sample, condense
-from zwerm.scenario.tables import built_in
+from zwerm.scenario.load import built_in
 from zwerm.study.plan import Point
 from zwerm.study.summary import Results
 from zwerm.study.tables import Setting, Study, VariantTable, check_study

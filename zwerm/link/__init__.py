@@ -52,17 +52,4 @@ class NodeProcesses(Protocol):
         """Let it go on."""
 
 
-class NodeLink(Protocol):
-    """A node's end of the link to the world."""
-
-    def send(self, payload: bytes) -> None:
-        """Send one message to the world."""
-
-    def receive(self, timeout_s: float) -> bytes | None:
-        """Return the next message from the world, or None after `timeout_s` seconds without one."""
-
-    def close(self) -> None:
-        """Release all that the link holds; idempotent."""
-
-
 Answer = Callable[[bytes], bytes]

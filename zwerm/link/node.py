@@ -22,6 +22,9 @@ from zwerm.wire.messages import REFUSABLE, Goodbye, Hello, Welcome, decode_welco
 
 RETRY_S: Final = 0.05
 
+# Zenoh wants a limit for every query. A year stands for none: a world that is gone ends the wait by closing the transport.
+LEAVE_TIMEOUT_S: Final = 365.0 * 86_400.0
+
 
 class ZenohNodeLink:
     """The end of the node that `credential` names, of the run `run`, connected to `endpoint`.
@@ -114,18 +117,23 @@ class ZenohNodeLink:
             return self._inbox.get(timeout=max(timeout_s, 0.0))
         return None
 
-    def take_leave(self, reason: str, timeout_s: float) -> bool:
-        """Say goodbye, and return once the world has confirmed it: then all that was sent before has arrived.
+    def take_leave(self, reason: str, heard: Callable[[], object]) -> None:
+        """Say goodbye, and return at once; `heard` is called, in Zenoh's thread, when the world has confirmed it.
 
-        Tell whether it was within `timeout_s` seconds. Closing at once could lose what is just being sent.
+        By then all that was sent before has arrived, so the link may be closed; earlier, closing could lose what is just being
+        sent. No time limit ends the wait: a world that is slow still gets everything. `heard` is also called when the link is
+        closed.
         """
-        key = hello_key(self._run, self._credential.node)
-        farewell = encode(Goodbye(reason))
         try:
-            replies = self._session.get(key, FifoChannel(1), payload=farewell, timeout=timeout_s, express=True)
-            return any(reply.ok is not None for reply in replies)
-        except zenoh.ZError:
-            return False  # closed already
+            self._session.get(
+                hello_key(self._run, self._credential.node),
+                Callback(_ignore, heard, indirect=False),
+                payload=encode(Goodbye(reason)),
+                timeout=LEAVE_TIMEOUT_S,
+                express=True,
+            )
+        except zenoh.ZError:  # closed already
+            heard()
 
     def close(self) -> None:
         """Release all that the link holds; idempotent."""
@@ -156,3 +164,7 @@ class ZenohNodeLink:
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         if event.kind == zenoh.SampleKind.DELETE and self._on_lost is not None:
             self._on_lost()
+
+
+def _ignore(reply: zenoh.Reply) -> None:
+    """Take an answer of which only its coming counts."""

@@ -13,8 +13,8 @@ from typing import Final, Self
 
 from mcap.writer import Writer
 
-from zwerm import __version__
 from zwerm.errors import ScenarioError
+from zwerm.version import __version__
 from zwerm.world.scene import Scene
 
 _POSES_SCHEMA: Final = {

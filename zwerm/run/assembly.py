@@ -6,15 +6,18 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from zwerm.agents.runtime.controllers import find, parameters_of
-from zwerm.deploy.node_specs import BASE, COORDINATOR, ROBOT, player
+from zwerm.catalogue import BASE, COORDINATOR, ROBOT, SENSORS, Role
+from zwerm.deploy.node_specs import controller_for
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
-from zwerm.world.fields.field import Field, make_field
+from zwerm.world.fields import Field
+from zwerm.world.fields.registry import make_field
 from zwerm.world.metrics.observers import Observers, make_meters
 from zwerm.world.sensors import Sensor, Surroundings
-from zwerm.world.sensors.registry import BUILT_IN, make_sensors
+from zwerm.world.sensors.registry import find as find_sensor
+from zwerm.world.sensors.registry import make_sensors
 from zwerm.world.world import World
 
 T = TypeVar("T")
@@ -87,7 +90,7 @@ def check_controllers(scenario: Scenario) -> None:
     robots, base, coordinator = scenario.robots, scenario.base, scenario.coordinator
     kinds = [table.kind for table in robots.sensors]
     # A controller may name what it needs by the sensor's kind or by the field of the observation that it fills.
-    given = [*kinds, *(BUILT_IN[kind].field for kind in kinds if kind in BUILT_IN)]
+    given = [*kinds, *(find_sensor(kind).field for kind in kinds if kind in SENSORS)]
     mistakes = _controller_mistakes(scenario, "robots", ROBOT, robots.controller, robots.parameters, given)
     if base is not None:
         mistakes += _controller_mistakes(scenario, "base", BASE, base.controller, base.parameters, given)
@@ -100,10 +103,10 @@ def check_controllers(scenario: Scenario) -> None:
 
 
 def _controller_mistakes(
-    scenario: Scenario, table: str, role: str, controller: str, parameters: dict[str, Any], sensors: Sequence[str]
+    scenario: Scenario, table: str, role: Role, controller: str, parameters: dict[str, Any], sensors: Sequence[str]
 ) -> list[str]:
     try:
-        found = find(player(role, controller, scenario.services))
+        found = find(controller_for(scenario, role, controller))
     except ControllerError as error:
         return [f"{table}.controller: {error}"]
     mistakes = [

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from zwerm.catalogue import layers_of
 from zwerm.record.history import History
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
@@ -12,7 +13,7 @@ from zwerm.world.scene import Ints
 from zwerm.world.tick.telemetry import TelemetryRecord
 
 if TYPE_CHECKING:  # pictures need matplotlib
-    from zwerm.view.stills import RunView
+    from zwerm.view.run_view import RunView
 
 
 @dataclass(slots=True)
@@ -82,12 +83,12 @@ class RunResult:
 
     def animate(self, path: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
         """Draw the run as an animation at `path`, .gif or .mp4, and return the path."""
-        from zwerm.view.stills import animate_run
+        from zwerm.view.animation import animate_run
 
         return animate_run(Path(path), self._view(), progress=progress)
 
     def _view(self) -> "RunView":
-        from zwerm.view.stills import RunView
+        from zwerm.view.run_view import RunView
 
         table = self.scenario.metrics
         return RunView(
@@ -102,6 +103,7 @@ class RunResult:
             0 if self.scenario.base is None else self.scenario.base.stations,
             self.told,
             self.series,
+            (*layers_of(self.scenario.robots.controller), *self.scenario.pictures.layers),
         )
 
     @property

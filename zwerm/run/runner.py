@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from zwerm.agents.runtime.node import Node
-from zwerm.deploy.node_specs import cast, recast
-from zwerm.deploy.swarm import LocalSwarm, RemoteSwarm
+from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import ScenarioError, StragglerError
 from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
 from zwerm.run.assembly import assemble
 from zwerm.run.result import RunResult
-from zwerm.scenario.tables import Scenario, load
+from zwerm.scenario.load import load
+from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.lockstep import FAILED, INTERRUPTED, LockStep
 from zwerm.world.drivers.realtime import RealTime
 from zwerm.world.metrics.measures import cell_counts, measure
@@ -83,24 +83,26 @@ def run(
     else:
         scenario = load(str(scenario), tuple(overrides))
     world = assemble(scenario, seed)
-    members = cast(scenario, seed)
+    members = node_specs(scenario, seed)
     watcher = watcher or NullProgress()
     if runner == "inline":
         nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
         watcher.joined(len(nodes), len(nodes))
         link = MemoryLink(
             {node: each.answer for node, each in nodes.items()},
-            lambda node, incarnation: Node(*recast(scenario, seed, node, incarnation)).answer,
+            lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
             world.schedule.unborn,
         )
         return drive(world, link, seed, runner, realtime, watcher, record, link)
+    from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
+
     with LocalSwarm(
         new_run_id(),
         members,
         progress=watcher.joined,
         paced=realtime is not None,
         unborn=world.schedule.unborn,
-        recast=lambda node, incarnation: recast(scenario, seed, node, incarnation),
+        restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
     ) as swarm:
         return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm)
 
@@ -124,10 +126,12 @@ def serve(
         raise ScenarioError(
             [f"{scenario.place}: faults: robots that run elsewhere cannot be killed, started or paused"]
         )
+    from zwerm.deploy.swarm import RemoteSwarm
+
     watcher = watcher or NullProgress()
     with RemoteSwarm(
         new_run_id(),
-        cast(scenario, seed),
+        node_specs(scenario, seed),
         listen=listen,
         credentials_file=credentials_file,
         progress=watcher.joined,

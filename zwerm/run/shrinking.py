@@ -15,7 +15,8 @@ from typing import Any, Final
 from zwerm.errors import ScenarioError
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
-from zwerm.scenario.tables import Scenario, validate
+from zwerm.scenario.load import validate
+from zwerm.scenario.tables import Scenario
 
 Faults = tuple[dict[str, Any], ...]
 

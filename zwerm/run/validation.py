@@ -11,7 +11,8 @@ from pydantic import ValidationError
 
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import assemble, prepare
-from zwerm.scenario.tables import Scenario, load, tables_of, validate
+from zwerm.scenario.load import load, tables_of, validate
+from zwerm.scenario.tables import Scenario
 
 Path = tuple[str, ...]
 

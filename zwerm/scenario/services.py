@@ -1,34 +1,40 @@
-"""Who provides what a deployment needs to have decided."""
+"""Services: the parts of an algorithm that either the coordinator or the robots provide, and the variant that follows."""
 
-from typing import Literal
+from collections.abc import Mapping
 
-from pydantic import BaseModel, ConfigDict
+from zwerm.catalogue import Algorithm, Variant
 
 
-class ServicesTable(BaseModel):
-    """Who provides what: the `coordinator`, or the robots among themselves. Every combination can be run.
+def choose(row: Algorithm, given: Mapping[str, str]) -> Variant:
+    """Return the first variant of `row` that agrees with every provider in `given`.
 
-    With `path` `gradient` robots find the way to the frontier by themselves, and with it fence and frontier, where it ends, and
-    that all is over, when there is none. By `redundancy`, who can be spared is found by the coordinator, by relative
-    homology; with `link` by robots, by agreement among neighbours; or not at all. A coordinator may find that alone.
+    Raises ValueError, in one line that starts with the path of the mistake, where there is none.
     """
+    known = list(row.variants[0].services) if row.variants else []
+    for service, provider in given.items():
+        if service not in known:
+            expected = " or ".join(known) or "no services"
+            raise ValueError(f"services.{service}: {row.name} has {expected}, got {service!r}")
+        providers = list(dict.fromkeys(variant.services[service] for variant in row.variants))
+        if provider not in providers:
+            raise ValueError(f"services.{service}: expected {' or '.join(map(repr, providers))}, got {provider!r}")
+    for variant in row.variants:
+        if all(variant.services[service] == provider for service, provider in given.items()):
+            return variant
+    chosen = ", ".join(f"{service}={provider}" for service, provider in given.items())
+    raise ValueError(f"services: {row.name} has no variant with {chosen}")
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
-    path: Literal["coordinator", "gradient"] = "coordinator"
-    redundancy: Literal["coordinator", "link", "none"] | None = None
+def lacking(variant: Variant, coordinator: bool, radio: bool, stations: int) -> str:
+    """Return what a scenario lacks to run `variant`, as one line that starts with the path, or an empty text.
 
-    @property
-    def spares(self) -> str:
-        """Who finds redundant robots: where nothing else is said a coordinator that finds the path, and else nobody."""
-        return self.redundancy or ("coordinator" if self.path == "coordinator" else "none")
-
-    @property
-    def leaving(self) -> bool:
-        """Whether robots leave the complex before anybody pushes from where they stand."""
-        return self.spares == "link" or (self.path, self.spares) == ("gradient", "coordinator")
-
-    @property
-    def centre(self) -> bool:
-        """Whether anything is the coordinator's."""
-        return "coordinator" in (self.path, self.spares)
+    `coordinator` and `radio` tell whether the scenario has these tables; `stations` is its number of base stations.
+    """
+    chosen = ", ".join(f"{service}={provider}" for service, provider in variant.services.items())
+    if variant.coordinator and not coordinator:
+        return f"services: {chosen} needs the table [coordinator]"
+    if variant.radio and not radio:
+        return f"services: {chosen} needs the table [radio]"
+    if variant.stations_max is not None and not 1 <= stations <= variant.stations_max:
+        return f"services: {chosen} needs 1 to {variant.stations_max} base stations, got {stations}"
+    return ""

@@ -5,65 +5,28 @@ are reported at once, each as `file: path: rule, got value`. What a sensor or a 
 to type; the tables here carry them as they are.
 """
 
-import re
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
-from zwerm.errors import ScenarioError
-from zwerm.scenario.diagnostics import mistakes as mistakes  # for those who type tables of their own
-from zwerm.scenario.overrides import override as override
-from zwerm.scenario.services import ServicesTable
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Fraction = Annotated[float, Field(ge=0, le=1)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1)]
-
-# TOML knows arrays only: a tuple that takes one says so with this, and its items stay strict.
-ARRAY = Field(strict=False)
-Point = Annotated[tuple[Finite, Finite], ARRAY]
-Size = Annotated[tuple[Positive, Positive], ARRAY]
-Pose = Annotated[tuple[Finite, Finite, Finite], ARRAY]
-Grid = Annotated[tuple[Count, Count], ARRAY]
-
-
-def _rectangle(corners: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    xmin, ymin, xmax, ymax = corners
-    if not (xmin < xmax and ymin < ymax):
-        raise ValueError("expected [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax")
-    return corners
-
-
-def _name(text: str) -> str:
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", text):
-        raise ValueError("expected letters, digits, '.', '_' and '-', and no sign first")
-    return text
-
-
-Rectangle = Annotated[tuple[Finite, Finite, Finite, Finite], ARRAY, AfterValidator(_rectangle)]
-
-
-class Table(BaseModel):
-    """A TOML table with a fixed set of keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class OpenTable(BaseModel):
-    """A TOML table that names a plug-in by `kind` and carries the plug-in's own parameters beside it."""
-
-    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
-
-    kind: str
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """The keys besides `kind`, for the plug-in to type."""
-        return dict(self.__pydantic_extra__ or {})
+from zwerm.catalogue import Variant, algorithm_of
+from zwerm.scenario.services import choose, lacking
+from zwerm.scenario.types import (
+    ARRAY,
+    Count,
+    Fraction,
+    Grid,
+    NonNegative,
+    OpenTable,
+    Point,
+    Pose,
+    Positive,
+    Rectangle,
+    Size,
+    Table,
+    scenario_name,
+)
 
 
 class TimeTable(Table):
@@ -248,10 +211,16 @@ class MetricsTable(Table):
     voronoi: VoronoiMetricsTable | None = None
 
 
+class PicturesTable(Table):
+    """Pictures and animations of the run: `layers`, as module:Class, are drawn over those of the algorithm."""
+
+    layers: list[str] = []
+
+
 class Scenario(Table):
     """One experiment."""
 
-    name: Annotated[str, AfterValidator(_name)]
+    name: Annotated[str, AfterValidator(scenario_name)]
     summary: str = ""
     source: str = ""
     time: TimeTable = TimeTable()
@@ -259,7 +228,7 @@ class Scenario(Table):
     robots: RobotsTable
     base: BaseTable | None = None
     coordinator: CoordinatorTable | None = None
-    services: ServicesTable | None = None
+    services: dict[str, str] | None = None
     field: OpenTable | None = None
     landmarks: list[Point] = []
     radio: RadioTable | None = None
@@ -267,24 +236,28 @@ class Scenario(Table):
     faults: list[OpenTable] = []
     random_faults: RandomFaultsTable | None = None
     metrics: MetricsTable = MetricsTable()
+    pictures: PicturesTable = PicturesTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")
 
     @model_validator(mode="after")
-    def _someone_provides_the_services(self) -> Self:
-        services = self.services
-        if services is None:
-            return self
-        if services.centre and self.coordinator is None:
-            raise ValueError("services: what the coordinator provides needs the table [coordinator]")
-        if services.path == "gradient":
-            if self.radio is None:
-                raise ValueError("services.path: robots that find the path need the table [radio]")
-            if self.base is None or self.base.stations > 1:
-                raise ValueError("services.path: robots find the path from one base station")
-        elif services.spares == "link" and self.radio is None:
-            raise ValueError("services.redundancy: robots that agree among themselves need the table [radio]")
+    def _variant_can_run(self) -> Self:
+        variant = self.variant
+        if variant is not None:
+            stations = 0 if self.base is None else self.base.stations
+            missing = lacking(variant, self.coordinator is not None, self.radio is not None, stations)
+            if missing:
+                raise ValueError(missing)
         return self
+
+    @property
+    def variant(self) -> Variant | None:
+        """The variant that `services` chooses, or None where it chooses none or the controller is not in the catalogue.
+
+        Raises ValueError, in one line, where no variant has these services.
+        """
+        row = algorithm_of(self.robots.controller)
+        return None if self.services is None or row is None else choose(row, self.services)
 
     @property
     def folder(self) -> Path:
@@ -295,85 +268,3 @@ class Scenario(Table):
     def place(self) -> str:
         """What messages call it: its file."""
         return self._place
-
-
-BUILT_IN = Path(__file__).parents[1] / "scenarios"
-
-
-def built_in() -> dict[str, Path]:
-    """Return the scenarios that ship with Zwerm, by name."""
-    return {path.stem: path for path in sorted(BUILT_IN.glob("*.toml"), key=lambda each: each.stem)}
-
-
-def locate(name: str) -> Path:
-    """Return the file of a built-in scenario's name, or of a path.
-
-    Raises ScenarioError where neither exists.
-    """
-    if name in built_in():
-        return built_in()[name]
-    path = Path(name)
-    if path.is_file():
-        return path
-    hint = "" if path.suffix == ".toml" else "; built in are " + ", ".join(built_in())
-    raise ScenarioError([f"{name}: expected a scenario file or the name of a built-in one{hint}"])
-
-
-def read(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file, unchecked.
-
-    Raises ScenarioError where it is no TOML.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ScenarioError([f"{path}: not TOML: {error}"]) from None
-    except OSError as error:
-        raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
-
-
-def load(name: str, overrides: tuple[str, ...] = ()) -> Scenario:
-    """Return the scenario `name` (built in, or a path) with each `path=value` of `overrides` applied.
-
-    Raises ScenarioError with every mistake.
-    """
-    tables, path = tables_of(name, overrides)
-    return validate(tables, str(path), path.parent)
-
-
-def tables_of(name: str, overrides: tuple[str, ...] = ()) -> tuple[dict[str, Any], Path]:
-    """Return what `load` would validate, and the scenario's file. Raises ScenarioError where there is none to validate."""
-    path = locate(name)
-    tables = read(path)
-    tables.setdefault("name", path.stem)
-    for assignment in overrides:
-        override(tables, assignment)
-    return tables, path
-
-
-def validate(tables: dict[str, Any], place: str, folder: Path) -> Scenario:
-    """Return `tables` as a Scenario whose relative paths start at `folder`.
-
-    Raises ScenarioError with every mistake, each led by `place`.
-    """
-    try:
-        scenario = Scenario.model_validate(tables)
-    except ValidationError as error:
-        raise ScenarioError(mistakes(error, place)) from None
-    if scenario.services is not None and not scenario.services.centre:
-        scenario = _without_coordinator(scenario)
-    scenario._folder, scenario._place = folder, place
-    return scenario
-
-
-def _without_coordinator(scenario: Scenario) -> Scenario:
-    """Return a scenario in which the coordinator has nothing to do without it, its uplink, and the faults of both."""
-    faults = []
-    for each in scenario.faults:
-        nodes = each.parameters.get("nodes")
-        if each.parameters.get("channel") == "uplink" or nodes == ["coordinator"]:
-            continue
-        if isinstance(nodes, list) and "coordinator" in nodes:
-            each = OpenTable(kind=each.kind, **each.parameters | {"nodes": [n for n in nodes if n != "coordinator"]})
-        faults.append(each)
-    return scenario.model_copy(update={"coordinator": None, "uplink": None, "faults": faults})

@@ -13,13 +13,14 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
-from zwerm import __version__
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import prepare
 from zwerm.run.runner import Runner
-from zwerm.scenario.tables import Scenario, load
-from zwerm.scenario.tables import built_in as built_in_scenarios
+from zwerm.scenario.load import built_in as built_in_scenarios
+from zwerm.scenario.load import load
+from zwerm.scenario.tables import Scenario
 from zwerm.study.tables import Setting, Study, VariantTable
+from zwerm.version import __version__
 
 # What a scenario says of itself and no run depends on.
 _WORDS = {"name", "summary", "source"}

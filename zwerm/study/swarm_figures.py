@@ -14,7 +14,7 @@ from zwerm.run.runner import run
 from zwerm.study.plan import Point
 from zwerm.study.summary import Results
 from zwerm.world.arena.arena import Arena
-from zwerm.world.fields.field import make_field
+from zwerm.world.fields.registry import make_field
 from zwerm.world.metrics.voronoi_coverage import Rings, VoronoiCells
 from zwerm.world.scene import Floats
 

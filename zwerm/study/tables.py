@@ -13,7 +13,9 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 
 from zwerm.errors import ScenarioError
-from zwerm.scenario.tables import Finite, NonNegative, Table, mistakes, read
+from zwerm.scenario.diagnostics import mistakes
+from zwerm.scenario.load import read
+from zwerm.scenario.types import Finite, NonNegative, Table
 
 Setting = bool | int | float | str
 

@@ -12,7 +12,7 @@ from typing import Final
 
 from zwerm.deploy.network.impairments import Impairments, Network, translate
 from zwerm.deploy.network.namespaces import Namespaces, address_of, missing
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.deploy.swarm import LocalSwarm, Members
 from zwerm.errors import LinkError
@@ -68,7 +68,7 @@ def run_twin(scenario: Scenario, seed: int, transport: Transport, watcher: Progr
     world = assemble(scenario, seed)
     links = {name: channel.pairs() for name, channel in world.medium.channels.items()}
     impairments = translate(scenario, links)
-    members = cast(scenario, seed)
+    members = node_specs(scenario, seed)
     with (
         Namespaces(sorted(members)) as namespaces,
         private_directory() as directory,

@@ -23,7 +23,7 @@ from zwerm.agents.runtime.controllers import make
 from zwerm.errors import ControllerError
 from zwerm.maths.keyed_random import Draws
 from zwerm.run.runner import run
-from zwerm.scenario.tables import load
+from zwerm.scenario.load import load
 from zwerm.wire.messages import Command, Observation, WheelSpeeds
 
 # The e-puck of the paper.

@@ -26,7 +26,8 @@ from support import ROOT
 
 from zwerm.agents.conformance.check import ConformanceError, check
 from zwerm.agents.runtime.contract import Controller, Setup
-from zwerm.agents.runtime.controllers import BUILT_IN, find
+from zwerm.agents.runtime.controllers import find
+from zwerm.catalogue import ROBOT, names
 from zwerm.errors import ControllerError
 from zwerm.maths.keyed_random import stream
 from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission, Wake, WheelSpeeds
@@ -52,7 +53,7 @@ def still(self: Any, observation: Observation) -> Command:
 # --- the good -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", sorted(BUILT_IN))
+@pytest.mark.parametrize("name", names(ROBOT))
 def test_a_built_in_controller_conforms(name: str) -> None:
     check(find(name), channels=("robots", "uplink"))
 

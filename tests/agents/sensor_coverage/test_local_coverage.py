@@ -17,12 +17,13 @@ from zwerm.agents.sensor_coverage.messages.peers import (
 )
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.mailbox import TRIES_MAX, ReliableMailbox
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import run
-from zwerm.scenario.tables import Scenario, load
+from zwerm.scenario.load import load
+from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
@@ -38,7 +39,7 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
     At no tick may two robots that are not part of a push have the same place, or a robot that is out be gone.
     """
     world = assemble(scenario, 1)
-    nodes = {node: Node(*each) for node, each in cast(scenario, 1).items()}
+    nodes = {node: Node(*each) for node, each in node_specs(scenario, 1).items()}
     seen: dict[int, None] = {}
 
     def out() -> list[LocalRobot]:

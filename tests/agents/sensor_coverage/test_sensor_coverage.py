@@ -8,7 +8,7 @@ import pytest
 from halls import HALL, NOISE, OBSTACLE, Link, drive
 
 from zwerm.agents.runtime.contract import Body, Setup
-from zwerm.agents.sensor_coverage import Robot
+from zwerm.agents.sensor_coverage import CentralRobot
 from zwerm.agents.sensor_coverage.messages.commands import (
     Answer,
     Arrived,
@@ -24,7 +24,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
 )
 from zwerm.agents.sensor_coverage.motion.homing import offset, slid, unit
 from zwerm.run.runner import run
-from zwerm.scenario.tables import load
+from zwerm.scenario.load import load
 from zwerm.wire.messages import (
     Bearing,
     BodyVelocity,
@@ -71,7 +71,7 @@ class OneRobot:
 
     def __init__(self, neighbour: tuple[float, float], wall_x_m: float) -> None:
         body = Body("holonomic", 0.07, 0.5, 6.0)
-        self.robot = Robot(Setup(1, "robot", 0.1, Robot.sensors, b"0" * 16, body))
+        self.robot = CentralRobot(Setup(1, "robot", 0.1, CentralRobot.sensors, b"0" * 16, body))
         self.neighbour, self.wall_x_m = neighbour, wall_x_m
         self.x = self.y = 0.0
         self.moved = (0.0, 0.0)

@@ -9,7 +9,7 @@ import pytest
 
 from zwerm.agents.voronoi_coverage.fixed_point import UNITS_PER_M, target
 from zwerm.maths.polygons import estimated_centroid, voronoi_cell
-from zwerm.world.fields.field import Gaussians
+from zwerm.world.fields.gaussians import Gaussians
 from zwerm.world.geometry.tessellation import Tessellation
 
 SCALE = 1000

@@ -32,7 +32,7 @@ from zwerm.errors import ScenarioError
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
-from zwerm.scenario.tables import tables_of, validate
+from zwerm.scenario.load import tables_of, validate
 from zwerm.wire.messages import Bearing, BodyVelocity, Displacement, Observation, Packet
 
 HALL = ("arena.size_m=[2.4,1.8]", "base.pose=[0.2,0.9,0.0]", "robots.count=30", "services.redundancy=link")

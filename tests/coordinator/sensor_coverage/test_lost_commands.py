@@ -29,12 +29,13 @@ from zwerm.agents.sensor_coverage.protocols.deduplication import COPIES_MAX, Req
 from zwerm.coordinator.sensor_coverage.command_mailbox import HASTE_COPIES, MUSTER_COPIES, CommandMailbox
 from zwerm.coordinator.sensor_coverage.coordinator import SensorCoverageCoordinator
 from zwerm.coordinator.sensor_coverage.retry_policy import BURST_TRIES, RetryPolicy
-from zwerm.deploy.node_specs import cast, recast
+from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
-from zwerm.scenario.tables import Scenario, load
+from zwerm.scenario.load import load
+from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Packet
 from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.metrics.measures import measure
@@ -248,10 +249,10 @@ def test_the_dead_are_waited_for_as_long_as_losses_may_explain_their_silence(los
 def drive(scenario: Scenario) -> tuple[str, World, SensorCoverageCoordinator]:
     """Run inline, and return how it ended, the world, and the coordinator in its last life."""
     world = assemble(scenario, 1)
-    nodes = {node: Node(*each) for node, each in cast(scenario, 1).items()}
+    nodes = {node: Node(*each) for node, each in node_specs(scenario, 1).items()}
 
     def again(node: int, incarnation: int) -> Callable[[bytes], bytes]:
-        nodes[node] = Node(*recast(scenario, 1, node, incarnation))
+        nodes[node] = Node(*restart_spec(scenario, 1, node, incarnation))
         return nodes[node].answer
 
     link = MemoryLink({node: each.answer for node, each in nodes.items()}, again)

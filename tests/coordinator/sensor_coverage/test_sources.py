@@ -12,12 +12,12 @@ from zwerm.agents.sensor_coverage.frontier.services import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.coordinator.sensor_coverage.command_mailbox import together
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import run
-from zwerm.scenario.tables import load
+from zwerm.scenario.load import load
 from zwerm.wire.messages import Wake
 
 HALL = ("arena.size_m=[4.2,2.6]", "robots.count=40", "base.poses=[[0.2,1.3,0.0],[4.0,1.3,3.0]]")
@@ -52,9 +52,9 @@ def test_of_robots_released_at_once_one_enters_a_tick() -> None:
 
 
 def test_every_station_is_a_node_and_only_the_coordinator_knows_which() -> None:
-    players = cast(load("sensor-coverage-multi-source"), 1)
-    assert [node for node, (_, setup) in players.items() if setup.role == "base"] == [0, 1, 2]
-    assert {node: setup.bases for node, (_, setup) in players.items() if setup.bases} == {160: (0, 1, 2)}
+    specs = node_specs(load("sensor-coverage-multi-source"), 1)
+    assert [node for node, (_, setup) in specs.items() if setup.role == "base"] == [0, 1, 2]
+    assert {node: setup.bases for node, (_, setup) in specs.items() if setup.bases} == {160: (0, 1, 2)}
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
 
 from zwerm.errors import ScenarioError
 from zwerm.scenario.tables import ArenaTable
+from zwerm.world.arena import arena as module
 from zwerm.world.arena.arena import Arena
-from zwerm.world.arena.arena import arena as module
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 
@@ -97,40 +97,14 @@ def test_sight_is_blocked_where_shapely_finds_a_crossing(way: str, arena: Arena,
 
 @pytest.mark.parametrize("way", WAYS)
 @settings(deadline=None, max_examples=50)
-@given(
-    arena=arenas(),
-    rays=st.lists(st.tuples(place, st.floats(-np.pi, np.pi)), min_size=1, max_size=8),
-    limit_m=st.sampled_from([0.3, 2.0, 10.0, np.inf]),
-)
-def test_a_ray_ends_where_shapely_finds_the_first_wall(way: str, arena: Arena, rays: Any, limit_m: float) -> None:
-    origin, angle = np.array([ray[0] for ray in rays]), np.array([ray[1] for ray in rays])
-    direction = np.column_stack([np.cos(angle), np.sin(angle)])
-    lines = shapely.linestrings(np.stack([origin, origin + 10.0 * direction], axis=1))
-    assume((shapely.distance(lines, MultiPoint(arena.segments.reshape(-1, 2))) > 1e-6).all())
-    met = shapely.distance(shapely.points(origin), shapely.intersection(lines, walls_of(arena)))
-    assume(((np.abs(met - limit_m) > 1e-6) & ~((met > 1e-12) & (met < 1e-7))).all())
-    expected = np.fmin(met, limit_m)  # an empty intersection is at distance nan
-    with answered(way):
-        assert arena.ray_length(origin, direction, limit_m) == pytest.approx(expected, abs=1e-9)
-
-
-def test_a_ray_along_a_wall_ends_at_its_near_end_and_one_that_only_points_away_goes_on() -> None:
-    arena = Arena(box(0, 0, 10, 10), [LineString([(4, 5), (6, 5)])])
-    origin = np.array([[1.0, 5.0], [9.0, 5.0], [5.0, 5.0], [1.0, 5.0]])
-    direction = np.array([[1.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [-1.0, 0.0]])
-    assert arena.ray_length(origin, direction, 20.0).tolist() == [3.0, 3.0, 0.0, 1.0]
-
-
-@pytest.mark.parametrize("way", WAYS)
-@settings(deadline=None, max_examples=50)
 @given(arena=arenas(), points=st.lists(place, min_size=1, max_size=8), margin_m=st.sampled_from([0.0, 0.1, 0.4]))
-def test_clearance_nearest_wall_and_margin_are_shapelys(way: str, arena: Arena, points: Any, margin_m: float) -> None:
+def test_nearest_wall_and_margin_are_shapelys(way: str, arena: Arena, points: Any, margin_m: float) -> None:
     at, dots = np.array(points), shapely.points(np.array(points))
     expected = shapely.distance(dots, walls_of(arena))
     with answered(way):
-        assert arena.clearance(at) == pytest.approx(expected, abs=1e-12)
-        nearest = shapely.points(arena.nearest_wall_points(at))
-        assert shapely.distance(nearest, walls_of(arena)).max() < 1e-12
+        nearest = arena.nearest_wall_points(at)
+        assert np.hypot(*(nearest - at).T) == pytest.approx(expected, abs=1e-12)
+        assert shapely.distance(shapely.points(nearest), walls_of(arena)).max() < 1e-12
         assume((np.abs(expected - margin_m) > 1e-9).all())
         inside = shapely.contains_properly(arena.free, dots) & (expected > margin_m)
         assert arena.contains(at, margin_m).tolist() == inside.tolist()
@@ -167,13 +141,10 @@ def test_in_a_large_arena_the_index_answers_bit_for_bit_as_comparing_all_with_al
     arena = Arena(box(-1, -1, 41, 41).difference(obstacles), [LineString([(0, 0), (40, 39)])])
     assert len(arena.segments) > 2000
     start, end = random.uniform(0, 40, (2, 300, 2))
-    direction = (end - start) / np.hypot(*(end - start).T)[:, None]
     answers = []
     for way in WAYS:
         with answered(way):
-            answers.append(
-                (arena.blocked(start, end), arena.ray_length(start, direction, 25.0), arena.clearance(start))
-            )
+            answers.append((arena.blocked(start, end), arena.nearest_wall_points(start)))
     for all_with_all, *others in zip(*answers, strict=True):
         assert all(other.tolist() == all_with_all.tolist() for other in others)
     assert 0 < answers[0][0].sum() < 300
@@ -186,8 +157,7 @@ def test_no_questions_get_no_answers() -> None:
         with answered(way):
             for answer in (
                 arena.blocked(none, none),
-                arena.ray_length(none, none, 1.0),
-                arena.clearance(none),
+                arena.nearest_wall_points(none)[:, 0],
                 arena.contains(none, 0.1),
                 arena.walls_within(none, 1.0).point,
             ):

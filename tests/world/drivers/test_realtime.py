@@ -11,7 +11,7 @@ from pathlib import Path
 from support import ROOT, ZWERM, scenario, until
 
 from zwerm.agents.runtime.node import Node
-from zwerm.deploy.node_specs import cast, recast
+from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.link.memory import MemoryLink
@@ -27,8 +27,8 @@ def test_the_world_goes_on_while_a_program_starts_and_observes_it_once_it_has() 
     chosen = scenario(faults=[{"kind": "restart", "nodes": [1], "at_s": 0.5}], time={"duration_s": 4.0})
     world = assemble(chosen, 1)
     link = MemoryLink(
-        {node: Node(*played).answer for node, played in cast(chosen, 1).items()},
-        lambda node, life: Node(*recast(chosen, 1, node, life)).answer,
+        {node: Node(*spec).answer for node, spec in node_specs(chosen, 1).items()},
+        lambda node, life: Node(*restart_spec(chosen, 1, node, life)).answer,
     )
     tick_15, started, observed = threading.Event(), threading.Event(), Counter[int]()
     start, send = link.start, link.send
@@ -60,7 +60,7 @@ def test_the_world_goes_on_while_a_program_starts_and_observes_it_once_it_has() 
 
 def test_a_hung_robot_is_sent_no_more_than_it_can_owe_and_is_observed_again_when_it_goes_on(nothing_left: None) -> None:
     chosen = scenario(time={"dt_s": 0.01, "duration_s": 2.0})
-    with LocalSwarm(new_run_id(), cast(chosen, 1), paced=True) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(chosen, 1), paced=True) as swarm:
         world, observed = assemble(chosen, 1), Counter[int]()
         send = swarm.link.send
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from support import robots_of_this_process, scenario, until
 
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError, ScenarioError, StragglerError
 from zwerm.link.node import ZenohNodeLink
@@ -87,7 +87,7 @@ def test_twenty_seeds_with_every_fault_and_model_give_one_trace_each_inline_and_
 def test_a_crash_is_a_sigkill_and_a_pause_a_sigstop(nothing_left: None) -> None:
     faults = [{"kind": "crash", "nodes": [1], "at_s": 0.5}, {"kind": "pause", "nodes": [2], "at_s": 0.5}]
     chosen = scenario(faults=faults, time={"duration_s": 1.0})
-    with LocalSwarm(new_run_id(), cast(chosen, 1)) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(chosen, 1)) as swarm:
         pids = swarm.supervisor.pids
         world = assemble(chosen, 1)
         drive(world, swarm.link, 1, "processes", programs=swarm)
@@ -103,7 +103,7 @@ def state_of(pid: int) -> str:
 
 def test_a_process_that_somebody_else_stops_ends_the_run_with_its_name(nothing_left: None) -> None:
     chosen = scenario(time={"straggler_s": 0.5, "duration_s": 60.0})
-    with LocalSwarm(new_run_id(), cast(chosen, 1)) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(chosen, 1)) as swarm:
         world = assemble(chosen, 1)
         swarm.pause(2)
         result = drive(world, swarm.link, 1, "processes", programs=swarm)
@@ -114,7 +114,7 @@ def test_a_process_that_somebody_else_stops_ends_the_run_with_its_name(nothing_l
 def test_a_late_joiner_has_no_process_before_its_time(nothing_left: None) -> None:
     chosen = scenario(faults=[{"kind": "join", "nodes": [3], "at_s": 1.0}])
     world = assemble(chosen, 1)
-    with LocalSwarm(new_run_id(), cast(chosen, 1), unborn=world.schedule.unborn) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(chosen, 1), unborn=world.schedule.unborn) as swarm:
         assert len(robots_of_this_process()) == 3
         result = drive(world, swarm.link, 1, "processes", programs=swarm)
         assert len(robots_of_this_process()) == 4
@@ -123,7 +123,7 @@ def test_a_late_joiner_has_no_process_before_its_time(nothing_left: None) -> Non
 
 def test_a_stale_incarnation_is_refused_and_counted(nothing_left: None) -> None:
     chosen = scenario()
-    with LocalSwarm(new_run_id(), cast(chosen, 1)) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(chosen, 1)) as swarm:
         old = next(credential for credential in swarm.credentials.nodes if credential.node == 1)
         endpoint = swarm.supervisor._endpoint
         swarm.restart(1)

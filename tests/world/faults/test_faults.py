@@ -11,7 +11,7 @@ from support import scenario
 
 from zwerm.agents.runtime.node import Node
 from zwerm.cli.console import print_result
-from zwerm.deploy.node_specs import cast, recast
+from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import LinkError, ScenarioError
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
@@ -20,6 +20,10 @@ from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Observation, decode_observation
 from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.faults.generator import draw
+from zwerm.world.faults.nodes import CrashTable
+from zwerm.world.faults.schedule import KINDS as SCHEDULE_KINDS
+from zwerm.world.faults.sensing import KINDS as SENSING_KINDS
+from zwerm.world.faults.sensing import SensorNoise, SensorNoiseTable
 from zwerm.world.tick.node_status import ProcessAction
 from zwerm.world.world import Send
 
@@ -45,9 +49,9 @@ class Life:
         self.world = assemble(chosen, seed)
         self.observed: list[dict[int, Observation]] = []
         self.orders: list[list[ProcessAction]] = []
-        nodes = {node: Node(*played).answer for node, played in cast(chosen, seed).items()}
+        nodes = {node: Node(*spec).answer for node, spec in node_specs(chosen, seed).items()}
         link = MemoryLink(
-            nodes, lambda node, life: Node(*recast(chosen, seed, node, life)).answer, self.world.schedule.unborn
+            nodes, lambda node, life: Node(*restart_spec(chosen, seed, node, life)).answer, self.world.schedule.unborn
         )
         self._spy()
         self.outcome = LockStep(self.world, link, programs=link).run()
@@ -360,6 +364,42 @@ def test_no_base_station_is_drawn_and_one_at_least_of_those_who_are_out(fraction
     assert 0 not in nodes
 
 
+@pytest.mark.parametrize("wider", [False, True])
+def test_a_new_optional_key_of_a_kind_of_fault_changes_no_draw(monkeypatch: pytest.MonkeyPatch, wider: bool) -> None:
+    noise = {"kind": "sensor_noise", "sensor": "bearings", "sd": 0.1, "at_s": 0.0}
+    seeing = {"sensors": [{"kind": "bearings"}]}
+
+    def drawn_now(**more: Any) -> tuple[list[tuple[int, list[int]]], str]:
+        return struck(1), Life(faulty(noise | more, robots=seeing)).world.trace.hex()
+
+    before = drawn_now()
+
+    class WiderCrash(CrashTable):
+        depth_m: float | None = None
+
+    class WiderNoise(SensorNoiseTable):
+        depth_m: float = 3.0 if wider else 2.0
+
+    monkeypatch.setitem(SCHEDULE_KINDS, "crash", WiderCrash)
+    monkeypatch.setitem(SCHEDULE_KINDS, "sensor_noise", WiderNoise)
+    monkeypatch.setitem(SENSING_KINDS, WiderNoise, SensorNoise)
+    assert drawn_now() == before
+    # What a scenario writes does key the draws: the same value, given, is another fault.
+    assert drawn_now(depth_m=WiderNoise.model_fields["depth_m"].default)[1] != before[1]
+
+
+def test_the_order_of_keys_and_an_integer_for_a_number_change_no_draw_and_the_kind_does() -> None:
+    noise = {"kind": "sensor_noise", "sensor": "bearings", "sd": 1.0, "at_s": 0.0}
+    seeing = {"sensors": [{"kind": "bearings"}]}
+    turned = dict(reversed(noise.items())) | {"sd": 1, "at_s": 0}
+    traces = [Life(faulty(each, robots=seeing)).world.trace.hex() for each in (noise, turned)]
+    assert traces[0] == traces[1]
+    out = [{"kind": kind, "robots": [0], "at_s": 0.0} for kind in ("dead_beacon", "camera_blackout")]
+    purposes = [fault.purpose for fault in assemble(faulty(*out, robots=seeing), 1).schedule.faults]
+    assert len(set(purposes)) == 2
+    assert all(purpose.startswith("faults/1/") for purpose in purposes), "each is the first of its kind"
+
+
 # --- random schedules -----------------------------------------------------------------------------------------------
 
 RATES = {
@@ -395,6 +435,18 @@ def test_a_random_schedule_depends_on_its_seed_and_no_kind_on_another() -> None:
     assert drawn(1, seed=7) == drawn(2, seed=7)
     fewer = [fault for fault in drawn(1) if fault["kind"] != "jam"]
     assert drawn(1, jam_per_h=0.0) == fewer
+
+
+@pytest.mark.parametrize("touch", [{"switches": 4}, {}, {"switches": 12}])
+def test_random_stuck_switches_are_drawn_among_those_that_the_sensor_has(touch: dict[str, int]) -> None:
+    robots = {"sensors": [{"kind": "touch", **touch}]}
+    chosen = faulty(random_faults={"stuck_touch_per_h": 4_000.0}, robots=robots)
+    arena = assemble(faulty(robots=robots), 1).arena
+    tables = [table for seed in range(100) for table in draw(chosen, seed, arena)]
+    # About 220 faults: the chance that one switch of 12 is never drawn is below 1e-7.
+    assert {table.parameters["switch"] for table in tables} == set(range(touch.get("switches", 8)))
+    for seed in range(10):
+        assemble(chosen, seed)
 
 
 def test_random_faults_that_cannot_be_are_mistakes() -> None:

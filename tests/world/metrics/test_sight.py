@@ -11,7 +11,7 @@ from shapely.geometry import LineString
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
 from zwerm.scenario.tables import ArenaTable
-from zwerm.view.snapshots import stages
+from zwerm.view.sensor_coverage import snapshots
 from zwerm.world.arena.arena import Arena
 from zwerm.world.metrics.measures import deployment_cycles
 from zwerm.world.metrics.sight import SeenArea, hexagonal_packing_robots, holes, obstacles, reachable
@@ -97,7 +97,7 @@ def test_holes_are_those_of_the_complex_and_obstacles_those_of_the_arena() -> No
 def test_the_complex_of_a_run_can_be_drawn_at_any_cycle(tmp_path: Path) -> None:
     settings = ["arena.size_m=[2.2,1.6]", "base.pose=[0.2,0.8,0.0]", "robots.count=14"]
     result = run("sensor-coverage", runner="inline", overrides=settings)
-    told = stages(result.told)
+    told = snapshots(result.told)
     assert [each.cycle for each in told] == list(range(1, int(result.metrics["deployment_cycles"]) + 1))
     assert len(told[1].frontier)
     assert not len(told[-1].frontier)
@@ -141,7 +141,7 @@ def test_holes_are_what_another_library_finds_in_the_true_complex(deployed: RunR
 
 def test_cycles_are_those_told_of_and_ticks_and_messages_are_shared_out_among_them(deployed: RunResult) -> None:
     found = deployed.metrics
-    assert found["deployment_cycles"] == stages(deployed.told)[-1].cycle
+    assert found["deployment_cycles"] == snapshots(deployed.told)[-1].cycle
     assert found["ticks_per_cycle_mean"] == deployed.ticks / found["deployment_cycles"]
     sent = sum(sum(channel["messages"]) for channel in deployed.radio["channels"].values())
     assert found["messages_per_cycle_mean"] == sent / found["deployment_cycles"]

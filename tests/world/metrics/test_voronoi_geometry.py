@@ -13,7 +13,9 @@ from scipy.spatial import Voronoi
 
 from zwerm.maths.polygons import estimated_centroid, linear_centroid, moments, nearest_point, voronoi_cell
 from zwerm.world.arena.arena import Arena
-from zwerm.world.fields.field import Constant, Gaussians, Linear
+from zwerm.world.fields.constant import Constant
+from zwerm.world.fields.gaussians import Gaussians
+from zwerm.world.fields.linear import Linear
 from zwerm.world.geometry import tessellation
 from zwerm.world.geometry.quadrature import integrate
 from zwerm.world.geometry.tessellation import Tessellation

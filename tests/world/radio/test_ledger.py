@@ -148,7 +148,65 @@ def test_messages_and_bytes_are_counted_once_for_each_sender() -> None:
     books = radio.medium.channels["robots"].accounts
     assert books.node_messages.tolist() == [2, 0, 0]
     assert books.node_bytes.tolist() == [6, 0, 0]
-    assert radio.medium.summary()["bytes"] == 11
+    assert radio.medium.summary()["bytes"] == 6
+
+
+def test_who_is_out_of_reach_loses_nothing() -> None:
+    count = 12  # along a line, so that each has two neighbours at most
+    line = [[0.5 + index, 0.5, 0.0] for index in range(count)]
+    robots = {
+        "count": count,
+        "controller": "beacon",
+        "sensors": [],
+        "body": {"kind": "holonomic", "radius_m": 0.05},
+        "placement": {"kind": "poses", "poses": line},
+    }
+    down = {"kind": "crash", "nodes": [count - 1], "at_s": 0.0}
+    cut = {"kind": "cut", "senders": [1], "receivers": [0, 5], "at_s": 0.0}
+    chosen = scenario(
+        arena={"size_m": [20.0, 1.0]},
+        time={"duration_s": 40.0},
+        robots=robots,
+        radio={"range_m": 1.1, "loss": 0.3, "check": True},
+        faults=[down, cut],
+    )
+    result = run(chosen, 1, "inline")
+    books, ticks = result.radio, 400
+    sent = ticks * (count - 1) * (count - 1)  # 11 live robots, 11 receivers each
+    # Neighbours among the 11 that live: 10 pairs, both ways. Of these the fault cuts one link, not the one to a stranger.
+    in_reach = ticks * 20
+    assert books["sent"] == sent
+    assert books["out_of_reach"] == sent - in_reach
+    assert books["dropped"]["cut"] == ticks
+    assert books["dropped"]["receiver-down"] == ticks * (count - 1)
+    assert books["sent"] == books["delivered"] + sum(books["dropped"].values()) + books["in_flight"]
+    assert books["bytes"] == sum(books["channels"]["robots"]["message_bytes"]) == ticks * (count - 1) * 16
+    assert result.metrics["out_of_reach_fraction"] == pytest.approx(1.0 - in_reach / sent)
+    expected = 0.7 * 19 / 20
+    assert abs(result.metrics["delivered_fraction"] - expected) < 2.576 * (0.7 * 0.3 / in_reach) ** 0.5 + 20 / in_reach
+    links = books["channels"]["robots"]["links"]
+    assert sum(links["out_of_reach"]) == books["channels"]["robots"]["out_of_reach"] == books["out_of_reach"]
+    console = Console(record=True, width=160, file=io.StringIO())
+    print_books(console, books, 1)
+    rows = [line.split() for line in console.export_text().splitlines()]
+    assert rows[2][-3] == f"{100.0 * result.metrics['delivered_fraction']:.1f}"
+    assert rows[3][:4] == ["1", "0", str(ticks), "0"], "the link that lost most, and not one out of reach"
+
+
+def test_without_anybody_in_reach_there_is_no_fraction_delivered() -> None:
+    far = {"range_m": 0.001}
+    metrics = run(scenario(robots={"controller": "beacon", "sensors": []}, radio=far), 1, "inline").metrics
+    assert metrics["out_of_reach_fraction"] == 1.0
+    assert "delivered_fraction" not in metrics
+
+
+def test_a_model_of_ones_own_says_whether_it_finds_receivers_out_of_reach() -> None:
+    far = {"senders": [0], "receivers": [1]}
+    for own, lost in (("own_models:Shadowed", 0), ("own_models:Lossy", 10)):
+        radio = Radio(ring(3), [{"kind": own, **far}])
+        summary = radio.all_broadcast(10)
+        assert summary["dropped"] == {"silence": 10}
+        assert summary["out_of_reach"] == 10 - lost
 
 
 def test_the_age_of_information_is_what_watching_every_tick_gives() -> None:

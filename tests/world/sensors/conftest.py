@@ -8,7 +8,7 @@ import pytest
 from shapely.geometry import LineString, box
 
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.tables import OpenTable
+from zwerm.scenario.types import OpenTable
 from zwerm.world.arena.arena import Arena
 from zwerm.world.scene import Scene
 from zwerm.world.sensors import Sensor, Surroundings

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from zwerm.scenario.tables import Positive, Table
+from zwerm.scenario.types import Positive, Table
 
 
 class Thermometer:

@@ -11,8 +11,9 @@ from PIL import Image
 from scipy.interpolate import RegularGridInterpolator
 
 from zwerm.errors import ScenarioError
-from zwerm.scenario.tables import OpenTable
-from zwerm.world.fields.field import Bitmap, make_field
+from zwerm.scenario.types import OpenTable
+from zwerm.world.fields.bitmap import Bitmap
+from zwerm.world.fields.registry import make_field
 
 BOUNDS_M = (0.0, 0.0, 3.0, 2.0)
 coordinate = st.floats(-1.0, 4.0)
@@ -98,7 +99,13 @@ def test_pictures_of_one_pixel_and_of_sixteen_bits_are_fields_too(tmp_path):
 @pytest.mark.parametrize(
     ("table", "lines"),
     [
-        ({"kind": "hills"}, ["x.toml: field.kind: expected bitmap, constant, gaussians, lamp, linear, got 'hills'"]),
+        (
+            {"kind": "hills"},
+            [
+                "x.toml: field.kind: expected a built-in field (bitmap, constant, gaussians, lamp, linear) "
+                "or module:Class, got 'hills'"
+            ],
+        ),
         ({"kind": "constant"}, ["x.toml: field.value: required, and missing"]),
         (
             {"kind": "gaussians", "amplitudes": [1, 2], "centers_m": [[0, 0]], "sd_m": 0},
@@ -149,3 +156,14 @@ def test_the_sensors_noise_has_the_given_spread_and_is_keyed(make_scene, sensor_
     assert values.std(axis=0) == pytest.approx([0.5, 2.0, 2.0], rel=0.2)
     assert values.mean(axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=4 * 2.0 / math.sqrt(200))
     assert np.abs(np.corrcoef(values.T) - np.eye(3)).max() < 4 / math.sqrt(200)
+
+
+def test_a_field_of_a_users_own_is_named_by_its_module_and_class():
+    field = make_field(
+        OpenTable.model_validate({"kind": "own_fields:Waves", "length_m": 4.0}), (0, 0, 1, 1), Path(), "x.toml"
+    )
+    value, gradient = field.sample(np.array([[1.0, 0.0], [0.0, 0.0]]))
+    assert value == pytest.approx([1.0, 0.0])
+    assert gradient[1] == pytest.approx([np.pi / 2.0, 0.0])
+    with pytest.raises(ScenarioError, match="module 'own_fields' has no class 'Nothing'"):
+        make_field(OpenTable.model_validate({"kind": "own_fields:Nothing"}), (0, 0, 1, 1), Path(), "x.toml")

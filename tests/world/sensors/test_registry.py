@@ -7,12 +7,13 @@ import msgspec
 import numpy as np
 import pytest
 
+from zwerm.catalogue import SENSORS
 from zwerm.errors import ScenarioError
-from zwerm.scenario.tables import OpenTable
-from zwerm.wire.messages import SENSOR_FIELDS, Observation, decode_observation, encode
-from zwerm.world.fields.field import Linear
+from zwerm.scenario.types import OpenTable
+from zwerm.wire.messages import SENSOR_FIELDS, Observation, Wake, decode_observation, encode
+from zwerm.world.fields.linear import Linear
 from zwerm.world.sensors import Surroundings
-from zwerm.world.sensors.registry import BUILT_IN, make_sensors
+from zwerm.world.sensors.registry import find, make_sensors
 
 
 @pytest.fixture(autouse=True)
@@ -44,7 +45,7 @@ def mistakes(make, *tables, **surroundings):
 
 def test_every_built_in_sensor_fills_its_field_with_what_crosses_the_wire(make, scene):
     landmarks, field = np.array([[1.0, 1.0]]), Linear(0.0, (1.0, 0.0))
-    sensors = make(*({"kind": kind} for kind in BUILT_IN), landmarks=landmarks, field=field)
+    sensors = make(*({"kind": kind} for kind in SENSORS), landmarks=landmarks, field=field)
     assert {sensor.field for sensor in sensors} == set(SENSOR_FIELDS) - {"extra"}
     robots = scene.present_ids()
     readings = {sensor.field: sensor.read(scene, robots) for sensor in sensors}
@@ -58,10 +59,10 @@ def test_every_built_in_sensor_fills_its_field_with_what_crosses_the_wire(make, 
 
 def test_every_built_in_sensor_reads_nobody_where_nobody_is_asked(make, scene):
     nobody = np.empty(0, dtype=np.int64)
-    sensors = make(*({"kind": kind} for kind in BUILT_IN), landmarks=np.array([[1.0, 1.0]]), field=Linear(0, (0, 0)))
-    assert [list(sensor.read(scene, nobody)) for sensor in sensors] == [[]] * len(BUILT_IN)
+    sensors = make(*({"kind": kind} for kind in SENSORS), landmarks=np.array([[1.0, 1.0]]), field=Linear(0, (0, 0)))
+    assert [list(sensor.read(scene, nobody)) for sensor in sensors] == [[]] * len(SENSORS)
     scene.present[:] = False
-    assert [list(sensor.read(scene, nobody)) for sensor in sensors] == [[]] * len(BUILT_IN)
+    assert [list(sensor.read(scene, nobody)) for sensor in sensors] == [[]] * len(SENSORS)
 
 
 @pytest.mark.parametrize(
@@ -117,7 +118,7 @@ def test_every_built_in_sensor_reads_nobody_where_nobody_is_asked(make, scene):
             {"kind": "other_peoples:Untyped"},
             [
                 "robots.sensors.0.kind: other_peoples:Untyped is no sensor: its `Parameters` must be a subclass of "
-                "zwerm.scenario.tables.Table"
+                "zwerm.scenario.types.Table"
             ],
         ),
         (
@@ -173,3 +174,24 @@ def test_somebody_elses_sensor_may_stand_in_for_a_built_in_one(make, scene):
     (sensor,) = make({"kind": "other_peoples:OwnLineOfSight"})
     assert sensor.field == "line_of_sight"
     assert sensor.read(scene, scene.present_ids()) == [True, True]
+
+
+@pytest.mark.parametrize("kind", sorted(SENSORS))
+def test_the_stimuli_of_a_sensor_cross_the_wire_and_its_traits_agree_with_them(kind):
+    found = find(kind)
+    random = np.random.Generator(np.random.Philox(7))
+    stimuli = [found.rest(), found.extremes(), *(found.stimulus(random, count) for count in (0, 1, 5))]
+    for reading in stimuli:
+        observation = Observation(tick=0, time_s=0.0, **{found.field: reading})
+        assert decode_observation(encode(observation)) == observation
+    assert found.has_items == (isinstance(found.rest(), tuple) and len(found.rest()) == 0)
+    if found.wake_event:
+        assert hasattr(Wake(), found.wake_event)
+        assert found.signature(found.stimulus(random, 3)) != found.signature(found.rest())
+
+
+def test_a_sensor_that_does_not_inherit_has_the_traits_of_the_base_class():
+    found = find("other_peoples:Thermometer")
+    assert found.dark is None
+    assert not found.has_items
+    assert found.rest() == (0.0,)

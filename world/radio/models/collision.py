@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.scenario.tables import Positive
+from zwerm.scenario.types import Positive
 from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 from zwerm.world.scene import Bools, Floats, Ints
 

@@ -9,12 +9,11 @@ The jitter's distribution, of mean jitter_s:
     pareto        with shape 2.5: a heavier one. netem offers the like, tc-netem(8)
 """
 
-import math
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from zwerm.scenario.tables import NonNegative
+from zwerm.scenario.types import NonNegative
 from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 from zwerm.world.scene import Floats
 
@@ -60,8 +59,3 @@ class Delay:
         if self._table.distribution == "exponential":
             return np.asarray(-np.log(left))
         return np.asarray(left ** (-1.0 / _PARETO_SHAPE) * (1.0 - 1.0 / _PARETO_SHAPE))
-
-
-def ticks_of(delay_s: float, dt_s: float) -> int:
-    """Return how many ticks after sending a packet with this delay is delivered."""
-    return max(1, math.ceil(delay_s / dt_s - 1e-9))

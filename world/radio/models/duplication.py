@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from zwerm.scenario.tables import Fraction
+from zwerm.scenario.types import Fraction
 from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 
 

@@ -17,6 +17,7 @@ class LineOfSightModel:
     kind: ClassVar[str] = "line_of_sight"
     cause: ClassVar[str] = "no-line-of-sight"
     needs_positions: ClassVar[bool] = True
+    out_of_reach: ClassVar[bool] = True
     Parameters: ClassVar[type[LinkTable]] = LinkTable
 
     def __init__(self, parameters: LinkTable, place: ModelPlace) -> None:

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from zwerm.scenario.tables import Fraction
+from zwerm.scenario.types import Fraction
 from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 
 

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.scenario.tables import Finite, NonNegative, Positive
+from zwerm.scenario.types import Finite, NonNegative, Positive
 from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 from zwerm.world.scene import Floats
 

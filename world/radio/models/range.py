@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.scenario.tables import Positive
+from zwerm.scenario.types import Positive
 from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 
 
@@ -23,6 +23,7 @@ class DiscRange:
     kind: ClassVar[str] = "range"
     cause: ClassVar[str] = "out-of-range"
     needs_positions: ClassVar[bool] = True
+    out_of_reach: ClassVar[bool] = True
     Parameters: ClassVar[type[LinkTable]] = RangeTable
 
     def __init__(self, parameters: RangeTable, place: ModelPlace) -> None:

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from zwerm.scenario.tables import NonNegative, Positive
+from zwerm.scenario.types import NonNegative, Positive
 from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 from zwerm.world.scene import Floats
 

@@ -13,7 +13,7 @@ from typing import ClassVar, Final, Literal
 import numpy as np
 from pydantic import Field
 
-from zwerm.scenario.tables import NonNegative, Rectangle, Table
+from zwerm.scenario.types import NonNegative, Rectangle, Table
 from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
 from zwerm.world.radio.static_links import StaticLinkValues
 from zwerm.world.scene import Floats
@@ -57,6 +57,7 @@ class WallAttenuation:
     kind: ClassVar[str] = "walls"
     cause: ClassVar[str] = "walls"
     needs_positions: ClassVar[bool] = True
+    out_of_reach: ClassVar[bool] = True
     Parameters: ClassVar[type[LinkTable]] = WallAttenuationTable
 
     def __init__(self, parameters: WallAttenuationTable, place: ModelPlace) -> None:

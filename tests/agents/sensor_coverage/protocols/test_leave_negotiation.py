@@ -10,12 +10,13 @@ from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.peers import NOWHERE, ListRequest, Word, read, write
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
-from zwerm.deploy.node_specs import cast
+from zwerm.deploy.node_specs import node_specs
 from zwerm.link.memory import MemoryLink
 from zwerm.maths.simplicial import FlagComplex, betti
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import run
-from zwerm.scenario.tables import Scenario, load
+from zwerm.scenario.load import load
+from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Command
 from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.metrics.removals import removals
@@ -101,7 +102,7 @@ def test_a_robot_that_has_granted_a_lock_stands_still_until_it_is_over() -> None
 def drive(scenario: Scenario, seed: int) -> tuple[World, list[LocalRobot]]:
     """Run inline, watch that no place has two robots that stand, and return the world and the robots that are out."""
     world = assemble(scenario, seed)
-    nodes = {node: Node(*each) for node, each in cast(scenario, seed).items()}
+    nodes = {node: Node(*each) for node, each in node_specs(scenario, seed).items()}
 
     def robots() -> list[LocalRobot]:
         out = [nodes[robot]._controller for robot in world.scene.present_ids().tolist() if robot]

@@ -1,0 +1,216 @@
+"""The catalogue: one row for each algorithm, and one for each plug-in of each kind.
+
+Everything that lists, checks, preloads or documents algorithms and plug-ins reads this file. A row holds names only, as
+`module:Class`, so that reading the catalogue imports nothing. A scenario may name a class outside the catalogue by
+`module:Class` wherever it may name a row.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+Role = Literal["robot", "base", "coordinator"]
+
+# Classes as `module:Class`, by role and then by the name that a scenario uses.
+Controllers = Mapping[Role, Mapping[str, str]]
+
+ROBOT: Final[Role] = "robot"
+BASE: Final[Role] = "base"
+COORDINATOR: Final[Role] = "coordinator"
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """The controllers that provide one combination of an algorithm's services.
+
+    `services` has one provider for each service of the algorithm. Controllers that are not named here are the algorithm's
+    own. `decides` is the role that ends the run. A variant with `coordinator=False` runs without that process.
+    """
+
+    services: Mapping[str, str]
+    decides: Role
+    controllers: Controllers = field(default_factory=dict)
+    coordinator: bool = True
+    radio: bool = False
+    stations_max: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Algorithm:
+    """One algorithm: its controllers by the name that a scenario uses, and all that comes with it.
+
+    `variants` are tried in order: the first that agrees with the services a scenario names is taken. `metrics` are measured
+    and `layers` drawn in every run of these controllers. `scenarios` and `studies` are patterns of file names.
+    """
+
+    name: str
+    title: str
+    paper: str = ""
+    page: str = ""
+    controllers: Controllers = field(default_factory=dict)
+    variants: Sequence[Variant] = ()
+    metrics: Sequence[str] = ()
+    layers: Sequence[str] = ()
+    scenarios: Sequence[str] = ()
+
+
+_SENSOR_COVERAGE: Final = "zwerm.agents.sensor_coverage"
+_SENSOR_COVERAGE_COORDINATOR: Final = "zwerm.coordinator.sensor_coverage"
+_NEGOTIATING: Final[Controllers] = {
+    ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}.negotiating_robot:NegotiatingRobot"},
+    BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}.negotiating_robot:NegotiatingBase"},
+}
+_DECENTRALISED: Final[Controllers] = {
+    ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}.local_robot:LocalRobot"},
+    BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}.local_base:LocalBase"},
+    COORDINATOR: {"sensor-coverage": f"{_SENSOR_COVERAGE_COORDINATOR}.redundancy_advisor:RedundancyAdvisor"},
+}
+
+ALGORITHMS: Final[Sequence[Algorithm]] = (
+    Algorithm(
+        name="sensor_coverage",
+        title="Sensor coverage with bearings and touch only",
+        paper="Ramaithitima, Whitzer, Bhattacharya, Kumar 2015",
+        page="papers/sensor-coverage.md",
+        controllers={
+            ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}:CentralRobot"},
+            BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}:CentralBase"},
+            COORDINATOR: {"sensor-coverage": f"{_SENSOR_COVERAGE_COORDINATOR}.coordinator:SensorCoverageCoordinator"},
+        },
+        variants=(
+            Variant({"path": "coordinator", "redundancy": "coordinator"}, decides=COORDINATOR),
+            Variant({"path": "coordinator", "redundancy": "none"}, decides=COORDINATOR),
+            Variant(
+                {"path": "coordinator", "redundancy": "link"}, decides=COORDINATOR, radio=True, controllers=_NEGOTIATING
+            ),
+            Variant(
+                {"path": "gradient", "redundancy": "none"},
+                decides=BASE,
+                coordinator=False,
+                radio=True,
+                stations_max=1,
+                controllers=_DECENTRALISED,
+            ),
+            Variant(
+                {"path": "gradient", "redundancy": "link"},
+                decides=BASE,
+                coordinator=False,
+                radio=True,
+                stations_max=1,
+                controllers=_DECENTRALISED,
+            ),
+            Variant(
+                {"path": "gradient", "redundancy": "coordinator"},
+                decides=BASE,
+                radio=True,
+                stations_max=1,
+                controllers=_DECENTRALISED,
+            ),
+        ),
+        layers=("zwerm.view.sensor_coverage:ComplexLayer",),
+        scenarios=("sensor-coverage*",),
+    ),
+    Algorithm(
+        name="voronoi_coverage",
+        title="Voronoi coverage with sensory feedback",
+        paper="Schwager, McLurkin, Rus 2006",
+        page="papers/voronoi-coverage.md",
+        controllers={
+            ROBOT: {
+                "voronoi-coverage": "zwerm.agents.voronoi_coverage:VoronoiCoverage",
+                "voronoi-integer": "zwerm.agents.voronoi_coverage:IntegerCoverage",
+                "voronoi-radio": "zwerm.agents.voronoi_coverage:RadioCoverage",
+                "voronoi-swarmbot": "zwerm.agents.voronoi_coverage:SwarmBotCoverage",
+            }
+        },
+        scenarios=("voronoi-*",),
+    ),
+    Algorithm(
+        name="computation_free",
+        title="Spatial coverage without computation",
+        paper="Özdemir, Gauci, Kolling, Hall, Groß 2019",
+        page="computation-free.md",
+        controllers={
+            ROBOT: {
+                "computation-free": "zwerm.agents.computation_free:ComputationFree",
+                "random-walk": "zwerm.agents.computation_free:RandomWalk",
+            }
+        },
+        scenarios=("computation-free*",),
+    ),
+    Algorithm(
+        name="robot_teams",
+        title="Sensor-based coverage by robot teams",
+        paper="Latimer, Srinivasa, Lee-Shue, Sonne, Choset, Hurst 2002",
+        page="papers/robot-teams.md",
+        controllers={ROBOT: {"robot-teams": "zwerm.agents.robot_teams:TeamRobot"}},
+        layers=("zwerm.view.robot_teams:CellsLayer",),
+        scenarios=("robot-teams*",),
+    ),
+    Algorithm(
+        name="gossip",
+        title="Demonstrations of the radio: gossip and beacons",
+        controllers={ROBOT: {"beacon": "zwerm.agents.gossip:Beacon", "gossip-max": "zwerm.agents.gossip:GossipMax"}},
+        scenarios=("beacon*", "gossip-*"),
+    ),
+)
+
+SENSORS: Final = {
+    "bearings": "zwerm.world.sensors.bearings:Bearings",
+    "boundary": "zwerm.world.sensors.boundary:Boundary",
+    "compass": "zwerm.world.sensors.compass:Compass",
+    "field": "zwerm.world.sensors.field:FieldSensor",
+    "landmarks": "zwerm.world.sensors.landmarks:Landmarks",
+    "line_of_sight": "zwerm.world.sensors.line_of_sight:LineOfSightSensor",
+    "neighbours": "zwerm.world.sensors.neighbours:NeighboursSensor",
+    "odometry": "zwerm.world.sensors.odometry:Odometry",
+    "pose": "zwerm.world.sensors.pose:PoseSensor",
+    "touch": "zwerm.world.sensors.touch:Touch",
+}
+
+FIELDS: Final = {
+    "bitmap": "zwerm.world.fields.bitmap:Bitmap",
+    "constant": "zwerm.world.fields.constant:Constant",
+    "gaussians": "zwerm.world.fields.gaussians:Gaussians",
+    "lamp": "zwerm.world.fields.lamp:Lamp",
+    "linear": "zwerm.world.fields.linear:Linear",
+}
+
+RADIO_MODELS: Final = {
+    "range": "zwerm.world.radio.models.range:DiscRange",
+    "line_of_sight": "zwerm.world.radio.models.line_of_sight:LineOfSightModel",
+    "path_loss": "zwerm.world.radio.models.path_loss:PathLoss",
+    "walls": "zwerm.world.radio.models.wall_attenuation:WallAttenuation",
+    "loss": "zwerm.world.radio.models.loss:Loss",
+    "bursts": "zwerm.world.radio.models.gilbert_elliott:GilbertElliott",
+    "delay": "zwerm.world.radio.models.delay:Delay",
+    "duplication": "zwerm.world.radio.models.duplication:Duplication",
+    "corruption": "zwerm.world.radio.models.corruption:Corruption",
+    "rate_limit": "zwerm.world.radio.models.rate_limit:RateLimit",
+    "collision": "zwerm.world.radio.models.collision:Collision",
+}
+
+
+def algorithm_of(controller: str) -> Algorithm | None:
+    """Return the row that has a controller of this name, of any role, or None."""
+    for row in ALGORITHMS:
+        if any(controller in group for group in row.controllers.values()):
+            return row
+    return None
+
+
+def layers_of(controller: str) -> Sequence[str]:
+    """Return the picture layers of the algorithm that has a controller of this name."""
+    row = algorithm_of(controller)
+    return () if row is None else row.layers
+
+
+def names(role: Role) -> list[str]:
+    """Return the names of all controllers of a role, in the order of the rows."""
+    return [name for row in ALGORITHMS for name in row.controllers.get(role, {})]
+
+
+def controller_classes() -> Iterator[str]:
+    """Yield every class of the catalogue that may run on a node, of all roles and variants, each once."""
+    groups = [group for row in ALGORITHMS for group in (row.controllers, *(each.controllers for each in row.variants))]
+    yield from dict.fromkeys(path for roles in groups for group in roles.values() for path in group.values())

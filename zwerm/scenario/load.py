@@ -1,0 +1,94 @@
+"""Reading scenarios: by the name of a built-in one or by a path, with overrides, checked as a whole."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from zwerm.errors import ScenarioError
+from zwerm.scenario.diagnostics import mistakes
+from zwerm.scenario.overrides import override
+from zwerm.scenario.tables import Scenario
+from zwerm.scenario.types import OpenTable
+
+BUILT_IN = Path(__file__).parents[1] / "scenarios"
+
+
+def built_in() -> dict[str, Path]:
+    """Return the scenarios that ship with Zwerm, by name."""
+    return {path.stem: path for path in sorted(BUILT_IN.glob("*.toml"), key=lambda each: each.stem)}
+
+
+def locate(name: str) -> Path:
+    """Return the file of a built-in scenario's name, or of a path.
+
+    Raises ScenarioError where neither exists.
+    """
+    if name in built_in():
+        return built_in()[name]
+    path = Path(name)
+    if path.is_file():
+        return path
+    hint = "" if path.suffix == ".toml" else "; built in are " + ", ".join(built_in())
+    raise ScenarioError([f"{name}: expected a scenario file or the name of a built-in one{hint}"])
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file, unchecked.
+
+    Raises ScenarioError where it is no TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError([f"{path}: not TOML: {error}"]) from None
+    except OSError as error:
+        raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
+
+
+def load(name: str, overrides: tuple[str, ...] = ()) -> Scenario:
+    """Return the scenario `name` (built in, or a path) with each `path=value` of `overrides` applied.
+
+    Raises ScenarioError with every mistake.
+    """
+    tables, path = tables_of(name, overrides)
+    return validate(tables, str(path), path.parent)
+
+
+def tables_of(name: str, overrides: tuple[str, ...] = ()) -> tuple[dict[str, Any], Path]:
+    """Return what `load` would validate, and the scenario's file. Raises ScenarioError where there is none to validate."""
+    path = locate(name)
+    tables = read(path)
+    tables.setdefault("name", path.stem)
+    for assignment in overrides:
+        override(tables, assignment)
+    return tables, path
+
+
+def validate(tables: dict[str, Any], place: str, folder: Path) -> Scenario:
+    """Return `tables` as a Scenario whose relative paths start at `folder`.
+
+    Raises ScenarioError with every mistake, each led by `place`.
+    """
+    try:
+        scenario = Scenario.model_validate(tables)
+    except ValidationError as error:
+        raise ScenarioError(mistakes(error, place)) from None
+    if scenario.variant is not None and not scenario.variant.coordinator:
+        scenario = _without_coordinator(scenario)
+    scenario._folder, scenario._place = folder, place
+    return scenario
+
+
+def _without_coordinator(scenario: Scenario) -> Scenario:
+    """Return a scenario in which the coordinator has nothing to do without it, its uplink, and the faults of both."""
+    faults = []
+    for each in scenario.faults:
+        nodes = each.parameters.get("nodes")
+        if each.parameters.get("channel") == "uplink" or nodes == ["coordinator"]:
+            continue
+        if isinstance(nodes, list) and "coordinator" in nodes:
+            each = OpenTable(kind=each.kind, **each.parameters | {"nodes": [n for n in nodes if n != "coordinator"]})
+        faults.append(each)
+    return scenario.model_copy(update={"coordinator": None, "uplink": None, "faults": faults})

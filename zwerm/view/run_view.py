@@ -1,0 +1,35 @@
+"""The parts of a run's result that pictures are drawn from."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from zwerm.record.history import History
+from zwerm.world.arena.arena import Arena
+from zwerm.world.tick.telemetry import TelemetryRecord
+
+
+@dataclass(frozen=True)
+class RunView:
+    """The drawable part of one run: `name` is its scenario and seed, `ending` says how it ended.
+
+    `cells` is (columns, rows); `told` and `series` are those of the run's result. `layers` are classes of picture layers, as
+    `module:Class`, drawn in this order over the arena.
+    """
+
+    arena: Arena
+    history: History
+    radius_m: float
+    name: str
+    ending: str = ""
+    coverage_radius_m: float | None = None
+    cells: tuple[int, int] | None = None
+    sight_range_m: float | None = None
+    bases: int = 0
+    told: Sequence[TelemetryRecord] = ()
+    series: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    layers: Sequence[str] = ()
+
+    @property
+    def title(self) -> str:
+        """One line that names the run."""
+        return f"{self.name}: {self.ending}" if self.ending else self.name
