@@ -44,7 +44,8 @@ class Segment(NamedTuple):
 class Arc(NamedTuple):
     """A robot followed the boundary from one end into the slab on its side `direction`, until it came to another end.
 
-    The arc is `length_mm` long; its point farthest from the first slice is (`x_mm`, `y_mm`): the critical point, where it returns.
+    The arc is `length_mm` long. Its point farthest from the first slice is (`x_mm`, `y_mm`): where the arc returns, that is the
+    critical point.
     """
 
     start: End

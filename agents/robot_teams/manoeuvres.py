@@ -125,13 +125,13 @@ class Sweep:
                 return way
             self._around, self._last_y_m = None, None
         last, self._last_y_m = self._last_y_m, senses.y_m
-        if any([ny * side > BLOCKS for _, ny in senses.walls]):
+        if any(ny * side > BLOCKS for _, ny in senses.walls):
             steep = max([ny * side for _, ny in senses.walls])
             slow = last is not None and (senses.y_m - last) * side < 0.3 * self._step_m
             if abs(off) > OFF_SLICE_M or slow or steep > 0.9:
                 self.end = End(self.slice, side, mm(senses.y_m))
                 return None
-        if any([ny * side > 0.2 for _, ny in blocks]):
+        if any(ny * side > 0.2 for _, ny in blocks):
             for end in self._parked(senses):
                 if (end.slice, end.side) == (self.slice, side) and (end.y_mm / 1000.0 - senses.y_m) * side > 0.0:
                     self.end = end
@@ -235,7 +235,7 @@ class Seek:
             return None
         if self._follower is None:
             way = math.copysign(1.0, line - x)
-            if not any([nx * way > BLOCKS for nx, _ in (*senses.walls, *blocks)]):
+            if not any(nx * way > BLOCKS for nx, _ in (*senses.walls, *blocks)):
                 return way, 0.0
             self._follower = WallFollower(LEFT_HAND, (way, 0.0))
         return self._follower.direction(senses.walls, blocks)

@@ -145,7 +145,7 @@ class Membership:
 
     def merges_soon(self, tick: int, patience_ticks: int) -> bool:
         """Tell whether a team was met a short time ago: the lead with the smaller id unites the two when all are free."""
-        return any([tick - since < patience_ticks for _, since in self._met.values()])
+        return any(tick - since < patience_ticks for _, since in self._met.values())
 
     def _meet(self, view: View, tick: int) -> None:
         if self.node in view.members or view.lead in self.view.members:

@@ -1,8 +1,8 @@
 """The lead's decisions: which corridors its free robots form next, and when the team divides. Pure functions.
 
-Latimer et al. 2002, sections 3.3 and 3.4. A corridor begins at the open end or port nearest to the team. The robots for which the
-map shows no room in it take the next open cell, if there is one. Where a robot found a new segment on its own slice, a reverse
-critical point lies between it and its predecessor: the team divides, it and those behind it take the new cell.
+Latimer et al. 2002, sections 3.3 and 3.4. A corridor begins at the open end or port nearest to a free robot. Robots for which
+the map shows no room in it take the next open cell, if there is one near. Where a robot found a new segment on its own slice,
+a reverse critical point lies between it and its predecessor. Then the team divides: it and those behind it take the new cell.
 """
 
 from collections.abc import Collection, Mapping, Sequence

@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from zwerm.agents.robot_teams.fact_exchange import FactExchange
-from zwerm.agents.robot_teams.facts import BOTTOM, TOP, End
+from zwerm.agents.robot_teams.facts import BOTTOM, PASSES, TOP, Arc, End, Segment
 from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre, mm
 from zwerm.agents.robot_teams.membership import Membership
 from zwerm.agents.robot_teams.messages import HUNTS, READY, Beacon, Plan, Status, decode_beacon, encode_beacon
@@ -71,7 +71,7 @@ class CorridorMates:
 
     def claimed(self, k: int) -> bool:
         """Tell whether a teammate takes slice k in this corridor."""
-        return any([status.claim == k for status in self._statuses()])
+        return any(status.claim == k for status in self._statuses())
 
     def awaits_predecessor(self) -> bool:
         """Tell whether the predecessor has still to sweep its slice."""
@@ -360,15 +360,32 @@ class TeamRobot(Controller):
         return tuple([Transmission(channel, frame) for channel in self.setup.channels])
 
     def _telemetry(self, tick: int) -> dict[str, Any]:
-        """Return what those who watch the run may see: the certificate, the map and the team, whenever the map grows."""
-        if len(self.map.facts) == self._told_count:
+        """Return what those who watch the run may see: the certificate, the team and what was found, when the map grows.
+
+        A fact is reported by the robot that found it.
+        """
+        facts = self.map.facts
+        if len(facts) == self._told_count:
             return {}
-        self._told_count = len(self.map.facts)
-        certificate = self.map.certificate
-        return {
+        self._told_count = len(facts)
+        certificate, membership = self.map.certificate, self.membership
+        told: dict[str, Any] = {
             "complete": certificate.complete,
             "ends": certificate.ends,
             "ends_without_mate": len(certificate.ends_without_mate),
             "open_ports": len(certificate.open_ports),
-            "team": self.membership.view.lead,
+            "critical_point_count": len({arc.ports for arc in facts.arcs if arc.kind != PASSES}),
+            "divisions": membership.divisions,
+            "merges": membership.merges,
+            "team": membership.view.lead,
         }
+        found, self.work.found_facts = self.work.found_facts, []
+        if found:
+            told["slices"] = [
+                [self._grid.x_m(fact.slice), fact.bottom_mm / 1000.0, fact.top_mm / 1000.0]
+                for fact in found
+                if isinstance(fact, Segment)
+            ]
+            arcs = [fact for fact in found if isinstance(fact, Arc) and fact.kind != PASSES]
+            told["critical_points"] = [[arc.x_mm / 1000.0, arc.y_mm / 1000.0] for arc in arcs]
+        return told

@@ -1,4 +1,4 @@
-"""One robot's work: to travel along what is known, to find its slice of a corridor, to sweep it, and to hunt for critical points.
+"""One robot's work: travel along known ways, find a slice of a corridor, sweep it, and hunt for critical points.
 
 The work is written as generators: each yields a manoeuvre, or None to wait a tick, and is resumed when the manoeuvre is done.
 They add what they find to the map, and keep `at`, the end where the robot stands.
@@ -7,7 +7,7 @@ They add what they find to the map, and keep `at`, the end where the robot stand
 from collections.abc import Callable, Generator
 from typing import Final, Protocol
 
-from zwerm.agents.robot_teams.facts import LEFT, RIGHT, End, Segment
+from zwerm.agents.robot_teams.facts import LEFT, RIGHT, End, Fact, Segment
 from zwerm.agents.robot_teams.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
 from zwerm.agents.robot_teams.messages import HUNTS, SWEEPS, TRAVELS, Plan
 from zwerm.agents.robot_teams.senses import Senses
@@ -62,6 +62,7 @@ class Work:
         self.room: int | None = None
         self.sweeping: int | None = None
         self.failures = 0
+        self.found_facts: list[Fact] = []
         self._grid = grid
         self._step_m = step_m
         self._sense = sense
@@ -85,9 +86,8 @@ class Work:
             return
         # The formation's first corridor: join the own end to the predecessor's, come back, and sweep.
         start = self.at = up.end
-        if not self.map.arcs_known:
-            if (yield from self.trace(LEFT)):
-                yield from self.travel(start)
+        if not self.map.arcs_known and (yield from self.trace(LEFT)):
+            yield from self.travel(start)
         yield from self.sweep()
         yield from self._hunt(up.slice, RIGHT, swept_by_others)
 
@@ -118,7 +118,7 @@ class Work:
         low, high = sorted((start.y_mm, end.y_mm))
         known = self.map.end(start)
         if known is None or self.map.mate(known) is None or self.map.end(end) is None:
-            self.map.add(Segment(start.slice, low, high))
+            self._note(Segment(start.slice, low, high))
         self.at = self.map.end(end)
 
     def trace(self, direction: int) -> Generator[Manoeuvre | None, None, bool]:
@@ -138,7 +138,7 @@ class Work:
         # Where a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known.
         known = self.map.end(start)
         if arc is not None and (known is None or self.map.arc(known, direction) is None):
-            self.map.add(arc)
+            self._note(arc)
         self.at = self.map.end(end)
         if self.at is None:
             raise Lost
@@ -148,7 +148,7 @@ class Work:
         """Go to a known end by the shortest known way."""
         astray = 0
         for _ in range(STEPS_MAX):
-            start = None if self.at is None else self.map.end(self.at)
+            start = self._here()
             goal = self.map.end(stop)
             if start is None or goal is None:
                 raise Lost
@@ -163,12 +163,19 @@ class Work:
                 yield from self.sweep()
             else:
                 yield from self.trace(step.direction)
-            at = None if self.at is None else self.map.end(self.at)
-            if at != self.map.end(step.stop):
+            if self._here() != self.map.end(step.stop):
                 astray += 1
                 if astray > ASTRAY_MAX:
                     raise NoWay
         raise NoWay
+
+    def _note(self, fact: Fact) -> None:
+        if self.map.add(fact):
+            self.found_facts.append(fact)
+
+    def _here(self) -> End | None:
+        """Return the known end at which the robot stands, if it stands at one."""
+        return None if self.at is None else self.map.end(self.at)
 
     def _approach(self, end: End) -> Story:
         senses = self._sense()

@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
+from zwerm.world.arena.arena import Arena
+from zwerm.world.scene import Scene
+
 Floats = NDArray[np.float64]
 
 QUARTER_SEGMENTS: Final = 32
@@ -71,3 +74,31 @@ def coverage(
         "path_length_m": length_m,
         "sweepable_area_m2": area.area,
     }
+
+
+class TeamCoverageObserver:
+    """Notes the path of every robot, tick by tick, and measures what their footprints swept."""
+
+    every_s = 0.05
+
+    def __init__(self, arena: Arena, radius_m: float, footprint_m: float) -> None:
+        self._free = arena.free
+        self._radius_m, self._footprint_m = radius_m, footprint_m
+        self._paths: list[Floats] = []
+
+    def look(self, scene: Scene, dead: Sequence[int]) -> None:
+        """Note where the robots are."""
+        self._paths.append(scene.position.copy())
+
+    def metrics(self) -> dict[str, float]:
+        """Return `coverage_fraction`, `repeat_coverage_fraction` and the length of all paths together."""
+        if not self._paths:
+            return {}
+        paths = np.array(self._paths)
+        return coverage(
+            self._free, [paths[:, robot] for robot in range(paths.shape[1])], self._radius_m, self._footprint_m
+        )
+
+    def series(self) -> dict[str, list[float]]:
+        """Return nothing: exact polygons at every look would take longer than the run."""
+        return {}
