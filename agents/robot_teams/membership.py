@@ -22,8 +22,11 @@ PARTED_S: Final = 20.0
 
 
 def later(view: View, than: View) -> bool:
-    """Tell whether a view replaces another: by epoch, and of equal epochs the one with the smaller lead."""
-    return (view.epoch, -view.lead) > (than.epoch, -than.lead)
+    """Tell whether a view replaces another: by epoch, then the smaller lead, then more members."""
+    return (view.epoch, -view.lead, len(view.members), view.members) > (
+        *(than.epoch, -than.lead, len(than.members)),
+        than.members,
+    )
 
 
 class Roster:
@@ -157,13 +160,14 @@ class Membership:
             self._met[view.lead] = view, known[1]
 
     def _is_gone(self, node: int, tick: int) -> bool:
-        silent = self.roster.silent_ticks(node, tick)
-        status = self.roster.statuses.get(node)
-        if silent > self._silence_ticks:
+        """Tell whether a member is silent, or holds on to another view longer than it takes to hear of this one."""
+        if self.roster.silent_ticks(node, tick) > self._silence_ticks:
             return True
-        if status is None or status.epoch <= self.view.epoch:
+        status, own = self.roster.statuses.get(node), self.view
+        if status is None or status.team == (own.epoch, own.lead):
             return False
-        return tick - self._since > self._left_ticks
+        patience = self._left_ticks if status.team[0] > own.epoch else self._silence_ticks
+        return tick - self._since > patience
 
     _since = 0
 

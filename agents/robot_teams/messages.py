@@ -44,7 +44,7 @@ class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """What one robot does: `beat` grows with every status. `at` is the end where it last was.
 
     Of the corridor: it `found` a new segment on its slice, is `spare`, takes slice `claim`, found `room` for so many robots.
-    It is `sweeping` a slice now.
+    It is `sweeping` a slice now. `team` is the epoch and the lead of its view; `epoch` and `number` are of its plan.
     """
 
     node: int
@@ -60,6 +60,7 @@ class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     claim: int | None
     room: int | None
     sweeping: int | None
+    team: tuple[int, int]
 
 
 class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

@@ -333,6 +333,7 @@ class TeamRobot(Controller):
             work.claim,
             work.room,
             work.sweeping,
+            (view.epoch, view.lead),
         )
 
     def _say(self, observation: Observation, senses: Senses) -> tuple[Transmission, ...]:
