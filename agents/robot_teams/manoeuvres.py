@@ -235,9 +235,11 @@ class Seek:
             return None
         if self._follower is None:
             way = math.copysign(1.0, line - x)
-            if not any(nx * way > BLOCKS for nx, _ in (*senses.walls, *blocks)):
+            ahead = [each for each in (*senses.walls, *blocks) if each[0] * way > BLOCKS]
+            if not ahead:
                 return way, 0.0
-            self._follower = WallFollower(LEFT_HAND, (way, 0.0))
+            # Slide along what is in the way, on the side that leads on.
+            self._follower = WallFollower(LEFT_HAND if ahead[0][1] * way > 0.0 else RIGHT_HAND, (way, 0.0))
         return self._follower.direction(senses.walls, blocks)
 
 

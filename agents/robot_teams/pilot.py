@@ -25,6 +25,8 @@ HEADWAY_M: Final = 0.2
 HEADWAY_S: Final = 4.0
 # After so many retreats the manoeuvre has failed.
 ATTEMPTS_MAX: Final = 5
+# The longest retreat, on average [m].
+RETREAT_M: Final = 4.0
 # How far apart the points of the trail are, and how many it has.
 TRAIL_STEP_M: Final = 0.08
 TRAIL_POINTS: Final = 600
@@ -176,7 +178,7 @@ class Pilot:
             self._attempts = 0
         else:
             self._failed_at = senses.x_m, senses.y_m
-            self._begin_retreat(senses, 0.5 * 2.0**self._attempts)
+            self._begin_retreat(senses, min(RETREAT_M, 0.5 * 2.0**self._attempts))
 
     def _begin_retreat(self, senses: Senses, scale_m: float) -> None:
         self.retreats += 1
@@ -237,8 +239,10 @@ class Pilot:
             into = wx * nx + wy * ny
             if into > 0.0:
                 wx, wy = wx - into * nx, wy - into * ny
+        scale = 1.0
         for other in senses.robots:
-            limit = max(0.0, other.gap_m) / (2.0 * self._dt_s) + 1e-6
-            if vx * other.nx + vy * other.ny > limit or wx * other.nx + wy * other.ny > limit:
-                return 0.0, 0.0
-        return vx, vy
+            limit = max(0.0, other.gap_m) / (2.0 * self._dt_s)
+            closing = max(vx * other.nx + vy * other.ny, wx * other.nx + wy * other.ny)
+            if closing > limit + 1e-6:
+                scale = min(scale, limit / closing)
+        return vx * scale, vy * scale

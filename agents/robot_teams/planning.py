@@ -109,6 +109,11 @@ def free_members(view: View, plans: Sequence[Plan], statuses: Mapping[int, Statu
     return free
 
 
+def without_busy(plans: Sequence[Plan], free: Collection[int]) -> list[Plan]:
+    """Return the plans whose robots are all free."""
+    return [plan for plan in plans if all(node in free for node in plan.order)]
+
+
 def finder(order: Sequence[int], statuses: Mapping[int, Status]) -> int | None:
     """Return the place in the formation of the first robot that found a new segment on its own slice."""
     for index, node in enumerate(order):
@@ -133,6 +138,7 @@ def assign(
     slice_map: SliceMap,
     view: View,
     plans: Sequence[Plan],
+    reserving: Sequence[Plan],
     statuses: Mapping[int, Status],
     skip: Collection[Task],
     one_corridor: bool,
@@ -140,7 +146,8 @@ def assign(
 ) -> list[Plan]:
     """Return new plans for the free members. With `one_corridor` the whole team forms one corridor at a time.
 
-    While others are busy, no robot travels farther than `join_mm`: its turn comes nearer.
+    While others are busy, no robot travels farther than `join_mm`: its turn comes nearer. The busy plans among `reserving`
+    keep others out of their cells.
     """
     free = free_members(view, plans, statuses)
     if not free or (one_corridor and len(free) < len(view.members)):
@@ -148,7 +155,7 @@ def assign(
     number = max([plan.number for plan in plans if plan.epoch == view.epoch], default=0)
     latest = latest_plans(plans, view)
     active = list({plan.number: plan for node, plan in latest.items() if node not in free}.values())
-    reserved = [reservation(slice_map, plan) for plan in active]
+    reserved = [reservation(slice_map, plan) for plan in active if plan in reserving]
     places = {node: _place(slice_map, statuses.get(node)) for node in free}
     if number == 0 and len(free) > 1 and _apart(slice_map, places):
         return [Plan(view.epoch, 1, End(0, LINK, 0), RIGHT, False, tuple(free))]
@@ -157,7 +164,7 @@ def assign(
     tasks = [task for task in open_tasks(slice_map) if task not in skip]
     tasks = [task for task in tasks if not (task.own_slice and task.end.slice in swept)]
     made: list[Plan] = []
-    limit = FAR - 1 if not active else join_mm
+    limit = join_mm if active else FAR - 1
     waiting = [node for node in free if node in distances]
     while waiting:
         best: tuple[int, int, int, Task] | None = None

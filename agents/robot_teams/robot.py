@@ -13,7 +13,17 @@ from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre, mm
 from zwerm.agents.robot_teams.membership import Membership
 from zwerm.agents.robot_teams.messages import HUNTS, READY, Beacon, Plan, Status, decode_beacon, encode_beacon
 from zwerm.agents.robot_teams.pilot import FAILED, IDLE, RUNNING, Pilot
-from zwerm.agents.robot_teams.planning import LINK, Task, assign, division, finder, free_members, latest_plans
+from zwerm.agents.robot_teams.planning import (
+    FAR,
+    LINK,
+    Task,
+    assign,
+    division,
+    finder,
+    free_members,
+    latest_plans,
+    without_busy,
+)
 from zwerm.agents.robot_teams.senses import Senses, Sensing
 from zwerm.agents.robot_teams.slice_map import SliceMap
 from zwerm.agents.robot_teams.work import Lost, NoWay, Work
@@ -30,6 +40,9 @@ MERGE_PATIENCE_S: Final = 30.0
 PARKED_M: Final = 0.75
 # For how long a task that brought nothing new is passed over [s].
 SKIP_S: Final = 30.0
+# After so long without a new corridor free robots take tasks however far, and then in cells where others work [s].
+FAR_AFTER_S: Final = 20.0
+ANY_AFTER_S: Final = 60.0
 # The lead decides every so many ticks.
 DECIDE_TICKS: Final = 4
 
@@ -126,7 +139,7 @@ class TeamRobot(Controller):
         self._skip: dict[Task, int] = {}
         self._judged: dict[int, Plan] = {}
         self._digests: dict[int, int] = {}
-        self._tried = (-1, -1)
+        self._made_tick = 0
         self._every = max(1, round(table.beacon_s / setup.dt_s))
         self._urgent = False
         self._told_count = -1
@@ -145,7 +158,7 @@ class TeamRobot(Controller):
             self._view = self.membership.view
             self._judged.clear()
             self._digests.clear()
-            self._tried = (-1, -1)
+            self._made_tick = tick
             self._urgent = True
             self.plans = tuple([plan for plan in self.plans if plan.epoch == self.membership.view.epoch])
         self._done = self.map.certificate.complete
@@ -258,7 +271,7 @@ class TeamRobot(Controller):
                 return
             if membership.merges_soon(tick, round(MERGE_PATIENCE_S / dt_s)):
                 return
-        if self.map.certificate.complete or (len(free), len(self.map.facts)) == self._tried:
+        if self.map.certificate.complete:
             return
         for plan in dict.fromkeys(latest_plans(self.plans, view).values()):
             if plan.number not in self._judged and all(node in free for node in plan.order):
@@ -272,15 +285,17 @@ class TeamRobot(Controller):
                     self._forget_plans()
                     return
         self._skip = {task: since for task, since in self._skip.items() if (tick - since) * dt_s < SKIP_S}
-        made = assign(self.map, view, self.plans, statuses, self._skip, table.one_corridor, mm(table.join_m))
-        self._tried = (-1, -1)
+        # Where nothing could be assigned for some time, far tasks are taken too, and then those in reserved cells.
+        idle_s = (tick - self._made_tick) * dt_s
+        join_mm = mm(table.join_m) if idle_s < FAR_AFTER_S else FAR
+        plans = self.plans if idle_s < ANY_AFTER_S else without_busy(self.plans, free)
+        made = assign(self.map, view, self.plans, plans, statuses, self._skip, table.one_corridor, join_mm)
         if made:
+            self._made_tick = tick
             self.plans = (*dict.fromkeys(latest_plans(self.plans, view).values()), *made)
             for plan in made:
                 self._digests[plan.number] = self.map.facts.digest
             self._urgent = True
-        elif not self._skip:
-            self._tried = len(free), len(self.map.facts)
 
     def _forget_plans(self) -> None:
         self.plans = ()
