@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from zwerm.agents.robot_teams.facts import Arc, Fact, Segment
+from zwerm.agents.robot_teams.facts import Arc, Fact, Segment, Void
 from zwerm.agents.robot_teams.messages import Beacon
 from zwerm.agents.robot_teams.slice_map import SliceMap
 
@@ -12,6 +12,10 @@ DIFFERENT_S: Final = 1.0
 ALL_EVERY_S: Final = 1.0
 # At most so many facts in one message: an arc takes about 40 bytes.
 FACTS_MAX: Final = 800
+
+
+# Facts by kind, as a beacon carries them.
+Parcel = tuple[tuple[Segment, ...], tuple[Arc, ...], tuple[Void, ...]]
 
 
 class FactExchange:
@@ -29,7 +33,7 @@ class FactExchange:
 
     def receive(self, beacon: Beacon, tick: int) -> None:
         """Take over the facts of a beacon, and note whether its sender lacks some of ours."""
-        self._map.merge((*beacon.segments, *beacon.arcs))
+        self._map.merge((*beacon.segments, *beacon.arcs, *beacon.voids))
         if beacon.digest == self._map.facts.digest:
             self._differs_since.pop(beacon.sender, None)
         else:
@@ -39,7 +43,7 @@ class FactExchange:
         """Owe a robot nothing any more."""
         self._differs_since.pop(node, None)
 
-    def outgoing(self, tick: int) -> tuple[tuple[Segment, ...], tuple[Arc, ...]]:
+    def outgoing(self, tick: int) -> Parcel:
         """Return the facts to send now."""
         facts = self._map.facts
         if not self._told or self._told[-1][1] != len(facts):
@@ -61,8 +65,9 @@ class FactExchange:
         return _sorted_out(send)
 
 
-def _sorted_out(facts: list[Fact]) -> tuple[tuple[Segment, ...], tuple[Arc, ...]]:
+def _sorted_out(facts: list[Fact]) -> Parcel:
     return (
         tuple([fact for fact in facts if isinstance(fact, Segment)]),
         tuple([fact for fact in facts if isinstance(fact, Arc)]),
+        tuple([fact for fact in facts if isinstance(fact, Void)]),
     )

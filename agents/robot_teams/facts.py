@@ -69,7 +69,16 @@ class Arc(NamedTuple):
         return (self.start, self.direction), (self.stop, back)
 
 
-Fact = Segment | Arc
+class Void(NamedTuple):
+    """A dead robot at `x_mm` hides the ends of slice `slice` between two heights: nobody can reach them any more."""
+
+    slice: int
+    x_mm: int
+    low_mm: int
+    high_mm: int
+
+
+Fact = Segment | Arc | Void
 
 
 class FactSet:
@@ -101,6 +110,11 @@ class FactSet:
     def segments(self) -> list[Segment]:
         """The swept segments, sorted: the order of arrival has no influence."""
         return sorted(fact for fact in self._facts if isinstance(fact, Segment))
+
+    @property
+    def voids(self) -> list[Void]:
+        """What dead robots hide, sorted."""
+        return sorted(fact for fact in self._facts if isinstance(fact, Void))
 
     @property
     def arcs(self) -> list[Arc]:

@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from zwerm.agents.robot_teams.fact_exchange import FactExchange
-from zwerm.agents.robot_teams.facts import BOTTOM, PASSES, TOP, Arc, End, Segment
+from zwerm.agents.robot_teams.facts import BOTTOM, PASSES, TOP, Arc, End, Segment, Void
 from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre, mm
 from zwerm.agents.robot_teams.membership import Membership
 from zwerm.agents.robot_teams.messages import HUNTS, READY, Beacon, Plan, Status, decode_beacon, encode_beacon
@@ -24,7 +24,7 @@ from zwerm.agents.robot_teams.planning import (
     latest_plans,
     without_busy,
 )
-from zwerm.agents.robot_teams.senses import Senses, Sensing
+from zwerm.agents.robot_teams.senses import DEAD_M, Senses, Sensing
 from zwerm.agents.robot_teams.slice_map import SliceMap
 from zwerm.agents.robot_teams.work import Lost, NoWay, Work
 from zwerm.agents.runtime.contract import Controller, Setup
@@ -122,6 +122,8 @@ class TeamRobot(Controller):
         self.exchange = FactExchange(self.map, setup.dt_s)
         self.plans: tuple[Plan, ...] = ()
         self.refused = 0
+        self._radius_m = body.radius_m
+        self._wrecks: dict[int, int] = {}
         self._sensing = Sensing(body.radius_m)
         self._senses: Senses | None = None
         self._grid = Grid(table.origin_m, table.spacing_m)
@@ -149,6 +151,10 @@ class TeamRobot(Controller):
         """Hear, decide, move, and say."""
         tick = observation.tick
         senses = self._senses = self._sensing.read(observation, self._is_dead)
+        for other in senses.robots:
+            if other.gap_m < DEAD_M and other.stands and other.node not in self._wrecks and self._is_dead(other.node):
+                self._wrecks[other.node] = tick
+                self._note_wreck(other.x_m, other.y_m)
         if observation.inbox:
             self._hear(observation, senses)
         if tick == round(MUSTER_S / self.setup.dt_s):
@@ -240,10 +246,21 @@ class TeamRobot(Controller):
                 found.append(status.at)
         return found
 
+    def _note_wreck(self, x_m: float, y_m: float) -> None:
+        """Add to the map which ends a dead robot hides: those nearer to it than another body can come."""
+        radius_m = 2.0 * self._radius_m
+        for k in (self._grid.nearest(x_m) + step for step in (-1, 0, 1)):
+            half_m2 = radius_m**2 - (self._grid.x_m(k) - x_m) ** 2
+            if half_m2 > 0.0:
+                half_m = math.sqrt(half_m2)
+                self.map.add(Void(k, mm(x_m), mm(y_m - half_m), mm(y_m + half_m)))
+
     def _is_dead(self, node: int) -> bool:
         """Tell whether a robot in sight has been silent for too long to be alive."""
         tick = 0 if self._senses is None else self._senses.tick
         silent = self.membership.roster.silent_ticks(node, tick)
+        if node in self._wrecks:
+            return bool(silent * self.setup.dt_s > self.parameters.silence_s)
         return bool(self.setup.channels) and silent * self.setup.dt_s > 2.0 * self.parameters.silence_s
 
     def _newest_senses(self) -> Senses:
@@ -357,7 +374,7 @@ class TeamRobot(Controller):
             return ()
         self._urgent = False
         membership = self.membership
-        segments, arcs = self.exchange.outgoing(tick)
+        parcel = self.exchange.outgoing(tick)
         mine = self._status(senses, tick)
         others = [status for node, status in sorted(membership.roster.statuses.items()) if node != self.setup.node]
         others = [status for status in others if status.node in membership.view.members]
@@ -369,8 +386,7 @@ class TeamRobot(Controller):
             (mine, *others),
             self.map.facts.digest,
             len(self.map.facts),
-            segments,
-            arcs,
+            *parcel,
         )
         frame = seal(encode_beacon(beacon))
         return tuple([Transmission(channel, frame) for channel in self.setup.channels])

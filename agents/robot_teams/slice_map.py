@@ -6,6 +6,8 @@ two slices is bounded by swept segments and traced arcs only. That presumes that
 radius, and at most the sum of the footprint's radius and the body's diameter, so that an obstacle between two slices that
 no arc reaches hides nothing.
 
+A dead robot may hide ends for ever. They count for nothing: its own footprint covers what is there, and arcs lead around it.
+
 Ends that two robots measured a little differently are one: those of one slice and side are joined where neighbours are at most
 `TOLERANCE_MM` apart. The joined ends are a function of the set of facts alone, so that merging maps needs no order.
 """
@@ -14,7 +16,7 @@ import heapq
 from collections.abc import Iterable
 from typing import Final, NamedTuple
 
-from zwerm.agents.robot_teams.facts import LEFT, RIGHT, Arc, End, Fact, FactSet, Segment
+from zwerm.agents.robot_teams.facts import LEFT, RIGHT, Arc, End, Fact, FactSet, Segment, Void
 
 TOLERANCE_MM: Final = 120
 
@@ -150,10 +152,12 @@ class SliceMap:
         for arc in arcs:
             self._join(arc)
         ends = sorted(end for level in self._levels.values() for _, _, end in level)
+        voids = self.facts.voids
+        reached = [end for end in ends if not any(_hides(void, end) for void in voids)]
         self._certificate = Certificate(
             len(ends),
-            tuple([end for end in ends if end not in self._mates]),
-            tuple([(end, side) for end in ends for side in (LEFT, RIGHT) if (end, side) not in self._arcs]),
+            tuple([end for end in reached if end not in self._mates]),
+            tuple([(end, side) for end in reached for side in (LEFT, RIGHT) if (end, side) not in self._arcs]),
         )
 
     def _known_end(self, end: End) -> End:
@@ -172,6 +176,10 @@ class SliceMap:
         (start, there), (stop, back) = ((self._known_end(end), side) for end, side in arc.ports)
         self._arcs.setdefault((start, there), Step(there, stop, arc.length_mm))
         self._arcs.setdefault((stop, back), Step(back, start, arc.length_mm))
+
+
+def _hides(void: Void, end: End) -> bool:
+    return void.slice == end.slice and void.low_mm <= end.y_mm <= void.high_mm
 
 
 def _joined(ends: Iterable[End]) -> dict[tuple[int, int], list[tuple[int, int, End]]]:

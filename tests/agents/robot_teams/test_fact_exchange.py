@@ -12,9 +12,9 @@ DT_S = 0.25
 
 
 def beacon(node: int, slice_map: SliceMap, exchange: FactExchange, tick: int) -> Beacon:
-    segments, arcs = exchange.outgoing(tick)
+    parcel = exchange.outgoing(tick)
     facts = slice_map.facts
-    sent = Beacon(node, (View(1, 0, (0, 1, 2)),), (), (), (), facts.digest, len(facts), segments, arcs)
+    sent = Beacon(node, (View(1, 0, (0, 1, 2)),), (), (), (), facts.digest, len(facts), *parcel)
     received: Beacon = decode_beacon(encode_beacon(sent))
     return received
 
@@ -44,7 +44,7 @@ def test_a_beacon_goes_back_to_saying_little_when_all_know_all() -> None:
     for k in range(20):
         slice_map.add(Segment(k, 0, 1_000))
     assert len(exchange.outgoing(0)[0]) == 20
-    assert exchange.outgoing(20) == ((), ())
+    assert exchange.outgoing(20) == ((), (), ())
 
 
 def test_a_large_map_is_sent_in_pages_to_a_robot_that_has_none() -> None:

@@ -6,7 +6,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwerm.agents.robot_teams.facts import BOTTOM, CONCAVE, CONVEX, LEFT, PASSES, RIGHT, TOP, Arc, End, Fact, Segment
+from zwerm.agents.robot_teams.facts import (
+    BOTTOM,
+    CONCAVE,
+    CONVEX,
+    LEFT,
+    PASSES,
+    RIGHT,
+    TOP,
+    Arc,
+    End,
+    Fact,
+    Segment,
+    Void,
+)
 from zwerm.agents.robot_teams.slice_map import TOLERANCE_MM, SliceMap
 
 ENDS = st.builds(End, st.integers(-3, 3), st.sampled_from([TOP, BOTTOM]), st.integers(0, 2_000))
@@ -143,6 +156,14 @@ def test_there_is_no_route_to_where_nothing_leads() -> None:
     slice_map = known([Segment(0, 0, 1_000), Segment(5, 0, 1_000)])
     assert slice_map.route(End(0, TOP, 1_000), End(5, TOP, 1_000)) is None
     assert End(5, TOP, 1_000) not in slice_map.distances(End(0, TOP, 1_000))
+
+
+def test_what_a_dead_robot_hides_is_not_open() -> None:
+    facts: list[Fact] = [fact for fact in room(3) if not isinstance(fact, Arc) or End(1, TOP, 5_000) not in fact[:3]]
+    assert not known(facts).certificate.complete
+    hidden = known([*facts, Void(1, 950, 4_600, 5_400)]).certificate
+    assert all(end != End(1, TOP, 5_000) for end, _ in hidden.open_ports)
+    assert hidden.open_ports == ((End(0, TOP, 5_000), RIGHT), (End(2, TOP, 5_000), LEFT))
 
 
 def test_a_swept_slice_is_known_by_height() -> None:
