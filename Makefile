@@ -16,7 +16,7 @@ COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generat
 .DEFAULT_GOAL := help
 APT_TOOLS := iproute2 nftables ffmpeg
 
-.PHONY: help setup dev compile tools run test lint format docs bench fidelity lock clean
+.PHONY: help setup dev compile tools run test lint format pages docs bench fidelity lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -53,6 +53,9 @@ format: dev  ## rewrite the code in the project's format
 	$(BIN)/ruff check --fix-only .
 	$(BIN)/ruff format .
 
+pages: dev  ## write the generated parts of the documentation into its pages
+	$(BIN)/python docs/pages.py
+
 docs: dev  ## build the documentation into site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
@@ -67,7 +70,7 @@ fidelity: dev  ## hold every model of the radio against its 99 % confidence inte
 
 lock:  ## resolve the dependencies anew (needs uv)
 	$(COMPILE) --upgrade --output-file requirements.txt
-	$(COMPILE) --group dev --constraint requirements.txt --upgrade --output-file requirements-dev.txt
+	$(COMPILE) --extra frames --group dev --constraint requirements.txt --upgrade --output-file requirements-dev.txt
 
 clean:  ## remove .venv and everything that was built
 	rm -rf $(VENV) build dist site *.egg-info zwerm/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis

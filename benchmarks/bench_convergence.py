@@ -1,15 +1,15 @@
-"""Why robots take as long as they do to converge in Table I: how fast a swarm near its optimum can approach it at all.
+"""Rate of convergence of Voronoi coverage near the optimum, compared with the times of Table I.
 
-There the errors of a swarm shrink as those of a linear system: dp/dt = k J (p - p*), where J is how the ways to the estimated
-centroids change with the positions. Its slowest mode falls as exp(-rate t), with any integrator and from any start. Prints
-that rate beside how the mean error fell over the last factor of a hundred, and the rate at which the paper's time would be
-long enough.
+Near its optimum a swarm is a linear system: dp/dt = k J (p - p*), where J is the derivative of the vectors to the estimated
+centroids by the positions. Its slowest mode decays as exp(-rate t), for any integrator and start. Prints that rate, the rate
+measured over the last factor of 100 of the mean error, and the rate that the paper's time needs.
 """
 
 import argparse
 import math
 
 import numpy as np
+from csv_rows import add_csv_option, write_csv
 
 from zwerm.run.assembly import assemble
 from zwerm.scenario.load import load
@@ -24,19 +24,19 @@ PAPER_ERROR_M = 1e-7
 
 
 def converge(coverage: VoronoiCells, position: Floats, error_m: float, longest_s: float) -> tuple[Floats, list[float]]:
-    """Return where robots at `position` end when their mean error is below error_m, and the mean error at every step [m]."""
+    """Return the positions at which the mean error is below `error_m`, and the mean error of each step [m]."""
     errors: list[float] = []
     while len(errors) * STEP_S < longest_s:
-        way = coverage.targets(position)
-        errors.append(float(np.hypot(*way.T).mean()))
+        offset = coverage.targets(position)
+        errors.append(float(np.hypot(*offset.T).mean()))
         if errors[-1] < error_m:
             break
-        position = position + GAIN_PER_S * STEP_S * way
+        position = position + GAIN_PER_S * STEP_S * offset
     return position, errors
 
 
 def slowest_per_s(coverage: VoronoiCells, position: Floats, by_m: float = 1e-6) -> float:
-    """Return the rate of the slowest mode there [1/s], from central differences."""
+    """Return the rate of the slowest mode at `position` [1/s], from central differences of `by_m`."""
     columns = []
     for coordinate in range(position.size):
         nudge = np.zeros(position.size)
@@ -53,7 +53,9 @@ def main() -> None:
     parser.add_argument("--robots", type=int, nargs="+", default=[10, 100])
     parser.add_argument("--error_m", type=float, default=PAPER_ERROR_M)
     parser.add_argument("--longest_s", type=float, default=2000.0)
+    add_csv_option(parser)
     arguments = parser.parse_args()
+    rows = []
     print(
         f"{'robots':>6} {'seed':>4} {'converged s':>11} {'measured 1/s':>12} {'slowest 1/s':>11} {'paper needs 1/s':>15}"
     )
@@ -71,6 +73,17 @@ def main() -> None:
             slowest = slowest_per_s(coverage, position)
             took = (len(errors) - 1) * STEP_S
             print(f"{count:>6} {seed:>4} {took:>11.1f} {measured:>12.3f} {slowest:>11.3f} {needed:>15.2f}")
+            rows.append(
+                {
+                    "robots": f"{count}",
+                    "seed": f"{seed}",
+                    "converged after [s]": f"{took:.1f}",
+                    "rate over the last factor of 100 [1/s]": f"{measured:.3f}",
+                    "rate of the slowest mode [1/s]": f"{slowest:.3f}",
+                    "rate that the paper's time needs [1/s]": f"{needed:.2g}",
+                }
+            )
+    write_csv(arguments.csv, rows)
 
 
 if __name__ == "__main__":

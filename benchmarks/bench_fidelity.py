@@ -1,8 +1,8 @@
-"""How true the radio's models are: a million packets through each, against the 99 % confidence interval of what it promises.
+"""Fidelity of the radio models: the mean over a million packets of each, and its 99 % confidence interval.
 
-Prints one row a number: model, what is measured, expected, found, the half width of the interval, and whether it is inside.
-Models without chance have to be exact: shapely says what they should find. With twenty numbers one in five such tables has
-a row outside by chance; a defect shows in every seed.
+Prints one row for each number: model, quantity, expected value, measured value, half width of the interval, and whether the
+measured value is inside. Deterministic models must be exact; shapely gives the expected values. With twenty numbers, one table
+in five has a row outside by chance; a defect is outside for every seed.
 """
 
 import argparse
@@ -20,6 +20,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from air import DT_S, Radio, ring
+from csv_rows import add_csv_option, write_csv
 
 from zwerm.wire.messages import Transmission
 
@@ -30,8 +31,10 @@ NODES = 40
 LINKS = NODES * (NODES - 1)
 
 
-def quiet(models: list[dict[str, Any]], seed: int, positions: list[tuple[float, float]] | None = None) -> Radio:
-    """Return a radio that does not audit itself."""
+def unaudited_radio(
+    models: list[dict[str, Any]], seed: int, positions: list[tuple[float, float]] | None = None
+) -> Radio:
+    """Return a radio without the audit of its ledger."""
     return Radio(positions or ring(NODES, 5.0), models, seed, check=False)
 
 
@@ -41,7 +44,7 @@ def row(model: str, what: str, expected: float, found: float, sd: float, count: 
 
 
 def fates(radio: Radio, ticks: int) -> np.ndarray:  # type: ignore[type-arg]
-    """Return (links, ticks) which packets were lost while everyone broadcast at every tick."""
+    """Return (links, ticks) whether each packet was lost; all nodes broadcast at every tick."""
     lost = np.ones((NODES, NODES, ticks), dtype=np.bool_)
     for tick in range(ticks):
         payload = tick.to_bytes(4, "big")
@@ -55,14 +58,14 @@ def fates(radio: Radio, ticks: int) -> np.ndarray:  # type: ignore[type-arg]
 
 
 def burst_length(lost: np.ndarray) -> tuple[float, int]:  # type: ignore[type-arg]
-    """Return the mean length of bursts, and how many ended; one that the end of its row cuts short counts for what is there."""
+    """Return the mean length of bursts and their number. A burst at the end of a row counts with its length so far."""
     before, after = lost[:, :-1], lost[:, 1:]
     ends = int((before & ~after).sum())
     return float(before.sum()) / ends, ends
 
 
 def measure_places(packets: int, seed: int) -> Iterator[Row]:
-    """Yield a row for every model that asks only where the robots are: new places and a wall of two pieces for every tick."""
+    """Yield a row for each model that depends on positions only: random positions at each tick, two walls."""
     ticks = math.ceil(packets / LINKS)
     random = np.random.Generator(np.random.Philox(seed))
     walls = [[(50.0, 45.0), (50.0, 52.0)], [(47.0, 48.0), (55.0, 49.0)]]
@@ -70,7 +73,7 @@ def measure_places(packets: int, seed: int) -> Iterator[Row]:
     models: dict[str, dict[str, Any]] = {
         "range": {"range_m": 4.0},
         "line_of_sight": {},
-        "walls": {"loss_db": 6.0, "margin_db": 10.0},
+        "wall_attenuation": {"loss_db": 6.0, "margin_db": 10.0},
     }
     radios = {
         kind: Radio(ring(NODES, 5.0), [{"kind": kind, **table}], seed, walls, check=False)
@@ -84,7 +87,7 @@ def measure_places(packets: int, seed: int) -> Iterator[Row]:
         between = shapely.linestrings(np.stack([places[first], places[second]], axis=1))
         crossed = sum(shapely.intersects(between, line).astype(int) for line in lines)
         near = shapely.dwithin(shapely.points(places[first]), shapely.points(places[second]), 4.0)
-        for kind, passes in (("range", near), ("line_of_sight", crossed == 0), ("walls", crossed < 2)):
+        for kind, passes in (("range", near), ("line_of_sight", crossed == 0), ("wall_attenuation", crossed < 2)):
             expected[kind] += 2 * int(passes.sum())
             radios[kind].position = places
             radios[kind].step(outboxes)
@@ -94,48 +97,59 @@ def measure_places(packets: int, seed: int) -> Iterator[Row]:
 
 
 def measure(packets: int, seed: int) -> Iterator[Row]:
-    """Yield a row for every number."""
+    """Yield a row for each number."""
     yield from measure_places(packets, seed)
     ticks = math.ceil(packets / LINKS)
     sent = ticks * LINKS
     for fraction in (0.01, 0.3):
-        found = quiet([{"kind": "loss", "fraction": fraction}], seed).all_broadcast(ticks)
+        found = unaudited_radio([{"kind": "loss", "fraction": fraction}], seed).all_broadcast(ticks)
         sd = math.sqrt(fraction * (1 - fraction))
         yield row("loss", "lost fraction", fraction, found["dropped"]["loss"] / sent, sd, sent)
     for loss, burst in ((0.1, 4.0), (0.5, 10.0)):
-        lost = fates(quiet([{"kind": "bursts", "loss_fraction": loss, "burst_packets": burst}], seed), ticks)
+        lost = fates(
+            unaudited_radio([{"kind": "gilbert_elliott", "loss_fraction": loss, "burst_packets": burst}], seed), ticks
+        )
         r = 1 - 1 / burst - loss / (1 - loss) / burst
-        yield row("bursts", "lost fraction", loss, lost.mean(), math.sqrt(loss * (1 - loss) * (1 + r) / (1 - r)), sent)
+        yield row(
+            "gilbert_elliott",
+            "lost fraction",
+            loss,
+            lost.mean(),
+            math.sqrt(loss * (1 - loss) * (1 + r) / (1 - r)),
+            sent,
+        )
         length, ends = burst_length(lost)
-        yield row("bursts", "burst length", burst, length, math.sqrt(burst * (burst - 1)), ends)
+        yield row("gilbert_elliott", "burst length", burst, length, math.sqrt(burst * (burst - 1)), ends)
     deviations = {"uniform": 3**-0.5, "exponential": 1.0, "lognormal": math.sqrt(math.e - 1), "pareto": 0.8944}
     for distribution, sd in deviations.items():
         model = {"kind": "delay", "delay_s": 1.0, "jitter_s": 2.0, "distribution": distribution}
-        yield row("delay", f"mean, {distribution} [s]", 3.0, delay_s(quiet([model], seed), ticks), 2.0 * sd, sent)
-    found = quiet([{"kind": "duplication", "fraction": 0.2}], seed).all_broadcast(ticks)
+        yield row(
+            "delay", f"mean, {distribution} [s]", 3.0, delay_s(unaudited_radio([model], seed), ticks), 2.0 * sd, sent
+        )
+    found = unaudited_radio([{"kind": "duplication", "fraction": 0.2}], seed).all_broadcast(ticks)
     yield row("duplication", "copied fraction", 0.2, found["copies"] / sent, 0.4, sent)
     rate = 0.001
-    found = quiet([{"kind": "corruption", "bit_error_rate": rate}], seed).all_broadcast(ticks)
+    found = unaudited_radio([{"kind": "corruption", "bit_error_rate": rate}], seed).all_broadcast(ticks)
     chance = 1 - (1 - rate) ** 128
     yield row("corruption", "damaged fraction", chance, found["damaged"] / sent, math.sqrt(chance * (1 - chance)), sent)
     rate_model = {"kind": "rate_limit", "rate_bytes_s": 100.0, "queue_bytes": 64.0}
-    radio = quiet([rate_model], seed)
+    radio = unaudited_radio([rate_model], seed)
     found = radio.all_broadcast(ticks)
-    # Not random: what is left in the queue at the end is all that may be missing or too much.
+    # Deterministic: the error is at most the bytes left in the queue at the end.
     expected = 100.0 * DT_S * ticks / 16.0
     yield "rate_limit", "transmissions a sender", expected, found["delivered"] / LINKS, 64.0 / 16.0
     airtime_s = 0.0005
-    found = quiet([{"kind": "collision", "airtime_s": airtime_s}], seed).all_broadcast(ticks)
+    found = unaudited_radio([{"kind": "collision", "airtime_s": airtime_s}], seed).all_broadcast(ticks)
     a = airtime_s / DT_S
     chance = (1 - (2 * a - a * a)) ** (NODES - 1)
-    # The packets of a transmission share their fate, and collisions come in pairs.
+    # All packets of a transmission collide or none, and collisions come in pairs.
     count = ticks * NODES / 2
     got = found["delivered"] / sent
     yield row("collision", "delivered fraction", chance, got, math.sqrt(chance * (1 - chance)), count)
     half = NODES // 2
     places = [(10.0, 10.0)] * half + [(20.0, 10.0)] * half
     model = {"kind": "path_loss", "shadowing_sd_db": 0.0, "width_db": 2.0, "sensitivity_dbm": -72.2}
-    lost = fates(quiet([model], seed, places), ticks)
+    lost = fates(unaudited_radio([model], seed, places), ticks)
     apart = np.array([(a < half) != (b < half) for a in range(NODES) for b in range(NODES) if a != b])
     chance = 1 / (1 + math.exp(-1))
     sd = math.sqrt(chance * (1 - chance))
@@ -143,7 +157,7 @@ def measure(packets: int, seed: int) -> Iterator[Row]:
 
 
 def delay_s(radio: Radio, ticks: int) -> float:
-    """Return the mean delay [s]; arrivals are looked at once a tick, half a tick late on average."""
+    """Return the mean delay [s]. Arrivals are read once a tick, half a tick late on average."""
     for tick in range(ticks):
         radio.step({node: (Transmission("robots", tick.to_bytes(4, "big")),) for node in range(NODES)})
     while radio.medium.summary()["in_flight"]:
@@ -155,17 +169,19 @@ def delay_s(radio: Radio, ticks: int) -> float:
 
 
 def is_inside(row: Row) -> bool:
-    """Tell whether what was found is as near to what was expected as it should be."""
+    """Return whether the measured value is inside its interval."""
     _, _, expected, found, half = row
     return abs(found - expected) <= half
 
 
 def main() -> None:
-    """Print the table; exit with status 1 where more than one row is outside."""
+    """Print the table; exit with status 1 if more than one row is outside."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--packets", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
+    add_csv_option(parser)
     chosen = parser.parse_args()
+    rows = []
     table = Table("model", "what", "expected", "found", "99 % within", "inside", box=None)
     outside = 0
     for each in measure(chosen.packets, chosen.seed):
@@ -175,7 +191,11 @@ def main() -> None:
         digits = ".5g" if half else "d"
         numbers = [f"{expected:{digits}}", f"{found:{digits}}", f"+-{half:.2g}" if half else "exact"]
         table.add_row(model, what, *numbers, "yes" if inside else "no")
+        columns = ("model", "what", "expected", "found", "99 % within", "inside")
+        cells = (f"`{model}`", what, *numbers, "yes" if inside else "no")
+        rows.append({name: cell.replace("+-", "±") for name, cell in zip(columns, cells, strict=True)})
     Console().print(table)
+    write_csv(chosen.csv, rows)
     sys.exit(outside > 1)
 
 

@@ -1,4 +1,4 @@
-"""How fast the inline runner is on one core, beside the physics engine alone in the same run.
+"""Speed of the inline runner on one core, compared with the physics engine alone.
 
 Prints robot-ticks per second of processor time: the whole emulator (e-pucks with the line-of-sight sensor, 10 substeps,
 wire format and trace included), and pymunk alone stepping the same bodies between the same walls.
@@ -8,6 +8,7 @@ import argparse
 import time
 
 import numpy as np
+from csv_rows import add_csv_option, write_csv
 
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import run
@@ -25,7 +26,7 @@ def emulator_rate(scenario: Scenario, seed: int) -> float:
 
 
 def physics_rate(scenario: Scenario, seed: int) -> float:
-    """Return robot-ticks per second of pymunk alone, driven by the speeds of robots that see nobody."""
+    """Return robot-ticks per second of pymunk alone, with the wheel speeds of robots that see no other robot."""
     physics = assemble(scenario, seed)._physics
     count = scenario.robots.count
     forward, turn = np.full(count, 0.0725), np.full(count, -0.77)
@@ -39,7 +40,9 @@ def physics_rate(scenario: Scenario, seed: int) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
-    repeats = parser.parse_args().repeats
+    add_csv_option(parser)
+    options = parser.parse_args()
+    repeats, rows = options.repeats, []
     print(f"{'robots':>6} {'emulator/s':>12} {'target/s':>10} {'pymunk alone/s':>15} {'ratio':>6}   ({repeats} runs)")
     for count, target in TARGETS.items():
         name = "computation-free" if count == 25 else "computation-free-scaling"
@@ -49,6 +52,13 @@ def main() -> None:
         for label, pick in (("best", np.max), ("median", np.median)):
             ratio = pick(emulator) / pick(physics)
             print(f"{count:>6} {pick(emulator):>12,.0f} {target:>10,} {pick(physics):>15,.0f} {ratio:>6.2f}   {label}")
+        measured = {
+            "robots": f"{count}",
+            "emulator [robot-ticks/s]": f"{np.median(emulator):.0f}",
+            "target": f"{target}",
+        }
+        rows.append(measured | {"pymunk alone, same run [robot-ticks/s]": f"{np.median(physics):.0f}"})
+    write_csv(options.csv, rows)
 
 
 if __name__ == "__main__":

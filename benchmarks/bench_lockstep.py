@@ -1,15 +1,16 @@
-"""Lock-step throughput with robots in processes, beside a bare Zenoh echo with as many processes and as many bytes.
+"""Lock-step throughput with robots in processes, compared with a bare Zenoh echo of as many processes and bytes.
 
-Both are measured in turn in the same run, many times, because where the scheduler puts a hundred processes moves both
-sides by a quarter; the ratio is the median of those of neighbours in that sequence, beside the range of its middle half. The
-emulator does everything: physics, sensing, encoding, decoding, controllers, trace. Its robots give way to the world, which
-those of the bare echo do not; the last column is the ratio to an echo that does so too.
+Both are measured alternately, many times, because the placement of a hundred processes on cores changes both rates by a
+quarter. The ratio is the median over adjacent pairs of measurements, with the range of its middle half. The emulator's rate
+includes physics, sensing, encoding, decoding, controllers and trace. Its robots have a higher niceness than the world; the
+last column is the ratio to an echo with the same niceness.
 """
 
 import argparse
 import operator
 import statistics
 
+from csv_rows import add_csv_option, write_csv
 from echo import echo_rate
 
 from zwerm.agents.runtime.process import NICENESS
@@ -22,7 +23,7 @@ from zwerm.scenario.tables import Scenario
 
 TARGET = 0.7
 
-# Evenly spread, so that a robot has about eight neighbours in range, as in a swarm that covers an area.
+# Uniform placement with about eight neighbours in range of each robot, as in a swarm that covers an area.
 SENSORS = (
     "arena.size_m=[4.0, 4.0]",
     "robots.placement={kind='uniform'}",
@@ -32,7 +33,7 @@ SENSORS = (
 
 
 def lockstep_rate(scenario: Scenario, seed: int) -> float:
-    """Return robot-ticks per second of one run in processes, the start of the processes not counted."""
+    """Return robot-ticks per second of one run in processes, without the start of the processes."""
     with LocalSwarm(new_run_id(), node_specs(scenario, seed)) as swarm:
         result = drive(assemble(scenario, seed), swarm.link, seed, "processes")
     if result.middleware_lost or not result.ok:
@@ -41,7 +42,7 @@ def lockstep_rate(scenario: Scenario, seed: int) -> float:
 
 
 def mean_payload_bytes(scenario: Scenario, seed: int) -> int:
-    """Return how long an observation of the first tick is on average."""
+    """Return the mean length of the observations of the first tick [bytes]."""
     world = assemble(scenario, seed)
     _, observations = world.observe()
     return round(statistics.fmean(map(len, observations)))
@@ -52,7 +53,9 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=100)
     parser.add_argument("--seconds", type=float, default=30.0, help="virtual time of each run")
     parser.add_argument("--repeats", type=int, default=21, help="at least 2")
+    add_csv_option(parser)
     options = parser.parse_args()
+    rows = []
     base = (f"robots.count={options.robots}", f"time.duration_s={options.seconds}")
     cases = {"line of sight": base, "five sensors": (*base, *SENSORS)}
     print(
@@ -74,6 +77,20 @@ def main() -> None:
             f"{name:<14} {payload_bytes:>6} {statistics.median(ours):>11,.0f} {statistics.median(bare):>9,.0f} {ratio:>6.2f}"
             f" {f'{low:.2f} to {high:.2f}':>14} {TARGET:>7} {fairest:>11.2f}"
         )
+        rows.append(
+            {
+                "observation": name,
+                "bytes": f"{payload_bytes}",
+                "pairs": f"{options.repeats}",
+                "emulator [robot-ticks/s]": f"{statistics.median(ours):.0f}",
+                "bare echo [robot-ticks/s]": f"{statistics.median(bare):.0f}",
+                "ratio, median": f"{ratio:.2f}",
+                "middle half": f"{low:.2f} to {high:.2f}",
+                "target": f"{TARGET}",
+                "ratio to an echo of low priority": f"{fairest:.2f}",
+            }
+        )
+    write_csv(options.csv, rows)
 
 
 if __name__ == "__main__":

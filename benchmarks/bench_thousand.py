@@ -1,7 +1,7 @@
-"""A thousand robot processes on one machine: how long they take to start, what each costs in memory, how fast they go.
+"""A thousand robot processes on one machine: time to start, memory of each process, and speed.
 
-With `--table1` they do what takes a while: Voronoi coverage until every robot is within 1e-7 m of its centroid, Table I of
-Schwager, McLurkin, Rus 2006; then the same run inline, whose trace has to be the same.
+With `--table1` the robots run Voronoi coverage until each is within 1e-7 m of its centroid (Table I of Schwager, McLurkin,
+Rus 2006); then the same run is repeated inline, and must have the same trace.
 """
 
 import argparse
@@ -9,6 +9,8 @@ import os
 import statistics
 import time
 from pathlib import Path
+
+from csv_rows import add_csv_option, write_csv
 
 from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm
@@ -22,13 +24,13 @@ START_S_MAX, PRIVATE_MB_MAX, RATE_MIN = 45.0, 8.0, 3_000.0
 
 
 def private_mb(pid: int) -> float:
-    """Return the memory [MB] that a process shares with no other (Linux)."""
+    """Return the private memory of a process [MB] (Linux)."""
     fields = (line.split() for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:])
     return sum(int(field[1]) for field in fields if field[0] in ("Private_Clean:", "Private_Dirty:")) / 1024
 
 
 def scenario_of(options: argparse.Namespace) -> Scenario:
-    """Return what the robots are to do."""
+    """Return the scenario of the options."""
     if options.table1:
         return load("voronoi-coverage-table1", (f"robots.count={options.robots}", *options.set))
     side_m = 0.4 * options.robots**0.5
@@ -44,7 +46,7 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
 
 def report(result: RunResult) -> None:
-    """Print what a run came to."""
+    """Print the result of a run."""
     print(f"{result.runner}: {result.ticks} ticks, outcome {result.outcome}, trace {result.trace}")
     print(f"{'wall time':<28} {result.wall_s:>8,.1f} s", flush=True)
 
@@ -56,6 +58,7 @@ def main() -> None:
     parser.add_argument("--table1", action="store_true")
     parser.add_argument("--set", action="append", default=[], help="override of Table I's scenario")
     parser.add_argument("--seed", type=int, default=1)
+    add_csv_option(parser)
     options = parser.parse_args()
     scenario, seed = scenario_of(options), options.seed
     world = assemble(scenario, seed)
@@ -73,10 +76,24 @@ def main() -> None:
     print(f"{'private memory, world':<28} {private_mb(os.getpid()):>8,.0f} MB")
     print(f"{'robot-ticks/s':<28} {rate:>8,.0f}     at least {RATE_MIN:g}")
     print(f"{'lost by the middleware':<28} {result.middleware_lost:>8}     exactly 0", flush=True)
+    rows = [
+        ("start, until all have joined [s]", f"{start_s:.1f}", f"at most {START_S_MAX:g}"),
+        ("private memory of a robot, mean [MB]", f"{statistics.fmean(memory):.2f}", f"at most {PRIVATE_MB_MAX:g}"),
+        ("private memory of a robot, largest [MB]", f"{max(memory):.2f}", f"at most {PRIVATE_MB_MAX:g}"),
+        ("private memory of all robots [MB]", f"{sum(memory):.0f}", ""),
+        ("private memory of the world [MB]", f"{private_mb(os.getpid()):.0f}", ""),
+        ("robot-ticks/s", f"{rate:.0f}", f"at least {RATE_MIN:g}"),
+        ("lost by the middleware", f"{result.middleware_lost}", "0"),
+        ("ticks", f"{result.ticks}", ""),
+        ("wall time, processes [s]", f"{result.wall_s:.0f}", ""),
+    ]
     if options.table1:
         inline = run(scenario, seed, "inline")
         report(inline)
         print("the same trace" if inline.trace == result.trace else "ANOTHER TRACE")
+        rows.append(("wall time, inline [s]", f"{inline.wall_s:.0f}", ""))
+        rows.append(("trace of both", "equal" if inline.trace == result.trace else "different", "equal"))
+    write_csv(options.csv, [{"what": what, "measured": measured, "target": target} for what, measured, target in rows])
 
 
 if __name__ == "__main__":

@@ -1,11 +1,13 @@
-"""How fast Voronoi coverage is inline on one core: 100 robots with a control period of 0.02 s, and where the time goes.
+"""Speed of Voronoi coverage inline on one core: robots with a control period of 0.02 s.
 
-Prints the factor over real time and the microseconds of processor time of one robot's tick: the whole emulator, and the
-controller's share of it (the same observations answered by the bare controllers).
+Prints the factor over real time, and the processor time of one robot's tick [us]: of the whole emulator, and of the controller
+alone with the same observations.
 """
 
 import argparse
 import time
+
+from csv_rows import add_csv_option, write_csv
 
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs
@@ -45,10 +47,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--duration_s", type=float, default=20.0, help="virtual time of a run; its start counts")
+    parser.add_argument("--code", choices=("interpreted", "compiled"), help="end with an error where it is the other")
+    add_csv_option(parser)
     arguments = parser.parse_args()
-    print(
-        f"best of {arguments.repeats}, the cell {'interpreted' if kept_cell.__file__.endswith('.py') else 'compiled'}"
-    )
+    code = "interpreted" if kept_cell.__file__.endswith(".py") else "compiled"
+    if arguments.code not in (None, code):
+        parser.error(f"the cell is {code}; for the other run `make compile`, or remove zwerm/maths/*.so")
+    rows = []
+    print(f"best of {arguments.repeats}, the cell {code}")
     print(f"{'robots':>6} {'x real time':>12} {'target':>7} {'us/robot-tick':>14} {'controller us':>14}")
     for count in (10, 100, 1000):
         overrides = (f"robots.count={count}", "time.dt_s=0.02", f"time.duration_s={arguments.duration_s}")
@@ -57,6 +63,17 @@ def main() -> None:
         own = min(controller(scenario, seed) for seed in range(1, arguments.repeats + 1))
         factor, spent = max(rate for rate, _ in rates), min(spent for _, spent in rates)
         print(f"{count:>6} {factor:>12.1f} {TARGET if count == 100 else '':>7} {spent:>14.1f} {own:>14.1f}")
+        rows.append(
+            {
+                "code": code,
+                "robots": f"{count}",
+                "times real time": f"{factor:.1f}",
+                "target": f"{TARGET:g}" if count == 100 else "",
+                "µs a robot and tick": f"{spent:.1f}",
+                "controller alone [µs]": f"{own:.1f}",
+            }
+        )
+    write_csv(arguments.csv, rows)
 
 
 if __name__ == "__main__":

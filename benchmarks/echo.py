@@ -1,8 +1,8 @@
-"""How fast Zenoh's Python binding can go round: a bare echo, the ceiling of the emulator's lock-step.
+"""Rate of a bare echo over Zenoh's Python binding: the upper limit of the emulator's lock-step rate.
 
-The world publishes a payload to each of n robots, every robot publishes it back from Zenoh's callback, the world waits
-for all, and again. Processes, sessions, access control and threads are the emulator's own; in the loop itself there is
-none of its code: no protocol, no controller, no asyncio, no deadline.
+The world publishes a payload to each of n robots, each robot publishes it back from Zenoh's callback, the world waits for
+all, and repeats. Processes, sessions, access control and threads are the emulator's. The loop contains no other code of the
+emulator: no protocol, no controller, no asyncio, no deadline.
 
     python benchmarks/echo.py 100 --ticks 200 --bytes 100
 """
@@ -38,7 +38,7 @@ BLOCK = zenoh.CongestionControl.BLOCK
 
 
 def echo(credential: Credential, endpoint: str, niceness: int) -> None:
-    """Be one robot: say that it is there, and send back whatever comes."""
+    """Run one robot: send one message when it is ready, then return each message."""
     os.nice(niceness)
     set_threads(ONE_THREAD)
     session = open_session(
@@ -56,7 +56,7 @@ def echo(credential: Credential, endpoint: str, niceness: int) -> None:
     session.declare_subscriber(
         observation_key(RUN, credential.node), Callback(lambda sample: put(sample.payload), indirect=False)
     )
-    # What is published before the session knows of a listener is lost.
+    # Messages published before the session knows of a subscriber are lost.
     while not publisher.matching_status.matching:
         time.sleep(0.01)
     put(b"")  # arrives after the subscription
@@ -64,9 +64,9 @@ def echo(credential: Credential, endpoint: str, niceness: int) -> None:
 
 
 def echo_rate(count: int, ticks: int, payload_bytes: int, niceness: int = 0) -> float:
-    """Return how many robot ticks a second `count` processes echo, over `ticks` rounds after a few to warm up.
+    """Return the robot ticks per second that `count` processes echo, over `ticks` rounds after 10 rounds to warm up.
 
-    They give way to the world by `niceness`, as a bare process does not.
+    `niceness` is added to the niceness of the robots' processes.
     """
     prepare(count)
     set_threads(TWO_THREADS)
@@ -122,6 +122,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    from echo import main as importable_main  # robots import what they run from here, and not the program
+    from echo import main as importable_main  # robots import this module instead of running the program
 
     importable_main()

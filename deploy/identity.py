@@ -1,12 +1,11 @@
-"""Identities: who may join a run, and what the network lets each node do.
+"""Credentials of a run's nodes, and the access control of its router.
 
-Every run has new random credentials. The router admits a user name only with its password, and only from the session
-with the Zenoh id issued along with it. Access control denies by default and leaves a node exactly its own keys: put
-its commands, receive its observations, say hello, keep its own liveliness token. So locality does not rest on good
-manners.
+Each run has new random credentials. The router admits a user name only with its password, and only from the session with
+the Zenoh id of the same credential. Access control denies by default. It allows each node four things on its own keys: put
+commands, receive observations, send hello, and hold its liveliness token. The router enforces locality, not the node.
 
-Credentials travel by pipe to processes of this machine, and by file (0600) to others; never on a command line or in the
-environment.
+Processes on this machine get credentials through a pipe, other machines through a file (mode 0600). Credentials never
+appear on a command line or in the environment.
 """
 
 import os
@@ -25,10 +24,10 @@ from zwerm.wire.messages import MESSAGE_BYTES_MAX
 PRIVATE_FILE_MODE: Final = 0o600
 SECRET_BYTES: Final = 24
 
-# The router does not put a longer message together. Those between MESSAGE_BYTES_MAX and this are refused, and counted.
+# The router discards a longer message. The receiver refuses and counts messages between MESSAGE_BYTES_MAX and this size.
 _MESSAGE_BYTES_MAX: Final = 16 * MESSAGE_BYTES_MAX
 
-# What a node may do on each of its keys: (key, message, flow seen from the router).
+# Operations allowed to a node on its keys: (key, message, flow seen from the router).
 _PERMISSIONS: Final = (
     (command_key, "put", "ingress"),
     (observation_key, "declare_subscriber", "ingress"),
@@ -40,12 +39,12 @@ _PERMISSIONS: Final = (
 
 
 def issue(run: str, nodes: Iterable[int], authority_pem: str = "") -> Credentials:
-    """Return new random credentials for `nodes`, who are to trust certificates signed by `authority_pem`."""
+    """Return new random credentials for `nodes`. The nodes trust certificates signed by `authority_pem`."""
     return Credentials(run, tuple(_issue(node) for node in nodes), authority_pem)
 
 
 def renew(credential: Credential) -> Credential:
-    """Return the credential for the next life of a node: it connects as before, and joins under a new incarnation."""
+    """Return the credential for a restarted node: the same connection, the next incarnation number."""
     return msgspec.structs.replace(credential, incarnation=credential.incarnation + 1)
 
 
@@ -60,9 +59,9 @@ def _issue(node: int) -> Credential:
 
 
 def router_settings(credentials: Credentials, endpoints: list[str], dictionary: Path) -> dict[str, Any]:
-    """Return Zenoh settings of a router that listens on `endpoints` and admits those, and only those, credentials.
+    """Return the Zenoh settings of a router that listens on `endpoints` and admits these credentials only.
 
-    Writes the passwords to `dictionary`, which the router reads when its session opens; the caller removes it then.
+    Writes the passwords to the file `dictionary`. The router reads it when its session opens; the caller then removes it.
     """
     write_private(dictionary, "".join(f"{node.user}:{node.password}\n" for node in credentials.nodes).encode())
     capacity = len(credentials.nodes)
@@ -79,8 +78,8 @@ def router_settings(credentials: Credentials, endpoints: list[str], dictionary: 
 
 
 def access_control(credentials: Credentials) -> dict[str, Any]:
-    """Return the access control that leaves every node its own keys and nothing else."""
-    # A session publishes only what it knows somebody listens to, so it may know that the world listens to every node.
+    """Return the access control that allows each node its own keys and nothing else."""
+    # A session publishes only if it knows of a subscriber, so each node may see the world's subscription.
     listens = _allow("world-listens", command_key(credentials.run, EVERY), "declare_subscriber", "egress")
     rules = [listens]
     policies = []
@@ -106,7 +105,7 @@ def _allow(name: str, key: str, message: str, flow: str) -> dict[str, Any]:
 
 
 def slice_of(credentials: Credentials, nodes: Iterable[int]) -> Credentials:
-    """Return the credentials of `nodes` only. Raises LinkError where there are none for one of them."""
+    """Return the credentials of `nodes` only. Raises LinkError if one of them has none."""
     known = {credential.node: credential for credential in credentials.nodes}
     chosen = list(nodes)
     if unknown := [node for node in chosen if node not in known]:
@@ -115,7 +114,7 @@ def slice_of(credentials: Credentials, nodes: Iterable[int]) -> Credentials:
 
 
 def save(credentials: Credentials, path: Path) -> None:
-    """Write credentials to a file that only its owner can read. Raises LinkError where that is impossible."""
+    """Write credentials to a file that only its owner can read. Raises LinkError if the file cannot be written."""
     try:
         write_private(path, msgspec.json.format(msgspec.json.encode(credentials), indent=1))
     except OSError as error:
@@ -123,7 +122,7 @@ def save(credentials: Credentials, path: Path) -> None:
 
 
 def load(path: Path) -> Credentials:
-    """Return the credentials in a file. Raises LinkError where it is missing, readable by others, or malformed."""
+    """Return the credentials in a file. Raises LinkError if it is missing, readable by others, or malformed."""
     try:
         if path.stat().st_mode & 0o077:
             raise LinkError(f"{path}: credentials must be readable by their owner only (chmod 600)")
@@ -135,7 +134,7 @@ def load(path: Path) -> Credentials:
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Write a file that only its owner can read, from its first byte on; one that was there before is replaced."""
+    """Write a file that only its owner can read, from its first byte on. Replaces an existing file."""
     path.unlink(missing_ok=True)
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, PRIVATE_FILE_MODE)
     with os.fdopen(descriptor, "wb") as file:

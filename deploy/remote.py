@@ -1,4 +1,4 @@
-"""A slice of a swarm on this machine, for a world elsewhere."""
+"""Run some of a swarm's robots on this machine, for a world on another machine."""
 
 import time
 from collections.abc import Callable
@@ -29,7 +29,7 @@ def run_robots(
 ) -> dict[int, int]:
     """Start the robots `ids` (all in the file, if empty), wait until they end, and return their exit codes by id.
 
-    Raises LinkError where the file cannot be used, or a robot cannot join within `deadline_s`.
+    Raises LinkError if the file cannot be used, or a robot does not join within `deadline_s`.
     """
     credentials = load(credentials_file)
     if ids:

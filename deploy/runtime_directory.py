@@ -1,7 +1,7 @@
-"""Private directories of a run, for sockets and the like: gone when the run is, however it ended.
+"""The private directory of a run, for sockets and passwords. No directory outlives its run for long.
 
-A run that ends removes its own. One that was killed cannot: but it held a lock that the kernel has let go of, and the next run
-on this machine removes what nobody holds any more.
+A run removes its directory when it ends. A killed run cannot do this, but the kernel releases the lock that it held. The
+next run on this machine removes all unlocked directories.
 """
 
 import contextlib
@@ -29,14 +29,14 @@ def private_directory() -> Iterator[Path]:
         path = Path(name)
         with (path / f".{_HELD}").open("wb") as held:
             fcntl.flock(held, fcntl.LOCK_EX)
-            (path / f".{_HELD}").rename(path / _HELD)  # whoever sees it finds it locked
+            (path / f".{_HELD}").rename(path / _HELD)  # other runs see the file only after it is locked
             yield path
 
 
 def sweep(home: Path) -> None:
-    """Remove the private directories in `home` whose runs were killed."""
+    """Remove the private directories in `home` of killed runs."""
     for path in home.glob(f"{_PREFIX}*/{_HELD}"):
-        with contextlib.suppress(OSError):  # somebody else's, or gone meanwhile
+        with contextlib.suppress(OSError):  # of another user, locked, or removed meanwhile
             if path.parent.stat(follow_symlinks=False).st_uid == os.geteuid():
                 with path.open("rb") as held:
                     fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -44,6 +44,6 @@ def sweep(home: Path) -> None:
 
 
 def _short_directory() -> Path:
-    """Return the directory for temporary files, or /tmp where a socket below it would have too long a path."""
+    """Return the directory for temporary files, or /tmp if the path of a socket below it would be too long."""
     chosen = tempfile.gettempdir()
     return Path(chosen if len(chosen) < _SOCKET_PATH_BYTES_MAX - len("/zwerm-12345678/router") else "/tmp")

@@ -1,7 +1,7 @@
-"""Robot processes of this machine: started a few at a time, watched, and ended, whatever happens.
+"""Start, watch and end the robot processes of this machine.
 
-Promises: `stop` leaves no process, and needs no cooperation of theirs; if this process is killed the kernel ends them
-(on Linux; elsewhere they end themselves). Knows nothing of the run they take part in.
+`stop` leaves no process and needs no cooperation of the processes. If this process is killed, the kernel kills the robots
+on Linux; elsewhere they exit by themselves. This module does not depend on the scenario or the world.
 """
 
 import contextlib
@@ -24,15 +24,15 @@ from zwerm.errors import LinkError
 from zwerm.link.peer_radio import Station
 from zwerm.link.session import Credential, Credentials
 
-# How many may be starting at once: more only get in each other's way.
+# Largest number of robots that start at the same time; more slow each other down.
 JOINING_MAX: Final = 16
 JOIN_DEADLINE_S: Final = 60.0
 
-# How long nobody may have left before those who remain are ended with more force.
+# Seconds without any exit after which the remaining processes get SIGTERM, and then SIGKILL.
 LEAVE_PATIENCE_S: Final = 3.0
 TERMINATE_PATIENCE_S: Final = 2.0
 
-# Open files a robot costs this process: two pipes and the router's end of its connection.
+# Open files of this process for each robot: two pipes and the router's end of the connection.
 _FILES_PER_ROBOT: Final = 3
 _FILES_MIN: Final = 16_384
 
@@ -40,16 +40,16 @@ Progress = Callable[[int, int], object]
 
 
 def prepare(robots: int) -> None:
-    """Start the server that robots are forked from, and raise the limit of open files for `robots` of them.
+    """Start the forkserver, and raise the limit of open files for `robots` robots.
 
-    Call it from the main thread, and before the first Zenoh session is opened: on Linux the server ends with the thread
-    that started it, and no fork may come after a session. The server lives as long as this process, and serves every
-    later swarm too. Raises LinkError where the limit cannot be raised far enough.
+    Call it from the main thread, before the first Zenoh session is opened: on Linux the server ends with the thread that
+    started it, and a process must not fork after it has a session. The server lives as long as this process and serves
+    later swarms too. Raises LinkError if the limit cannot be raised far enough.
     """
     _raise_file_limit(robots * _FILES_PER_ROBOT + 200)
     multiprocessing.set_forkserver_preload(["zwerm.deploy.preload"])
     resource_tracker.ensure_running()
-    # The server and every robot inherit the mask: Ctrl-C is for this process, which then ends them in order.
+    # The server and all robots inherit the mask: only this process handles Ctrl-C, and it ends them in order.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         forkserver.ensure_running()
@@ -59,7 +59,7 @@ def prepare(robots: int) -> None:
 
 def _raise_file_limit(needed: int) -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = max(needed, _FILES_MIN)  # the server inherits the limit, and may have to serve a larger swarm later
+    wanted = max(needed, _FILES_MIN)  # the server inherits the limit, and may serve a larger swarm later
     if hard != resource.RLIM_INFINITY:
         if hard < needed:
             raise LinkError(f"the robots need {needed} open files, the limit is {hard} (ulimit -n)")
@@ -71,7 +71,7 @@ def _raise_file_limit(needed: int) -> None:
 class LocalSupervisor:
     """One process for each of `credentials`, connected to `endpoint`; `order` is the order of starting.
 
-    Those with a place in `stations` have a radio of their own there, on a real network.
+    Nodes in `stations` send packets over a real network.
     """
 
     def __init__(
@@ -111,8 +111,8 @@ class LocalSupervisor:
     def start(self, progress: Progress | None = None, deadline_s: float = JOIN_DEADLINE_S) -> None:
         """Start all robots, and return when all have joined.
 
-        `progress` is called with how many have joined, and of how many. Raises LinkError where a robot ends before it
-        has joined, or has not joined within `deadline_s` of its own start.
+        Calls `progress` with the number of joined robots and the number of all. Raises LinkError if a robot ends before
+        it joins, or does not join within `deadline_s` of its own start.
         """
         credentials = [self._credentials[node] for node in self._order]
         for number, _ in enumerate(self._launch(credentials, deadline_s), 1):
@@ -120,12 +120,12 @@ class LocalSupervisor:
                 progress(number, len(credentials))
 
     def restart(self, credential: Credential, deadline_s: float = JOIN_DEADLINE_S) -> None:
-        """Start a robot that has ended once more, under the incarnation in `credential`. Raises as `start`."""
+        """Start an ended robot again, as the incarnation in `credential`. Raises LinkError as `start` does."""
         for _ in self._launch([credential], deadline_s):
             pass
 
     def kill(self, node: int) -> None:
-        """Kill one robot and wait until it is gone."""
+        """Kill one robot and wait until its process has ended."""
         process = self._processes[node]
         process.kill()
         process.join()
@@ -135,7 +135,7 @@ class LocalSupervisor:
         os.kill(self.pids[node], number)
 
     def wait(self, patience_s: float | None = None) -> bool:
-        """Wait until all robots have ended, or none has for `patience_s` seconds; tell whether all have."""
+        """Wait until all robots have ended, or none ends for `patience_s` seconds. Return whether all have ended."""
         alive: dict[Any, ForkServerProcess] = {process.sentinel: process for process in self._alive()}
         while alive:
             ended = wait(list(alive), patience_s)
@@ -146,7 +146,7 @@ class LocalSupervisor:
         return True
 
     def stop(self, patience_s: float = 0.0) -> None:
-        """End all robots: wait for them to leave, as `wait` does, then SIGTERM, then SIGKILL; idempotent."""
+        """End all robots: wait as `wait` does, then send SIGTERM, then SIGKILL. Idempotent."""
         with interrupts_held():
             if self.wait(patience_s):
                 return
@@ -171,12 +171,12 @@ class LocalSupervisor:
                 with interrupts_held(), main_module_hidden():
                     while waiting and len(missing) < JOINING_MAX:
                         credential = waiting.popleft()
-                        process = self._started(credential, deadline_s, writer)
+                        process = self._start_process(credential, deadline_s, writer)
                         missing[credential.node] = process, time.monotonic() + deadline_s
                 first, end_s = next(iter(missing.values()))
                 sentinels = [process.sentinel for process, _ in missing.values()]
                 ready = wait([reader, *sentinels], max(0.0, end_s - time.monotonic()))
-                if reader in ready:  # before the sentinels: who has joined may have ended since
+                if reader in ready:  # before the sentinels: a joined robot may have ended since
                     node = int(reader.recv_bytes())
                     del missing[node]
                     yield node
@@ -187,7 +187,7 @@ class LocalSupervisor:
                         raise LinkError(f"{process.name} ended with exit code {process.exitcode} before it joined")
                 raise LinkError(f"{first.name} did not join within {deadline_s:g} s")
 
-    def _started(self, credential: Credential, deadline_s: float, joined: Connection) -> ForkServerProcess:
+    def _start_process(self, credential: Credential, deadline_s: float, joined: Connection) -> ForkServerProcess:
         process = self._context.Process(
             target=main,
             args=(
@@ -204,7 +204,7 @@ class LocalSupervisor:
 
 @contextlib.contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back until the block has ended, and deliver it then."""
+    """Defer SIGINT to the end of the block."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -220,7 +220,7 @@ def interrupts_held() -> Iterator[None]:
 
 @contextlib.contextmanager
 def main_module_hidden() -> Iterator[None]:
-    """Keep robot processes from importing the program that starts them, and all that it imports."""
+    """Prevent robot processes from importing the main module of this process, and its imports."""
     module = sys.modules["__main__"]
     names: dict[str, Any] = vars(module)
     hidden: dict[str, Any] = {name: names[name] for name in ("__spec__", "__file__") if name in names}

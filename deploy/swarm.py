@@ -1,9 +1,9 @@
-"""A whole swarm behind one link: its credentials, its router, and its processes, on this machine or on others.
+"""A swarm behind one link: its credentials, its router, and its processes, on this machine or on others.
 
     with LocalSwarm(run, members) as swarm:
         swarm.link.send(...); swarm.link.receive(...)
 
-Promises: entering returns when every node has joined; leaving, in whatever way, leaves no process, socket or directory.
+Entering returns when every node has joined. Leaving, also by an exception, leaves no process, socket or directory.
 """
 
 import contextlib
@@ -29,12 +29,12 @@ from zwerm.deploy.supervisor import (
 from zwerm.errors import LinkError
 from zwerm.link.peer_radio import Station
 from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials
-from zwerm.link.world import ExpectedNode, ZenohWorldLink
+from zwerm.link.world_link import ExpectedNode, ZenohWorldLink
 from zwerm.wire.messages import encode
 
 Members = Mapping[int, tuple[str, Setup]]
 
-# Of a node's id and incarnation: who plays it.
+# From a node's id and incarnation to its controller and Setup.
 RestartSpec = Callable[[int, int], tuple[str, Setup]]
 
 
@@ -47,7 +47,7 @@ class Certificate(NamedTuple):
 
 
 class _Swarm(ABC):
-    """The nodes of `members` (controller name and setup, by id), and the link to them, from enter to exit."""
+    """The nodes of `members` (controller and Setup by node id), and the link to them, from enter to exit."""
 
     link: ZenohWorldLink
     credentials: Credentials
@@ -61,7 +61,7 @@ class _Swarm(ABC):
         self._stack = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
-        """Start everything, and return when every node has joined. Raises LinkError where one does not."""
+        """Start all nodes, and return when all have joined. Raises LinkError if one does not join."""
         try:
             with interrupts_held():
                 self._open(self._stack.enter_context(private_directory()))
@@ -100,7 +100,7 @@ class _Swarm(ABC):
 
     @abstractmethod
     def _open(self, directory: Path) -> None:
-        """Open the link, and leave on the stack what ends the nodes."""
+        """Open the link, and push the function that ends the nodes onto the exit stack."""
 
     @abstractmethod
     def _gather(self) -> None:
@@ -121,22 +121,22 @@ class LocalSwarm(_Swarm):
         order: Sequence[int] | None = None,
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
-        unborn: Collection[int] = (),
+        late_joiners: Collection[int] = (),
         restart: RestartSpec | None = None,
         stations: Mapping[int, Station] | None = None,
     ) -> None:
-        """`order` is the order of starting; `deadline_s` is given to each process to join; `paced` is real time.
+        """`order` is the order of starting, `deadline_s` the time each process has to join, `paced` means real time.
 
-        The nodes in `unborn` are not started before `start` is called; `restart` says who plays a node's next incarnation,
-        the same as before if it is not given. Nodes with a place in `stations` have their radio there.
+        The nodes `late_joiners` start only when `start` is called. `restart` returns the controller and Setup of a node's
+        next incarnation; without it they stay the same. Nodes in `stations` send packets over a real network.
         """
         super().__init__(run, members, progress, deadline_s, paced)
-        self._order = [node for node in (members if order is None else order) if node not in unborn]
+        self._order = [node for node in (members if order is None else order) if node not in late_joiners]
         self._restart = restart
         self._stations = stations
         self._ran = set(self._order)
         self._stopped: set[int] = set()
-        self._patience_s = 0.0  # nobody waits for those who have not joined
+        self._patience_s = 0.0  # do not wait for nodes that have not joined
 
     def _open(self, directory: Path) -> None:
         prepare(len(self._members))
@@ -151,17 +151,17 @@ class LocalSwarm(_Swarm):
         self._patience_s = LEAVE_PATIENCE_S
 
     def kill(self, node: int) -> None:
-        """Kill a node with SIGKILL; the link reports its end."""
+        """Kill a node with SIGKILL. The link then reports the node lost."""
         self._stopped.discard(node)
         self.supervisor.kill(node)
 
     def start(self, node: int) -> None:
-        """Start a node that has not run yet, or that has ended: then with a new incarnation and no memory.
+        """Start a node that has not run yet or has ended, and return when it has joined. Raises LinkError if it does not.
 
-        Returns when it has joined. Raises LinkError where it does not.
+        A node that has ended starts as a new incarnation, without its former state.
         """
         if node in self._ran:
-            self._revive(node)
+            self._start_next_incarnation(node)
             return
         self._ran.add(node)
         self.supervisor.restart(self._current[node], self._deadline_s)
@@ -172,19 +172,19 @@ class LocalSwarm(_Swarm):
         self.supervisor.send_signal(node, signal.SIGSTOP)
 
     def resume(self, node: int) -> None:
-        """Let a stopped process go on, with SIGCONT."""
+        """Continue a stopped process with SIGCONT."""
         self._stopped.discard(node)
         self.supervisor.send_signal(node, signal.SIGCONT)
 
     def restart(self, node: int) -> None:
-        """Kill a node, and start it with a new incarnation and no memory; return when it has joined.
+        """Kill a node, start its next incarnation without its former state, and return when it has joined.
 
-        Its end is reported by the link all the same. Raises LinkError where it does not join.
+        The link reports the killed incarnation as lost. Raises LinkError if the new one does not join.
         """
         self.kill(node)
-        self._revive(node)
+        self._start_next_incarnation(node)
 
-    def _revive(self, node: int) -> None:
+    def _start_next_incarnation(self, node: int) -> None:
         self.link.wait_joined(lambda joined: node not in joined, LEAVE_PATIENCE_S)
         credential = renew(self._current[node])
         if self._restart is not None:
@@ -201,7 +201,7 @@ class LocalSwarm(_Swarm):
 
 
 class RemoteSwarm(_Swarm):
-    """A swarm whose processes are started by others, with the credentials that are written to `credentials_file`."""
+    """A swarm whose processes are started elsewhere, with the credentials in the file `credentials_file`."""
 
     def __init__(
         self,
@@ -215,7 +215,7 @@ class RemoteSwarm(_Swarm):
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
     ) -> None:
-        """`listen` are Zenoh endpoints, such as `tcp/0.0.0.0:7447`; `deadline_s` is given to all nodes to join."""
+        """`listen` are Zenoh endpoints, such as `tcp/0.0.0.0:7447`. All nodes must join within `deadline_s`."""
         super().__init__(run, members, progress, deadline_s, paced)
         self._endpoints = list(listen)
         self._credentials_file = credentials_file

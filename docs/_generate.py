@@ -1,7 +1,7 @@
-"""What the documentation says of tables, sensors, messages and commands, taken from the code each time it is built.
+"""The parts of the documentation that come from the code: tables, sensors, messages, commands.
 
-A MkDocs hook: a line `<!-- generated: NAME -->` in a page is replaced by what the function of that name returns. So these
-parts cannot go stale; a test checks that every name is known, used and complete.
+`pages.py` writes what a function of GENERATED returns into the pages, below the line `<!-- generated: NAME -->`. A test checks
+that every name is known, used and up to date. The file is a MkDocs hook as well, which draws the picture of the index.
 """
 
 import atexit
@@ -10,7 +10,7 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,28 +21,20 @@ from mkdocs.structure.files import File, Files
 from pydantic import BaseModel
 
 from zwerm.agents.runtime import controllers
-from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, FIELDS, ROBOT, SENSORS, names
+from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, FAULTS, FIELDS, RADIO_MODELS, ROBOT, SENSORS, names
 from zwerm.cli.app import app
 from zwerm.run.runner import run
-from zwerm.scenario import tables as scenario
-from zwerm.scenario.tables import Scenario
+from zwerm.scenario.load import built_in, load
+from zwerm.scenario.tables import Scenario, metrics_table
 from zwerm.scenario.types import OpenTable
-from zwerm.study.tables import StudyTable
+from zwerm.study.study_tables import StudyTable
 from zwerm.wire import messages as protocol
 from zwerm.world.faults import FaultTable
-from zwerm.world.faults import schedule as faults
+from zwerm.world.faults import registry as faults
 from zwerm.world.fields import registry as fields
-from zwerm.world.radio import LinkTable
+from zwerm.world.radio import RadioModel, RadioModelTable
 from zwerm.world.radio import registry as radio
 from zwerm.world.sensors import registry as sensors
-
-MARK: Final = re.compile(r"^<!-- generated: ([a-z-]+) -->$", re.MULTILINE)
-
-
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Fill in a page's generated parts; called by MkDocs."""
-    return MARK.sub(lambda found: GENERATED[found[1]](), markdown)
-
 
 # --- from JSON schemas to words -------------------------------------------------------------------------------------
 
@@ -127,10 +119,13 @@ def study_tables() -> str:
 def _tables(model: type[BaseModel], root: str) -> str:
     schema = model.model_json_schema()
     definitions = schema.get("$defs", {})
+    if "MetricsTable" in definitions:  # its keys are rows of the catalogue
+        metrics = metrics_table().model_json_schema()
+        definitions |= metrics.pop("$defs", {}) | {"MetricsTable": metrics}
     parts: list[str] = []
 
     def describe(table: Schema, path: str, title: str) -> None:
-        parts.append(f"### {title} {{ #{anchor(path or root)} }}\n\n{paragraphs(table.get('description'))}")
+        parts.append(f"{heading(title, anchor(path or root))}\n\n{paragraphs(table.get('description'))}")
         inner = {key: found for key, each in table.get("properties", {}).items() if (found := _table_in(each))}
         below = {key: f"{path}.{key}" if path else key for key in inner}
         parts.append(rows(table, {key: f"[{words}](#{anchor(below[key])})" for key, (_, words) in inner.items()}))
@@ -155,6 +150,11 @@ def _table_in(schema: Schema) -> tuple[str, str] | None:
     return None
 
 
+def heading(text: str, name: str) -> str:
+    """Return a heading that is linked by `name`, on a site and on a code host alike."""
+    return f'<a id="{name}"></a>\n\n### {text}'
+
+
 def anchor(path: str) -> str:
     """Return the name a heading is linked by."""
     return "table-" + re.sub(r"[^a-z0-9]+", "-", path.lower()).strip("-")
@@ -163,8 +163,8 @@ def anchor(path: str) -> str:
 def built_in_scenarios() -> str:
     """Return the scenarios that ship with Zwerm."""
     lines = ["| scenario | robots | lasts | what it is |", "| --- | --- | --- | --- |"]
-    for name in scenario.built_in():
-        each = scenario.load(name)
+    for name in built_in():
+        each = load(name)
         lines.append(f"| `{name}` | {each.robots.count} | {each.time.duration_s:g} s | {escaped(each.summary)} |")
     return "\n".join(lines)
 
@@ -178,31 +178,33 @@ def sensor_list() -> str:
     for kind, found in ((kind, sensors.find(kind)) for kind in SENSORS):
         module = inspect.getmodule(found)
         text = module.__doc__ if module else found.__doc__
-        parts.append(f"### `{kind}` {{ #sensor-{kind.replace('_', '-')} }}\n\n{paragraphs(text)}")
+        parts.append(f"{heading(f'`{kind}`', 'sensor-' + kind.replace('_', '-'))}\n\n{paragraphs(text)}")
         parts.append(f"Fills `{found.field}` of the observation.")
         parts.append(rows(found.Parameters.model_json_schema()))
     return "\n\n".join(parts)
 
 
 def radio_models() -> str:
-    """Return every link model: its cause, what it is, and its parameters."""
-    return _kinds({kind: (model, model.Parameters) for kind, model in radio.BUILT_IN.items()}, LinkTable)
+    """Return every radio model: what it is, its cause, and its parameters."""
+    return _kinds({kind: radio.find(kind) for kind in RADIO_MODELS}, RadioModelTable)
 
 
 def fault_list() -> str:
     """Return every kind of fault and its parameters."""
-    return _kinds({kind: (table, table) for kind, table in faults.KINDS.items()}, FaultTable)
+    return _kinds({kind: faults.find(kind) for kind in FAULTS}, FaultTable)
 
 
-def _kinds(kinds: dict[str, tuple[type, type[BaseModel]]], base: type[BaseModel]) -> str:
+def _kinds(kinds: Mapping[str, type[Any]], base: type[BaseModel]) -> str:
     parts = []
-    for kind, (described, table) in kinds.items():
-        schema = table.model_json_schema()
+    for kind, found in kinds.items():
+        schema = found.Parameters.model_json_schema()
         own = {key: each for key, each in schema["properties"].items() if key not in base.model_fields}
-        text = first_paragraph(described.__doc__)
-        if hasattr(described, "cause"):
-            text = f"{paragraphs(sys.modules[described.__module__].__doc__)}\n\nDrops for `{described.cause}`."
-        parts.append(f"### `{kind}`\n\n{text}\n\n{rows(schema | {'properties': own}) if own else ''}")
+        parts.append(f"### `{kind}`\n\n{paragraphs(sys.modules[found.__module__].__doc__)}")
+        cause = getattr(found, "cause", RadioModel.cause)
+        if cause != RadioModel.cause:
+            parts.append(f"Drops for `{cause}`.")
+        if own:
+            parts.append(rows(schema | {"properties": own}))
     return "\n\n".join(parts)
 
 
@@ -210,7 +212,7 @@ def field_list() -> str:
     """Return every kind of scalar field and what it takes."""
     parts = []
     for kind, found in ((kind, fields.find(kind)) for kind in FIELDS):
-        parts.append(f"### `{kind}` {{ #field-{kind} }}\n\n{paragraphs(found.__doc__)}")
+        parts.append(f"{heading(f'`{kind}`', f'field-{kind}')}\n\n{paragraphs(found.__doc__)}")
         parts.append(rows(found.Parameters.model_json_schema()))
     return "\n\n".join(parts)
 
@@ -236,7 +238,7 @@ def _controller(title: str, anchor: str, name: str) -> str:
     needs = ", ".join(f"`{each}`" for each in getattr(found, "sensors", ())) or "no sensor"
     (schema,), components = msgspec.json.schema_components([parameters])
     return (
-        f"### {title} {{ #{anchor} }}\n\n{paragraphs(found.__doc__)}\n\nNeeds {needs}.\n\n"
+        f"{heading(title, anchor)}\n\n{paragraphs(found.__doc__)}\n\nNeeds {needs}.\n\n"
         f"{paragraphs(parameters.__doc__)}\n\n{rows(components[schema['$ref'].rpartition('/')[2]])}"
     )
 
@@ -288,7 +290,7 @@ def commands() -> str:
 
 
 def _command(name: str, command: Any) -> str:
-    lines = [f"### `zwerm {name}` {{ #command-{name} }}", _plain(command.help)]
+    lines = [heading(f"`zwerm {name}`", f"command-{name}"), _plain(command.help)]
     table = ["| | |", "| --- | --- |"] if command.params else []
     for each in command.params:
         names = each.metavar or each.name.upper() if each.param_type_name == "argument" else ", ".join(each.opts)

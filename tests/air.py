@@ -1,6 +1,6 @@
-"""A radio without robots: what the medium makes of packets, for tests that count them."""
+"""A radio without robots, for tests that count packets."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ DT_S = 0.1
 
 
 class Radio:
-    """Nodes that stand still at `positions` and send what they are told; `received` maps a node to (tick, packet)."""
+    """Nodes at fixed `positions` that send given packets. `received` maps a node to its list of (tick, packet)."""
 
     def __init__(
         self,
@@ -46,8 +46,8 @@ class Radio:
         place = self.position.copy()
         return Scene(self.tick, self.tick * DT_S, place, heading, there, still, 0.05, self.arena, self.draws)
 
-    def step(self, outboxes: dict[int, Sequence[Transmission]], listeners: Sequence[int] | None = None) -> None:
-        """One tick: `listeners` (everyone, if None) take what is there for them, then the outboxes are sent."""
+    def step(self, outboxes: Mapping[int, Sequence[Transmission]], listeners: Sequence[int] | None = None) -> None:
+        """One tick: `listeners` (all nodes, if None) receive their packets, then the outboxes are sent."""
         self.medium.arrive(self.tick)
         nodes = list(range(len(self.position))) if listeners is None else list(listeners)
         for node, packets in zip(nodes, self.medium.deliver(nodes, self.tick), strict=True):
@@ -56,7 +56,7 @@ class Radio:
         self.tick += 1
 
     def all_broadcast(self, ticks: int, payload: bytes = b"0123456789abcdef") -> dict[str, Any]:
-        """Let everyone broadcast at every tick, then wait until nothing is in flight; return the books."""
+        """Let all nodes broadcast at every tick, then step until no packet is in flight; return the summary."""
         everyone = {node: (Transmission("robots", payload),) for node in range(len(self.position))}
         for _ in range(ticks):
             self.step(everyone)

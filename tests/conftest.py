@@ -4,14 +4,18 @@ import multiprocessing.util
 import shutil
 import signal
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from support import ROBOTS, robots_of_this_process
 
-# A shell has what it runs in the background ignore Ctrl-C, children included, and Python leaves it at that: tests that press
-# it would wait for ever.
+if TYPE_CHECKING:  # most tests need no study
+    from zwerm.study.study_tables import Study
+
+# A shell makes its background processes ignore SIGINT, and Python and its children inherit this. Tests that send SIGINT would
+# then wait without end.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
@@ -38,3 +42,21 @@ def nothing_left(private_tmp: Path) -> Iterator[None]:
     assert robots_of_this_process() == set(), "robot processes left"
     left = [path for path in private_tmp.iterdir() if path.name.startswith("zwerm-")]
     assert left == [], "private directories left"
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., "Study"]]:
+    """A function that writes a study of a tiny scenario and loads it."""
+    from study_files import study_writer
+
+    yield from study_writer(tmp_path, monkeypatch)
+
+
+@pytest.fixture
+def gossip(tmp_path: Path) -> Path:
+    """The file of a scenario with ten robots that gossip for two seconds."""
+    from comparisons import GOSSIP
+
+    path = tmp_path / "talk.toml"
+    path.write_text(GOSSIP)
+    return path

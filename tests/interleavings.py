@@ -14,16 +14,16 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
-from zwerm.agents.sensor_coverage.protocols.leave_lock import (
-    LeaveLock,
+from zwerm.agents.sensor_coverage.messages.locks import (
     LockDenial,
     LockGrant,
-    LockMessage,
+    LockProtocolMessage,
     LockRelease,
     LockRequest,
-    Message,
     NeighbourList,
 )
+from zwerm.agents.sensor_coverage.protocols.component import Outgoing
+from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock
 from zwerm.maths.simplicial import FlagComplex, betti, bits
 
 LEASE_TICKS = 2
@@ -72,7 +72,7 @@ class Explorer:
         self.kind = kind
         self._objects: list[LeaveLock] = []
         self._numbers: dict[Any, int] = {}
-        self._letters: list[tuple[int, int, Message]] = []
+        self._letters: list[tuple[int, int, LockProtocolMessage]] = []
         self._letter_numbers: dict[Any, int] = {}
         self._done: dict[Any, tuple[int, tuple[Any, ...]]] = {}
         self._useless: dict[tuple[int, int], bool] = {}
@@ -120,10 +120,10 @@ class Explorer:
         for number in bits(state.sent):
             sender, receiver, message = self._letters[number]
             if not self._only_forbids(state, sender, receiver, message):
-                yield self._after(state, receiver, "hear", sender, message)
+                yield self._after(state, receiver, "receive", sender, message)
         for node in self.graph:
             bit = 1 << node
-            if any(asker in state.asks for asker in (node, *self._graph(state)[node])):
+            if any(requester in state.asks for requester in (node, *self._graph(state)[node])):
                 yield self._after(state, node, "look")
             if state.standing & bit:
                 yield from self._acts(state, node)
@@ -147,7 +147,7 @@ class Explorer:
                 self.departures += 1
                 yield self._after(state, node, "leave")._replace(standing=gone)
         elif node in state.asks:
-            after = self._after(state, node, "ask")
+            after = self._after(state, node, "request")
             if self._objects[after.robots[node]].wants:
                 yield after._replace(asks=_less(state.asks, node))
         if node == self.mover and state.moving == BEFORE and not robot.locked(state.now):
@@ -158,7 +158,7 @@ class Explorer:
     def _graph(self, state: State) -> Graph:
         return self.graph if state.moving else self.later
 
-    def _only_forbids(self, state: State, sender: int, receiver: int, message: Message) -> bool:
+    def _only_forbids(self, state: State, sender: int, receiver: int, message: LockProtocolMessage) -> bool:
         """Tell whether all that a message would do is to make its receiver refuse others, which might as well be lost."""
         lock = self._objects[state.robots[receiver]]._lock
         return isinstance(message, LockRelease) and (
@@ -175,12 +175,12 @@ class Explorer:
         standing = sum(1 << node for node in self.graph if not (self.budget.comes and node == self.mover))
         robots = {node: self.kind(node, LEASE_TICKS, -LEASE_TICKS) for node in self.graph}
         for node, robot in robots.items():
-            robot.see((other for other in self.graph[node] if standing >> other & 1), 0)
+            robot.update((other for other in self.graph[node] if standing >> other & 1), 0)
             if not standing >> node & 1:
                 robot.depart()
         for node, robot in robots.items():
             for other in self.graph[node]:
-                robot.hear(other, robots[other].tell(), 0)
+                robot.receive(other, robots[other].neighbour_list(), 0)
         numbers = tuple(self._number(robots[node]) for node in sorted(robots))
         moving = AFTER if self.mover < 0 else UNDER_WAY if self.budget.comes else BEFORE
         return State(0, numbers, 0, standing, standing, self.budget.asks, self.budget.amnesias, moving)
@@ -199,7 +199,7 @@ class Explorer:
         for to, message in sent:
             for receiver in self._graph(state)[node] if to is None else (to,):
                 if isinstance(message, LockGrant):
-                    robots[receiver], _ = self._step(robots[receiver], state.now, None, "hear", node, message)
+                    robots[receiver], _ = self._step(robots[receiver], state.now, None, "receive", node, message)
                     continue
                 if isinstance(message, NeighbourList):
                     message = NeighbourList(message.version, message.listed)
@@ -225,7 +225,7 @@ class Explorer:
                     left |= 1 << number
         return state._replace(robots=robots, sent=left)
 
-    def _still_matters(self, state: State, sender: int, receiver: int, message: Message) -> bool:
+    def _still_matters(self, state: State, sender: int, receiver: int, message: LockProtocolMessage) -> bool:
         """Tell whether a message can allow anything to those who have asked or will."""
         match message:
             case NeighbourList():
@@ -242,14 +242,14 @@ class Explorer:
             self._bare[number] = self._number(robot)
         return self._bare[number]
 
-    def _ignores(self, robot: LeaveLock, sender: int, message: Message) -> bool:
+    def _ignores(self, robot: LeaveLock, sender: int, message: LockProtocolMessage) -> bool:
         if self.mover in (robot._me, sender):
             return False
         if sender not in robot._listed or (not robot._stands and not isinstance(message, LockRequest)):
             return True
         match message:
             case LockRequest() if not robot._stands:
-                return not any(isinstance(each.message, LockGrant) for each in _copy(robot).hear(sender, message, 0))
+                return not any(isinstance(each.message, LockGrant) for each in _copy(robot).receive(sender, message, 0))
             case LockRequest() | LockRelease():
                 return message.number <= robot._over.get(sender, -1)
             case NeighbourList():
@@ -275,14 +275,15 @@ class Explorer:
             robot = _copy(self._objects[number])
             if event == "forget":
                 vars(robot).update(vars(self.kind(robot._me, LEASE_TICKS, now)))
-            before = robot.tell()
+            before = robot.neighbour_list()
             if seen is not None:
-                robot.see(seen, now)
-            told = [] if robot.tell() == before else [LockMessage(None, robot.tell())]
+                robot.update(seen, now)
+            told = [] if robot.neighbour_list() == before else [Outgoing(None, robot.neighbour_list())]
             match event:
-                case "hear":
-                    told += robot.hear(*what, now)
-                case "ask" | "leave":
+                case "receive":
+                    sender, message = what
+                    told += robot.receive(sender, message, now)
+                case "request" | "leave":
                     told += getattr(robot, event)(now)
                 case "give_up" | "depart":
                     told += getattr(robot, event)()

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import zenoh
 
 from zwerm.deploy.identity import issue, router_settings
-from zwerm.link.node import ZenohNodeLink
+from zwerm.link.node_link import ZenohNodeLink
 from zwerm.link.session import TWO_THREADS, Credential, Credentials, open_session, set_threads
-from zwerm.link.world import ExpectedNode, ZenohWorldLink
+from zwerm.link.world_link import ExpectedNode, ZenohWorldLink
 from zwerm.wire.keys import hello_key
 from zwerm.wire.messages import Hello, encode
 
@@ -19,7 +19,7 @@ NIL = b"\xc0"
 
 
 class Network(NamedTuple):
-    """The world's link, and what nodes connect to it with."""
+    """The world's link, and the credentials of its nodes."""
 
     link: ZenohWorldLink
     credentials: Credentials
@@ -30,7 +30,7 @@ class Network(NamedTuple):
         return ZenohNodeLink(RUN, self.credentials.nodes[number], self.endpoint, deadline_s=20.0, **options)
 
     def session(self, credential: Credential | None, **settings: Any) -> zenoh.Session:
-        """Return a session that may do what Zenoh lets it, with a credential, or without."""
+        """Return a raw Zenoh session, with a credential or without one."""
         identity = {}
         if credential is not None:
             identity = {
@@ -66,7 +66,7 @@ def network(directory: Path, nodes: int = 3, members: Mapping[int, ExpectedNode]
 
 
 def ask(session: zenoh.Session, node: int, payload: bytes) -> list[bytes]:
-    """Say hello on the key of `node`, and return the answers."""
+    """Send hello on the key of `node`, and return the answers."""
     replies = session.get(hello_key(RUN, node), zenoh.handlers.FifoChannel(8), payload=payload, timeout=5.0)
     return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 

@@ -1,4 +1,4 @@
-"""What several tests share: small scenarios, and a look at the processes of this machine."""
+"""Helpers of several tests: small scenarios, and the processes of this machine."""
 
 import importlib.util
 import os
@@ -47,12 +47,12 @@ def children_of(parent: int) -> set[int]:
 
 
 def robots_of_this_process() -> set[int]:
-    """Return the ids of the robot processes that this process has started; the server they are forked from is none."""
+    """Return the ids of the robot processes that this process has started; without the forkserver."""
     return {robot for child in children_of(os.getpid()) for robot in children_of(child)}
 
 
 def gone(pids: set[int]) -> bool:
-    """Tell whether none of `pids` lives; a zombie is dead."""
+    """Return whether all processes `pids` have ended; a zombie counts as ended."""
     for pid in pids:
         try:
             if (Path("/proc") / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()[0] != "Z":

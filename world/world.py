@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from zwerm.catalogue import BASE
+from zwerm.errors import ProtocolError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import (
@@ -32,10 +33,10 @@ from zwerm.world.arena.entrance import Depots, EntrySchedule
 from zwerm.world.arena.placement import place
 from zwerm.world.bodies.drives import Drives
 from zwerm.world.bodies.physics import Physics
-from zwerm.world.faults import ticks
+from zwerm.world.faults import Fault, ticks
 from zwerm.world.faults.generator import scheduled
 from zwerm.world.faults.schedule import Schedule, unite
-from zwerm.world.faults.sensing import SensingFault, read
+from zwerm.world.faults.sensing import read
 from zwerm.world.metrics.observers import Observers
 from zwerm.world.radio.medium import Medium
 from zwerm.world.scene import Bools, Floats, Ints, Scene
@@ -59,15 +60,18 @@ class ExchangeRecorder(Protocol):
 
 
 class World:
-    """One run's world. Every robot carries the `sensors`; `seed` keys all randomness. `meters` are for whoever drives it."""
+    """One run's world. Every robot carries the `sensors`; `seed` keys all randomness.
+
+    `observers` are the run's metrics; the runner has them take samples.
+    """
 
     def __init__(
-        self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor], meters: Observers | None = None
+        self, scenario: Scenario, seed: int, arena: Arena, sensors: Sequence[Sensor], observers: Observers | None = None
     ) -> None:
         count, body = scenario.robots.count, scenario.robots.body
         self.scenario = scenario
         self.arena = arena
-        self.meters = meters or Observers()
+        self.observers = observers or Observers()
         self.draws = Draws(seed)
         self.tick = 0
         self.count = count
@@ -75,7 +79,8 @@ class World:
         self.crashed: dict[int, str] = {}
         self.failures: dict[int, Failure] = {}
         self.exited: list[int] = []
-        self.audience = TelemetrySink()
+        self.telemetry = TelemetrySink(scenario.time.dt_s)
+        self.observers.subscribe(self.telemetry)
         self.trace = Trace()
         self.recording: ExchangeRecorder | None = None
         self.coordinator = count if scenario.coordinator is not None else None
@@ -86,10 +91,10 @@ class World:
         self._wakes = Wakes(nodes, scenario.time.dt_s)
         self.fault_tables = scheduled(scenario, seed, arena)
         self.schedule = Schedule(self.fault_tables, scenario, self.draws)
-        self.lives = NodeStatus(nodes, self.schedule.unborn)
-        for node in self.schedule.unborn:
+        self.lives = NodeStatus(nodes, self.schedule.late_joiners)
+        for node in self.schedule.late_joiners:
             self.medium.switch_off(node, "receiver-down")
-        self._blinding: list[SensingFault] = []
+        self._blinding: list[Fault] = []
         self._deadman_at: dict[int, int] = {}  # the tick at which a paused robot's motors stop
         self._sensors = {sensor.field: sensor for sensor in sensors}
         # One column of readings a field, up to the last field that any sensor fills.
@@ -192,8 +197,17 @@ class World:
         """Take a node's answer to its observation of this tick, or in real time to an earlier one.
 
         Raises ProtocolError, and counts its reason, for what is malformed or unasked for; the node is still awaited then.
+        Telemetry that breaks the rules counts too, and is a crash of the node: the run goes on or ends by `on_crash`.
         """
-        answer = self.answers.hear(node, payload)
+        try:
+            answer = self.answers.hear(node, payload)
+        except ProtocolError as error:
+            if error.reason != "telemetry" or node not in self.awaited():
+                raise
+            # Its controller is at fault, and gives no other answer to this observation.
+            self._move_early()
+            self.crash(node, f"refused: {error}")
+            return
         if type(answer) is Failure:
             self.failures[node] = answer
             self._move_early()  # whether it was done already or not, the motors stop after this tick
@@ -207,9 +221,9 @@ class World:
         """Apply what was accepted, in id order, and go on to the next tick."""
         self.trace.catch_up()
         self._move_early()
-        payloads, commands = self.answers.close()
+        payloads, traced, commands = self.answers.close()
         self._apply(self.lives.finished(commands, self.tick))
-        self.trace.extend(self.tick, self._nodes, self._observations, payloads)
+        self.trace.extend(self.tick, self._nodes, self._observations, traced)
         if self.recording is not None:
             self.recording.exchange(self.tick, self._nodes, self._observations, payloads, self.scene)
         if self._outboxes:
@@ -392,8 +406,8 @@ class World:
                 self._outboxes.append((node, answer.outbox))
             if answer.wake is not None:
                 self._wakes.sleep(node, answer.wake, self.tick)
-            if answer.told or answer.gave_up:
-                self.audience.hear(self.scene, node, answer, self._decides(node))
+            if answer.telemetry or answer.snapshot or answer.gave_up:
+                self.telemetry.accept(self.scene, node, answer, self._decides(node))
             if answer.release and self._depots is not None and node < self._depots.stations:
                 self._depots.release(node)
             if answer.done or self._any_done:

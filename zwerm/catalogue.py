@@ -7,6 +7,7 @@ Everything that lists, checks, preloads or documents algorithms and plug-ins rea
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from typing import Final, Literal
 
 Role = Literal["robot", "base", "coordinator"]
@@ -56,6 +57,7 @@ class Algorithm:
 
 _SENSOR_COVERAGE: Final = "zwerm.agents.sensor_coverage"
 _SENSOR_COVERAGE_COORDINATOR: Final = "zwerm.coordinator.sensor_coverage"
+_SENSOR_COVERAGE_METRICS: Final = "zwerm.world.metrics.sensor_coverage"
 _NEGOTIATING: Final[Controllers] = {
     ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}.negotiating_robot:NegotiatingRobot"},
     BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}.negotiating_robot:NegotiatingBase"},
@@ -73,8 +75,8 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         paper="Ramaithitima, Whitzer, Bhattacharya, Kumar 2015",
         page="papers/sensor-coverage.md",
         controllers={
-            ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}:CentralRobot"},
-            BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}:CentralBase"},
+            ROBOT: {"sensor-coverage": f"{_SENSOR_COVERAGE}.central_robot:CentralRobot"},
+            BASE: {"sensor-coverage": f"{_SENSOR_COVERAGE}.central_base:CentralBase"},
             COORDINATOR: {"sensor-coverage": f"{_SENSOR_COVERAGE_COORDINATOR}.coordinator:SensorCoverageCoordinator"},
         },
         variants=(
@@ -106,6 +108,11 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
                 stations_max=1,
                 controllers=_DECENTRALISED,
             ),
+        ),
+        metrics=(
+            f"{_SENSOR_COVERAGE_METRICS}:Deployment",
+            f"{_SENSOR_COVERAGE_METRICS}:Conclusion",
+            f"{_SENSOR_COVERAGE_METRICS}:Removals",
         ),
         layers=("zwerm.view.sensor_coverage:ComplexLayer",),
         scenarios=("sensor-coverage*",),
@@ -155,6 +162,19 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
     ),
 )
 
+# Commands of the command line, in the order of `zwerm --help`, as `module:function`.
+COMMANDS: Final = {
+    "list": "zwerm.cli.commands.list_command:list_catalogue",
+    "check": "zwerm.cli.commands.check_command:check",
+    "run": "zwerm.cli.commands.run_command:run",
+    "world": "zwerm.cli.commands.world_command:world",
+    "robot": "zwerm.cli.commands.robot_command:robot",
+    "twin": "zwerm.cli.commands.twin_command:twin",
+    "shrink": "zwerm.cli.commands.shrink_command:shrink",
+    "study": "zwerm.cli.commands.study_command:study",
+    "compare": "zwerm.cli.commands.compare_command:compare",
+}
+
 SENSORS: Final = {
     "bearings": "zwerm.world.sensors.bearings:Bearings",
     "boundary": "zwerm.world.sensors.boundary:Boundary",
@@ -168,6 +188,9 @@ SENSORS: Final = {
     "touch": "zwerm.world.sensors.touch:Touch",
 }
 
+# The function that returns a sensor's class by its name, for tools that must not import the world.
+SENSOR_LOOKUP: Final = "zwerm.world.sensors.registry:find"
+
 FIELDS: Final = {
     "bitmap": "zwerm.world.fields.bitmap:Bitmap",
     "constant": "zwerm.world.fields.constant:Constant",
@@ -180,15 +203,53 @@ RADIO_MODELS: Final = {
     "range": "zwerm.world.radio.models.range:DiscRange",
     "line_of_sight": "zwerm.world.radio.models.line_of_sight:LineOfSightModel",
     "path_loss": "zwerm.world.radio.models.path_loss:PathLoss",
-    "walls": "zwerm.world.radio.models.wall_attenuation:WallAttenuation",
+    "wall_attenuation": "zwerm.world.radio.models.wall_attenuation:WallAttenuation",
     "loss": "zwerm.world.radio.models.loss:Loss",
-    "bursts": "zwerm.world.radio.models.gilbert_elliott:GilbertElliott",
+    "gilbert_elliott": "zwerm.world.radio.models.gilbert_elliott:GilbertElliott",
     "delay": "zwerm.world.radio.models.delay:Delay",
     "duplication": "zwerm.world.radio.models.duplication:Duplication",
     "corruption": "zwerm.world.radio.models.corruption:Corruption",
     "rate_limit": "zwerm.world.radio.models.rate_limit:RateLimit",
     "collision": "zwerm.world.radio.models.collision:Collision",
 }
+
+FAULTS: Final = {
+    "crash": "zwerm.world.faults.programs.crash:Crash",
+    "restart": "zwerm.world.faults.programs.restart:Restart",
+    "pause": "zwerm.world.faults.programs.pause:Pause",
+    "slow": "zwerm.world.faults.programs.slow:Slow",
+    "join": "zwerm.world.faults.programs.join:Join",
+    "partition": "zwerm.world.faults.air.partition:Partition",
+    "jam": "zwerm.world.faults.air.jam:Jam",
+    "blackout": "zwerm.world.faults.air.blackout:Blackout",
+    "cut": "zwerm.world.faults.air.cut:Cut",
+    "camera_blackout": "zwerm.world.faults.sensing.camera_blackout:CameraBlackout",
+    "dead_beacon": "zwerm.world.faults.sensing.dead_beacon:DeadBeacon",
+    "stuck_touch": "zwerm.world.faults.sensing.stuck_touch:StuckTouch",
+    "sensor_noise": "zwerm.world.faults.sensing.sensor_noise:SensorNoise",
+    "heal": "zwerm.world.faults.heal:Heal",
+}
+
+# Former names of radio models, which scenarios may still use, and the current names.
+RENAMED_RADIO_MODELS: Final = {"bursts": "gilbert_elliott", "walls": "wall_attenuation"}
+
+# Metrics by the key of `[metrics]` that switches them on; the value of the key is validated by the class's `Parameters`.
+METRICS: Final = {
+    "cells": "zwerm.world.metrics.coverage:CellCoverage",
+    "coverage_radius_m": "zwerm.world.metrics.coverage:AreaCoverage",
+    "voronoi": "zwerm.world.metrics.voronoi_coverage:VoronoiMetrics",
+    "sight_range_m": "zwerm.world.metrics.sight_coverage:SightCoverage",
+}
+
+
+def plugins() -> dict[str, Mapping[str, str]]:
+    """Return the rows of every kind of plug-in."""
+    return {"sensor": SENSORS, "field": FIELDS, "radio model": RADIO_MODELS, "command": COMMANDS}
+
+
+def row_of(file_name: str) -> Algorithm | None:
+    """Return the row whose patterns name a scenario or study of this name, or None."""
+    return next((row for row in ALGORITHMS if any(fnmatchcase(file_name, each) for each in row.scenarios)), None)
 
 
 def algorithm_of(controller: str) -> Algorithm | None:

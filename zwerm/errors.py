@@ -38,5 +38,9 @@ class LinkError(ZwermError):
     """The connection between the world and its nodes could not be made, or was lost."""
 
 
+class MissingExtraError(ZwermError):
+    """A library of an optional extra is not installed."""
+
+
 class PictureError(ZwermError):
     """A picture or an animation cannot be drawn or written."""

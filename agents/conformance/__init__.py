@@ -1,1 +1,1 @@
-"""The conformance kit: does a controller keep the contract?"""
+"""The conformance kit: tests whether a controller fulfils the contract."""

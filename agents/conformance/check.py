@@ -1,9 +1,9 @@
-"""Does a controller keep the contract? One call tells, in anybody's tests: `check(MyController)`.
+"""Test whether a controller fulfils the contract: `check(MyController)`, from any test suite.
 
-The controller is made and stepped as a runner would, through plain days and odd ones: nothing to be seen, everything to be
-seen, packets that make no sense, the far future. It must answer each observation with a command that the world takes, the
-same command for the same life whatever lives beside it, and it must not do what `traps` watches for. What is found is
-listed all at once. No finding is no proof: the kit looks at a few hundred observations.
+The kit makes and steps the controller as a runner does, with ordinary and unusual observations: empty readings, many
+readings, malformed packets, a very late tick. The controller must answer each observation with a command that the world
+accepts. Its answers must not depend on other controllers in the process, and it must not do what `purity` detects. All
+violations are reported at once. A controller without violations is not proven correct: the kit uses a few hundred observations.
 """
 
 import importlib
@@ -17,7 +17,7 @@ from typing import Any, Final
 import msgspec
 
 from zwerm.agents.conformance.purity import PurityMonitor
-from zwerm.agents.conformance.stimuli import FIELD_OF, StimulusSetup, tell
+from zwerm.agents.conformance.stimuli import StimulusSetup, make_stimuli, sensor_class
 from zwerm.agents.runtime.contract import Body, NoParameters, Setup
 from zwerm.errors import ControllerError, ProtocolError, ZwermError
 from zwerm.maths.keyed_random import Draws
@@ -29,6 +29,7 @@ from zwerm.wire.messages import (
     WheelSpeeds,
     decode_observation,
     encode,
+    encode_command,
     open_answer,
 )
 
@@ -60,11 +61,11 @@ def check(
     channels: Sequence[str] = ("robots",),
     extra: Mapping[str, tuple[float, ...]] | None = None,
 ) -> None:
-    """Raise ConformanceError with everything in which `controller` breaks the contract.
+    """Raise ConformanceError with every violation of the contract by `controller`.
 
-    `parameters` are what a scenario would set, `sensors` what it would give (by default what the controller declares),
-    `channels` the radio's (none: `()`), `extra` a reading of each sensor of one's own. The controller has to work on one
-    of two bodies, an e-puck's or a holonomic one.
+    `parameters` and `sensors` are the scenario's; by default the sensors that the controller declares. `channels` are the
+    radio's channels, `()` for none. `extra` holds a reading of each sensor that is not found by its name. The controller must
+    work on one of two bodies, an e-puck's or a holonomic one.
     """
     name = getattr(controller, "__qualname__", repr(controller))
     found = _declarations(controller, sensors, extra)
@@ -73,7 +74,7 @@ def check(
         setups = [_setup(given, body, tuple(channels), dict(parameters or {})) for body in _BODIES]
         examinations = [_Examination(controller, setup, extra) for setup in setups]
         fitting = min(examinations, key=lambda each: (not each.fits, len(each.violations)))
-        fitting.live_elsewhere()
+        fitting.compare_other_processes()
         found = fitting.violations
     if found:
         raise ConformanceError(name, found)
@@ -87,7 +88,7 @@ def controller_sensors(controller: type[Any]) -> tuple[str, ...]:
 def _declarations(
     controller: type[Any], sensors: Sequence[str] | None, extra: Mapping[str, tuple[float, ...]] | None
 ) -> list[str]:
-    """Return what is wrong with a controller before it is made."""
+    """Return the violations in the declarations of a controller class."""
     if not isinstance(controller, type):
         return [f"expected a class, got {controller!r}"]
     found = []
@@ -97,10 +98,10 @@ def _declarations(
     if not isinstance(declared, tuple | list) or not all(isinstance(each, str) for each in declared):
         return [*found, f"sensors: expected a tuple of names, got {declared!r}"]
     for sensor in declared:
-        if FIELD_OF.get(sensor) is None and not extra:
+        if sensor_class(sensor) is None and not extra:
             found.append(f"sensors: {sensor!r} is none that Zwerm knows; give a reading of your own with extra=")
         if sensors is not None and sensor not in sensors:
-            found.append(f"sensors: it declares {sensor!r}, which check() was told not to give")
+            found.append(f"sensors: it declares {sensor!r}, which check() does not give")
     kind = getattr(controller, "Parameters", NoParameters)
     if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct)):
         found.append(f"Parameters: expected a msgspec.Struct, got {kind!r}")
@@ -119,24 +120,25 @@ class _Examination:
         self._controller = controller
         self._setup = setup
         self.violations: list[str] = []
-        self.fits = True  # the controller takes this body, and drives it as it can be driven
-        fields = [field for sensor in setup.sensors if (field := FIELD_OF.get(sensor)) is not None]
-        self._given = {*fields, *(["extra"] if extra else [])}
-        self._story = tell(StimulusSetup(tuple(fields), setup.channels, dict(extra or {}), setup.dt_s))
-        with PurityMonitor() as watch:
-            self._life: list[bytes | None] | None = None
+        self.fits = True  # the controller accepts this body and its drive commands fit it
+        sensors = tuple(found for sensor in setup.sensors if (found := sensor_class(sensor)) is not None)
+        self._stimuli = make_stimuli(StimulusSetup(sensors, setup.channels, extra or {}, setup.dt_s))
+        first = decode_observation(self._stimuli[0].sent)
+        self._given = {field for field in SENSOR_FIELDS if getattr(first, field) is not None}
+        with PurityMonitor() as monitor:
+            self._answers: list[bytes | None] | None = None
             if self._make() is not None:
                 self._each_alone()
-                self._life = self._whole_lives()
-                self._reading()
-        self.violations += watch.found
+                self._answers = self._repeated_runs()
+                self._undeclared_sensors()
+        self.violations += monitor.found
 
     def _note(self, violation: str) -> None:
         if violation not in self.violations:
             self.violations.append(violation)
 
     def _make(self, node: int = 0) -> Any:
-        """Return a new controller with a Setup of its own, or None with the violation noted."""
+        """Return a new controller with its own Setup, or None after noting a violation."""
         key = self._setup.stream_key if node == 0 else _DRAWS.stream_key("conformance", node)
         sent = encode(msgspec.structs.replace(self._setup, node=node, stream_key=key))
         setup = msgspec.msgpack.decode(sent, type=Setup)
@@ -147,19 +149,19 @@ class _Examination:
             self._note(f"the constructor refuses its Setup: {error}")
             return None
         except Exception as error:
-            self._note(f"the constructor raised {_said(error)}")
+            self._note(f"the constructor raised {_in_one_line(error)}")
             return None
         if encode(setup) != sent:
             self._note("the constructor changes its Setup")
         return made
 
     def _step(self, controller: Any, sent: bytes, when: str) -> bytes | None:
-        """Return the encoded answer to one encoded observation, or None with the violations noted."""
+        """Return the encoded answer to one encoded observation, or None after noting a violation."""
         observation = decode_observation(sent)
         try:
             command = controller.step(observation)
         except Exception as error:
-            self._note(f"step() raised {_said(error)}, on {when}")
+            self._note(f"step() raised {_in_one_line(error)}, on {when}")
             return None
         if encode(observation) != sent:
             self._note(f"step() changes the observation, on {when}")
@@ -170,9 +172,9 @@ class _Examination:
         return self._answer(command, when)
 
     def _answer(self, command: Command, when: str) -> bytes | None:
-        """Return the command as it goes over the wire, or None with the reasons noted why the world would refuse it."""
+        """Return the encoded command, or None after noting why the world would refuse it."""
         try:
-            payload = encode(command)
+            payload = encode_command(command)
             open_answer(payload)
         except (TypeError, ValueError, OverflowError, RecursionError) as error:
             self._note(f"step() returned what cannot be encoded: {error}, on {when}")
@@ -193,31 +195,31 @@ class _Examination:
         return payload
 
     def _each_alone(self) -> None:
-        """Show every kind of observation to a controller that has seen nothing yet."""
-        first = {chapter.title: chapter for chapter in reversed(self._story)}
+        """Give each kind of observation to a new controller as its first one."""
+        first = {stimulus.title: stimulus for stimulus in reversed(self._stimuli)}
         for title in sorted(first):
             controller = self._make()
             if controller is not None:
                 self._step(controller, first[title].sent, f"{title} as its first observation")
 
-    def _live(self, controller: Any, beside: Any = None) -> list[bytes | None]:
-        """Return a controller's answers to the whole story, while `beside` it another lives through the same."""
+    def _run(self, controller: Any, beside: Any = None) -> list[bytes | None]:
+        """Return a controller's answers to all stimuli. `beside` is another controller that gets each stimulus first."""
         answers = []
-        for number, chapter in enumerate(self._story):
-            when = f"observation {number} ({chapter.title})"
+        for number, stimulus in enumerate(self._stimuli):
+            when = f"observation {number} ({stimulus.title})"
             if beside is not None:
-                self._step(beside, chapter.sent, when)
-            answers.append(self._step(controller, chapter.sent, when))
+                self._step(beside, stimulus.sent, when)
+            answers.append(self._step(controller, stimulus.sent, when))
             if answers[-1] is None:
                 break
         return answers
 
-    def _whole_lives(self) -> list[bytes | None] | None:
-        """Compare the lives of controllers that should be the same, and return one if all are."""
-        one = self._live(self._make())
+    def _repeated_runs(self) -> list[bytes | None] | None:
+        """Run equal controllers and compare their answers; return the answers if all are equal."""
+        one = self._run(self._make())
         if None in one:
             return None
-        again = self._live(self._make())
+        again = self._run(self._make())
         if number := _first_difference(one, again):
             self._note(
                 "two controllers with the same Setup answer the same observations differently: state that instances share,"
@@ -225,21 +227,21 @@ class _Examination:
             )
             return None
         other = self._make(node=1)
-        if number := _first_difference(one, self._live(self._make(), beside=other)):
+        if number := _first_difference(one, self._run(self._make(), beside=other)):
             self._note(
                 f"its answers change when another controller lives beside it: shared state ({self._when(number)})"
             )
             return None
         return one
 
-    def live_elsewhere(self) -> None:
-        """Compare the life, if it went well, with those of new interpreters that hash strings differently."""
-        if self._life is None:
+    def compare_other_processes(self) -> None:
+        """Compare the answers with those from new interpreters with other string hashes."""
+        if self._answers is None:
             return
-        story = [each.sent for each in self._story]
+        observations = [each.sent for each in self._stimuli]
         for hash_seed in _HASH_SEEDS:
-            digest = _life_elsewhere(self._controller, self._setup, story, hash_seed)
-            if digest is not None and digest != _digest(self._life):
+            digest = _digest_in_new_process(self._controller, self._setup, observations, hash_seed)
+            if digest is not None and digest != _digest(self._answers):
                 self._note(
                     "its answers differ in another process with another PYTHONHASHSEED:"
                     " the order of a set, or hash(), decides something; sort it"
@@ -247,15 +249,15 @@ class _Examination:
                 return
 
     def _when(self, number: int) -> str:
-        return f"first at observation {number - 1}, {self._story[number - 1].title}"
+        return f"first at observation {number - 1}, {self._stimuli[number - 1].title}"
 
-    def _reading(self) -> None:
-        """Find sensors that the controller reads and was not promised."""
+    def _undeclared_sensors(self) -> None:
+        """Note the sensors that the controller reads without declaring them."""
         controller = self._make()
         read: dict[str, None] = {}
-        for chapter in self._story:
-            told = decode_observation(chapter.sent)
-            watched = _Watched(*(getattr(told, field) for field in told.__struct_fields__))
+        for stimulus in self._stimuli:
+            decoded = decode_observation(stimulus.sent)
+            watched = _Watched(*(getattr(decoded, field) for field in decoded.__struct_fields__))
             _reads[id(watched)] = read
             try:
                 controller.step(watched)
@@ -272,7 +274,7 @@ _reads: dict[int, dict[str, None]] = {}
 
 
 class _Watched(Observation, frozen=True):
-    """An observation that takes note of which sensors are read."""
+    """An observation that records which sensors are read."""
 
     def __getattribute__(self, name: str) -> Any:
         if name in SENSOR_FIELDS and (read := _reads.get(id(self))) is not None:
@@ -281,7 +283,7 @@ class _Watched(Observation, frozen=True):
 
 
 def _first_difference(one: list[bytes | None], other: list[bytes | None]) -> int:
-    """Return the number, from 1, of the first answer in which two lives differ, or 0."""
+    """Return the number, from 1, of the first answer that differs, or 0."""
     for number, (a, b) in enumerate(zip(one, other, strict=False), start=1):
         if a != b:
             return number
@@ -292,14 +294,16 @@ def _digest(answers: Sequence[bytes | None]) -> str:
     return blake2b(b"".join(answer or b"" for answer in answers), digest_size=16).hexdigest()
 
 
-def _life_elsewhere(controller: type[Any], setup: Setup, story: list[bytes], hash_seed: str) -> str | None:
-    """Return the digest of a life in a new interpreter, or None where that cannot import the controller by name."""
+def _digest_in_new_process(
+    controller: type[Any], setup: Setup, observations: list[bytes], hash_seed: str
+) -> str | None:
+    """Return the digest of the answers in a new interpreter, or None if it cannot import the controller by name."""
     module = sys.modules.get(controller.__module__)
     if controller.__module__ == "__main__" or getattr(module, controller.__qualname__, None) is not controller:
         return None
-    task = msgspec.msgpack.encode((controller.__module__, controller.__qualname__, setup, story))
+    task = msgspec.msgpack.encode((controller.__module__, controller.__qualname__, setup, observations))
     run = subprocess.run(
-        [sys.executable, "-c", f"import {__name__} as kit; kit.live_for_parent()"],
+        [sys.executable, "-c", f"import {__name__} as kit; kit.answer_for_parent()"],
         input=task,
         capture_output=True,
         env=os.environ | {"PYTHONHASHSEED": hash_seed, "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -309,25 +313,25 @@ def _life_elsewhere(controller: type[Any], setup: Setup, story: list[bytes], has
     return run.stdout.decode().strip() if run.returncode == 0 else None
 
 
-def live_for_parent() -> None:
-    """Live the life that standard input tells, and write its digest to standard output."""
+def answer_for_parent() -> None:
+    """Run the controller and the observations from standard input; write the digest of the answers."""
     task = msgspec.msgpack.decode(sys.stdin.buffer.read(), type=tuple[str, str, Setup, list[bytes]])
-    module, name, setup, story = task
+    module, name, setup, observations = task
     try:
         found: Any = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError):
         sys.exit(_NOT_IMPORTABLE)
     controller, answers = found(setup), []
-    for sent in story:
+    for sent in observations:
         observation = decode_observation(sent)
         command = controller.step(observation)
         command.tick = observation.tick
-        answers.append(encode(command))
+        answers.append(encode_command(command))
     sys.stdout.write(_digest(answers))
 
 
-def _said(error: Exception) -> str:
-    """Return an exception in a line, with the place that raised it if that is not the call here."""
+def _in_one_line(error: Exception) -> str:
+    """Return an exception in one line, with the place that raised it unless that is the call here."""
     trace, line = error.__traceback__, f"{type(error).__name__}: {error}"
     if trace is None or trace.tb_next is None:
         return line

@@ -1,9 +1,9 @@
-"""Traps for what a controller must not do: read a clock, draw from a global stream, touch files, network or processes.
+"""Detect what a controller must not do: read a clock, draw from a global random stream, use files, network or processes.
 
-A `PurityMonitor` records what the code that runs inside it does, in its own thread, and lets it go on. How a function was
-imported makes no difference. It sees calls to functions written in C, what the interpreter audits (PEP 578), whether the global
-random streams have moved, and what was printed. Imports are allowed. What C code asks of the system without telling the
-interpreter it does not see: it is there to find mistakes, and is no prison.
+A `PurityMonitor` records the violations of the code that runs inside it, in its own thread, and does not stop the code. It
+detects calls of functions written in C, the interpreter's audit events (PEP 578), changes of the global random streams, and
+printed text. The way a function was imported makes no difference. Imports are allowed. It does not see system calls that C
+code makes without an audit event: it finds mistakes, and is no sandbox.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ import threading
 from types import FrameType, TracebackType
 from typing import Any, Final, Self
 
-# Functions written in C, by module; what calling one of them is.
+# Functions written in C: description of the violation -> module -> names.
 _FORBIDDEN: Final = {
     "reads the wall clock": {
         "time": "time time_ns monotonic monotonic_ns perf_counter perf_counter_ns process_time process_time_ns"
@@ -67,7 +67,7 @@ def _forbidden_functions() -> dict[Any, str]:
 
 
 class PurityMonitor:
-    """A stretch of code that is watched. `found` holds what it did, each once, with the line that did it."""
+    """Context manager that watches the code inside it. `found` lists each violation once, with its file and line."""
 
     def __init__(self) -> None:
         self.found: list[str] = []
@@ -84,7 +84,7 @@ class PurityMonitor:
         self._stack.enter_context(contextlib.redirect_stderr(self._printed))
         self._profiler = sys.getprofile()
         _active[threading.get_ident()] = self
-        # What others hang on the garbage collector is not the controller's doing, whenever it happens to run.
+        # Callbacks of the garbage collector are not the controller's, so the collector is off.
         self._collecting = gc.isenabled()
         gc.disable()
         sys.setprofile(self._called)
@@ -109,7 +109,7 @@ class PurityMonitor:
                 getattr(importlib.import_module(name), _STREAMS[name][1])(self._states[name])
 
     def _called(self, frame: FrameType, event: str, argument: Any) -> None:
-        """Look at a call: the interpreter's profiling hook."""
+        """Check a call; this is the interpreter's profiling hook."""
         if event == "c_call":
             owner = getattr(argument, "__self__", None)
             if owner is self._global_random:
@@ -122,7 +122,7 @@ class PurityMonitor:
             self._note("reads the environment: os.environ", frame)
 
     def audited(self, event: str, arguments: tuple[Any, ...]) -> None:
-        """Look at an event that the interpreter audits."""
+        """Check an audit event of the interpreter."""
         what = next((text for start, text in _AUDITED.items() if event.startswith(start)), None)
         if what is not None:
             detail = f": {arguments[0]!r}" if event == "open" else f" ({event})"
@@ -141,7 +141,7 @@ def _stream_states() -> dict[str, Any]:
 
 
 def _plain(state: Any) -> Any:
-    """Return a state of a random stream as what can be compared: arrays as bytes."""
+    """Return the state of a random stream in a comparable form: arrays as bytes."""
     return tuple(map(_plain, state)) if isinstance(state, tuple) else getattr(state, "tobytes", lambda: state)()
 
 
@@ -150,15 +150,15 @@ _audited = threading.Event()
 
 
 def _audit() -> None:
-    """Install the hook, once and for good: Python has no way to take one out. It is idle while nobody watches."""
+    """Install the audit hook once. Python cannot remove it; it does nothing while no monitor is active."""
     if not _audited.is_set():
         _audited.set()
         sys.addaudithook(_hook)
 
 
 def _hook(event: str, arguments: tuple[Any, ...]) -> None:
-    if _active and (watch := _active.get(threading.get_ident())) is not None:
-        watch.audited(event, arguments)
+    if _active and (monitor := _active.get(threading.get_ident())) is not None:
+        monitor.audited(event, arguments)
 
 
 def _is_importing(frame: FrameType | None) -> bool:
@@ -170,9 +170,9 @@ def _is_importing(frame: FrameType | None) -> bool:
 
 
 def _is_numpy_seeding(frame: FrameType) -> bool:
-    """Tell whether this may be numpy, which asks for entropy even where it is given a key and uses none of it.
+    """Return whether this call may be numpy, which asks for entropy even if it gets a key and does not use the entropy.
 
-    Where it does use it, the controller's answers differ from run to run, and that is seen.
+    If it uses the entropy, the controller's answers differ between runs, and the kit detects this.
     """
     return frame.f_code.co_name == "getrandbits" and frame.f_code.co_filename.startswith(_STANDARD_LIBRARY)
 

@@ -1,1 +1,1 @@
-"""What runs a controller: the contract, a node without transport, and the robot process."""
+"""The controller's contract, a node without transport, and the robot process."""

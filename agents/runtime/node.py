@@ -1,6 +1,6 @@
-"""A node without its transport: bytes of an observation in, bytes of a command out.
+"""A node without its transport: from the bytes of an observation to the bytes of a command.
 
-The same object runs behind the memory link and inside a robot process, so both answer with the same bytes.
+The memory link and the robot process run the same object, so both return the same bytes.
 """
 
 import traceback
@@ -12,26 +12,34 @@ import msgspec
 from zwerm.agents.runtime.contract import Setup, Stepper
 from zwerm.agents.runtime.controllers import make
 from zwerm.link import Answer
-from zwerm.wire.messages import MESSAGE_BYTES_MAX, Command, Failure, Observation, decode_observation, encode
+from zwerm.wire.messages import (
+    MESSAGE_BYTES_MAX,
+    Command,
+    Failure,
+    Observation,
+    decode_observation,
+    encode,
+    encode_command,
+)
 
 if TYPE_CHECKING:
     from zwerm.link.peer_radio import PeerRadio
 
-# So that a failure fits into a message, whatever its characters.
+# Limits of a Failure, so that it fits into a message even if each character takes several bytes.
 ERROR_CHARS_MAX: Final = 2_000
 TRACEBACK_CHARS_MAX: Final = 10_000
 
 
 def _nothing() -> None:
-    """Be told of a failure, and do nothing about it."""
+    """Ignore a failure."""
 
 
 class Node:
     """One node: its controller and the wire format around it.
 
-    `answer` returns the encoded command for one encoded observation, or the encoded Failure if the controller raises; before
-    that it calls `on_failure`. It is one function that has all it needs at hand: between two ticks of a big swarm a
-    processor forgets a robot, and what has to be looked up again is what an answer costs.
+    `answer` returns the encoded command for one encoded observation. If the controller raises, it calls `on_failure` and
+    returns the encoded Failure. `answer` is a closure over local names, because attribute look-ups cost most of an answer: in
+    a large swarm the robot's objects leave the processor's cache between two ticks.
     """
 
     def __init__(self, controller: str, setup: Setup, on_failure: Callable[[], object] = _nothing) -> None:
@@ -40,11 +48,11 @@ class Node:
         self._controller: Stepper = make(controller, setup)
         self.answer: Answer = self._answering(self._controller.step)
 
-    def go_on_air(self, radio: "PeerRadio") -> None:
-        """From now on hear what `radio` hears, and nothing else, and send by it what the controller sends."""
+    def use_radio(self, radio: "PeerRadio") -> None:
+        """From now on receive packets from `radio` only, and send the controller's packets over it."""
         step, began = self._controller.step, radio.begin
 
-        def step_on_air(observation: Observation) -> Command:
+        def step_with_radio(observation: Observation) -> Command:
             began()
             tick = observation.tick
             command = step(msgspec.structs.replace(observation, inbox=radio.take(tick)))
@@ -52,10 +60,10 @@ class Node:
                 radio.send(tick, message)
             return command
 
-        self.answer = self._answering(step_on_air)
+        self.answer = self._answering(step_with_radio)
 
     def _answering(self, step: Callable[[Observation], Command]) -> Answer:
-        decode, write, fail = decode_observation, encode, self._fail
+        decode, write, fail = decode_observation, encode_command, self._fail
 
         def answer(payload: bytes) -> bytes:
             observation = decode(payload)
@@ -63,11 +71,13 @@ class Node:
             try:
                 command = step(observation)
                 command.tick = tick
-                said = write(command)
-                if len(said) > MESSAGE_BYTES_MAX:
-                    raise ValueError(f"the command takes {len(said)} bytes, at most {MESSAGE_BYTES_MAX} are allowed")
-                return said
-            except KeyboardInterrupt:  # Ctrl-C, for whoever runs nodes inline
+                payload_out = write(command)
+                if len(payload_out) > MESSAGE_BYTES_MAX:
+                    raise ValueError(
+                        f"the command takes {len(payload_out)} bytes, at most {MESSAGE_BYTES_MAX} are allowed"
+                    )
+                return payload_out
+            except KeyboardInterrupt:  # Ctrl-C during an inline run
                 raise
             except BaseException as error:
                 return fail(tick, error)

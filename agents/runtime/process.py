@@ -1,14 +1,13 @@
-"""The robot process: an asyncio loop that lives its life, one Zenoh session, one Node.
+"""The robot process: an asyncio loop, one Zenoh session and one Node.
 
-Promises: it answers each observation with one command, in order; it ends by itself when the world says goodbye or is
-lost, on SIGTERM, and with the process that started it. When its controller fails it ends once the world has confirmed the
-failure: the world never sees its end before the reason. It ignores SIGINT: Ctrl-C is for
-whoever started it.
+The process answers each observation with one command, in order. It exits when the world says goodbye or is lost, on SIGTERM,
+and with the process that started it. After a failure of its controller it exits once the world has confirmed the failure, so
+the world always knows the reason first. It ignores SIGINT: the process that started it handles Ctrl-C.
 
-The loop joins, waits and ends; an observation is answered right where Zenoh delivers it. Handing each one over to the loop's
-thread would cost more than everything else together (measured, a robot tick: 160 us of processor time in place of 106).
-In real time it is handed over all the same: there a slow controller meets a backlog, and whoever answers a backlog in the
-thread that sends can wait for itself.
+The loop joins, waits and ends. Zenoh's thread answers observations where it delivers them. Passing each observation to the
+loop's thread costs more than all other work together (measured, one robot tick: 160 us of processor time instead of 106).
+In real time observations are passed to the loop all the same: a slow controller gets a backlog there, and a backlog that is
+answered in the sending thread can block that thread.
 """
 
 import asyncio
@@ -29,7 +28,7 @@ import uvloop
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.node import Node
 from zwerm.errors import ControllerError, ZwermError
-from zwerm.link.node import ZenohNodeLink
+from zwerm.link.node_link import ZenohNodeLink
 from zwerm.link.peer_radio import PeerRadio, Station, enter_namespace
 from zwerm.link.session import ONE_THREAD, TWO_THREADS, Credential, is_local, set_threads
 from zwerm.wire.messages import REFUSABLE, Failure, Goodbye, Welcome, decode_to_node, encode
@@ -38,8 +37,8 @@ EXIT_FAILED: Final = 1
 EXIT_REFUSED: Final = 2
 EXIT_LOST: Final = 3
 
-# All robots wait for the world, so it goes first where there are more processes than cores (measured: 100 robots on two cores
-# make a few per cent more ticks). Less than the most, which would leave robots next to nothing beside other work.
+# All robots wait for the world, so the world has priority if there are more processes than cores (measured: a few per cent
+# more ticks with 100 robots on two cores). The largest niceness would starve robots beside other programs.
 NICENESS: Final = 5
 
 _PR_SET_PDEATHSIG: Final = 1
@@ -54,35 +53,35 @@ def main(
     joined: Connection,
     station: Station | None = None,
 ) -> None:
-    """Live one robot's life and exit: 0 at its end, 1 controller failed, 2 could not join, 3 lost the world.
+    """Run one robot and exit: 0 end of the run, 1 the controller failed, 2 could not join, 3 lost the world.
 
-    With a `station` its radio is that of a real network, which this process moves into.
+    With a `station` the process moves into its network namespace and sends packets over that network.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)
     die_with_parent()
     parent = parent_process()
-    if parent is not None and not parent.is_alive():  # it died before the kernel was told
+    if parent is not None and not parent.is_alive():  # it died before die_with_parent took effect
         sys.exit(EXIT_LOST)
     set_threads(ONE_THREAD if is_local(endpoint) and station is None else TWO_THREADS)
     here = str(Path.cwd())
     if here not in sys.path:
-        sys.path.append(here)  # where a user's own controllers are
+        sys.path.append(here)  # the place of a user's own controllers
     try:
         if station is not None:
             enter_namespace(station.namespace)
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            code = runner.run(live(run, credential, endpoint, authority_pem, deadline_s, joined, station))
+            code = runner.run(run_node(run, credential, endpoint, authority_pem, deadline_s, joined, station))
     except ZwermError as error:
         sys.stderr.write(f"zwerm: {error}\n")
         code = EXIT_REFUSED
     if station is not None:
         sys.stderr.flush()
-        os._exit(code)  # the radio's session would wait for goodbyes that the network loses
+        os._exit(code)  # closing the radio's session waits for messages that the network loses
     sys.exit(code)
 
 
-async def live(
+async def run_node(
     run: str,
     credential: Credential,
     endpoint: str,
@@ -91,32 +90,32 @@ async def live(
     joined: Connection | None = None,
     station: Station | None = None,
 ) -> int:
-    """Join the run, answer until the end, and return the exit code.
+    """Join the run, answer observations until its end, and return the exit code.
 
-    `joined`, if given, is sent the node's id once it has joined. Raises ZwermError where it cannot join.
+    Writes the node's id to `joined` once the node has joined. Raises ZwermError if it cannot join.
     """
     loop = asyncio.get_running_loop()
     end: asyncio.Future[int] = loop.create_future()
-    may_leave = asyncio.Event()
+    may_exit = asyncio.Event()
 
     def finish(code: int) -> None:
         if not end.done():
             end.set_result(code)
-        if code != EXIT_FAILED:  # the world is over or lost, or SIGTERM: nobody is left to hear why
-            may_leave.set()
+        if code != EXIT_FAILED:  # the run is over, or the world lost, or SIGTERM: no goodbye is needed
+            may_exit.set()
 
-    def finish_from_outside(code: int) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop has ended by itself
+    def finish_from_thread(code: int) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has ended
             loop.call_soon_threadsafe(finish, code)
 
-    def heard() -> None:
+    def confirmed() -> None:
         with contextlib.suppress(RuntimeError):
-            loop.call_soon_threadsafe(may_leave.set)
+            loop.call_soon_threadsafe(may_exit.set)
 
-    async def take_leave(reason: str) -> None:
-        """Return when the world has taken in all that this node has said, however long that takes, or is lost."""
-        link.take_leave(reason, heard)
-        await may_leave.wait()
+    async def leave(reason: str) -> None:
+        """Say goodbye, and return when the world has confirmed all messages, or is lost."""
+        link.send_goodbye(reason, confirmed)
+        await may_exit.wait()
 
     failed = False
 
@@ -130,11 +129,11 @@ async def live(
         try:
             send(answer(payload))
         except REFUSABLE:
-            finish_from_outside(0 if _is_goodbye(payload) else EXIT_LOST)
-        except BaseException:  # a thread of Zenoh's cannot be left that way
-            finish_from_outside(EXIT_FAILED)
+            finish_from_thread(0 if _is_goodbye(payload) else EXIT_LOST)
+        except BaseException:  # an exception must not leave a callback of Zenoh
+            finish_from_thread(EXIT_FAILED)
         if failed:
-            finish_from_outside(EXIT_FAILED)
+            finish_from_thread(EXIT_FAILED)
 
     def receive_in_loop(payload: bytes) -> None:
         with contextlib.suppress(RuntimeError):
@@ -146,7 +145,7 @@ async def live(
         endpoint,
         authority_pem=authority_pem,
         deadline_s=deadline_s,
-        on_lost=lambda: finish_from_outside(EXIT_LOST),
+        on_lost=lambda: finish_from_thread(EXIT_LOST),
     )
     radio = None
     try:
@@ -158,20 +157,20 @@ async def live(
             answer = _node(welcome, radio, fail).answer
         except ControllerError as error:
             link.send(encode(Failure(0, str(error), "")))
-            await take_leave("it has no controller")
+            await leave("it has no controller")
             raise
         parent: Any = parent_process()
         if parent is not None:
-            # Where the kernel does not do it. At once, because a controller that does not return would hold up the
-            # rest.
+            # For systems without die_with_parent. Exits at once, because a controller that does not return blocks the
+            # normal end.
             loop.add_reader(parent.sentinel, os._exit, EXIT_LOST)
         if joined is not None:
-            with contextlib.suppress(OSError), joined:  # nobody waits for it any more
+            with contextlib.suppress(OSError), joined:  # the supervisor does not wait any more
                 joined.send_bytes(str(credential.node).encode())
         link.listen(receive_in_loop if welcome.paced else receive)
         code = await end
         if code == EXIT_FAILED:
-            await take_leave("its controller failed")
+            await leave("its controller failed")
         return code
     finally:
         link.close()
@@ -180,10 +179,10 @@ async def live(
 
 
 def _node(welcome: Welcome, radio: PeerRadio | None, on_failure: Callable[[], object]) -> Node:
-    """Make the node that the world describes. Raises ControllerError where it has no such controller."""
+    """Make the node that the world describes. Raises ControllerError if the controller is not found."""
     node = Node(welcome.controller, msgspec.msgpack.decode(welcome.setup, type=Setup), on_failure)
     if radio is not None:
-        node.go_on_air(radio)
+        node.use_radio(radio)
     return node
 
 
@@ -195,6 +194,6 @@ def _is_goodbye(payload: bytes) -> bool:
 
 
 def die_with_parent() -> None:
-    """Have the kernel kill this process when its parent dies, where the kernel can do that (Linux)."""
+    """Tell the kernel to kill this process when its parent dies (Linux only)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -1,16 +1,17 @@
-"""The base station: a robot that never moves, and lets the others out one by one when the coordinator asks."""
+"""The base station under a coordinator: it never moves, and releases robots from its depot on command."""
 
 from typing import Final
 
 from zwerm.agents.runtime.contract import Setup
-from zwerm.agents.sensor_coverage.central_robot import STOP, CentralRobot, Story
-from zwerm.agents.sensor_coverage.messages.commands import Order, Release, Released
+from zwerm.agents.sensor_coverage.central_robot import CentralRobot
+from zwerm.agents.sensor_coverage.messages.commands import UPLINK, Release, Released, RobotCommand
+from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive
 from zwerm.wire.messages import Command, Observation, Wake
 
-# Who has not come out by then [ticks] will not.
-BIRTH_TICKS: Final = 12
-# A coordinator that has said nothing for so long is gone [s].
-SILENCE_S: Final = 120.0
+# A released robot that is not visible after this many ticks does not come out.
+RELEASE_TICKS_MAX: Final = 12
+# The coordinator counts as lost after this silence.
+SILENCE_S_MAX: Final = 120.0
 
 
 class CentralBase(CentralRobot):
@@ -18,34 +19,39 @@ class CentralBase(CentralRobot):
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
-        self._releasing = False
+        self._release = False
         self._heard_s = 0.0
 
     def step(self, observation: Observation) -> Command:
-        """Answer surveys, and release."""
+        """Answer scan requests, release robots, and give up when the coordinator is lost."""
         command = super().step(observation)
         command.drive = None
-        command.release, self._releasing = self._releasing, False
-        if observation.inbox:
+        command.release, self._release = self._release, False
+        if any(packet.channel == UPLINK for packet in observation.inbox):
             self._heard_s = observation.time_s
-        elif observation.time_s > self._heard_s + SILENCE_S - 1e-9:
+        elif observation.time_s > self._heard_s + SILENCE_S_MAX - 1e-9:
             self._heard_s = observation.time_s
-            command.gave_up = f"coordinator-lost: not a word from the coordinator for {SILENCE_S:g} s"
+            command.gave_up = f"coordinator-lost: not a word from the coordinator for {SILENCE_S_MAX:g} s"
         if command.wake is not None:
-            command.wake = Wake(at_s=self._heard_s + SILENCE_S, on_packet=True)
+            command.wake = self._before_silence(command.wake)
         return command
 
-    def _begin(self, order: Order) -> Story | None:
-        return self._let_out() if isinstance(order, Release) else super()._begin(order)
+    def _before_silence(self, wake: Wake) -> Wake:
+        """Return a wake-up that is no later than the end of the permitted silence."""
+        at_s = self._heard_s + SILENCE_S_MAX
+        return Wake(at_s=at_s if wake.at_s is None else min(at_s, wake.at_s), on_packet=True)
 
-    def _let_out(self) -> Story:
-        """Let a robot out, and say who it is: the one who is in sight now and was not before."""
-        before = self.senses.seen
-        self._releasing = True
-        born: int | None = None
-        for _ in range(BIRTH_TICKS):
+    def _begin(self, command: RobotCommand) -> Drive | None:
+        return self._let_out() if isinstance(command, Release) else super()._begin(command)
+
+    def _let_out(self) -> Drive:
+        """Release a robot, and report it: the robot that is visible now and was not before."""
+        before = self.motion.frame.seen
+        self._release = True
+        released: int | None = None
+        for _ in range(RELEASE_TICKS_MAX):
             yield STOP
-            born = min((node for node in self.senses.seen if node not in before), default=None)
-            if born is not None:
+            released = min((node for node in self.motion.frame.seen if node not in before), default=None)
+            if released is not None:
                 break
-        self._outbox.append(Released(born))
+        self.commands.answer(Released(released))

@@ -1,143 +1,115 @@
-"""The robot under a coordinator that agrees with its neighbours on who may leave the complex; and its base station.
+"""The robot and the base station under a coordinator, where neighbours agree on which robot leaves the complex.
 
-The coordinator asks those who are not on the fence to find out; all others only answer their neighbours, and stand still for
-them (`redundancy`). It is the robots that decide. Who has left stays where it is in body, and says so in all that it reports,
-until it is ordered to move: then it is one of the complex again. An order to move is never refused: it waits for the
-end of a lock.
+The coordinator requests a negotiation from robots that are not on the fence. Their neighbours only answer, and stand
+still for them (`leave_lock`). The robots decide. A robot that has left reports that in each scan until it is commanded
+to move. A command to move is never refused: it waits for the end of a lock.
 """
 
-from collections.abc import Generator
-from typing import Any, Final, TypeVar
+from collections.abc import Generator, Sequence
+from typing import Final, TypeVar
 
-import msgspec
-
-from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.sensor_coverage.central_base import CentralBase
-from zwerm.agents.sensor_coverage.central_robot import STOP, CentralRobot, Story
+from zwerm.agents.sensor_coverage.central_robot import CentralRobot
+from zwerm.agents.sensor_coverage.messages import peers
 from zwerm.agents.sensor_coverage.messages.commands import (
     Correct,
     Deploy,
     LeftComplex,
     Move,
     NegotiateLeave,
-    Order,
     Report,
+    RobotCommand,
     ScanRequest,
+    Sighting,
 )
-from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, ListRequest, read, write
 from zwerm.agents.sensor_coverage.motion.homing import Vector
-from zwerm.agents.sensor_coverage.protocols import leave_lock as redundancy
-from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
-from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission, Wake
+from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive
+from zwerm.agents.sensor_coverage.protocols.component import Component
+from zwerm.agents.sensor_coverage.protocols.component_loop import Codec
+from zwerm.agents.sensor_coverage.protocols.requested_leave import RequestedLeave
+from zwerm.wire.messages import BodyVelocity, Command, Observation
 
 T = TypeVar("T")
 
-# How long to try to leave, how often in vain, and how long after its last drive a body is still [ticks].
-CONFER_TICKS: Final = 70
-TRIES_MAX: Final = 2
-STILL_TICKS: Final = 2
+# A negotiation ends after this many ticks, or after this many failed attempts.
+NEGOTIATION_TICKS_MAX: Final = 70
+ATTEMPTS_MAX: Final = 2
 
 
 class NegotiatingRobot(CentralRobot):
     """A robot that may leave the complex."""
 
-    def __init__(self, setup: Setup) -> None:
-        super().__init__(setup)
-        newborn = setup.incarnation == 1
-        self._leaving = LeaveNegotiation(setup.node, setup.dt_s, self.random, newborn)
-        self._left = False
-        self._seeks = False  # it is to leave if it can
-        self._drives = False
-        self._driven_at = 0
-        self._told: dict[str, Any] = {} if newborn else {"removal": {"in": setup.node}}
+    def _make_components(self) -> Sequence[Component]:
+        self._leave = RequestedLeave(self.setup, self.random)
+        return (*super()._make_components(), self._leave)
+
+    def _make_codecs(self) -> dict[str, Codec]:
+        return super()._make_codecs() | {peers.CHANNEL: Codec(peers.read, peers.write, needs_sender=True)}
 
     def step(self, observation: Observation) -> Command:
-        """Answer the neighbours, go on with what the coordinator ordered, and leave if that was agreed upon."""
-        tick, leaving = observation.tick, self._leaving
-        leaving.watch(tick, [each.node for each in observation.bearings or ()])
-        leaving.note(self._stands(tick))
-        orders = []
-        for packet in observation.inbox:
-            if packet.channel != CHANNEL:
-                orders.append(packet)
-                continue
-            word = read(packet.payload)
-            if packet.sender is not None and isinstance(word, redundancy.Message | ListRequest):
-                leaving.hear(packet.sender, word)
-        command = super().step(msgspec.structs.replace(observation, inbox=tuple(orders)))
-        if command.drive is not None and command.drive != STOP:
-            self._driven_at = tick
-        leaving.note(self._stands(tick))
-        if leaving.turn(self._seeks):
-            self._left, self._told = True, {"removal": {"out": self.setup.node}}
-            leaving.note(stands=False)
-        words = tuple(Transmission(CHANNEL, write(word), to) for to, word in leaving.letters())
-        command.outbox += words
-        command.wake = self._sooner(command.wake, tick)
-        command.told, self._told = self._told, {}
+        """Observe the neighbours, and step as a robot under a coordinator."""
+        self._tick = observation.tick
+        self._leave.observe(observation.tick, [each.node for each in observation.bearings or ()])
+        command = super().step(observation)
+        command.snapshot, self._leave.snapshot = self._leave.snapshot, b""
         return command
 
-    def _stands(self, tick: int) -> bool:
-        return not (self._left or self._drives or tick <= self._driven_at + STILL_TICKS)
+    def _advance(self) -> BodyVelocity:
+        drive = super()._advance()
+        if drive != STOP:
+            self._leave.driven(self._tick)
+        return drive
 
-    def _sooner(self, wake: Wake | None, tick: int) -> Wake | None:
-        """Return a wake that is not later than the neighbours need it."""
-        due = self._leaving.next_tick()
-        if wake is None or due is None:
-            return wake
-        at_s = max(tick + 1, due) * self.setup.dt_s
-        return Wake(at_s=at_s if wake.at_s is None else min(at_s, wake.at_s), on_packet=True)
+    # --- commands -----------------------------------------------------------------------------------------------------
 
-    # --- orders -----------------------------------------------------------------------------------------------------
-
-    def _begin(self, order: Order) -> Story | None:
-        self._seeks = self._drives = False
-        match order:
+    def _begin(self, command: RobotCommand) -> Drive | None:
+        self._leave.wanted = self._leave.driving = False
+        match command:
             case NegotiateLeave():
-                return self._confer(order)
+                return self._negotiate(command)
             case Deploy() | Move() | Correct():
-                story = super()._begin(order)
-                return story and self._once_unlocked(story)
+                drive = super()._begin(command)
+                return drive and self._once_unlocked(drive)
             case _:
-                return super()._begin(order)
+                return super()._begin(command)
 
-    def _confer(self, order: NegotiateLeave) -> Story:
-        """Leave, if the neighbours agree; nothing that was agreed upon holds after the answer."""
-        self._leaving.begin()
-        self._seeks = not self._left
-        for _ in range(CONFER_TICKS):
+    def _negotiate(self, command: NegotiateLeave) -> Drive:
+        """Leave if the neighbours agree, and report. No agreement holds after the report."""
+        leave = self._leave
+        leave.negotiation.begin()
+        leave.wanted = not leave.has_left
+        for _ in range(NEGOTIATION_TICKS_MAX):
             yield STOP
-            if self._left or self._leaving.stays or self._leaving.tries >= TRIES_MAX:
+            if leave.has_left or leave.negotiation.stays or leave.negotiation.tries >= ATTEMPTS_MAX:
                 break
-        self._seeks = False
-        yield from self._survey(ScanRequest(order.cycle, ()))
+        leave.wanted = False
+        yield from self._scan(ScanRequest(command.cycle, ()))
 
-    def _survey(self, order: ScanRequest) -> Story:
-        yield from super()._survey(order)
-        report = self._outbox[-1]
-        if self._left and isinstance(report, Report):
-            self._outbox[-1] = LeftComplex(report.cycle, report.sightings, report.touched, report.home)
+    def _report(self, cycle: int, sightings: tuple[Sighting, ...] | None, home: bool) -> Report:
+        report = super()._report(cycle, sightings, home)
+        if not self._leave.has_left:
+            return report
+        return LeftComplex(report.cycle, report.sightings, report.touched, report.home)
 
-    # --- standing still for others ----------------------------------------------------------------------------------
+    # --- standing still for a neighbour -------------------------------------------------------------------------------
 
-    def _once_unlocked(self, drive: Story) -> Story:
-        while self._leaving.locked:
+    def _once_unlocked(self, drive: Drive) -> Drive:
+        while self._leave.negotiation.locked:
             yield STOP
-        if self._left:
-            self._left, self._told = False, {"removal": {"in": self.setup.node}}
+        self._leave.rejoin()
         yield from self._driving(drive)
 
-    def _return(self, rest: Vector) -> Generator[BodyVelocity, None, Vector]:
-        if self._leaving.locked:
+    def _return_to_rest(self, rest: Vector) -> Generator[BodyVelocity, None, Vector]:
+        if self._leave.negotiation.locked:
             return rest
-        return (yield from self._driving(super()._return(rest)))
+        return (yield from self._driving(super()._return_to_rest(rest)))
 
     def _driving(self, drive: Generator[BodyVelocity, None, T]) -> Generator[BodyVelocity, None, T]:
-        self._drives = True
+        self._leave.driving = True
         end = yield from drive
-        self._drives = False
+        self._leave.driving = False
         return end
 
 
 class NegotiatingBase(NegotiatingRobot, CentralBase):
-    """The base station: it never leaves, but those beside it may."""
+    """The base station, which never leaves; robots beside it may."""

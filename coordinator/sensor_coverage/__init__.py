@@ -1,1 +1,1 @@
-"""The coordinator of sensor coverage, and the redundancy advisor."""
+"""The coordinator of sensor coverage, and the redundancy advisor of decentralised robots."""

@@ -1,38 +1,47 @@
-"""The coordinator of sensor coverage: survey, fence, path, push, and again until nothing is left to expand.
+"""The coordinator of sensor coverage: Algorithm 1 of Ramaithitima et al. 2015.
 
-Algorithm 1 of Ramaithitima et al. 2015. It knows what robots told it over the uplink, and nothing else. What is to be decided
-stands behind one interface each (`zwerm.agents.sensor_coverage.frontier.services`); here is only the story.
+It knows only the robots' reports over the uplink. Each decision stands behind an interface
+(`zwerm.agents.sensor_coverage.frontier.services`). `SensorCoverageCoordinator._algorithm_1` is the algorithm as the
+paper prints it.
 """
 
-import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, Final, Protocol
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.frontier.assignment import CheapestFirst
+from zwerm.agents.sensor_coverage.frontier.directions import add_wall
+from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
-from zwerm.agents.sensor_coverage.frontier.planner import Planner, PlannerParameters
-from zwerm.agents.sensor_coverage.frontier.quiescence import COVERED, QuiescenceDetector
-from zwerm.agents.sensor_coverage.frontier.relative_homology import RelativeHomology
-from zwerm.agents.sensor_coverage.frontier.services import Plan, ScanResult, Services
+from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.planner import Planner
+from zwerm.agents.sensor_coverage.frontier.services import Services
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.messages.commands import LIVES, Emerged, Report, RollCall, ScanRequest
-from zwerm.coordinator.sensor_coverage.command_mailbox import MUSTER_COPIES, CommandMailbox, Story, together
+from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS, Emerged, Report, RollCall, ScanRequest
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_snapshot
+from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
+from zwerm.coordinator.sensor_coverage.command_mailbox import (
+    ROLL_CALL_COPIES,
+    CommandMailbox,
+    Routine,
+    run_concurrently,
+)
 from zwerm.coordinator.sensor_coverage.leave_requests import LeaveRequests
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
+from zwerm.coordinator.sensor_coverage.quiescence import COVERED, QuiescenceDetector
+from zwerm.coordinator.sensor_coverage.relative_homology import RelativeHomology
 from zwerm.coordinator.sensor_coverage.sources import Sources
 from zwerm.maths.keyed_random import stream
 from zwerm.maths.simplicial import Edge, FlagComplex
 from zwerm.wire.messages import Command, Observation, Wake
 
-# A robot that can be spared is taken before any from a base station.
-SPARED_COST: Final = -100.0
+# Cost to start a path at a redundant robot: it is preferred to any station.
+REDUNDANT_COST: Final = -100.0
 
-# So long it rests between surveys while it watches over what is covered.
+# Pause [ticks] between scans while the coordinator watches a covered space.
 WATCH_TICKS: Final = 50
 
-# How a deployment ends that does not end with all covered.
+# Explanations of the outcomes other than `covered`.
 GIVEN_UP: Final = {
     "depot-dry": "the depot is empty",
     "source-blocked": "no robot gets away from the base",
@@ -43,15 +52,15 @@ GIVEN_UP: Final = {
 
 
 class CoordinatorSetup(Protocol):
-    """What a coordinator needs of its setup."""
+    """The parts of its setup that the coordinator uses."""
 
     @property
     def dt_s(self) -> float:
-        """The period of a tick."""
+        """The period of a tick [s]."""
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """What the scenario set."""
+        """The parameters that the scenario sets."""
 
     @property
     def bases(self) -> tuple[int, ...]:
@@ -59,289 +68,312 @@ class CoordinatorSetup(Protocol):
 
     @property
     def stream_key(self) -> bytes:
-        """The key of its own stream of randomness, another one in each life."""
+        """The key of its random stream, another one in each incarnation."""
 
     @property
     def services(self) -> dict[str, str]:
-        """Who provides which service."""
+        """The provider of each service."""
 
     @property
     def incarnation(self) -> int:
-        """How often it has begun."""
+        """The number of its starts, 1 at first."""
 
 
 class SensorCoverageCoordinator:
-    """Fills an unknown space with robots, from what they tell by radio (Ramaithitima et al. 2015, algorithm 1)."""
+    """Fills an unknown space with robots, by their reports over the uplink."""
 
     Parameters = PlannerParameters
 
     def __init__(self, setup: CoordinatorSetup) -> None:
-        rules: PlannerParameters = msgspec.convert(setup.parameters, PlannerParameters)
-        self.parameters = rules
-        self.places = Slots()
-        life = int(stream(setup.stream_key).integers(1, LIVES))
-        self.post = CommandMailbox(setup.dt_s, life, rules.survey_ticks_max, rules.drive_ticks_max)
-        self.sources = Sources(setup.bases, self.places, self.post)
-        planner = Planner(rules, self.places)
+        parameters: PlannerParameters = msgspec.convert(setup.parameters, PlannerParameters)
+        self.parameters = parameters
+        self.slots = Slots()
+        incarnation = int(stream(setup.stream_key).integers(1, INCARNATIONS))
+        self.mailbox = CommandMailbox(setup.dt_s, incarnation, parameters.survey_ticks_max, parameters.drive_ticks_max)
+        self.sources = Sources(setup.bases, self.slots, self.mailbox)
+        planner = Planner(parameters, self.slots)
         self.services = Services(
             planner,
-            Dijkstra(rules.obstacle_cost),
+            Dijkstra(parameters.obstacle_cost),
             RelativeHomology(),
-            CheapestFirst(self.places, rules.pushes_max),
+            CheapestFirst(self.slots, parameters.pushes_max),
             QuiescenceDetector(),
         )
-        self.pushing = PushExecution(rules, self.places, self.post, self.sources, planner)
-        self.picture = ScanResult({}, FlagComplex({}), ())
+        self.pushing = PushExecution(parameters, self.slots, self.mailbox, self.sources, planner)
+        self.scan = ScanResult({}, FlagComplex({}), ())
         self.redundant: tuple[int, ...] = ()
         self.outcome = ""
         self.cycle = 0
-        self._anew = setup.incarnation > 1
-        self._conference = LeaveRequests(rules.corner_margin_rad, self.places, self.post)
-        self._spares = setup.services.get("redundancy", "coordinator")
-        self._spared_at = 0
+        self._restarted = setup.incarnation > 1
+        self._leave_requests = LeaveRequests(parameters.corner_margin_rad, self.slots, self.mailbox)
+        self._redundancy = setup.services.get("redundancy", "coordinator")
+        self._redundancy_at = 0  # number of pushes when redundant robots were last searched
         self._silent: dict[int, None] = {}
-        self._told: dict[str, Any] = {}
-        self._story = self._tell()
+        self._telemetry: dict[str, float | bool] = {}
+        self._snapshot = b""
+        self._routine = self._run()
 
     def step(self, observation: Observation) -> Command:
-        """Take the mail and go on."""
-        self.post.take(observation.time_s, observation.inbox)
-        wake = next(self._story, Wake())
-        told, self._told = self._told, {}
-        outbox = self.post.sent()
-        again_s = None if self.outcome else self.post.next_s()
-        if again_s is not None and (wake.at_s is None or again_s < wake.at_s):
-            wake = Wake(at_s=again_s, on_packet=wake.on_packet)
+        """Take in the reports of a tick, and go on with the algorithm."""
+        self.mailbox.receive(observation.time_s, observation.inbox)
+        wake = next(self._routine, Wake())
+        telemetry, self._telemetry = self._telemetry, {}
+        snapshot, self._snapshot = self._snapshot, b""
+        outbox = self.mailbox.outgoing()
+        repeat_s = None if self.outcome else self.mailbox.next_wake_s()
+        if repeat_s is not None and (wake.at_s is None or repeat_s < wake.at_s):
+            wake = Wake(at_s=repeat_s, on_packet=wake.on_packet)
         return Command(
             outbox=outbox,
             wake=wake,
             done=self.outcome == COVERED,
             gave_up=self._gave_up(),
-            told=told,
+            telemetry=telemetry,
+            snapshot=snapshot,
         )
 
     def _gave_up(self) -> str:
-        """Return why the task cannot be completed, if so."""
+        """Return why the task cannot be completed, or an empty string."""
         reason = GIVEN_UP.get(self.outcome, "")
-        return (
-            f"{self.outcome}: {reason}; frontier edges left: {len(self.services.frontier.frontier)}" if reason else ""
-        )
+        frontier = self.services.frontier.frontier
+        return f"{self.outcome}: {reason}; frontier edges left: {len(frontier)}" if reason else ""
 
-    # --- the story --------------------------------------------------------------------------------------------------
+    # --- the algorithm ----------------------------------------------------------------------------------------------
 
-    def _tell(self) -> Story[None]:
+    def _algorithm_1(self) -> Routine[None]:
+        """Algorithm 1 of the paper; the numbers beside the lines are its line numbers.
+
+        With several stations line 1 is carried out by each station that sees no robot, and pushes run concurrently.
+        """
         moved: Moved = ()
-        self.post.muster(RollCall(1), MUSTER_COPIES if self._anew else 1)
-        while self.cycle < self.parameters.cycles_max and not self.outcome:
+        while self.cycle < self.parameters.cycles_max and not self.outcome:  # 2: do
             self.cycle += 1
-            yield from self._survey(moved)
-            stories, plans = yield from self._next()
-            self._tell_complex(plans)
-            self.outcome = self._judge(bool(stories))
-            moved = [robot for each in (yield from together(stories)) for robot in each]
-            if self.outcome == "source-lost" and self.post.suspect():
-                self.outcome = ""
-                self._ask_stations_again()
-            if self.outcome == COVERED and self.post.now_s < self.parameters.watch_until_s:
-                self.outcome = ""
-                yield from self.post.pause(WATCH_TICKS)
+            scan = yield from self._scan_swarm(moved)  # 3: R := ComputeRipsComplex({N_i})
+            self._update_fence(scan)  # 4: [F, O] := FenceSubcomplex(R, {theta})
+            plans: Sequence[Plan] = ()
+            if stations := self._stations_without_robots():
+                pushes = [self.pushing.deploy_first(base) for base in stations]  # 1: deploy robot 1
+            else:
+                if self._redundancy_is_due():
+                    yield from self._find_redundant()  # 5: (periodically) identify redundant robots
+                plans = yield from self._find_paths()  # 6: find path in the 1-skeleton
+                pushes = [self.pushing.push(plan) for plan in plans]  # 7 and 8: push robots in path, deploy robot n + 1
+            self._report_complex(plans)
+            self.outcome = self._judge(bool(pushes))  # 9: while F is not empty
+            moved = [robot for each in (yield from run_concurrently(pushes)) for robot in each]
+            yield from self._reconsider_outcome()
+
+    def _run(self) -> Routine[None]:
+        """Call the roll, carry out the algorithm, and report the numbers."""
+        self.mailbox.roll_call(RollCall(1), ROLL_CALL_COPIES if self._restarted else 1)
+        yield from self._algorithm_1()
         self.outcome = self.outcome or "no-end"
-        if self._spares == "coordinator":
-            yield from self._spare()
-        self._tell_numbers()
+        if self._redundancy == "coordinator":
+            yield from self._find_redundant()
+        self._report_numbers()
         yield Wake()
 
-    def _ask_stations_again(self) -> None:
-        for place, base in self.sources.stations.items():
-            self.places.occupant[place] = base
-            self._silent.pop(base, None)
+    # --- line 3: the scan -------------------------------------------------------------------------------------------
+
+    def _scan_swarm(self, moved: Moved) -> Routine[ScanResult]:
+        """Ask all robots for their reports; a silent robot counts as dead until it sends something."""
+        slots = self.slots
+        self._readmit()
+        asked = sorted(slots.occupant.values())
+        reports = yield from self._ask(asked, moved)
+        slot_of = slots.slot_of()
+        for robot in asked:
+            if robot not in reports:
+                slots.drop(slot_of[robot])
+        self._take_sightings(reports)
+        at_station: dict[int, tuple[int, Report]] = {}
+        while strangers := self._strangers(reports, at_station):
+            answers = yield from self._ask(strangers, ())
+            stations = {robot: self.sources.station_seeing(robot) for robot, each in answers.items() if each.home}
+            at_station |= {robot: (at, answers.pop(robot)) for robot, at in stations.items() if at is not None}
+            for robot in answers:
+                slots.add(robot)
+                self.sources.out[robot] = None
+            self._take_sightings(answers)
+            reports |= answers
+        self._ping(reports)
+        slots.learn_headings(robot for robot, report in sorted(reports.items()) if report.sightings is not None)
+        slot_of = slots.slot_of()
+        for robot, report in sorted(reports.items()):
+            for bearing in report.touched:
+                add_wall(slots.walls.setdefault(slot_of[robot], []), bearing + slots.heading[robot])
+        views = slots.views()
+        slots.learn_references(views)
+        for robot, (station, report) in at_station.items():
+            self.sources.adopt(robot, station, report.sightings or (), views[station])
+        self._leave_requests.update(reports)
+        self.pushing.cycle = self.cycle
+        return ScanResult(views, FlagComplex(views), tuple(self.sources.alive()))
+
+    def _take_sightings(self, reports: Mapping[int, Report]) -> None:
+        for robot, report in reports.items():
+            if report.sightings is not None:
+                self.slots.take(robot, report.sightings)
+
+    def _ask(self, robots: Sequence[int], moved: Moved) -> Routine[dict[int, Report]]:
+        """Return the reports of robots; a robot that does not answer in time is not asked again.
+
+        A robot whose view is unknown is asked as if it had moved, because "nothing has changed" would be no information.
+        """
+        cycle, known = self.cycle, self.slots.view
+        for robot in robots:
+            if cycle == 1:
+                self.mailbox.expect(robot)
+            else:
+                request = ScanRequest(cycle, tuple(sorted(moved if robot in known else {*moved, robot})))
+                self.mailbox.send(robot, request)
+        answers = yield from self.mailbox.answers(robots, Report)
+        reports = {node: answer for node, answer in answers.items() if isinstance(answer, Report)}
+        self._silent |= dict.fromkeys(robot for robot in robots if robot not in reports)
+        return reports
+
+    def _strangers(self, reports: Mapping[int, Report], at_station: Collection[int]) -> list[int]:
+        """Return visible robots without a slot: a coordinator that starts again finds the swarm as it is."""
+        waiting = self.sources.waiting.values()
+        known = {*self.slots.occupant.values(), *waiting, *at_station, *self._silent, *self.pushing.lost}
+        seen = {each.node for report in reports.values() for each in report.sightings or ()}
+        return sorted(seen - known)
+
+    def _ping(self, reports: Mapping[int, Report]) -> None:
+        """Ask visible robots that count as dead, without waiting for an answer: they may come back."""
+        seen = {node for robot in reports for node in self.slots.view.get(robot, ())}
+        for robot in self._silent:
+            if robot in seen and not self.mailbox.waits_for(robot):
+                self.mailbox.send(robot, ScanRequest(self.cycle, (robot,)), ping=True)
+
+    def _readmit(self) -> None:
+        """Give a slot to robots that counted as dead and have sent something; one that has restarted has a new frame."""
+        placed = self.slots.slot_of()
+        for robot, answer in self.mailbox.take_unread():
+            if isinstance(answer, Emerged) and robot in self.slots.heading:
+                self.slots.orient(robot, robot, 0.0)
+            if robot in self._silent and robot not in placed:
+                del self._silent[robot]
+                station = self.sources.slot_of(robot)
+                if station is None:
+                    self.slots.add(robot)
+                else:
+                    self.slots.occupant[station] = robot
+
+    # --- line 4: the fence ------------------------------------------------------------------------------------------
+
+    def _update_fence(self, scan: ScanResult) -> None:
+        """Find the fence of the complex without robots that have left it; pushes may begin at those."""
+        self.scan = self.pushing.scan = scan
+        if self._redundancy == "link":
+            self.redundant = self._leave_requests.redundant_slots(scan)
+            if self.redundant:
+                self.scan = scan._replace(complex_=scan.complex_.without(self.redundant))
+        self.services.frontier.update(self.scan)
+
+    # --- line 1: the first robot of a station -------------------------------------------------------------------------
+
+    def _stations_without_robots(self) -> list[int]:
+        """Return the slots of the stations that can release robots and see only stations."""
+        seen, stations = self.scan.complex_.neighbours, self.sources.alive()
+        return [slot for slot in self.sources.available() if all(each in stations for each in seen[slot])]
+
+    # --- line 5: redundant robots -------------------------------------------------------------------------------------
+
+    def _redundancy_is_due(self) -> bool:
+        """Return whether `redundancy_every` pushes have succeeded, or none since the coordinator's latest search."""
+        pushes, every = self.pushing.pushes, self.parameters.redundancy_every
+        again = pushes == self._redundancy_at and self._redundancy == "coordinator"
+        return bool(every and pushes and (pushes // every > self._redundancy_at // every or again))
+
+    def _find_redundant(self) -> Routine[None]:
+        """Find redundant robots by relative homology, or let robots negotiate."""
+        if self._redundancy == "none":
+            return
+        self._redundancy_at = self.pushing.pushes
+        boundary_edges = self.services.frontier.boundary_edges()
+        if self._redundancy == "coordinator":
+            self.redundant = self.services.redundancy.redundant(self.scan, boundary_edges)
+        else:
+            yield from self._leave_requests.negotiate(self.scan, boundary_edges, self._silent, self.cycle)
+            self._update_fence(self.pushing.scan)
+
+    # --- line 6: paths ------------------------------------------------------------------------------------------------
+
+    def _find_paths(self) -> Routine[tuple[Plan, ...]]:
+        """Return the deployments of this cycle with their paths; an empty depot makes redundant robots the only source."""
+        plans = self._assign()
+        if not plans and self.sources.empty:
+            yield from self._find_redundant()
+            plans = self._assign()
+        return plans
+
+    def _assign(self) -> tuple[Plan, ...]:
+        services = self.services
+        self.redundant = tuple(slot for slot in self.redundant if slot in self.slots.occupant)
+        shut = self.scan.bases  # a station does not move
+        sources = dict.fromkeys(self.sources.available(), 0.0) | dict.fromkeys(self.redundant, REDUNDANT_COST)
+
+        def find_routes(complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
+            return services.paths.routes(complex_, sources, services.frontier.obstacle, shut)
+
+        return services.assignment.assign(services.frontier.plans(), self.pushing.scan, sources, find_routes)
+
+    # --- line 9: the end ----------------------------------------------------------------------------------------------
 
     def _judge(self, busy: bool) -> str:
-        """Return the outcome, or nothing while it goes on.
+        """Return the outcome, or an empty string while the deployment goes on.
 
-        An empty frontier says that all is covered where nobody is cut off from all stations, and somebody got anywhere.
+        An empty frontier means that all is covered if each component has a station, and a robot got away from a
+        station.
         """
         outcome = self.services.termination.judge(busy, bool(self.services.frontier.frontier))
-        sources, pieces = self.sources, self.picture.complex_.components()
+        sources, pieces = self.sources, self.scan.complex_.components()
         stations = sources.alive()
-        alone = all(place in stations for piece in pieces for place in piece)
+        alone = all(slot in stations for piece in pieces for slot in piece)
         whole = [len(piece) > 1 for piece in pieces] == [True] or all(
-            any(place in stations for place in piece) for piece in pieces
+            any(slot in stations for slot in piece) for piece in pieces
         )
         if not outcome or (outcome == COVERED and whole and not alone):
             return outcome
         if not stations:
             return "source-lost"
-        if sources.dry:
+        if sources.empty:
             return "depot-dry"
         return "source-blocked" if alone else "cut-off"
 
-    # --- what to do next --------------------------------------------------------------------------------------------
+    def _reconsider_outcome(self) -> Routine[None]:
+        """Go on after all if silent stations may be a first loss, or if the covered space is to be watched."""
+        if self.outcome == "source-lost" and self.mailbox.suspect_loss():
+            self.outcome = ""
+            for slot, base in self.sources.stations.items():
+                self.slots.occupant[slot] = base
+                self._silent.pop(base, None)
+        if self.outcome == COVERED and self.mailbox.now_s < self.parameters.watch_until_s:
+            self.outcome = ""
+            yield from self.mailbox.pause(WATCH_TICKS)
 
-    def _next(self) -> Story[tuple[list[Story[Moved]], Sequence[Plan]]]:
-        """Return what to do in this cycle: pushes, or the first ones of stations that see no robot but stations."""
-        seen, stations = self.picture.complex_.neighbours, self.sources.alive()
-        lonely = [place for place in self.sources.open() if all(each in stations for each in seen[place])]
-        if lonely:
-            return [self.pushing.first(place) for place in lonely], ()
-        pushes, every = self.pushing.pushes, self.parameters.redundancy_every
-        again = pushes == self._spared_at and self._spares == "coordinator"
-        if every and pushes and (pushes // every > self._spared_at // every or again):
-            yield from self._spare()
-        plans = self._assign()
-        if not plans and self.sources.dry:
-            yield from self._spare()
-            plans = self._assign()
-        return [self.pushing.push(plan) for plan in plans], plans
+    # --- telemetry ----------------------------------------------------------------------------------------------------
 
-    def _assign(self) -> tuple[Plan, ...]:
-        services = self.services
-        self.redundant = tuple(place for place in self.redundant if place in self.places.occupant)
-        shut = self.picture.bases  # a station does not move
-        sources = dict.fromkeys(self.sources.open(), 0.0) | dict.fromkeys(self.redundant, SPARED_COST)
+    def _report_complex(self, plans: Iterable[Plan]) -> None:
+        """Report the complex and the paths of this cycle, by robots."""
+        complex_ = ComplexSnapshot(
+            cycle=self.cycle,
+            edges=self._by_robot(self.scan.complex_.edges),
+            frontier=self._by_robot(self.services.frontier.frontier),
+            obstacle=self._by_robot(self.services.frontier.obstacle),
+            paths=tuple(tuple(self.slots.occupant[each] for each in plan.path) for plan in plans),
+        )
+        self._snapshot = encode_snapshot(complex_)
 
-        def ways(complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
-            return services.paths.ways(complex_, sources, services.frontier.obstacle, shut)
+    def _by_robot(self, edges: Iterable[Edge]) -> tuple[tuple[int, int], ...]:
+        occupant = self.slots.occupant
+        return tuple((occupant[i], occupant[j]) for i, j in edges)
 
-        return services.assignment.assign(services.frontier.plans(), self.pushing.picture, sources, ways)
-
-    def _spare(self) -> Story[None]:
-        """Find out who can be spared, or have the robots find out."""
-        if self._spares == "none":
-            return
-        self._spared_at = self.pushing.pushes
-        rim = self.services.frontier.rim()
-        if self._spares == "coordinator":
-            self.redundant = self.services.redundancy.redundant(self.picture, rim)
-        else:
-            yield from self._conference.hold(self.picture, rim, self._silent, self.cycle)
-            self._draw(self.pushing.picture)
-
-    # --- the survey -------------------------------------------------------------------------------------------------
-
-    def _survey(self, moved: Moved) -> Story[None]:
-        """Ask everyone what they see; who does not answer is dead, until it says something."""
-        places = self.places
-        self._welcome()
-        asked = sorted(places.occupant.values())
-        reports = yield from self._ask(asked, moved)
-        place_of = places.place_of()
-        for robot in asked:
-            if robot not in reports:
-                places.drop(place_of[robot])
-        self._look(reports)
-        at_door: dict[int, tuple[int, Report]] = {}
-        while strangers := self._strangers(reports, at_door):
-            answers = yield from self._ask(strangers, ())
-            doors = {robot: self.sources.door(robot) for robot, answer in answers.items() if answer.home}
-            at_door |= {robot: (door, answers.pop(robot)) for robot, door in doors.items() if door is not None}
-            for robot in answers:
-                places.found(robot)
-                self.sources.out[robot] = None
-            self._look(answers)
-            reports |= answers
-        self._ping(reports)
-        places.learn_headings(robot for robot, report in sorted(reports.items()) if report.sightings is not None)
-        place_of = places.place_of()
-        for robot, report in sorted(reports.items()):
-            place = place_of[robot]
-            for bearing in report.touched:
-                self._remember(places.walls.setdefault(place, []), bearing + places.heading[robot])
-        views = places.views()
-        places.learn_references(views)
-        for robot, (door, report) in at_door.items():
-            self.sources.adopt(robot, door, report.sightings or (), views[door])
-        self._conference.note(reports)
-        self._draw(ScanResult(views, FlagComplex(views), tuple(self.sources.alive())))
-        self.pushing.cycle = self.cycle
-
-    def _draw(self, whole: ScanResult) -> None:
-        """Take what the survey found for the picture, but for robots that have left: these are where pushes begin."""
-        self.picture = self.pushing.picture = whole
-        if self._spares == "link":
-            self.redundant = self._conference.spare(whole)
-            if self.redundant:
-                self.picture = whole._replace(complex_=whole.complex_.without(self.redundant))
-        self.services.frontier.look(self.picture)
-
-    def _look(self, reports: Mapping[int, Report]) -> None:
-        for robot, report in reports.items():
-            if report.sightings is not None:
-                self.places.take(robot, report.sightings)
-
-    def _ask(self, robots: Sequence[int], moved: Moved) -> Story[dict[int, Report]]:
-        """Return what robots report, by robot; who does not answer in time is not asked again.
-
-        Of whom nothing is known, its own reading is asked for as if it had moved: "as before" would tell nothing.
-        """
-        cycle, known = self.cycle, self.places.view
-        for robot in robots:
-            if cycle == 1:
-                self.post.expect(robot)
-            else:
-                self.post.say(robot, ScanRequest(cycle, tuple(sorted(moved if robot in known else {*moved, robot}))))
-        answers = yield from self.post.answers(robots, Report)
-        reports = {node: answer for node, answer in answers.items() if isinstance(answer, Report)}
-        self._silent |= dict.fromkeys(robot for robot in robots if robot not in reports)
-        return reports
-
-    def _strangers(self, reports: Mapping[int, Report], at_door: Collection[int]) -> list[int]:
-        """Return robots that are seen and have no place: a coordinator that begins anew finds the swarm as it is."""
-        waiting = self.sources.waiting.values()
-        known = {*self.places.occupant.values(), *waiting, *at_door, *self._silent, *self.pushing.lost}
-        seen = {each.node for report in reports.values() for each in report.sightings or ()}
-        return sorted(seen - known)
-
-    def _ping(self, reports: Mapping[int, Report]) -> None:
-        """Ask those who were given up for dead and are still seen, and wait for no answer: they may be back one day."""
-        seen = {node for robot in reports for node in self.places.view.get(robot, ())}
-        for robot in self._silent:
-            if robot in seen and not self.post.waits_for(robot):
-                self.post.say(robot, ScanRequest(self.cycle, (robot,)), ping=True)
-
-    def _welcome(self) -> None:
-        """Give a place to those who were given up for dead, and speak; who begins anew has a frame of its own."""
-        placed = self.places.place_of()
-        for robot, answer in self.post.rest():
-            if isinstance(answer, Emerged) and robot in self.places.heading:
-                self.places.orient(robot, robot, 0.0)
-            if robot in self._silent and robot not in placed:
-                del self._silent[robot]
-                station = self.sources.place_of(robot)
-                if station is None:
-                    self.places.found(robot)
-                else:
-                    self.places.occupant[station] = robot
-
-    @staticmethod
-    def _remember(known: list[float], direction: float) -> None:
-        if all(_apart(each, direction) > 0.2 for each in known):
-            known.append(direction)
-
-    # --- for those who watch ----------------------------------------------------------------------------------------
-
-    def _tell_complex(self, plans: Iterable[Plan]) -> None:
-        """Tell who watches what the swarm looks like, by robots."""
-        self._told["complex"] = {
-            "cycle": self.cycle,
-            "edges": self._by_robot(self.picture.complex_.edges),
-            "frontier": self._by_robot(self.services.frontier.frontier),
-            "obstacle": self._by_robot(self.services.frontier.obstacle),
-            "paths": [[self.places.occupant[each] for each in plan.path] for plan in plans],
-        }
-
-    def _by_robot(self, edges: Iterable[Edge]) -> list[list[int]]:
-        occupant = self.places.occupant
-        return [[occupant[i], occupant[j]] for i, j in edges]
-
-    def _tell_numbers(self) -> None:
-        self._told |= {
+    def _report_numbers(self) -> None:
+        self._telemetry |= {
             "deployment_cycles": self.cycle,
             "pushes": self.pushing.pushes,
             "robots_released": len(self.sources.out),
             "redundant_robots": len(self.redundant),
         }
-
-
-def _apart(a: float, b: float) -> float:
-    return abs(math.remainder(a - b, math.tau))

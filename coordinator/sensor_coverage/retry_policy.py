@@ -1,52 +1,52 @@
-"""How soon to say an order again, and how long to wait for its answer, by how much of what was said has got through.
+"""When to repeat a request, and how long to wait for its answer, by the measured fraction of lost messages.
 
-While nothing was ever lost, an order is said again only when it takes unusually long: a perfect radio costs nothing. From the
-first loss on it is said again after one way there and back. Whoever is silent is dead once so many attempts in a row cannot
-all have been lost, one in a million aside; and not before a burst is over.
+Before the first loss a request is repeated only when its answer is overdue: a perfect radio costs nothing. After the
+first loss it is repeated after one round trip. A silent robot is dead once its silence has a probability below CHANCE,
+and not before a burst of losses has ended.
 """
 
 import math
 from typing import Final
 
-# One way there and back [ticks], and how often somebody is asked who is on the way.
-AGAIN_TICKS: Final = 2
+# Ticks of one round trip, and between requests to a robot that has acknowledged.
+REPEAT_TICKS: Final = 2
 BUSY_TICKS: Final = 8
-# Where most is lost, orders follow each other without a pause.
-MOST: Final = 0.6
-# How many attempts in a row may be lost: bursts of 16 packets in the mean are over by then. And how many are enough.
+# Above this fraction of losses requests follow each other in every tick.
+MOST_LOST: Final = 0.6
+# Bounds of the consecutive attempts that may be lost. Bursts of 16 packets on average have ended after the first.
 BURST_TRIES: Final = 250
 TRIES_MAX: Final = 2000
 CHANCE: Final = 1e-6
-# The older a loss, the less it says of the next: the weight of an order against the one after it.
+# Weight of a request relative to the next one in the measured fraction of losses.
 FADING: Final = 0.995
 
 
 class RetryPolicy:
-    """What is known of how much gets lost."""
+    """The measured fraction of lost requests. `lossy`: a message was lost, ever."""
 
     def __init__(self) -> None:
         self.lossy = False
-        self._said = self._missed = 0.0
+        self._sent = self._missed = 0.0
 
-    def note(self, attempts: int, heard: int) -> None:
-        """Take note that an order was said so often, and heard so often."""
+    def update(self, attempts: int, heard: int) -> None:
+        """Record that a request was sent `attempts` times and heard `heard` times."""
         self.lossy = self.lossy or heard < attempts
-        self._said = FADING * self._said + attempts
+        self._sent = FADING * self._sent + attempts
         self._missed = FADING * self._missed + attempts - heard
 
     @property
     def lost_fraction(self) -> float:
-        """The fraction of orders that get lost."""
-        return self._missed / self._said if self._said else 0.0
+        """The fraction of requests that get lost."""
+        return self._missed / self._sent if self._sent else 0.0
 
     @property
-    def again_ticks(self) -> int:
-        """After how many ticks an order is said again."""
-        return 1 if self.lost_fraction > MOST else AGAIN_TICKS
+    def repeat_ticks(self) -> int:
+        """Ticks after which a request is repeated."""
+        return 1 if self.lost_fraction > MOST_LOST else REPEAT_TICKS
 
     @property
     def tries_max(self) -> int:
-        """How many attempts in a row may stay without an answer before nobody is there."""
+        """Number of consecutive attempts without an answer before a robot counts as dead."""
         if not self.lossy:
             return 0
         through = max((1.0 - self.lost_fraction) ** 2, 1e-4)

@@ -1,7 +1,7 @@
-"""Where robots come from: base stations with their depots.
+"""Sources of robots: base stations with their depots.
 
-A released robot does not say where it came out, so stations let robots out one after the other. A robot that came out
-stands where its station stands and sees what that sees: this tells its heading.
+A released robot does not report at which station it came out, so stations release robots one after the other. A robot
+that has come out stands at its station's point and sees the same directions. This determines its heading.
 """
 
 import math
@@ -18,64 +18,68 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     ScanRequest,
     Sighting,
 )
-from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Story
+from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine
 
-# A depot is not empty because nobody came out: whoever did may have died at the door.
+# A depot counts as empty only after this many releases: a released robot may have died before it reported.
 RELEASES_MAX: Final = 3
-# Who has come out says so within these [ticks], unless that got lost.
-EMERGENCE_TICKS: Final = 30
+# Ticks within which a released robot reports, unless its report was lost.
+EMERGENCE_TICKS_MAX: Final = 30
 
 
 class Sources:
-    """The stations, by place. `dry`: a depot that let nobody out; `blocked`: no robot gets away from there."""
+    """The stations by slot.
 
-    def __init__(self, bases: Collection[int], places: Slots, post: CommandMailbox) -> None:
-        self.stations = {places.found(base): base for base in bases}
-        self.waiting: dict[int, int] = {}  # place: the robot that came out there and has not gone yet
-        self.dry: dict[int, None] = {}
+    `waiting` has the robot that came out at a station and has not gone yet, by the station's slot. `empty` depots
+    released no robot. No robot gets away from a `blocked` station. `out` are all robots that were ever outside.
+    """
+
+    def __init__(self, bases: Collection[int], slots: Slots, mailbox: CommandMailbox) -> None:
+        self.stations = {slots.add(base): base for base in bases}
+        self.waiting: dict[int, int] = {}
+        self.empty: dict[int, None] = {}
         self.blocked: dict[int, None] = {}
-        self.out: dict[int, None] = {}  # everyone who was ever outside
-        self._places = places
-        self._post = post
-        self._busy = False
+        self.out: dict[int, None] = {}
+        self._slots = slots
+        self._mailbox = mailbox
+        self._releasing = False
 
-    def open(self) -> list[int]:
-        """Return the places where robots may come from."""
+    def available(self) -> list[int]:
+        """Return the slots of the stations from which robots can come."""
         return [
-            place
-            for place in self.alive()
-            if place not in self.blocked and (place not in self.dry or place in self.waiting)
+            slot
+            for slot in self.alive()
+            if slot not in self.blocked and (slot not in self.empty or slot in self.waiting)
         ]
 
-    def place_of(self, robot: int) -> int | None:
-        """Return the place of a station, or None for a robot that is none."""
-        return next((place for place, base in self.stations.items() if base == robot), None)
+    def slot_of(self, robot: int) -> int | None:
+        """Return the slot of a station, or None for a robot that is none."""
+        return next((slot for slot, base in self.stations.items() if base == robot), None)
 
     def alive(self) -> list[int]:
-        """Return the places of the stations that answer."""
-        return [place for place in self.stations if place in self._places.occupant]
+        """Return the slots of the stations that answer."""
+        return [slot for slot in self.stations if slot in self._slots.occupant]
 
-    def release(self, base: int, cycle: int) -> Story[int | None]:
-        """Return the robot that waits at a station, or else let one out; None from a depot that is empty."""
+    def release(self, base: int, cycle: int) -> Routine[int | None]:
+        """Return the robot that waits at a station, or release one; None if the depot is empty."""
         if base in self.waiting:
             return self.waiting[base]
-        while self._busy:
-            yield from self._post.pause()
-        self._busy = True
+        while self._releasing:
+            yield from self._mailbox.pause()
+        self._releasing = True
         for _ in range(RELEASES_MAX):
-            robot = yield from self._newborn(self.stations[base], cycle)
+            robot = yield from self._release_one(self.stations[base], cycle)
             if robot is not None:
-                self._busy = False
+                self._releasing = False
                 self.waiting[base] = robot
                 return robot
-        self._busy = False
-        self.dry[base] = None
+        self._releasing = False
+        self.empty[base] = None
         return None
 
-    def _newborn(self, station: int, cycle: int) -> Story[int | None]:
-        """Let a robot out, and return it once it has said what it sees; None if nobody came, or nobody that lives."""
-        self._post.say(station, Release(cycle))
-        letter = yield from self._post.first(
+    def _release_one(self, station: int, cycle: int) -> Routine[int | None]:
+        """Release a robot, and return it once it has reported; None if no robot came out, or it died."""
+        self._mailbox.send(station, Release(cycle))
+        letter = yield from self._mailbox.first(
             lambda node, answer: self._is_new(node, answer) or (node == station and isinstance(answer, Released)),
             station,
         )
@@ -87,62 +91,66 @@ class Sources:
                 return None
             robot = answer.robot
             self.out[robot] = None
-            return (yield from self._seeing(robot, cycle))
-        self._post.close(station)
-        return self._born(robot, answer.sightings if isinstance(answer, Emerged) else ())
+            return (yield from self._first_report(robot, cycle))
+        self._mailbox.cancel(station)
+        return self._admit(robot, answer.sightings if isinstance(answer, Emerged) else ())
 
-    def _seeing(self, robot: int, cycle: int) -> Story[int | None]:
-        """Wait until a robot that came out says what it sees, and ask it if that may have got lost."""
+    def _first_report(self, robot: int, cycle: int) -> Routine[int | None]:
+        """Wait until a released robot reports, and ask it if its report may have been lost."""
         letter = None
-        if not self._post.patience.lossy:
-            letter = yield from self._post.first(
-                lambda node, answer: node == robot and isinstance(answer, Emerged), robot, EMERGENCE_TICKS
+        if not self._mailbox.retry_policy.lossy:
+            letter = yield from self._mailbox.first(
+                lambda node, answer: node == robot and isinstance(answer, Emerged), robot, EMERGENCE_TICKS_MAX
             )
         if letter is None:
-            self._post.say(robot, ScanRequest(cycle, ()))
-            letter = yield from self._post.first(
+            self._mailbox.send(robot, ScanRequest(cycle, ()))
+            letter = yield from self._mailbox.first(
                 lambda node, answer: node == robot and isinstance(answer, Emerged | Report), robot
             )
         if letter is None:
             return None
-        self._post.close(robot)
+        self._mailbox.cancel(robot)
         answer = letter[1]
-        return self._born(robot, answer.sightings or () if isinstance(answer, Emerged | Report) else ())
+        return self._admit(robot, answer.sightings or () if isinstance(answer, Emerged | Report) else ())
 
-    def _born(self, robot: int, sightings: Collection[Sighting]) -> int:
+    def _admit(self, robot: int, sightings: Collection[Sighting]) -> int:
         self.out[robot] = None
-        self._places.take(robot, sightings)
+        self._slots.take(robot, sightings)
         return robot
 
     def _is_new(self, node: int, answer: Answer) -> bool:
-        return isinstance(answer, Emerged) and self.place_of(node) is None and node not in self._places.heading
+        return isinstance(answer, Emerged) and self.slot_of(node) is None and node not in self._slots.heading
 
-    def let_out(self, base: int, cycle: int, view: Mapping[int, float], moving: Collection[int]) -> Story[None]:
-        """Have a robot wait at a station that has this view, its heading known, unless one does; some places may be moving."""
+    def let_out(self, base: int, cycle: int, view: Mapping[int, float], moving: Collection[int]) -> Routine[None]:
+        """Have a robot wait at a station, unless one does, and find its heading from the station's view.
+
+        The robots at the slots in `moving` may be moving.
+        """
         if base in self.waiting:
             return
         robot = yield from self.release(base, cycle)
         if robot is not None:
-            frame = self._places.frame[self.stations[base]]
-            self._places.orient(robot, frame, self._heading(robot, view, moving))
+            frame = self._slots.frame[self.stations[base]]
+            self._slots.orient(robot, frame, self._heading(robot, view, moving))
 
-    def door(self, robot: int) -> int | None:
-        """Return the place of the station that sees a robot which has not left."""
-        places = self._places
-        return next((place for place in self.alive() if robot in places.view.get(self.stations[place], ())), None)
+    def station_seeing(self, robot: int) -> int | None:
+        """Return the slot of the station that sees a robot which has not left it."""
+        slots = self._slots
+        return next((slot for slot in self.alive() if robot in slots.view.get(self.stations[slot], ())), None)
 
     def adopt(self, robot: int, base: int, sightings: Collection[Sighting], view: Mapping[int, float]) -> None:
-        """Have a robot wait that was found at a station which has this view, unless one does."""
+        """Have a robot wait that was found at a station with this view, unless another robot waits there."""
         if base not in self.waiting:
-            self.waiting[base] = self._born(robot, sightings)
-            self._places.orient(robot, self._places.frame[self.stations[base]], self._heading(robot, view, ()))
+            self.waiting[base] = self._admit(robot, sightings)
+            self._slots.orient(robot, self._slots.frame[self.stations[base]], self._heading(robot, view, ()))
 
     def _heading(self, robot: int, view: Mapping[int, float], moving: Collection[int]) -> float:
-        place_of = self._places.place_of()
+        """Return the heading [rad] that makes a robot's bearings agree with its station's view."""
+        slot_of = self._slots.slot_of()
         x = y = 0.0
-        for node, bearing in self._places.view[robot].items():
-            place = place_of.get(node)
-            if place is not None and place in view and (place not in moving or len(view) == 1):
-                x += math.cos(view[place] - bearing)
-                y += math.sin(view[place] - bearing)
+        for node, bearing in self._slots.view[robot].items():
+            slot = slot_of.get(node)
+            if slot is not None and slot in view and (slot not in moving or len(view) == 1):
+                x += math.cos(view[slot] - bearing)
+                y += math.sin(view[slot] - bearing)
         return math.atan2(y, x)

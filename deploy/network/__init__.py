@@ -1,1 +1,1 @@
-"""Network namespaces, and impairments of a real network."""
+"""Network namespaces, and packet loss, delay and rate limits on a real network."""

@@ -1,13 +1,14 @@
-"""From the models of a scenario's radio to a real network that does the same, or a clear word that none can.
+"""Translate the radio models of a scenario to rules of a real network, or report the models without such a rule.
 
-    range, line_of_sight, walls     pairs of nodes between which nothing passes, looked up in the world at every tick, and so
-    (with margin_db), and faults    are partition, jam, blackout and cut; an nftables set
-    loss                            nftables, `numgen random`, for every packet
-    bursts                          nftables: the pairs in the bad state are a set, which packets enter and leave by chance
-    rate_limit                      `tc tbf` at the sender; a broadcast is as many packets there as it has receivers
-    delay (fixed or uniform)        `tc netem` before the receiver, where the kernel has it; else left out, and said so
+Each model names its rule (`RadioModel.network_rule`). A network installs four mechanisms:
 
-Everything else is refused. Rules stand in the order of the models, and a packet that one drops the next never sees.
+    BlockedPairs    an nftables set of blocked pairs of nodes; the world computes the set at every tick, also for radio faults
+    RandomLoss      nftables, `numgen random`, for each packet; with bursts a set of pairs in the bad state, where packets
+                    add and delete pairs at random
+    SenderRate      `tc tbf` at the sender; a broadcast is one packet for each receiver there
+    ReceiverDelay   `tc netem` before the receiver; skipped, with a message, if the kernel has none
+
+Other models are refused. Rules are in the order of the models; a packet that one rule drops does not reach the next.
 """
 
 import json
@@ -16,41 +17,41 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from zwerm.deploy.network.namespaces import Namespaces, address_of, lacks_netem, port_of
+from pydantic import ValidationError
+
+from zwerm.deploy.network.namespaces import Namespaces, address_of, netem_unavailable_reason, port_of
 from zwerm.errors import ScenarioError
 from zwerm.link.peer_radio import HEAD_BYTES, Transport
 from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.tables import Scenario
 from zwerm.scenario.types import OpenTable
+from zwerm.world.faults import registry as faults
 from zwerm.world.radio import ROBOTS
-from zwerm.world.radio.registry import BUILT_IN, selected, tables_of
+from zwerm.world.radio import registry as radio
+from zwerm.world.radio.network_rules import BlockedPairs, NetworkRule, RandomLoss, ReceiverDelay, SenderRate
+from zwerm.world.radio.nodes import selected
+from zwerm.world.radio.registry import tables_of
 
 Pairs = list[tuple[int, int]]
 
-# Nodes: every two of them have a link of their own.
+# Largest number of nodes: each pair of nodes has a link.
 NODES_MAX: Final = 64
 
 _CHANCES: Final = 1_000_000_000
 
-# Ethernet, IP, and UDP or TCP with its timestamps; then what Zenoh and the radio put before a payload.
+# Header bytes: Ethernet, IP, and UDP or TCP with timestamps; then the Zenoh header of a message.
 _WIRE_BYTES: Final = {"udp": 14 + 20 + 8, "tcp": 14 + 20 + 32}
 _ZENOH_BYTES: Final = 16
-
-_BY_PLACE: Final = ("range", "line_of_sight", "walls")
-_BY_CHANCE: Final = ("loss", "bursts")
-_OF_A_CABLE: Final = ("delay", "rate_limit")
-_CANNOT: Final = {
-    "path_loss": "its chance changes with every distance; say range and loss",
-    "walls": "without margin_db nothing is dropped",
-    "duplication": "Zenoh drops what comes twice, by its number",
-    "corruption": "the kernel drops what its checksum does not fit",
-    "collision": "cables do not collide",
-}
 
 
 @dataclass(slots=True)
 class Rule:
-    """A model of loss between some pairs. `enter` and `leave` are a burst's chances, `lose` what is lost while it lasts."""
+    """A loss model for some pairs. `lose` is the probability of loss of a packet.
+
+    With `bursts`, `lose` applies in the bad state only. `enter` and `leave` are the probabilities per packet of entering and
+    leaving the bad state.
+    """
 
     name: str
     pairs: Pairs
@@ -62,22 +63,24 @@ class Rule:
 
 @dataclass(slots=True)
 class Impairments:
-    """What the network is to do. `by_place` are the numbers of the models, by channel, that only the world can judge."""
+    """The rules of a network. `by_place` are, by channel, the indices of the models that depend on positions."""
 
     rules: list[Rule] = field(default_factory=list)
     by_place: dict[str, list[int]] = field(default_factory=dict)
     rates: dict[int, tuple[float, float, int]] = field(default_factory=dict)  # by sender: bytes/s, queue, receivers
-    delays: dict[int, tuple[float, float]] = field(default_factory=dict)  # by receiver: mean [s], and how far around it
+    delays: dict[int, tuple[float, float]] = field(
+        default_factory=dict
+    )  # by receiver: mean [s] and largest deviation [s]
 
 
-def possible(scenario: Scenario) -> tuple[Scenario, list[str]]:
-    """Return `scenario` without what this machine's kernel cannot do, and a line for each thing left out.
+def supported(scenario: Scenario) -> tuple[Scenario, list[str]]:
+    """Return `scenario` without the models this machine's kernel does not support, and a line for each of these.
 
-    Raises ScenarioError with every part of it that no network could do.
+    Raises ScenarioError with every part of the scenario that a real network cannot reproduce.
     """
     wrong: list[str] = []
     skipped: list[str] = []
-    cables: list[str] = []
+    interface_rules: list[type[NetworkRule]] = []
     reason = ""
     changed: dict[str, Any] = {}
     nodes = scenario.robots.count + (scenario.coordinator is not None)
@@ -88,26 +91,26 @@ def possible(scenario: Scenario) -> tuple[Scenario, list[str]]:
     for name, table in (("radio", scenario.radio), ("uplink", scenario.uplink)):
         kept: list[OpenTable] = []
         for path, model in [] if table is None else tables_of(table, name):
-            complaint = _complaint(model)
-            if not complaint and model.kind in _OF_A_CABLE:
-                if scenario.radio is not None and scenario.coordinator is not None:
-                    complaint = "both channels share a node's cable"
-                elif model.kind in cables:
-                    complaint = "one such model at most"
-                cables.append(model.kind)
-            if complaint:
-                wrong.append(_not_in_the_twin(path, complaint, model))
-            elif model.kind == "delay" and (reason := reason or lacks_netem()):
-                skipped.append(f"{path} (delay): {reason}")
+            try:
+                rule, _ = _rule(model, path, scenario)
+                if isinstance(rule, ReceiverDelay | SenderRate):
+                    if scenario.radio is not None and scenario.coordinator is not None:
+                        raise ScenarioError([_not_in_the_twin(path, "both channels share a node's cable", model)])
+                    if type(rule) in interface_rules:
+                        raise ScenarioError([_not_in_the_twin(path, "one such model at most", model)])
+                    interface_rules.append(type(rule))
+            except ScenarioError as error:
+                wrong += error.mistakes
+                continue
+            if isinstance(rule, ReceiverDelay) and (reason := reason or netem_unavailable_reason()):
+                skipped.append(f"{path} ({model.kind}): {reason}")
             elif path.startswith(f"{name}.models."):
                 kept.append(model)
         if table is not None:
             changed[name] = table.model_copy(update={"models": kept})
-    wrong += [
-        f"faults.{index}.kind: not in the twin: its programs are left alone, got {fault.kind!r}"
-        for index, fault in enumerate(scenario.faults)
-        if fault.kind in ("crash", "restart", "pause", "join")
-    ]
+    for index, fault in enumerate(scenario.faults):
+        if reason_refused := _fault_refused(fault):
+            wrong.append(f"faults.{index}.kind: not in the twin: {reason_refused}, got {fault.kind!r}")
     if scenario.random_faults is not None:
         wrong.append("random_faults: not in the twin; write the schedule into the scenario")
     if wrong:
@@ -115,52 +118,72 @@ def possible(scenario: Scenario) -> tuple[Scenario, list[str]]:
     return scenario.model_copy(update=changed), skipped
 
 
-def _complaint(model: OpenTable) -> str:
-    """Return why no network does what this model does, or an empty string."""
-    if model.kind in _CANNOT and not (model.kind == "walls" and model.parameters.get("margin_db") is not None):
-        return _CANNOT[model.kind]
-    if model.kind not in (*_BY_PLACE, *_BY_CHANCE, *_OF_A_CABLE):
-        return "no rule of the network is known for this model"
-    if model.kind == "delay":
-        if model.parameters.get("jitter_s") and model.parameters.get("distribution", "uniform") != "uniform":
-            return "netem has jitter of that mean only uniform"
-        if model.parameters.get("senders") is not None:
-            return "netem delays all that goes to a receiver; say receivers"
-    if model.kind == "rate_limit" and model.parameters.get("receivers") is not None:
-        return "tbf slows down all that a sender sends; say senders"
-    return ""
+def _rule(model: OpenTable, path: str, scenario: Scenario) -> tuple[NetworkRule, Any]:
+    """Return the rule of the model that stands at `path`, and its parameters.
+
+    Raises ScenarioError if a real network cannot reproduce the model, or its table has mistakes.
+    """
+    try:
+        kind = radio.find(model.kind)
+        parameters = kind.Parameters.model_validate(model.parameters)
+        rule = kind.network_rule(parameters)
+        if rule is None:
+            raise ValueError("no rule of the network is known for this model")
+        if isinstance(rule, ReceiverDelay) and parameters.senders is not None:
+            raise ValueError("netem delays all that goes to a receiver; say receivers")
+        if isinstance(rule, SenderRate) and parameters.receivers is not None:
+            raise ValueError("tbf slows down all that a sender sends; say senders")
+    except ValidationError as error:
+        named = f"{scenario.place}: "
+        found = [line.removeprefix(named) for line in mistakes(error, scenario.place, f"{path}.")]
+        raise ScenarioError(found) from None
+    except ValueError as error:
+        raise ScenarioError([_not_in_the_twin(path, str(error), model)]) from None
+    return rule, parameters
+
+
+def _fault_refused(fault: OpenTable) -> str:
+    """Return the reason why a fault cannot occur in the twin, or an empty string."""
+    try:
+        kind = faults.find(fault.kind)
+    except ValueError as error:
+        return str(error)
+    if kind.touches_programs:
+        return "its programs are left alone"
+    return "" if kind.in_network else "no rule of the network is known for this fault"
 
 
 def translate(scenario: Scenario, links: Mapping[str, Pairs]) -> Impairments:
-    """Return what the network has to do for a scenario that is possible; `links` are all pairs of a channel, by its name.
+    """Return the rules of the network for a `supported` scenario; `links` are all (sender, receiver) pairs by channel.
 
-    Raises ScenarioError, a line for each, for models that no network does.
+    Raises ScenarioError with a line for each model that a real network cannot reproduce.
     """
     found = Impairments()
     wrong: list[str] = []
     for name, every in links.items():
         place, table = ("radio", scenario.radio) if name == ROBOTS else ("uplink", scenario.uplink)
         for index, (path, model) in enumerate([] if table is None else tables_of(table, place)):
-            if complaint := _complaint(model):
-                wrong.append(_not_in_the_twin(path, complaint, model))
+            try:
+                rule, parameters = _rule(model, path, scenario)
+            except ScenarioError as error:
+                wrong += error.mistakes
                 continue
-            parameters: Any = BUILT_IN[model.kind].Parameters.model_validate(model.parameters)
             sends, receives = (
                 selected(names, scenario, path, []) for names in (parameters.senders, parameters.receivers)
             )
             pairs = [(sender, receiver) for sender, receiver in every if sends[sender] and receives[receiver]]
-            if model.kind in _BY_PLACE:
-                found.by_place.setdefault(name, []).append(index)
-            elif model.kind == "loss":
-                found.rules.append(Rule(f"loss{len(found.rules)}", pairs, parameters.fraction))
-            elif model.kind == "bursts":
-                found.rules.append(_burst(f"bursts{len(found.rules)}", pairs, parameters))
-            elif model.kind == "rate_limit":
-                for sender, many in Counter(sender for sender, _ in pairs).items():
-                    found.rates[sender] = many * parameters.rate_bytes_s, parameters.queue_bytes, many
-            elif model.kind == "delay":
-                for _, receiver in pairs:
-                    found.delays[receiver] = parameters.delay_s + parameters.jitter_s, parameters.jitter_s
+            match rule:
+                case BlockedPairs():
+                    found.by_place.setdefault(name, []).append(index)
+                case RandomLoss(lose, bursts, enter, leave):
+                    label = f"{'burst_loss' if bursts else 'loss'}{len(found.rules)}"
+                    found.rules.append(Rule(label, pairs, lose, enter, leave, bursts))
+                case SenderRate(rate_bytes_s, queue_bytes):
+                    for sender, many in Counter(sender for sender, _ in pairs).items():
+                        found.rates[sender] = many * rate_bytes_s, queue_bytes, many
+                case ReceiverDelay(mean_s, deviation_s):
+                    for _, receiver in pairs:
+                        found.delays[receiver] = mean_s, deviation_s
     if wrong:
         raise ScenarioError([f"{scenario.place}: {line}" for line in wrong])
     return found
@@ -170,15 +193,8 @@ def _not_in_the_twin(path: str, reason: str, model: OpenTable) -> str:
     return f"{path}.kind: not in the twin: {reason}, got {model.kind!r}"
 
 
-def _burst(name: str, pairs: Pairs, table: Any) -> Rule:
-    """Return a rule whose chances are those of the model `bursts`."""
-    bad = table.loss_fraction / table.bad_loss_fraction
-    enter = bad / (1.0 - bad) / table.burst_packets
-    return Rule(name, pairs, table.bad_loss_fraction, enter, 1.0 / table.burst_packets, bursts=True)
-
-
 def ruleset(rules: Sequence[Rule], draws: Draws) -> str:
-    """Return the nftables rules of a bridge; each link's first packet finds its burst as likely as any later one."""
+    """Return the nftables rules of a bridge. Each link starts in the bad state with its stationary probability."""
     lines = ["table bridge zwerm {", " counter blocked { }", f" set blocked {{ {_SET} }}"]
     for rule in rules:
         lines += [f" counter {rule.name} {{ }}", f" set {rule.name} {{ {_SET} {_elements(rule.pairs)}}}"]
@@ -229,7 +245,7 @@ def _listed(pairs: Sequence[tuple[int, int]]) -> str:
 
 
 class Network:
-    """A network that can be impaired. Commands are run on its bridge and at its nodes."""
+    """A network with impairments. Runs commands on its bridge and at its nodes."""
 
     def __init__(self, namespaces: Namespaces, impairments: Impairments, transport: Transport) -> None:
         self._namespaces = namespaces
@@ -238,17 +254,17 @@ class Network:
         self._blocked: Pairs = []
 
     def impair(self, draws: Draws) -> None:
-        """Begin to lose, to delay and to limit. Raises LinkError where a tool refuses."""
+        """Install the rules for loss, delay and rate. Raises LinkError if a tool refuses."""
         self._namespaces.run(["nft", "-f", "-"], ruleset(self._impairments.rules, draws))
         for node, command in self.cables():
             self._namespaces.run(["tc", "qdisc", "add", "dev", *command], node=node)
 
     def cables(self) -> Iterator[tuple[int | None, list[str]]]:
-        """Yield what tc is told, of which device in the namespace of which node (None: at the bridge)."""
-        # What is counted is payload: the table of sizes takes away what stands before it, and has an entry for each size.
+        """Yield the arguments of `tc qdisc add dev`, with the node whose namespace they apply to (None: the bridge)."""
+        # The rate counts payload bytes: the size table subtracts the headers, with one entry for each size.
         before = _WIRE_BYTES[self._transport] + _ZENOH_BYTES + HEAD_BYTES
         sizes = ["stab", "overhead", str(-before - 1), "mtu", "2047", "tsize", "2048"]
-        # What is longer than the burst would never get out: a segment of TCP can hold many packets.
+        # tbf never sends a packet longer than its burst, and a TCP segment can hold several packets.
         longest = 0.0 if self._transport == "udp" else 1500.0
         for sender, (rate_bytes_s, queue_bytes, receivers) in self._impairments.rates.items():
             burst, limit = max(queue_bytes, longest), max(receivers * queue_bytes, longest)
@@ -259,14 +275,14 @@ class Network:
             yield None, [port_of(receiver), "root", "netem", *delay]
 
     def block(self, pairs: Pairs) -> None:
-        """Let nothing pass between `pairs` from now on, and all others pass again."""
+        """Block packets between `pairs` from now on, and unblock all other pairs."""
         if pairs != self._blocked:
             added = f"add element bridge zwerm blocked {{ {_listed(pairs)} }}\n" if pairs else ""
             self._namespaces.run(["nft", "-f", "-"], f"flush set bridge zwerm blocked\n{added}")
             self._blocked = pairs
 
     def dropped(self) -> dict[str, int]:
-        """Return how many IP packets each rule has dropped."""
+        """Return the number of IP packets that each rule has dropped."""
         listed = json.loads(self._namespaces.run(["nft", "--json", "list", "counters"]))["nftables"]
         counters = [entry["counter"] for entry in listed if "counter" in entry]
         return {counter["name"]: counter["packets"] for counter in counters}

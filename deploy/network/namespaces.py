@@ -1,8 +1,7 @@
-"""Network namespaces of a run's own: one for each node, joined by veth pairs to a bridge in one more.
+"""Network namespaces of a run: one for each node, connected by veth pairs to a bridge in one more namespace.
 
-Promises: nothing outlives this process, however it ends. A namespace has no name and no file: it is there as long as this
-process holds its descriptor, or another process stands in it, and with it go its interfaces, addresses and rules. Nothing
-is changed in the namespace that this process itself is in, and every address exists only inside.
+No namespace outlives this process. It has no name and no file: the kernel removes it, with its interfaces, addresses and
+rules, when no process holds its descriptor or runs in it. The namespace of this process itself is never changed.
 """
 
 import contextlib
@@ -20,7 +19,7 @@ from zwerm.errors import LinkError
 
 TOOLS: Final = {"ip": "iproute2", "tc": "iproute2", "nft": "nftables", "nsenter": "util-linux"}
 
-# Inside namespaces only: addresses that were set aside for measuring networks, RFC 2544.
+# Addresses reserved for network benchmarks (RFC 2544); they exist inside the namespaces only.
 _FIRST: Final = IPv4Address("198.18.0.1")
 _PREFIX_BITS: Final = 15
 
@@ -33,12 +32,12 @@ def address_of(node: int) -> str:
 
 
 def port_of(node: int) -> str:
-    """Return the name of the bridge's end of a node's cable; the node's own end is `eth0`."""
+    """Return the name of the bridge's end of a node's veth pair; the node's own end is `eth0`."""
     return f"node{node}"
 
 
 class Namespaces:
-    """The namespaces of `nodes`, and of the bridge between them, from enter to exit."""
+    """The namespaces of `nodes` and of the bridge between them, from enter to exit."""
 
     def __init__(self, nodes: Sequence[int]) -> None:
         self._nodes = list(nodes)
@@ -46,21 +45,21 @@ class Namespaces:
         self._node: dict[int, int] = {}  # descriptors
 
     def __enter__(self) -> Self:
-        """Make everything. Raises LinkError where the kernel or a tool refuses."""
+        """Create all namespaces and interfaces. Raises LinkError if the kernel or a tool refuses."""
         try:
-            self._bridge = self._made()
-            self._node = {node: self._made() for node in self._nodes}
-            cables = [
+            self._bridge = self._make_namespace()
+            self._node = {node: self._make_namespace() for node in self._nodes}
+            interfaces = [
                 line
                 for node in self._nodes
                 for line in (
-                    # Packets are to be lost one by one: none that is put together from several crosses the bridge.
+                    # Packets are lost one by one, so segmentation offload is off: no frame holds several packets.
                     f"link add {port_of(node)} gso_max_segs 1 type veth peer name eth0 netns {self.path(node)}",
                     f"link set {port_of(node)} master bridge up",
                 )
             ]
             self.run(
-                ["ip", "-batch", "-"], "\n".join(["link add bridge type bridge", "link set bridge up", *cables, ""])
+                ["ip", "-batch", "-"], "\n".join(["link add bridge type bridge", "link set bridge up", *interfaces, ""])
             )
             for node in self._nodes:
                 commands = (
@@ -78,18 +77,18 @@ class Namespaces:
         self.close()
 
     def close(self) -> None:
-        """Let go of the namespaces: the kernel removes each when nobody is in it any more. Idempotent."""
+        """Close the descriptors. The kernel removes each namespace when its last process leaves. Idempotent."""
         self._stack.close()
 
     def path(self, node: int | None = None) -> str:
-        """Return where other processes find the namespace of a node, or of the bridge."""
+        """Return the path of the namespace of a node, or of the bridge, for other processes."""
         descriptor = self._bridge if node is None else self._node[node]
         return f"/proc/{os.getpid()}/fd/{descriptor}"
 
     def run(self, command: Sequence[str], text: str = "", node: int | None = None) -> str:
-        """Run a command in the namespace of a node, or of the bridge, with `text` to read; return what it says.
+        """Run a command in the namespace of a node, or of the bridge, with `text` as its input; return its output.
 
-        Raises LinkError with what it complains of.
+        Raises LinkError with the first line of its error output if it fails.
         """
         done = subprocess.run(
             ["nsenter", f"--net={self.path(node)}", *command], input=text, text=True, capture_output=True, check=False
@@ -99,13 +98,13 @@ class Namespaces:
             raise LinkError(f"{' '.join(command)}: {complaint[0]}")
         return done.stdout
 
-    def _made(self) -> int:
-        """Make a namespace, and return a descriptor that keeps it."""
+    def _make_namespace(self) -> int:
+        """Create a namespace, and return a descriptor that keeps it alive."""
         descriptors: list[int] = []
         errors: list[int] = []
 
         def make() -> None:
-            # A thread of its own moves into the namespace that it makes, and ends there.
+            # unshare moves the calling thread, so a new thread calls it and ends.
             if ctypes.CDLL(None, use_errno=True).unshare(_NEW_NETWORK):
                 errors.append(ctypes.get_errno())
             else:
@@ -120,8 +119,8 @@ class Namespaces:
         return descriptors[0]
 
 
-def missing() -> str:
-    """Return in one line why this machine cannot be given networks of a run's own, or an empty string."""
+def unavailable_reason() -> str:
+    """Return in one line why network namespaces cannot be used on this machine, or an empty string."""
     if sys.platform != "linux":
         return f"needs Linux, this is {sys.platform}"
     if os.geteuid() != 0:
@@ -140,8 +139,8 @@ def missing() -> str:
     return ""
 
 
-def lacks_netem() -> str:
-    """Return in one line why there is no `tc netem` here, or an empty string."""
+def netem_unavailable_reason() -> str:
+    """Return in one line why `tc netem` cannot be used on this machine, or an empty string."""
     try:
         with Namespaces([0]) as networks:
             networks.run(["tc", "qdisc", "add", "dev", port_of(0), "root", "netem", "delay", "1ms"])

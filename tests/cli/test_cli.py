@@ -1,21 +1,14 @@
-"""The command line, as a person meets it."""
+"""The built-in commands: output, exit status and error lines."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from support import ROOT, ZWERM
+from command_line import zwerm
 
+from zwerm import __version__
+from zwerm.catalogue import ALGORITHMS, COMMANDS, plugins
 from zwerm.scenario.load import built_in
-
-
-def zwerm(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "120", "HOME": str(cwd)}
-    return subprocess.run(
-        [sys.executable, *ZWERM, *arguments], cwd=cwd, env=environment, capture_output=True, text=True, timeout=120
-    )
 
 
 def test_list_names_every_scenario() -> None:
@@ -25,13 +18,28 @@ def test_list_names_every_scenario() -> None:
         assert f"{name} " in ran.stdout
 
 
+def test_list_groups_scenarios_and_studies_by_algorithm_and_filters_them() -> None:
+    whole = json.loads(zwerm("list", "--json").stdout)["algorithms"]
+    assert [row["name"] for row in whole] == [row.name for row in ALGORITHMS]
+    assert {each["name"] for row in whole for each in row["entries"] if each["kind"] == "scenario"} == set(built_in())
+    some = json.loads(zwerm("list", "gossip", "--json").stdout)["algorithms"]
+    assert [each["name"] for row in some for each in row["entries"]] == ["gossip-max"]
+    assert "nothing in the catalogue has this text" in zwerm("list", "no such thing").stdout
+
+
+def test_list_names_the_plug_ins_of_every_kind() -> None:
+    ran = zwerm("list", "--plugins")
+    for kind, rows in plugins().items():
+        assert f"{kind}: {', '.join(rows)}" in " ".join(ran.stdout.split())
+
+
 def test_every_built_in_scenario_checks() -> None:
     ran = zwerm("check", *built_in())
     assert ran.returncode == 0, ran.stderr
     assert len(ran.stdout.splitlines()) == len(built_in())
 
 
-def test_check_reports_every_mistake_of_every_stage_with_its_place_rule_and_value(tmp_path: Path) -> None:
+def test_check_reports_every_error_of_every_stage_with_its_place_rule_and_value(tmp_path: Path) -> None:
     (tmp_path / "tables.toml").write_text(
         'arena = { size_m = [3.0, -1.0] }\nrobots = { count = 0, controller = "computation-free", colour = "red" }\n'
     )
@@ -51,7 +59,7 @@ def test_check_reports_every_mistake_of_every_stage_with_its_place_rule_and_valu
     assert "zwerm: parts.toml: robots.parameters.left_0: expected <= 1.0, got 3.0" in said
 
 
-def test_check_names_a_controller_and_a_sensor_that_do_not_exist_beside_mistakes_in_the_tables(tmp_path: Path) -> None:
+def test_check_reports_an_unknown_controller_and_an_unknown_sensor_beside_errors_in_the_tables(tmp_path: Path) -> None:
     (tmp_path / "all.toml").write_text(
         'arena = { size_m = [3.0, 3.0] }\ntime = { dt_s = 0.0 }\n[robots]\ncount = 2\ncontroller = "nobody"\ncuont = 3\n'
         'sensors = [{ kind = "sonar" }]\nplacement = { kind = "uniform", colour = 1 }\n'
@@ -81,7 +89,7 @@ def test_check_names_a_controller_and_a_sensor_that_do_not_exist_beside_mistakes
         ),
     ],
 )
-def test_a_mistake_is_one_line_and_status_2(arguments: list[str], line: str) -> None:
+def test_an_input_error_is_one_line_and_status_2(arguments: list[str], line: str) -> None:
     ran = zwerm(*arguments)
     assert ran.returncode == 2, ran.stderr
     assert line in ran.stderr
@@ -89,7 +97,7 @@ def test_a_mistake_is_one_line_and_status_2(arguments: list[str], line: str) -> 
     assert ran.stdout == ""
 
 
-def test_json_is_one_object_with_exactly_the_documented_keys_and_nothing_else(tmp_path: Path) -> None:
+def test_json_prints_one_object_with_exactly_the_documented_keys(tmp_path: Path) -> None:
     ran = zwerm(
         "run", "computation-free", "--inline", "--json", "--seed", "2", "--set", "time.duration_s=1", cwd=tmp_path
     )
@@ -112,7 +120,7 @@ def test_json_is_one_object_with_exactly_the_documented_keys_and_nothing_else(tm
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_run_for_people_says_how_it_went_and_where_the_picture_is(tmp_path: Path) -> None:
+def test_run_without_json_prints_the_outcome_and_the_paths_of_the_pictures(tmp_path: Path) -> None:
     ran = zwerm(
         "run", "computation-free", "--inline", "--set", "time.duration_s=2", "--animate", "run.gif", cwd=tmp_path
     )
@@ -130,18 +138,32 @@ def test_a_run_for_people_says_how_it_went_and_where_the_picture_is(tmp_path: Pa
     assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
 
 
-def test_help_has_examples() -> None:
-    for command in ("list", "check", "run", "world", "robot"):
-        assert f"zwerm {command}" in zwerm(command, "--help").stdout
-    assert zwerm("--version").stdout.startswith("zwerm ")
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_every_command_has_an_example(command: str) -> None:
+    assert f"zwerm {command}" in zwerm(command, "--help").stdout.partition("Example")[2]
 
 
-def test_a_run_is_also_drawn_at_the_moments_asked_for_and_kept_where_it_has_none(tmp_path: Path) -> None:
+def test_h_prints_the_same_help_as_the_long_option() -> None:
+    assert zwerm("-h").stdout == zwerm("--help").stdout
+    assert zwerm("run", "-h").stdout == zwerm("run", "--help").stdout
+
+
+def test_a_misspelt_command_is_answered_with_the_nearest_name_and_status_2() -> None:
+    ran = zwerm("rnu")
+    assert ran.returncode == 2
+    assert "Did you mean 'run'" in ran.stderr
+
+
+def test_version_prints_the_version() -> None:
+    assert zwerm("--version").stdout == f"zwerm {__version__}\n"
+
+
+def test_picture_at_draws_each_moment_and_an_unknown_cycle_keeps_the_result(tmp_path: Path) -> None:
     hall = ["--set", "arena.size_m=[1.2,1.0]", "--set", "base.pose=[0.2,0.5,0.0]", "--set", "robots.count=8"]
     moments = ["--picture-at", "2", "--picture-at", "1.5s", "--picture-at", "999"]
     ran = zwerm("run", "sensor-coverage", "--inline", *hall, *moments, cwd=tmp_path)
     assert ran.returncode == 2
-    assert "zwerm: cycle 999: expected one that the run told of, which are " in ran.stderr
+    assert "zwerm: cycle 999: expected one that the run reported, which are " in ran.stderr
     assert "trace" in ran.stdout
     drawn = sorted(path.name for path in (tmp_path / "runs").iterdir())
     assert drawn == [f"sensor-coverage-seed1{each}.png" for each in ("-1.5s", "-cycle2", "")]

@@ -1,4 +1,4 @@
-"""What the network lets a node do: its own keys and nothing else, whoever it says it is."""
+"""Credentials and access control: a node can use its own keys and nothing else."""
 
 import contextlib
 import os
@@ -17,7 +17,7 @@ from zwerm.deploy.identity import issue, load, save, slice_of
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError
 from zwerm.link import Arrival
-from zwerm.link.node import ZenohNodeLink
+from zwerm.link.node_link import ZenohNodeLink
 from zwerm.wire.keys import alive_key, command_key, observation_key
 from zwerm.wire.messages import Welcome, decode_welcome
 
@@ -53,7 +53,7 @@ def after_all_before(net: Network, session: zenoh.Session) -> None:
 
 
 @pytest.mark.parametrize("key", ["**", "zwerm/**", f"zwerm/{RUN}/node/*/obs", observation_key(RUN, VICTIM)])
-def test_an_eavesdropper_hears_nothing_but_its_own_observations(
+def test_a_node_receives_no_other_nodes_observations(
     net: Network, victim: ZenohNodeLink, intruder: zenoh.Session, key: str
 ) -> None:
     heard: list[tuple[str, bytes]] = []
@@ -73,7 +73,9 @@ def test_an_eavesdropper_hears_nothing_but_its_own_observations(
     assert [payload for _, payload in heard if payload != b"control"] == []
 
 
-def test_a_forger_is_not_heard_as_another_node(net: Network, victim: ZenohNodeLink, intruder: zenoh.Session) -> None:
+def test_a_node_cannot_send_commands_as_another_node(
+    net: Network, victim: ZenohNodeLink, intruder: zenoh.Session
+) -> None:
     intruder.put(command_key(RUN, VICTIM), b"forged command")
     intruder.put(observation_key(RUN, VICTIM), b"forged observation")
     intruder.put(f"zwerm/{RUN}/node/*/cmd", b"forged for all")
@@ -86,7 +88,7 @@ def test_a_forger_is_not_heard_as_another_node(net: Network, victim: ZenohNodeLi
     assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
 
 
-def test_nobody_answers_hello_in_the_world_s_place_or_asks_in_another_s(
+def test_a_node_cannot_answer_hello_as_the_world_or_send_hello_as_another_node(
     net: Network, victim: ZenohNodeLink, intruder: zenoh.Session
 ) -> None:
     asked: list[str] = []
@@ -103,7 +105,9 @@ def test_nobody_answers_hello_in_the_world_s_place_or_asks_in_another_s(
     assert asked == []
 
 
-def test_nobody_lives_or_dies_in_another_s_place(net: Network, victim: ZenohNodeLink, intruder: zenoh.Session) -> None:
+def test_a_node_cannot_declare_or_withdraw_another_nodes_liveliness_token(
+    net: Network, victim: ZenohNodeLink, intruder: zenoh.Session
+) -> None:
     seen: list[str] = []
     intruder.liveliness().declare_subscriber(
         f"zwerm/{RUN}/alive/*", lambda sample: seen.append(str(sample.key_expr)), history=True
@@ -121,7 +125,7 @@ def test_nobody_lives_or_dies_in_another_s_place(net: Network, victim: ZenohNode
     assert net.link.receive(20.0) == Arrival(INTRUDER, None)
 
 
-def test_without_the_right_password_there_is_no_session(net: Network) -> None:
+def test_a_session_with_a_wrong_password_is_refused(net: Network) -> None:
     right = net.credentials.nodes[INTRUDER]
     for wrong in (
         None,
@@ -136,7 +140,7 @@ def test_without_the_right_password_there_is_no_session(net: Network) -> None:
     assert net.link.refused == {}
 
 
-def test_a_node_is_told_in_one_line_that_it_is_not_let_in(net: Network) -> None:
+def test_a_refused_node_gets_an_error_of_one_line(net: Network) -> None:
     wrong = msgspec.structs.replace(net.credentials.nodes[0], password="guess")
     with pytest.raises(LinkError) as refused:
         ZenohNodeLink(RUN, wrong, net.endpoint, deadline_s=0.5)
@@ -145,7 +149,9 @@ def test_a_node_is_told_in_one_line_that_it_is_not_let_in(net: Network) -> None:
     assert "\n" not in line
 
 
-def test_stolen_credentials_from_another_session_reach_nothing(net: Network, victim: ZenohNodeLink) -> None:
+def test_credentials_from_a_session_with_another_zenoh_id_have_no_permissions(
+    net: Network, victim: ZenohNodeLink
+) -> None:
     stolen = net.credentials.nodes[VICTIM]
     heard: list[bytes] = []
     with net.session(msgspec.structs.replace(stolen, zid="abc")) as twin:
@@ -159,7 +165,7 @@ def test_stolen_credentials_from_another_session_reach_nothing(net: Network, vic
     assert net.link.joined == {VICTIM}
 
 
-def test_the_same_credentials_twice_are_refused_and_the_first_keeps_its_place(
+def test_a_second_session_with_the_same_credentials_is_refused_and_the_first_stays(
     net: Network, victim: ZenohNodeLink
 ) -> None:
     with pytest.raises(LinkError, match=r"^no session: "):
@@ -170,13 +176,13 @@ def test_the_same_credentials_twice_are_refused_and_the_first_keeps_its_place(
     assert net.link.receive(20.0) == Arrival(VICTIM, b"yes")
 
 
-def test_a_second_hello_of_a_node_that_has_joined_is_counted(net: Network, intruder: zenoh.Session) -> None:
+def test_a_second_hello_of_a_joined_node_is_refused_and_counted(net: Network, intruder: zenoh.Session) -> None:
     assert [decode_welcome(reply) for reply in ask(intruder, INTRUDER, hello(INTRUDER))] == [Welcome(refused="joined")]
     assert net.link.refused == {"joined": 1}
     after_all_before(net, intruder)
 
 
-def test_every_run_has_credentials_of_its_own() -> None:
+def test_each_run_has_its_own_credentials() -> None:
     first, second = issue(RUN, range(50)), issue(RUN, range(50))
     for field in ("password", "zid"):
         values = [getattr(node, field) for node in (*first.nodes, *second.nodes)]
@@ -184,9 +190,9 @@ def test_every_run_has_credentials_of_its_own() -> None:
         assert min(map(len, values)) >= 31, field
 
 
-def test_credentials_survive_a_file_that_only_its_owner_reads(tmp_path: Path) -> None:
+def test_credentials_are_equal_after_saving_and_loading_a_private_file(tmp_path: Path) -> None:
     path = tmp_path / "keys"
-    path.write_text("something that everybody can read")
+    path.write_text("a file that others can read")
     path.chmod(0o644)
     some = slice_of(issue(RUN, range(9), "PEM"), [2, 5])
     save(some, path)
@@ -195,7 +201,7 @@ def test_credentials_survive_a_file_that_only_its_owner_reads(tmp_path: Path) ->
     assert [node.node for node in some.nodes] == [2, 5]
 
 
-def test_a_bad_credentials_file_is_one_clear_line(tmp_path: Path) -> None:
+def test_a_bad_credentials_file_is_an_error_of_one_line(tmp_path: Path) -> None:
     path = tmp_path / "keys"
     with pytest.raises(LinkError, match=r"keys: cannot read credentials: No such file or directory$"):
         load(path)

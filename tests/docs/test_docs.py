@@ -16,7 +16,7 @@ from zwerm.run.assembly import assemble
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import built_in, validate
 from zwerm.scenario.tables import Scenario
-from zwerm.study.tables import StudyTable
+from zwerm.study.study_tables import StudyTable
 from zwerm.wire.messages import Observation
 from zwerm.world.sensors import registry as sensors
 
@@ -41,18 +41,6 @@ def examples(language: str) -> list[tuple[str, str, str]]:
 
 
 # --- what is generated ----------------------------------------------------------------------------------------------
-
-
-def test_every_generator_is_used_and_every_mark_is_known(generated: ModuleType) -> None:
-    used = [name for page in PAGES for name in generated.MARK.findall(page.read_text(encoding="utf-8"))]
-    assert sorted(used) == sorted(generated.GENERATED)
-
-
-def test_a_mark_is_replaced_and_the_text_around_it_stays(generated: ModuleType) -> None:
-    page = generated.on_page_markdown("before\n\n<!-- generated: built-in-scenarios -->\n\nafter", page=None)
-    assert page.startswith("before\n\n| scenario |")
-    assert page.endswith("|\n\nafter")
-    assert "`computation-free`" in page
 
 
 def keys_of(model: type) -> set[str]:
@@ -111,7 +99,26 @@ def titled(words: str) -> str:
     return found[1] if found else ""
 
 
-@pytest.mark.parametrize(("page", "words", "text"), [each for each in examples("python") if titled(each[1])])
+TITLED = [each for each in examples("python") if titled(each[1])]
+
+
+@pytest.mark.parametrize(("page", "words", "text"), [each for each in TITLED if "truth: Truth" in each[2]])
+def test_every_metric_in_the_documentation_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, page: str, words: str, text: str
+) -> None:
+    (tmp_path / f"{titled(words)}.py").write_text(text, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    overrides = [f'metrics.own=["{titled(words)}:order_parameter"]', "time.duration_s=3"]
+    result = zwerm.run("computation-free", runner="inline", overrides=overrides)
+    assert 0.0 <= result.metrics["order_parameter"] <= 1.0
+    assert len(result.series["order_parameter"]) == 4
+
+
+def test_every_titled_example_is_a_controller_or_a_metric() -> None:
+    assert [page for page, _, text in TITLED if "(Controller)" not in text and "truth: Truth" not in text] == []
+
+
+@pytest.mark.parametrize(("page", "words", "text"), [each for each in TITLED if "(Controller)" in each[2]])
 def test_every_controller_in_the_documentation_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, page: str, words: str, text: str
 ) -> None:
@@ -155,8 +162,9 @@ METRICS = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8").split("##
 
 def undescribed(result: RunResult) -> list[str]:
     """Return the run's metrics that the guide's table does not have; it has the first ring for all."""
-    rows = set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\|[^|]*\|", METRICS, re.MULTILINE))))
-    return [name for name in result.metrics if re.sub(r"^(density_ring)_\d+$", r"\1_01", name) not in rows]
+    rows = set(re.findall(r"`([\w.]+)`", "".join(re.findall(r"^\|[^|]*\|", METRICS, re.MULTILINE))))
+    families = [(r"^(density_ring)_\d+$", r"\1_01"), (r"^telemetry\..*$", "telemetry.NAME")]
+    return [name for name in result.metrics if not any(re.sub(*family, name) in rows for family in families)]
 
 
 @pytest.mark.parametrize("name", built_in())

@@ -71,8 +71,8 @@ def test_what_is_kept_changes_no_bit_of_an_answer():
     for position in walk(3, 30, 60, 0.003):
         for robot, cell in enumerate(kept):
             before = cell._order
-            sensed = seen(position, robot, SQUARE)
-            assert cell.target(*sensed, 1.0, 0.3, -0.2) == KeptCell().target(*sensed, 1.0, 0.3, -0.2)
+            corners, others = seen(position, robot, SQUARE)
+            assert cell.target(corners, others, 1.0, 0.3, -0.2) == KeptCell().target(corners, others, 1.0, 0.3, -0.2)
             found_anew += cell._order is not before
     assert 100 < found_anew < 1000  # of 1800: orders were kept, and orders were found
 
@@ -82,13 +82,15 @@ def test_the_compiled_cell_is_that_of_its_source_to_the_bit_and_no_older():
     source = Path(kept_cell.__file__).with_name("kept_cell.py")
     assert Path(kept_cell.__file__).stat().st_mtime >= source.stat().st_mtime
     spec = importlib.util.spec_from_file_location("kept_cell_source", source)
+    assert spec is not None
     interpreted = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(interpreted)
     pairs = [(KeptCell(), interpreted.KeptCell()) for _ in range(30)]
     for position in walk(3, 30, 60, 0.003):
         for robot, (compiled, plain) in enumerate(pairs):
-            sensed = seen(position, robot, SQUARE)
-            assert compiled.target(*sensed, 1.0, 0.3, -0.2) == plain.target(*sensed, 1.0, 0.3, -0.2)
+            corners, others = seen(position, robot, SQUARE)
+            found = plain.target(corners, others, 1.0, 0.3, -0.2)
+            assert compiled.target(corners, others, 1.0, 0.3, -0.2) == found
 
 
 @settings(max_examples=150, deadline=None)

@@ -47,7 +47,7 @@ class Slow(Controller):
 class Chatter(Controller):
     """Every robot sends its random number to all, sums what it hears into its speed, and sleeps a little every tenth tick."""
 
-    def __init__(self, setup):  # type: ignore[no-untyped-def]
+    def __init__(self, setup):
         super().__init__(setup)
         self.heard = 0.0
 

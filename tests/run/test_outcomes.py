@@ -9,10 +9,10 @@ import pytest
 from halls import HALL, Link, drive
 from support import ROOT, ZWERM
 
+from zwerm.run.measurement import measure
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.wire.messages import BodyVelocity, Command, decode_observation, encode, open_answer
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 STATIONS = ("arena.size_m=[4.2,2.6]", "robots.count=40", "base.poses=[[0.2,1.3,0.0],[4.0,1.3,3.0]]")
@@ -58,7 +58,7 @@ def test_a_frontier_that_no_path_leads_to_is_cut_off() -> None:
 
     outcome, world = drive(load("sensor-coverage", corridor), strike)
     assert outcome == "failed"
-    assert world.audience.gave_up.startswith("node 160 gave up: cut-off: no path leads to the frontier; ")
+    assert world.telemetry.gave_up.startswith("node 160 gave up: cut-off: no path leads to the frontier; ")
     assert len(world.crashed) > 2
 
 
@@ -119,7 +119,7 @@ def test_a_robot_that_cannot_get_to_its_place_is_given_up_and_another_comes(robo
     scenario = load("sensor-coverage", HALL)
     outcome, world = drive(scenario, around=with_dead_motors(robot, from_tick))
     assert outcome == "completed"
-    assert measure(world, scenario.metrics)["coverage_fraction"] >= 0.99
+    assert measure(world)["coverage_fraction"] >= 0.99
 
 
 def test_of_two_stations_one_may_die() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from support import ROBOTS, ROOT, ZWERM, children_of, gone, scenario, until
 
-from zwerm.run.runner import run
+from zwerm.run.runner import Runner, run
 
 
 def troubled(controller: str, **robots: object) -> dict[str, object]:
@@ -19,7 +19,7 @@ def troubled(controller: str, **robots: object) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("runner", ["inline", "processes"])
-def test_a_controller_that_raises_fails_the_run_with_its_traceback(runner: str, nothing_left: None) -> None:
+def test_a_controller_that_raises_fails_the_run_with_its_traceback(runner: Runner, nothing_left: None) -> None:
     result = run(scenario(robots=troubled("Raises")), runner=runner)
     assert result.outcome == "failed"
     assert result.reason == "node 2 crashed at tick 5: ZeroDivisionError: division by zero"
@@ -29,7 +29,7 @@ def test_a_controller_that_raises_fails_the_run_with_its_traceback(runner: str, 
 
 
 @pytest.mark.parametrize("runner", ["inline", "processes"])
-def test_a_controller_that_raises_is_survived_where_the_scenario_says_so(runner: str, nothing_left: None) -> None:
+def test_a_controller_that_raises_is_survived_where_the_scenario_says_so(runner: Runner, nothing_left: None) -> None:
     result = run(scenario(robots=troubled("Raises", on_crash="continue")), runner=runner)
     assert (result.outcome, result.crashed, result.ticks) == ("time-limit", [2], 20)
     tracks = result.history.arrays()
@@ -56,7 +56,7 @@ def test_a_straggler_ends_the_run_with_its_name(nothing_left: None) -> None:
 
 
 @pytest.mark.parametrize("runner", ["inline", "processes"])
-def test_a_run_completes_when_every_robot_is_done(runner: str, nothing_left: None) -> None:
+def test_a_run_completes_when_every_robot_is_done(runner: Runner, nothing_left: None) -> None:
     result = run(scenario(robots=troubled("Finishes", count=6)), runner=runner)
     assert (result.outcome, result.ticks) == ("completed", 6)
 
@@ -68,14 +68,15 @@ def test_in_real_time_late_commands_count_and_silent_robots_stop(nothing_left: N
     assert result.ticks == 60
     assert result.metrics["deadman_stops"] == 1
     assert result.metrics["late_commands"] >= 5
-    assert result.wall_s == pytest.approx(1.2, abs=0.3)
+    assert result.wall_s >= 59 * 0.02, "the last tick begins at this time"
     assert result.middleware_lost == 0
 
 
 def test_real_time_is_paced_by_its_factor(nothing_left: None) -> None:
-    result = run(scenario(time={"duration_s": 4.0}), runner="inline", realtime=8.0)
-    assert 0.5 <= result.wall_s < 1.0
-    assert result.metrics["late_commands"] == 0
+    for factor in (8.0, 4.0):
+        result = run(scenario(time={"duration_s": 4.0}), runner="inline", realtime=factor)
+        assert result.wall_s >= 3.9 / factor, "the last tick begins at this time"
+        assert result.metrics["late_commands"] == 0
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:

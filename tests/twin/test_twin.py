@@ -1,4 +1,4 @@
-"""The twin: packets between robots really cross a network, which does what the models say, and nothing of it is left behind."""
+"""The twin: packets between robots cross a real network with the rules of the models; nothing remains afterwards."""
 
 import json
 import os
@@ -12,9 +12,8 @@ from typing import Any
 import pytest
 from support import ROOT, ZWERM, children_of, gone, scenario, until
 
-from zwerm.deploy.network import namespaces
-from zwerm.deploy.network.impairments import Network, possible, ruleset, translate
-from zwerm.deploy.network.namespaces import Namespaces, lacks_netem, missing
+from zwerm.deploy.network.impairments import Network, ruleset, supported, translate
+from zwerm.deploy.network.namespaces import Namespaces, netem_unavailable_reason, unavailable_reason
 from zwerm.errors import LinkError, ScenarioError
 from zwerm.link.peer_radio import ARRIVED
 from zwerm.maths.keyed_random import Draws
@@ -22,10 +21,8 @@ from zwerm.scenario.tables import Scenario
 from zwerm.twin import twin_runner as running
 from zwerm.twin.packet_comparison import compare, lost_runs
 from zwerm.twin.twin_runner import run_twin
-from zwerm.world.radio.models.loss import Loss
-from zwerm.world.radio.registry import BUILT_IN
 
-WHY_NOT = missing()
+WHY_NOT = unavailable_reason()
 on_a_real_network = pytest.mark.skipif(bool(WHY_NOT), reason=f"the twin on a real network {WHY_NOT}")
 
 # A square, 2 m wide.
@@ -58,7 +55,7 @@ def test_over_udp_a_real_network_loses_what_the_models_lose(nothing_left: None) 
     models = [
         {"kind": "loss", "fraction": 1.0, "senders": [0], "receivers": [1]},
         {"kind": "loss", "fraction": 0.3, "senders": [1]},
-        {"kind": "bursts", "loss_fraction": 0.4, "burst_packets": 6.0, "senders": [2, 3]},
+        {"kind": "gilbert_elliott", "loss_fraction": 0.4, "burst_packets": 6.0, "senders": [2, 3]},
     ]
     run = run_twin(beacons(0.01, 2.5, radio={"models": models}), 1, "udp")
     found = compare(run)
@@ -83,7 +80,7 @@ def test_over_udp_a_real_network_loses_what_the_models_lose(nothing_left: None) 
 
 
 @on_a_real_network
-def test_what_the_world_alone_can_judge_is_blocked_tick_by_tick(nothing_left: None) -> None:
+def test_pairs_out_of_range_or_cut_by_a_fault_are_blocked_at_each_tick(nothing_left: None) -> None:
     faults = [
         {"kind": "partition", "groups": [[0, 1]], "at_s": 0.6, "for_s": 0.5},
         {"kind": "cut", "senders": [2], "receivers": [3], "at_s": 0.3, "for_s": 0.5},
@@ -100,7 +97,7 @@ def test_what_the_world_alone_can_judge_is_blocked_tick_by_tick(nothing_left: No
 
 
 @on_a_real_network
-def test_the_uplink_is_a_network_of_its_own_between_robots_and_coordinator(nothing_left: None) -> None:
+def test_the_uplink_has_its_own_rules_between_robots_and_coordinator(nothing_left: None) -> None:
     robots = {"count": 2, "controller": "radioed:Counts", "sensors": [], "body": {"kind": "holonomic"}}
     deaf = {"kind": "loss", "fraction": 1.0, "senders": [0], "receivers": ["coordinator"]}
     chosen = scenario(
@@ -146,10 +143,10 @@ def test_a_rate_limit_is_a_token_bucket_at_the_sender(nothing_left: None) -> Non
 
 
 @on_a_real_network
-def test_delay_is_netems_or_left_out_of_both_with_the_reason(nothing_left: None) -> None:
+def test_a_delay_uses_netem_or_is_skipped_on_both_sides_with_its_reason(nothing_left: None) -> None:
     delay = {"kind": "delay", "delay_s": 0.1, "jitter_s": 0.02}
-    chosen, skipped = possible(beacons(0.05, 1.0, radio={"models": [delay]}))
-    reason = lacks_netem()
+    chosen, skipped = supported(beacons(0.05, 1.0, radio={"models": [delay]}))
+    reason = netem_unavailable_reason()
     assert skipped == ([f"radio.models.0 (delay): {reason}"] if reason else [])
     found = compare(run_twin(chosen, 1, "udp"))
     expected_s = 0.0 if reason else 0.12
@@ -180,11 +177,11 @@ def descendants(pid: int) -> set[int]:
 
 @on_a_real_network
 @pytest.mark.parametrize(
-    ("who", "number", "status"),
+    ("target", "number", "status"),
     [("itself", signal.SIGINT, 130), ("itself", signal.SIGKILL, -9), ("robot", signal.SIGKILL, 1)],
 )
-def test_nothing_is_left_whoever_is_interrupted_or_killed(
-    who: str, number: signal.Signals, status: int, private_tmp: Path
+def test_no_namespace_or_process_remains_after_an_interrupted_or_killed_twin(
+    target: str, number: signal.Signals, status: int, private_tmp: Path
 ) -> None:
     interfaces = sorted(Path("/sys/class/net").iterdir())
     command = [
@@ -214,7 +211,7 @@ def test_nothing_is_left_whoever_is_interrupted_or_killed(
         assert len(own) == 5, "one for each robot, and the bridge's"
         running_robots = [pid for pid in robots if str(Path(f"/proc/{pid}/ns/net").readlink()) in own]
         assert len(running_robots) == 4
-        os.kill(process.pid if who == "itself" else running_robots[0], number)
+        os.kill(process.pid if target == "itself" else running_robots[0], number)
         _, complaints = process.communicate(timeout=60.0)
     assert process.returncode == status, complaints
     until(lambda: gone(started), "all processes end")
@@ -223,7 +220,7 @@ def test_nothing_is_left_whoever_is_interrupted_or_killed(
 
 
 @on_a_real_network
-def test_namespaces_vanish_with_an_error_inside(nothing_left: None) -> None:
+def test_namespaces_are_removed_after_an_error(nothing_left: None) -> None:
     before = networks([os.getpid()])
     with pytest.raises(LinkError, match=r"^nft -f -: .*syntax error"), Namespaces([0, 1]) as there:
         there.run(["nft", "-f", "-"], "nonsense\n")
@@ -238,14 +235,14 @@ def test_namespaces_vanish_with_an_error_inside(nothing_left: None) -> None:
     [
         ({"radio": {"models": [{"kind": "path_loss"}]}}, "radio.models.0.kind: not in the twin: its chance changes with "
          "every distance; say range and loss, got 'path_loss'"),
-        ({"radio": {"models": [{"kind": "walls"}]}},
-         "radio.models.0.kind: not in the twin: without margin_db nothing is dropped, got 'walls'"),
+        ({"radio": {"models": [{"kind": "wall_attenuation"}]}},
+         "radio.models.0.kind: not in the twin: without margin_db nothing is dropped, got 'wall_attenuation'"),
         ({"radio": {"models": [{"kind": "collision", "airtime_s": 0.1}]}},
          "radio.models.0.kind: not in the twin: cables do not collide, got 'collision'"),
         ({"radio": {"models": [{"kind": "delay", "jitter_s": 1.0, "distribution": "pareto"}]}},
          "radio.models.0.kind: not in the twin: netem has jitter of that mean only uniform, got 'delay'"),
-        ({"radio": {"models": [{"kind": "mine:Own"}]}},
-         "radio.models.0.kind: not in the twin: no rule of the network is known for this model, got 'mine:Own'"),
+        ({"radio": {"models": [{"kind": "own_models:Lossy"}]}},
+         "radio.models.0.kind: not in the twin: no rule of the network is known for this model, got 'own_models:Lossy'"),
         ({"radio": {"models": [{"kind": "rate_limit", "rate_bytes_s": 1.0, "queue_bytes": 1.0}] * 2}},
          "radio.models.1.kind: not in the twin: one such model at most, got 'rate_limit'"),
         ({"coordinator": {"controller": "radioed:Counts"}, "uplink": {"models": [{"kind": "delay", "delay_s": 1.0}]}},
@@ -257,49 +254,74 @@ def test_namespaces_vanish_with_an_error_inside(nothing_left: None) -> None:
          "robots.count: the twin links every two nodes, 64 at most, got 65"),
     ],
 )  # fmt: skip
-def test_what_no_network_could_do_is_refused_with_its_place(tables: dict[str, Any], line: str) -> None:
+def test_the_twin_refuses_unsupported_parts_of_a_scenario_with_their_place(tables: dict[str, Any], line: str) -> None:
     with pytest.raises(ScenarioError) as caught:
-        possible(scenario(**{"radio": {}, **tables}))
+        supported(scenario(**{"radio": {}, **tables}))
     assert caught.value.mistakes == [f"small.toml: {line}"]
 
 
+@pytest.mark.parametrize(
+    ("model", "reason"),
+    [
+        ({"kind": "own_models:Lossy"}, "no rule of the network is known for this model"),
+        ({"kind": "collision", "airtime_s": 0.1}, "cables do not collide"),
+    ],
+)
 def test_a_model_without_a_rule_of_the_network_is_refused_by_name_and_never_left_out(
-    monkeypatch: pytest.MonkeyPatch,
+    model: dict[str, Any], reason: str
 ) -> None:
-    monkeypatch.setitem(BUILT_IN, "fading", Loss)  # a built-in model that the twin does not know
-    for kind, reason in (
-        ("fading", "no rule of the network is known for this model"),
-        ("mine:Own", "no rule of the network is known for this model"),
-        ("collision", "cables do not collide"),
-    ):
-        chosen = scenario(radio={"loss": 0.1, "models": [{"kind": kind, "fraction": 0.5}]})
-        line = f"small.toml: radio.models.0.kind: not in the twin: {reason}, got '{kind}'"
-        with pytest.raises(ScenarioError) as caught:
-            possible(chosen)
-        assert caught.value.mistakes == [line]
-        with pytest.raises(ScenarioError) as caught:
-            translate(chosen, {"robots": LINKS})
-        assert caught.value.mistakes == [line]
+    chosen = scenario(radio={"loss": 0.1, "models": [model]})
+    line = f"small.toml: radio.models.0.kind: not in the twin: {reason}, got '{model['kind']}'"
+    with pytest.raises(ScenarioError) as caught:
+        supported(chosen)
+    assert caught.value.mistakes == [line]
+    with pytest.raises(ScenarioError) as caught:
+        translate(chosen, {"robots": LINKS})
+    assert caught.value.mistakes == [line]
+
+
+def test_a_model_of_a_user_can_name_its_rule_of_the_network() -> None:
+    chosen = scenario(radio={"loss": 0.1, "models": [{"kind": "own_models:Rain", "mm_per_h": 20.0, "senders": [1]}]})
+    assert supported(chosen)[1] == []
+    rules = translate(chosen, {"robots": LINKS}).rules
+    assert [(rule.name, rule.lose, len(rule.pairs)) for rule in rules] == [("loss0", 0.1, 12), ("loss1", 0.2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        ({"kind": "own_faults:Flood", "area_m": [0, 0, 1, 1]}, ""),
+        ({"kind": "own_faults:Static", "fraction": 0.5}, "no rule of the network is known for this fault"),
+    ],
+)
+def test_a_fault_of_a_user_is_in_the_twin_only_if_it_says_so(fault: dict[str, Any], reason: str) -> None:
+    chosen = scenario(radio={}, faults=[fault | {"at_s": 0.0}])
+    if not reason:
+        assert supported(chosen)[0].faults == chosen.faults
+        return
+    with pytest.raises(ScenarioError) as caught:
+        supported(chosen)
+    assert caught.value.mistakes == [f"small.toml: faults.0.kind: not in the twin: {reason}, got '{fault['kind']}'"]
 
 
 def test_a_scenario_without_a_radio_has_no_twin() -> None:
     with pytest.raises(ScenarioError, match=r"^small.toml: radio: the scenario has none"):
-        possible(scenario())
+        supported(scenario())
 
 
 def test_rules_stand_in_the_order_of_the_models_and_bursts_begin_in_equilibrium() -> None:
-    bursts = {"kind": "bursts", "loss_fraction": 0.5, "burst_packets": 2.0}
+    bursts = {"kind": "gilbert_elliott", "loss_fraction": 0.5, "burst_packets": 2.0}
     chosen = scenario(robots={"count": 40, "controller": "beacon"}, radio={"loss": 0.25, "models": [bursts]})
     rules = translate(chosen, {"robots": [(a, b) for a in range(40) for b in range(40) if a != b]}).rules
-    assert [rule.name for rule in rules] == ["loss0", "bursts1"]
+    assert [rule.name for rule in rules] == ["loss0", "burst_loss1"]
     text = ruleset(rules, Draws(1))
     assert "numgen random mod 1000000000 < 250000000 counter name loss0 drop" in text
-    assert text.index("@loss0 jump") < text.index("@bursts1 jump")
-    began = next(line for line in text.splitlines() if "bursts1_bad {" in line).count(" . ") - 1
+    assert text.index("@loss0 jump") < text.index("@burst_loss1 jump")
+    began = next(line for line in text.splitlines() if "burst_loss1_bad {" in line).count(" . ") - 1
     assert abs(began / (40 * 39) - 0.5) < 5.0 * (0.25 / (40 * 39)) ** 0.5
 
 
-def test_a_delay_is_told_to_netem_before_its_receiver() -> None:
+def test_a_delay_is_a_netem_rule_at_its_receiver() -> None:
     delay = {"kind": "delay", "delay_s": 0.1, "jitter_s": 0.02, "receivers": [1]}
     impairments = translate(scenario(radio={"models": [delay]}), {"robots": LINKS})
     assert list(Network(Namespaces([]), impairments, "udp").cables()) == [
@@ -307,17 +329,17 @@ def test_a_delay_is_told_to_netem_before_its_receiver() -> None:
     ]
 
 
-def test_where_there_can_be_no_network_the_reason_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(namespaces.os, "geteuid", lambda: 1000)
-    assert missing() == "needs root, to make network namespaces"
-    monkeypatch.setattr(namespaces.sys, "platform", "darwin")
-    assert missing() == "needs Linux, this is darwin"
+def test_the_reason_for_an_unavailable_network_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    assert unavailable_reason() == "needs root, to make network namespaces"
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert unavailable_reason() == "needs Linux, this is darwin"
     with pytest.raises(LinkError, match=r"^the twin on a real network needs Linux, this is darwin$"):
         run_twin(scenario(radio={}), 1, "udp")
 
 
 @on_a_real_network
-def test_the_command_prints_one_json_object_and_a_missing_tool_is_a_mistake(private_tmp: Path) -> None:
+def test_twin_prints_one_json_object_and_a_missing_tool_is_an_input_error(private_tmp: Path) -> None:
     command = [sys.executable, *ZWERM, "twin", "beacon-twin", "--transport", "udp", "--json"]
     short = ["--set", "time.duration_s=0.5"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}

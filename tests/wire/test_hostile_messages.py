@@ -15,7 +15,7 @@ from zwerm.deploy.identity import load
 from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import RemoteSwarm
 from zwerm.errors import ProtocolError
-from zwerm.link.node import ZenohNodeLink
+from zwerm.link.node_link import ZenohNodeLink
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import drive, new_run_id, run
 from zwerm.wire.messages import (
@@ -134,7 +134,7 @@ class Stranger(threading.Thread):
         link.close()
 
 
-def run_with_a_stranger(tmp_path: Path, say: Callable[[Node, bytes], list[bytes]], **tables: object):  # type: ignore[no-untyped-def]
+def run_with_a_stranger(tmp_path: Path, say: Callable[[Node, bytes], list[bytes]], **tables: object):
     """Run the small scenario over Zenoh; node 0 says what `say` makes of each observation, the others behave."""
     keys, endpoint = tmp_path / "keys", f"unixsock-stream/{tmp_path}/router"
     strangers = [
@@ -158,7 +158,7 @@ def _start_when_there(keys: Path, strangers: list[Stranger]) -> None:
 def test_a_robot_that_babbles_over_zenoh_changes_nothing_and_is_counted(tmp_path: Path) -> None:
     def babble(node: Node, seen: bytes) -> list[bytes]:
         answer = node.answer(seen)
-        return [*HOSTILE, answer, answer] if decode_to_node(seen).tick == 0 else [answer]  # type: ignore[union-attr]
+        return [*HOSTILE, answer, answer] if decode_to_node(seen).tick == 0 else [answer]
 
     result = run_with_a_stranger(tmp_path, babble)
     assert result.outcome == "time-limit"

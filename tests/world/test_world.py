@@ -19,7 +19,7 @@ from zwerm.wire.messages import (
     decode_observation,
     encode,
 )
-from zwerm.world.metrics.measures import area_coverage_fraction, cell_counts, cell_coverage_fraction
+from zwerm.world.metrics.coverage import area_coverage_fraction, cell_counts, cell_coverage_fraction
 from zwerm.world.world import World
 
 
@@ -182,7 +182,7 @@ def test_radio_packets_arrive_one_tick_later_and_every_one_is_accounted_for() ->
     assert observed[2].inbox == ()
     found = world.medium.summary()
     assert (found["sent"], found["delivered"], found["in_flight"], found["bytes"]) == (3, 2, 0, 8)
-    assert world.medium.channels["robots"].accounts.by_link() == {
+    assert world.medium.channels["robots"].ledger.by_link() == {
         "sender": [0, 0],
         "receiver": [1, 2],
         "sent": [2, 1],
@@ -247,7 +247,7 @@ def trace_of(*, foreseeing: bool, latency_ticks: int) -> str:
         if foreseeing:
             world.foresee()
         for node in nodes:
-            said = answer.get(world.tick + node, Command(drive=BodyVelocity(1.9, 0.0, 0.05 * node)))
+            said: Command | Failure = answer.get(world.tick + node, Command(drive=BodyVelocity(1.9, 0.0, 0.05 * node)))
             failed = world.tick == 30 and node == nodes[0]
             said = Failure(world.tick, "Oops", "") if failed else msgspec.structs.replace(said, tick=world.tick)
             world.accept(node, encode(said))

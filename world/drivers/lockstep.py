@@ -48,8 +48,8 @@ class LockStep:
             self._tick()
             if world.crashed and world.scenario.robots.on_crash == "fail":
                 return self._fail()
-            if world.audience.gave_up:
-                self.reason = world.audience.gave_up
+            if world.telemetry.gave_up:
+                self.reason = world.telemetry.gave_up
                 return FAILED
             if world.completed:
                 return COMPLETED

@@ -90,8 +90,8 @@ class RealTime:
                 node, why = next(iter(world.crashed.items()))
                 self.reason = f"node {node} crashed at tick {world.tick}: {why}"
                 return FAILED
-            if world.audience.gave_up:
-                self.reason = world.audience.gave_up
+            if world.telemetry.gave_up:
+                self.reason = world.telemetry.gave_up
                 return FAILED
             if world.completed:
                 return COMPLETED

@@ -1,87 +1,140 @@
-"""Meters: what is measured all through a run, beside what `metrics` says of its end.
+"""The metrics of one run: which classes the scenario asks for, when they take samples, and what they found."""
 
-A group of metrics is switched on by its table in the scenario's `[metrics]`. A meter looks at the truth and changes nothing:
-the trace of a run is the same with and without it.
-"""
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+from typing import Any, Final
 
-from collections.abc import Sequence
-from typing import Protocol
-
+from zwerm.catalogue import ALGORITHMS, METRICS, Algorithm, algorithm_of
 from zwerm.errors import ScenarioError
-from zwerm.scenario.tables import MetricsTable
+from zwerm.scenario.plugin_names import class_named
+from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.fields import Field
-from zwerm.world.metrics.sight_growth import SightObserver
-from zwerm.world.metrics.voronoi_coverage import VoronoiCoverageObserver
-from zwerm.world.scene import Scene
+from zwerm.world.metrics import Metric, MetricContext, Truth
+from zwerm.world.metrics.own import own_metric
+from zwerm.world.tick.telemetry import TelemetrySink
 
-
-class Observer(Protocol):
-    """One group of metrics, over one run."""
-
-    @property
-    def every_s(self) -> float:
-        """How often it looks where the scenario does not say [s]."""
-
-    def look(self, scene: Scene, dead: Sequence[int]) -> None:
-        """Take note of a scene, and of who is dead."""
-
-    def metrics(self) -> dict[str, float]:
-        """Return the metrics by name, after the last scene was looked at; nan is for what did not come to pass."""
-
-    def series(self) -> dict[str, list[float]]:
-        """Return what was noted, by name: one value for each look."""
+# Metrics of every run, whatever the scenario asks for, and those of a radio or an uplink.
+ENGINE_NAMES: Final = (
+    *("robots_in_arena", "robots_exited", "faults_missed", "refused_messages"),
+    *("late_commands", "deadman_stops", "tick_overruns", "telemetry_dropped"),
+)
+RADIO_NAMES: Final = (
+    *("robots_done_fraction", "delivered_fraction", "out_of_reach_fraction"),
+    *("messages_per_robot_*", "bytes_per_robot_*", "information_age_*"),
+)
+TELEMETRY_NAMES: Final = "telemetry.*"
 
 
 class Observers:
-    """The meters of one run, and when they look: every `every_s` of virtual time, and at the end.
+    """Metrics of one run. They take samples every `every_s` of virtual time, and at the end.
 
-    Where that is not given, all look as often as the one that needs to most.
+    Where `every_s` is None, all that sample during a run do so as often as the one that needs it most often.
     """
 
-    def __init__(self, meters: Sequence[Observer] = (), every_s: float | None = None, dt_s: float = 1.0) -> None:
-        self._meters = tuple(meters)
-        every_s = every_s or min((meter.every_s for meter in meters), default=1.0)
-        self._stride = max(1, round(every_s / dt_s))
+    def __init__(self, metrics: Sequence[Metric] = (), every_s: float | None = None, dt_s: float = 1.0) -> None:
+        self._metrics = tuple(metrics)
+        self._periodic = tuple(each for each in metrics if every_s is not None or each.every_s is not None)
+        period_s = every_s or min((each.every_s for each in self._periodic if each.every_s is not None), default=1.0)
+        self._stride = max(1, round(period_s / dt_s))
         self._last_tick = -1
         self._time_s: list[float] = []
 
-    def look(self, scene: Scene, dead: Sequence[int] = (), now: bool = False) -> bool:
-        """Have the meters look, if it is time to or `now` is true, and they have not yet; tell whether they have."""
-        if not self._meters or scene.tick == self._last_tick or (scene.tick % self._stride and not now):
-            return False
-        self._last_tick = scene.tick
-        self._time_s.append(scene.time_s)
-        for meter in self._meters:
-            meter.look(scene, dead)
-        return True
+    @property
+    def names(self) -> list[str]:
+        """The names of all metrics, where `*` stands for any characters."""
+        return [name for metric in self._metrics for name in metric.names]
 
-    def metrics(self) -> dict[str, float]:
-        """Return every meter's metrics."""
-        return {name: value for meter in self._meters for name, value in meter.metrics().items()}
+    def subscribe(self, telemetry: TelemetrySink) -> None:
+        """Give every metric that has a method `report` each telemetry record as it comes."""
+        telemetry.listeners += [each.report for each in self._metrics if hasattr(each, "report")]
+
+    def is_due(self, tick: int) -> bool:
+        """Tell whether a sample is due at a tick and has not been taken."""
+        return bool(self._periodic) and tick % self._stride == 0 and tick != self._last_tick
+
+    def sample(self, truth: Truth) -> None:
+        """Have the metrics that sample during a run take a sample."""
+        self._last_tick = truth.scene.tick
+        self._time_s.append(truth.time_s)
+        for metric in self._periodic:
+            metric.sample(truth)
+
+    def finish(self, truth: Truth) -> dict[str, float]:
+        """Have every metric take its last sample, and return all metrics by name."""
+        for metric in self._metrics:
+            if metric not in self._periodic:
+                metric.sample(truth)
+        if self._periodic and truth.scene.tick != self._last_tick:
+            self.sample(truth)
+        return {name: value for metric in self._metrics for name, value in metric.metrics().items()}
 
     def newest(self) -> dict[str, float]:
         """Return the newest value of every series."""
-        return {name: values[-1] for meter in self._meters for name, values in meter.series().items()}
+        return {name: values[-1] for metric in self._periodic for name, values in metric.series().items()}
 
     def series(self) -> dict[str, list[float]]:
-        """Return every meter's series, and the times [s] they are of as `time_s`; nothing where there is no meter."""
-        found = {name: values for meter in self._meters for name, values in meter.series().items()}
+        """Return every series, and the times of the samples as `time_s` [s]; nothing where there is no series."""
+        found = {name: values for metric in self._periodic for name, values in metric.series().items()}
         return {"time_s": self._time_s, **found} if found else {}
 
 
-def make_meters(table: MetricsTable, arena: Arena, field: Field | None, dt_s: float) -> Observers:
-    """Return the meters that `table` switches on.
+def make_observers(scenario: Scenario, arena: Arena, field: Field | None) -> Observers:
+    """Return the metrics that a scenario asks for: by key of `[metrics]`, by algorithm, and its user's own.
 
-    Raises ScenarioError where the arena or the field lacks what one needs.
+    Raises ScenarioError with every mistake, each `metrics.<key>: rule`.
     """
-    meters: list[Observer] = []
-    if table.voronoi is not None:
-        if not arena.is_convex:
-            raise ScenarioError(["metrics.voronoi: needs a convex arena without obstacles and walls"])
-        if field is None:
-            raise ScenarioError(["metrics.voronoi: needs a field, and the scenario has none"])
-        meters.append(VoronoiCoverageObserver(table.voronoi, arena, field))
-    if table.sight_range_m is not None:
-        meters.append(SightObserver(arena, table.sight_range_m))
-    return Observers(meters, table.every_s, dt_s)
+    context = MetricContext(arena, field, scenario.time.dt_s, scenario)
+    metrics: list[Metric] = []
+    mistakes: list[str] = []
+    for kind, parameters in _asked_for(scenario):
+        try:
+            metrics.append(class_named(kind, "metric", METRICS)(parameters, context))
+        except ScenarioError as error:
+            mistakes += error.mistakes
+    known = [*ENGINE_NAMES, *RADIO_NAMES, TELEMETRY_NAMES, *_catalogue_names()] if scenario.metrics.own else []
+    for index, name in enumerate(scenario.metrics.own):
+        try:
+            metric = own_metric(name, context)
+            _refuse_taken(metric.names, known)
+            known += metric.names
+            metrics.append(metric)
+        except ValueError as error:
+            mistakes.append(f"metrics.own.{index}: {error}")
+        except ScenarioError as error:
+            mistakes += [f"metrics.own.{index}: {line}" for line in error.mistakes]
+    if mistakes:
+        raise ScenarioError(mistakes)
+    return Observers(metrics, scenario.metrics.every_s, scenario.time.dt_s)
+
+
+def is_measured(name: str, names: Sequence[str]) -> bool:
+    """Tell whether one of `names`, where `*` stands for any characters, is that of a metric."""
+    return any(fnmatchcase(name, each) for each in names)
+
+
+def algorithms(scenario: Scenario) -> list[Algorithm]:
+    """Return the rows of the catalogue whose controllers a scenario uses, each once."""
+    tables = (scenario.robots, scenario.base, scenario.coordinator)
+    rows = [algorithm_of(table.controller) for table in tables if table is not None]
+    return list({row.name: row for row in rows if row is not None}.values())
+
+
+def _asked_for(scenario: Scenario) -> Iterator[tuple[str, Any]]:
+    """Yield every metric class of the catalogue that a scenario asks for, as `module:Class`, and its parameters."""
+    for key, path in METRICS.items():
+        if (parameters := getattr(scenario.metrics, key)) is not None:
+            yield path, parameters
+    for row in algorithms(scenario):
+        yield from ((path, None) for path in row.metrics)
+
+
+def _catalogue_names() -> list[str]:
+    paths = [*METRICS.values(), *(path for row in ALGORITHMS for path in row.metrics)]
+    return [name for path in paths for name in class_named(path, "metric", METRICS).names]
+
+
+def _refuse_taken(names: Sequence[str], known: Sequence[str]) -> None:
+    for name in names:
+        if is_measured(name, known):
+            raise ValueError(f"expected a name that no other metric has, got {name!r}")

@@ -7,20 +7,24 @@ of the true field. Source: Schwager, McLurkin, Rus 2006.
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 import shapely
+from pydantic import Field as Limits
 
+from zwerm.errors import ScenarioError
 from zwerm.maths.kept_cell import KeptCell
-from zwerm.maths.polygons import Point, Polygon, voronoi_cell
-from zwerm.scenario.tables import VoronoiMetricsTable
+from zwerm.maths.polygons import Point as Place
+from zwerm.maths.polygons import Polygon, voronoi_cell
+from zwerm.scenario.types import Count, Point, Positive, Table
 from zwerm.wire.messages import Neighbour
 from zwerm.world.arena.arena import Arena
 from zwerm.world.fields import Field
 from zwerm.world.geometry.quadrature import CellIntegrals, integrate
 from zwerm.world.geometry.tessellation import Tessellation
-from zwerm.world.scene import Floats, Ints, Scene
+from zwerm.world.metrics import Metric, MetricContext, Truth
+from zwerm.world.scene import Floats, Ints
 
 # The statistics whose fall below the threshold is timed. The paper names the first; the published times lie between those
 # of the next two.
@@ -30,6 +34,18 @@ STATISTICS: Final[dict[str, Callable[[Floats], float]]] = {
     "convergence_time_max_squared_s": lambda error: float(np.square(error).max()),
     "convergence_time_max_s": lambda error: float(error.max()),
 }
+
+
+class VoronoiMetricsTable(Table):
+    """Coverage of the field by Voronoi cells: errors, cost, when statistics of the error fall below `converged_m`.
+
+    With `peak_m` also the density in `rings` about it. The first `stationary` robots have cells, and no errors.
+    """
+
+    converged_m: Positive = 1e-7
+    peak_m: Point | None = None
+    rings: Count = 10
+    stationary: Annotated[int, Limits(ge=0)] = 0
 
 
 def outline_of(arena: Arena) -> Floats:
@@ -68,7 +84,7 @@ class VoronoiCells:
             ]
         )
 
-    def _seen(self, position: Floats) -> tuple[list[list[Point]], list[tuple[Neighbour, ...]]]:
+    def _seen(self, position: Floats) -> tuple[list[list[Place]], list[tuple[Neighbour, ...]]]:
         """Return what is around each of position (n, 2), relative to it: the outline, and the Voronoi neighbours."""
         pairs = self._tessellation.pairs(position)
         observer, seen = np.concatenate([pairs, pairs[:, ::-1]]).T
@@ -115,21 +131,32 @@ class Rings:
         return found
 
 
-class VoronoiCoverageObserver:
-    """The metrics of the table `[metrics.voronoi]`, over the robots that are present and not `stationary`."""
+class VoronoiMetrics(Metric):
+    """`metrics.voronoi`: coverage of the field by the robots that are present and not `stationary`."""
 
-    every_s: Final = 0.1
+    names: ClassVar[Sequence[str]] = (
+        *("mean_error_m", "max_error_m", "true_mean_error_m", "coverage_cost", *STATISTICS),
+        *("mean_peak_distance_m", "density_ring_*"),
+    )
+    every_s: ClassVar[float | None] = 0.1
+    Parameters: ClassVar[Any] = VoronoiMetricsTable
 
-    def __init__(self, table: VoronoiMetricsTable, arena: Arena, field: Field) -> None:
-        self._table = table
+    def __init__(self, parameters: VoronoiMetricsTable, context: MetricContext) -> None:
+        arena, field = context.arena, context.field
+        if not arena.is_convex:
+            raise ScenarioError(["metrics.voronoi: needs a convex arena without obstacles and walls"])
+        if field is None:
+            raise ScenarioError(["metrics.voronoi: needs a field, and the scenario has none"])
+        self._table = parameters
         self._coverage = VoronoiCells(arena, field)
-        self._rings = None if table.peak_m is None else Rings(arena, table.peak_m, table.rings)
+        self._rings = None if parameters.peak_m is None else Rings(arena, parameters.peak_m, parameters.rings)
         self._converged_s = dict.fromkeys(STATISTICS, math.nan)
         self._mean_error_m: list[float] = []
         self._last: tuple[Floats, Floats] | None = None
 
-    def look(self, scene: Scene, dead: Sequence[int]) -> None:
-        """Take note of the errors, and of which statistics are below the threshold for the first time."""
+    def sample(self, truth: Truth) -> None:
+        """Measure the errors; set the times of the statistics that are below the threshold for the first time."""
+        scene = truth.scene
         position = scene.position[scene.present]
         if len(position) <= self._table.stationary:
             self._mean_error_m.append(math.nan)
@@ -142,7 +169,7 @@ class VoronoiCoverageObserver:
                 self._converged_s[name] = scene.time_s
 
     def metrics(self) -> dict[str, float]:
-        """Return the errors, the cost and the density at the last look, and the times of convergence."""
+        """Return the errors, the cost and the density at the last sample, and the times of convergence."""
         if self._last is None:
             return {}
         position, error = self._last
@@ -159,5 +186,5 @@ class VoronoiCoverageObserver:
         return found if self._rings is None else found | self._rings.density(moving)
 
     def series(self) -> dict[str, list[float]]:
-        """Return the mean error [m] at every look. Figures 3 and 9."""
+        """Return the mean error [m] at every sample. Figures 3 and 9."""
         return {"mean_error_m": self._mean_error_m}

@@ -1,10 +1,13 @@
-"""The radio: every packet between nodes passes here, and every packet is accounted for.
+"""Radio: every packet between nodes passes here, and every packet is counted in a ledger.
 
-A **model** is one reason why a packet may not arrive, or not as it was sent. It judges the packets of a tick together and
-returns a verdict for each: dropped, delayed, copied or damaged. The models of a channel judge in the order of the
-scenario; what one drops the next never sees. `models` holds one file a model, `registry` names them, `medium` runs them.
+A **radio model** is one reason why a packet does not arrive, or not as it was sent. It judges the packets of a tick
+together and returns a verdict for each packet: dropped, delayed, copied or damaged. The models of a channel judge in the
+order of the scenario; a packet that one model drops does not reach the next. `models` holds one file a model, the catalogue
+names them.
 """
 
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Literal, NamedTuple, Protocol
@@ -15,20 +18,21 @@ from numpy.typing import NDArray
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.types import Table
 from zwerm.world.arena.arena import Arena
-from zwerm.world.radio.links import LinkDraws, Links
+from zwerm.world.radio.links import LinkRandom, Links
+from zwerm.world.radio.network_rules import NetworkRule
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 
-# From robot to robot, and between any robot and the coordinator.
+# Channels: from robot to robot, and between any robot and the coordinator.
 ROBOTS: Final = "robots"
 UPLINK: Final = "uplink"
 
 NodeName = int | Literal["base", "coordinator"]
 
 
-class LinkTable(Table):
-    """Parameters of a model. Those of every model: who sends and who receives what it judges, all where it does not say.
+class RadioModelTable(Table):
+    """Parameters that every model has: it judges only packets from `senders` to `receivers`, by default those of all nodes.
 
-    `name` keys the model's randomness, in place of its kind and how many of that kind stand before it.
+    `name` keys the random numbers of the model, in place of its kind and its number among the models of that kind.
     """
 
     name: str = ""
@@ -37,14 +41,14 @@ class LinkTable(Table):
 
 
 @dataclass(slots=True)
-class Air:
-    """What is sent on one channel at one tick. Arrays have one row per transmission: a broadcast is one."""
+class Transmissions:
+    """The transmissions of one channel at one tick. Arrays have one row per transmission: a broadcast is one."""
 
     scene: Scene
     dt_s: float
     sender: Ints  # (t,)
-    rank: Ints  # (t,) how many the same sender sent on this channel at this tick before it
-    payloads: list[bytes]  # one per transmission, and then the damaged ones
+    rank: Ints  # (t,) number of earlier transmissions of the same sender on this channel at this tick
+    payloads: list[bytes]  # one per transmission; models append damaged payloads
 
     @property
     def tick(self) -> int:
@@ -58,16 +62,16 @@ class Air:
 
 @dataclass(slots=True)
 class Packets:
-    """The packets that are still in the air, arrays (k,). A transmission is one packet for every node it is meant for."""
+    """Packets that no model has dropped yet, arrays (k,). A transmission is one packet for each of its receivers."""
 
     links: Links
-    link: Ints  # which row of `links`
-    transmission: Ints  # which row of Air
-    payload: Ints  # which of Air.payloads
-    key: NDArray[np.uint64]  # keys the packet's draws: its tick, rank and copy
+    link: Ints  # row of `links`
+    transmission: Ints  # row of Transmissions
+    payload: Ints  # index in Transmissions.payloads
+    key: NDArray[np.uint64]  # keys the random numbers of the packet: its tick, rank and copy
     copy: Ints | None = None  # 0 for the packet as sent; None where all are
     delay_s: Floats | None = None  # after sending; None where all are 0
-    attenuation_db: Floats | None = None  # by what stands in the way; None where nothing does
+    attenuation_db: Floats | None = None  # by obstacles; None where there is none
 
     def __len__(self) -> int:
         return len(self.link)
@@ -101,9 +105,9 @@ class Packets:
             part(self.attenuation_db),
         )
 
-    def layers(self, air: Air) -> Iterator[Ints]:
+    def layers(self, sent: Transmissions) -> Iterator[Ints]:
         """Yield rows in the order of sending, such that no link appears twice in one array."""
-        order = air.rank[self.transmission]
+        order = sent.rank[self.transmission]
         if self.copy is not None:
             order = order * (int(self.copy.max(initial=0)) + 1) + self.copy
         if not order.any():
@@ -114,45 +118,78 @@ class Packets:
 
 
 class Verdict(NamedTuple):
-    """What becomes of k packets; None means that nothing of the kind happens to any."""
+    """Effects on k packets. None means no effect of this kind on any packet."""
 
     drop: Bools | None = None  # (k,)
     after_s: Floats | None = None  # (k,) added delay [s]
-    copies: Ints | None = None  # (k,) how many copies arrive besides it
-    payload: Ints | None = None  # (k,) which of Air.payloads it carries now
+    copies: Ints | None = None  # (k,) number of copies that arrive besides the packet
+    payload: Ints | None = None  # (k,) new index in Transmissions.payloads
     attenuation_db: Floats | None = None  # (k,) added attenuation [dB]
 
 
 @dataclass(frozen=True, slots=True)
-class ModelPlace:
-    """Where a model stands: what it may know before the first packet."""
+class ModelContext:
+    """The constants of a run that a model may know. `purpose` keys its random numbers."""
 
     links: Links
     draws: Draws
-    purpose: str  # keys its draws
+    purpose: str
     nodes: int
     dt_s: float
     arena: Arena
 
-    def link_draws(self, what: str = "") -> LinkDraws:
-        """Return draws of this model's own, by link and packet."""
-        return LinkDraws(self.draws, self.purpose + what, self.links)
+    def link_random(self, suffix: str = "") -> LinkRandom:
+        """Return random numbers of this model, keyed by link and packet."""
+        return LinkRandom(self.draws, self.purpose + suffix, self.links)
 
 
-class LinkModel(Protocol):
-    """One reason why a packet may not arrive; `needs_positions` means that it makes sense between bodies only.
+class PacketJudge(Protocol):
+    """The part of a model that a channel uses. Radio faults have it, too."""
 
-    A model with an attribute `out_of_reach` that is true drops packets to receivers that are out of reach, by no chance. The
-    others lose packets to receivers in reach.
+    @property
+    def cause(self) -> str:
+        """The name under which the ledger counts dropped packets."""
+
+    @property
+    def out_of_reach(self) -> bool:
+        """Whether receivers of dropped packets are out of reach. Otherwise the packets are losses."""
+
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Return the effects on `packets`."""
+
+
+class RadioModel(ABC):
+    """One reason why a packet does not arrive as it was sent: the base class of the plug-in kind `radio model`.
+
+    A subclass states here all that other parts need to know about it.
     """
 
-    kind: ClassVar[str]
-    cause: ClassVar[str]
-    needs_positions: ClassVar[bool]
-    Parameters: ClassVar[type[LinkTable]]
+    Parameters: ClassVar[type[RadioModelTable]] = RadioModelTable
 
-    def __init__(self, parameters: Any, place: ModelPlace) -> None:
-        """Take an instance of `Parameters`. Raises ValueError, one line, where they make no sense together."""
+    # The name under which the ledger counts the packets that the model drops.
+    cause: ClassVar[str] = "lost"
+    # The key of its random numbers in place of the kind that the scenario names; for a model whose kind was renamed.
+    draw_key: ClassVar[str] = ""
+    # The model is defined between bodies only: not on the channel to the coordinator.
+    needs_positions: ClassVar[bool] = False
+    # Receivers of dropped packets are out of reach, by no chance. Otherwise the packets are losses.
+    out_of_reach: ClassVar[bool] = False
 
-    def judge(self, air: Air, packets: Packets) -> Verdict:
-        """Return what becomes of `packets`."""
+    # The model drops every packet over more than this distance [m].
+    range_max_m: float = math.inf
+
+    @abstractmethod
+    def __init__(self, parameters: Any, context: ModelContext) -> None:
+        """Take an instance of `Parameters`. Raises ValueError, one line, if they contradict each other."""
+
+    @abstractmethod
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Return the effects on `packets`, which are those of `sent` that no earlier model dropped."""
+
+    @classmethod
+    def network_rule(cls, parameters: Any) -> NetworkRule | None:
+        """Return the rule by which a real network reproduces this model, or None if no rule is known.
+
+        Raises ValueError with the reason, one line, if no network can reproduce it with these parameters.
+        """
+        return None

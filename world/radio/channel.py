@@ -1,8 +1,8 @@
-"""A channel of the radio: who may send to whom, and the models that judge each packet, in order.
+"""A channel of the radio: the permitted pairs of sender and receiver, and the models that judge each packet, in order.
 
-What a node hears of a packet's sender is the channel's to say. A receiver that is absent or switched off is judged before the
-models. Faults judge before the models, too, but after those leading ones that find receivers out of reach: what a fault drops
-would have reached its receiver. Neither of the two draws, so their order changes the causes, and not the packets that pass.
+The channel drops packets to absent and switched-off receivers first. Faults judge before the models, but after the leading
+models that find receivers out of reach: a packet that a fault drops would have reached its receiver. These leading models
+use no random numbers, so the order of faults and models changes the causes and not the packets that pass.
 """
 
 from collections.abc import Sequence
@@ -13,21 +13,21 @@ from numpy.typing import NDArray
 
 from zwerm.maths.keyed_random import key_part
 from zwerm.wire.messages import Packet, Transmission
-from zwerm.world.radio import Air, LinkModel, Packets, Verdict
-from zwerm.world.radio.accounts import Ledger
+from zwerm.world.radio import PacketJudge, Packets, Transmissions, Verdict
+from zwerm.world.radio.ledger import Ledger
 from zwerm.world.radio.links import Links
-from zwerm.world.radio.mail import Mail, Parcel
+from zwerm.world.radio.packet_queue import PacketBatch, PacketQueue
 from zwerm.world.scene import Ints, Scene
 
 Outboxes = Sequence[tuple[int, Sequence[Transmission]]]
 
-# A packet's key: its tick, which of its sender's at that tick it is, and which copy of it.
+# Key of a packet: its tick, its number among those of its sender at that tick, and the number of the copy.
 _TICK_BITS: Final = np.uint64(32)
 _COPY_BITS: Final = np.uint64(16)
 
 
 class Channel:
-    """A named channel among `members`, ids below `nodes`; with a `center`, everyone else speaks with that node only."""
+    """A named channel among `members`, ids below `nodes`. With a `center`, each other node exchanges packets with it only."""
 
     def __init__(
         self,
@@ -36,61 +36,61 @@ class Channel:
         center: int | None,
         nodes: int,
         dt_s: float,
-        models: Sequence[LinkModel] = (),
+        models: Sequence[PacketJudge] = (),
         anonymous: bool = False,
         links: Links | None = None,
     ) -> None:
         self.name = name
         self.models = list(models)
         self.links = links or Links(nodes)
-        self.accounts = Ledger(self.links, nodes, dt_s)
-        self.mail = Mail(nodes)
+        self.ledger = Ledger(self.links, nodes, dt_s)
+        self.queue = PacketQueue(nodes)
         self._members = members
         self._center = center
         self.dt_s = dt_s
         self._anonymous = anonymous
         self._audiences: dict[int, Ints] = {}
-        # How many models, from the first on, find receivers out of reach.
-        self._leading = next((at for at, model in enumerate(self.models) if not _is_of_reach(model)), len(self.models))
+        # The number of leading models that find receivers out of reach.
+        self._leading = next((at for at, model in enumerate(self.models) if not model.out_of_reach), len(self.models))
 
     def carries(self, sender: int, to: int) -> bool:
-        """Tell whether `sender` may address `to` at all."""
+        """Return whether `sender` may address `to`."""
         if to == sender or to not in self._members:
             return False
         return self._center is None or self._center in (sender, to)
 
     def pairs(self) -> list[tuple[int, int]]:
-        """Return every (sender, receiver) between whom a broadcast passes, sorted."""
+        """Return every (sender, receiver) of broadcasts, sorted."""
         audiences = [
             (node, self._audience(node)) for node in self._members
-        ]  # all of them, before receivers are looked up
+        ]  # all of them first: `_audience` adds links
         return [(node, other) for node, links in audiences for other in self.links.receiver[links].tolist()]
 
-    def stopped(self, scene: Scene, models: Sequence[LinkModel]) -> list[tuple[int, int]]:
-        """Return the pairs between whom one of `models` would now let nothing pass, sorted; for models without chance."""
+    def stopped(self, scene: Scene, models: Sequence[PacketJudge]) -> list[tuple[int, int]]:
+        """Return the pairs whose packets one of `models`, which use no random numbers, drops now; sorted."""
         nodes = np.array(self._members)
         links = [self._audience(node) for node in nodes.tolist()]
         transmission = np.repeat(np.arange(len(nodes)), [len(each) for each in links])
-        air = Air(scene, self.dt_s, nodes, np.zeros(len(nodes), dtype=np.int64), [b""] * len(nodes))
+        traffic = Transmissions(scene, self.dt_s, nodes, np.zeros(len(nodes), dtype=np.int64), [b""] * len(nodes))
         key = np.zeros(len(transmission), dtype=np.uint64)
         packets = Packets(self.links, np.concatenate(links), transmission, transmission, key)
         stopped = np.zeros(len(packets), dtype=np.bool_)
         for model in models:
-            drop = model.judge(air, packets).drop
+            drop = model.judge(traffic, packets).drop
             if drop is not None:
                 stopped |= drop
         return sorted(zip(packets.sender[stopped].tolist(), packets.receiver[stopped].tolist(), strict=True))
 
     def send(
-        self, scene: Scene, outboxes: Outboxes, before: Sequence[LinkModel] = (), faults: Sequence[LinkModel] = ()
+        self, scene: Scene, outboxes: Outboxes, before: Sequence[PacketJudge] = (), faults: Sequence[PacketJudge] = ()
     ) -> None:
-        """Take what the nodes sent on this channel at this tick, (node, its outbox) in id order, and judge every packet."""
-        name, books = self.name, self.accounts
+        """Judge every packet that the nodes sent on this channel at this tick; (node, outbox) are in id order."""
+        name, ledger = self.name, self.ledger
         senders: list[int] = []
         ranks: list[int] = []
         payloads: list[bytes] = []
         links: list[Ints] = []
-        sent: dict[int, int] = {}  # a node that answered late is here twice
+        sent: dict[int, int] = {}  # a node that answered late appears twice
         for node, outbox in outboxes:
             rank = sent.get(node, 0)
             for message in outbox:
@@ -99,27 +99,27 @@ class Channel:
                     ranks.append(rank)
                     payloads.append(message.payload)
                     links.append(self._audience(node) if message.to is None else self._link(node, message.to))
-                    books.node_bytes[node] += len(message.payload)
+                    ledger.node_bytes[node] += len(message.payload)
                     rank += 1
-            books.node_messages[node] += rank - sent.get(node, 0)
+            ledger.node_messages[node] += rank - sent.get(node, 0)
             sent[node] = rank
         if not senders:
             return
         audience = list(map(len, links))
-        air = Air(scene, self.dt_s, np.array(senders), np.array(ranks), payloads)
+        traffic = Transmissions(scene, self.dt_s, np.array(senders), np.array(ranks), payloads)
         link = np.concatenate(links)
         transmission = np.repeat(np.arange(len(senders)), audience)
-        key = key_part(_stamp(air))[transmission]
-        books.send(link)
+        key = key_part(_stamp(traffic))[transmission]
+        ledger.send(link)
         packets = Packets(self.links, link, transmission, transmission, key)
         for model in (*before, *self.models[: self._leading], *faults, *self.models[self._leading :]):
             if not len(packets):
                 return
-            packets = self._carry_out(model.judge(air, packets), model, air, packets)
-        self._post(air, packets)
+            packets = self._apply(model.judge(traffic, packets), model, traffic, packets)
+        self._enqueue(traffic, packets)
 
-    def _carry_out(self, verdict: Verdict, model: LinkModel, air: Air, packets: Packets) -> Packets:
-        """Return what is left of `packets` after a verdict of `model`."""
+    def _apply(self, verdict: Verdict, model: PacketJudge, traffic: Transmissions, packets: Packets) -> Packets:
+        """Return the packets that remain after a verdict of `model`."""
         drop, after_s, copies, payload, attenuation_db = verdict
         if payload is not None:
             packets.payload = payload
@@ -129,54 +129,54 @@ class Channel:
             before_db = packets.attenuation_db
             packets.attenuation_db = attenuation_db if before_db is None else before_db + attenuation_db
         if copies is not None and copies.any():
-            packets = self._copied(air, packets, copies)
+            packets = self._copied(traffic, packets, copies)
         if drop is not None and drop.any():
-            self.accounts.drop(packets.link[drop], model.cause, _is_of_reach(model))
+            self.ledger.drop(packets.link[drop], model.cause, model.out_of_reach)
             packets = packets.take(np.flatnonzero(~drop))
         return packets
 
-    def _copied(self, air: Air, packets: Packets, copies: Ints) -> Packets:
-        """Return `packets` with `copies` (k,) of each right after it; a copy has a key of its own."""
+    def _copied(self, traffic: Transmissions, packets: Packets, copies: Ints) -> Packets:
+        """Return `packets`, each followed by its `copies` (k,). A copy has a key of its own."""
         original = np.repeat(np.arange(len(packets)), copies + 1)
         number = np.arange(len(original)) - np.repeat(np.cumsum(copies + 1) - copies - 1, copies + 1)
         made = packets.take(original)
-        # Copies of copies count on from the largest number that there is.
+        # Copies of copies continue after the largest number.
         made.copy = number if made.copy is None else made.copy * (int(copies.max()) + 1) + number
         fresh = number > 0
-        stamp = _stamp(air)[made.transmission] | made.copy.astype(np.uint64)
+        stamp = _stamp(traffic)[made.transmission] | made.copy.astype(np.uint64)
         made.key = np.where(fresh, key_part(stamp), made.key)
-        self.accounts.send(made.link[fresh])
-        self.accounts.copies += int(np.count_nonzero(fresh))
+        self.ledger.send(made.link[fresh])
+        self.ledger.copies += int(np.count_nonzero(fresh))
         return made
 
-    def _post(self, air: Air, packets: Packets) -> None:
-        """Send on their way what nothing has dropped."""
+    def _enqueue(self, traffic: Transmissions, packets: Packets) -> None:
+        """Add the remaining packets to the queue."""
         if not len(packets):
             return
-        sent = air.payloads
-        objects: NDArray[np.object_] = np.empty(len(sent), dtype=np.object_)
+        payloads = traffic.payloads
+        objects: NDArray[np.object_] = np.empty(len(payloads), dtype=np.object_)
         name, anonymous = self.name, self._anonymous
-        whose = air.sender.tolist()
+        whose = traffic.sender.tolist()
         whole = len(whose)
         objects[:whole] = [
             Packet(name, payload, None if anonymous else sender)
-            for payload, sender in zip(sent[:whole], whose, strict=True)
+            for payload, sender in zip(payloads[:whole], whose, strict=True)
         ]
         sender = packets.sender
-        if len(sent) > whole:
+        if len(payloads) > whole:
             damaged = np.flatnonzero(packets.payload >= whole)
             for row in damaged.tolist():
                 which = int(packets.payload[row])
-                objects[which] = Packet(name, sent[which], None if anonymous else int(sender[row]))
-            self.accounts.damaged += len(damaged)
+                objects[which] = Packet(name, payloads[which], None if anonymous else int(sender[row]))
+            self.ledger.damaged += len(damaged)
         delay_s = packets.delay_s
-        tick, now_s = air.tick, air.scene.time_s
+        tick, now_s = traffic.tick, traffic.scene.time_s
         due: Ints | int = tick + 1
         arrival_s = np.full(len(packets), now_s)
         if delay_s is not None:
             arrival_s = now_s + delay_s
             due = tick + np.maximum(1, np.ceil(delay_s / self.dt_s - 1e-9)).astype(np.int64)
-        parcel = Parcel(
+        batch = PacketBatch(
             sender,
             packets.receiver,
             packets.link,
@@ -184,10 +184,10 @@ class Channel:
             arrival_s,
             objects[packets.payload],
         )
-        self.mail.post(parcel, due)
+        self.queue.push(batch, due)
 
     def _audience(self, sender: int) -> Ints:
-        """Return the links of a broadcast of `sender`: to everyone, or to the center where there is one."""
+        """Return the links of a broadcast of `sender`: to all others, or to the center if there is one."""
         links = self._audiences.get(sender)
         if links is None:
             if self._center is not None and sender != self._center:
@@ -201,11 +201,6 @@ class Channel:
         return self.links.rows(np.array([sender]), np.array([to]))
 
 
-def _is_of_reach(model: LinkModel) -> bool:
-    """Tell whether a model drops packets whose receivers are out of reach."""
-    return bool(getattr(model, "out_of_reach", False))
-
-
-def _stamp(air: Air) -> NDArray[np.uint64]:
-    """Return what keys each transmission (t,) of a sender: when it was sent, and which of that tick's it is."""
-    return np.uint64(air.tick) << _TICK_BITS | air.rank.astype(np.uint64) << _COPY_BITS
+def _stamp(traffic: Transmissions) -> NDArray[np.uint64]:
+    """Return the part of the key of each transmission (t,): its tick, and its number among those of its sender."""
+    return np.uint64(traffic.tick) << _TICK_BITS | traffic.rank.astype(np.uint64) << _COPY_BITS

@@ -1,8 +1,8 @@
-"""Links: the pairs of nodes between which packets were ever sent, numbered as they appear.
+"""Links: the pairs of nodes between which packets were ever sent, numbered in the order of their first packet.
 
-Whatever belongs to a link (accounts, the state of a burst, the head of a key of randomness) is an array with one row per
-link. Up to a few thousand nodes a link is found in a dense table, beyond in a sorted one. The numbers are an index and
-nothing else: they depend on who sends first, so no outcome may depend on them.
+Every property of a link (its ledger, the state of a burst, the key of its random numbers) is an array with one row per link. Up
+to a few thousand nodes a dense table finds a link, beyond that a sorted one. The number of a link depends on the order of
+sending, so no outcome may depend on it.
 """
 
 from typing import Any, Final
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from zwerm.maths.keyed_random import Draws, gaussian, splitmix64, unit
 from zwerm.world.scene import Floats, Ints
 
-# Up to this many nodes the dense table is used: 64 MB at most.
+# Largest number of nodes with a dense table: 64 MB at most.
 _DENSE_NODES_MAX: Final = 4_096
 _FIRST_ROWS: Final = 64
 
 
 class Column:
-    """One value per link; `values` grows with the links, so it is looked up anew each time."""
+    """One value per link. `values` is replaced when the links grow: do not keep a reference to it."""
 
     def __init__(self, fill: float, kind: Any) -> None:
         self.fill = fill
@@ -112,8 +112,8 @@ class Links:
         return column
 
 
-class LinkDraws:
-    """Draws keyed by (purpose, sender, receiver, packet), and by (purpose, sender, receiver) alone."""
+class LinkRandom:
+    """Random numbers keyed by (purpose, sender, receiver, packet)."""
 
     def __init__(self, draws: Draws, purpose: str, links: Links) -> None:
         self._draws = draws
@@ -123,11 +123,11 @@ class LinkDraws:
         self._states = links.words()
 
     def uniform(self, link: Ints, key: NDArray[np.uint64]) -> Floats:
-        """Return draws (k,) in [0, 1) for the packets with these keys (k,) on links (k,)."""
+        """Return random numbers (k,) in [0, 1) for the packets with these keys (k,) on links (k,)."""
         return unit(self.words(link, key))
 
     def normal(self, link: Ints, key: NDArray[np.uint64]) -> Floats:
-        """Return standard normal draws (k,) for the packets with these keys (k,) on links (k,)."""
+        """Return standard normal random numbers (k,) for the packets with these keys (k,) on links (k,)."""
         return gaussian(self.words(link, key))
 
     def words(self, link: Ints, key: NDArray[np.uint64]) -> NDArray[np.uint64]:

@@ -1,8 +1,8 @@
-"""The medium: the channels of a run, and everything that can happen to a packet between two nodes.
+"""Medium: the channels of a run, and all effects on packets between two nodes.
 
-A packet is delivered with its receiver's next observation, one tick after it was sent at the earliest. Whoever is switched
-off hears nothing: what is sent to it is dropped, and so is what is due to it, each with its cause. With `check`, the books
-of every link are held against the air at every tick.
+A packet is delivered with the next observation of its receiver, one tick after it was sent at the earliest. A node that is
+switched off receives nothing: packets that are sent to it or due to it are dropped, each with its cause. With `check`, the
+ledger of every link is compared with the packets in flight at every tick.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Packet, Transmission
 from zwerm.world.arena.arena import Arena
-from zwerm.world.radio import ROBOTS, UPLINK, Air, LinkModel, LinkTable, Packets, Verdict
+from zwerm.world.radio import ROBOTS, UPLINK, PacketJudge, Packets, Transmissions, Verdict
 from zwerm.world.radio.channel import Channel, Outboxes
 from zwerm.world.radio.links import Links
 from zwerm.world.radio.registry import make_models
@@ -22,17 +22,14 @@ from zwerm.world.scene import Bools, Scene
 
 
 class Absent:
-    """Drops what is sent to a robot that is not in the arena; nodes without a body are always there."""
+    """Drops packets to robots that are not in the arena. Nodes without a body are always present."""
 
-    kind: ClassVar[str] = "absent"
     cause: ClassVar[str] = "absent"
-    needs_positions: ClassVar[bool] = False
     out_of_reach: ClassVar[bool] = True
-    Parameters: ClassVar[type[LinkTable]] = LinkTable
 
-    def judge(self, air: Air, packets: Packets) -> Verdict:
-        """Look the receivers up."""
-        present = air.scene.present
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Check the presence of the receivers."""
+        present = sent.scene.present
         if present.all():
             return Verdict()
         receiver = packets.receiver
@@ -40,20 +37,17 @@ class Absent:
 
 
 class SwitchedOff:
-    """Drops what is sent to a node whose program does not run: it crashed, or has not started yet."""
+    """Drops packets to nodes whose programs do not run: crashed, or not started yet."""
 
-    kind: ClassVar[str] = "receiver-down"
     cause: ClassVar[str] = "receiver-down"
-    needs_positions: ClassVar[bool] = False
     out_of_reach: ClassVar[bool] = True
-    Parameters: ClassVar[type[LinkTable]] = LinkTable
 
     def __init__(self, nodes: int) -> None:
-        self.deaf: Bools = np.zeros(nodes, dtype=np.bool_)
+        self.off: Bools = np.zeros(nodes, dtype=np.bool_)
 
-    def judge(self, air: Air, packets: Packets) -> Verdict:
-        """Look the receivers up."""
-        return Verdict(self.deaf[packets.receiver]) if self.deaf.any() else Verdict()
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Check the status of the receivers."""
+        return Verdict(self.off[packets.receiver]) if self.off.any() else Verdict()
 
 
 class Medium:
@@ -65,10 +59,10 @@ class Medium:
         coordinator = scenario.coordinator is not None
         nodes = robots + coordinator
         self.channels: dict[str, Channel] = {}
-        self.faults: dict[str, list[LinkModel]] = {ROBOTS: [], UPLINK: []}  # those in force now, by channel
+        self.faults: dict[str, list[PacketJudge]] = {ROBOTS: [], UPLINK: []}  # the active ones, by channel
         self._off = SwitchedOff(nodes)
         self._causes: dict[int, str] = {}
-        self._before: list[LinkModel] = [Absent(), self._off]
+        self._before: list[PacketJudge] = [Absent(), self._off]
         tables = {ROBOTS: scenario.radio, UPLINK: scenario.uplink}
         self._check = any(table.check for table in tables.values() if table is not None)
         members: dict[str, tuple[range, int | None]] = (
@@ -85,56 +79,56 @@ class Medium:
             )
 
     def arrive(self, tick: int) -> Sequence[int]:
-        """Put what is due at `tick` into the inboxes, and return the nodes that have packets waiting, in id order."""
-        deaf = self._off.deaf
+        """Move packets that are due at `tick` to the inboxes; return the nodes with packets in them, in id order."""
+        off = self._off.off
         for channel in self.channels.values():
-            if deaf.any():
-                for receiver, link in zip(*channel.mail.remove_due(tick, deaf), strict=True):
-                    channel.accounts.drop(link[None], self._causes[int(receiver)])
-            channel.mail.arrive(tick)
+            if off.any():
+                for receiver, link in zip(*channel.queue.remove_due(tick, off), strict=True):
+                    channel.ledger.drop(link[None], self._causes[int(receiver)])
+            channel.queue.arrive(tick)
         if self._check:
             self.audit()
-        waiting = [channel.mail.waiting() for channel in self.channels.values()]
+        waiting = [channel.queue.waiting() for channel in self.channels.values()]
         return waiting[0] if len(waiting) == 1 else sorted({node for nodes in waiting for node in nodes})
 
     def deliver(self, nodes: Sequence[int], tick: int) -> list[tuple[Packet, ...]]:
-        """Hand over the packets that wait for `nodes`, at `tick`."""
+        """Return the packets in the inboxes of `nodes` at `tick`, and empty these."""
         inboxes: dict[int, tuple[Packet, ...]] = {}
         for channel in self.channels.values():
-            handed, link, sent_tick = channel.mail.collect(nodes)
+            handed, link, sent_tick = channel.queue.collect(nodes)
             if len(link):
-                channel.accounts.deliver(link, sent_tick, tick)
+                channel.ledger.deliver(link, sent_tick, tick)
             for node, packets in handed.items():
                 inboxes[node] = inboxes[node] + packets if node in inboxes else packets
         return [inboxes.get(node, ()) for node in nodes]
 
     def send(self, scene: Scene, outboxes: Outboxes) -> None:
-        """Take what the nodes sent at this tick, (node, its outbox) in id order, and judge every packet."""
+        """Judge every packet that the nodes sent at this tick; (node, outbox) are in id order."""
         for name, channel in self.channels.items():
             channel.send(scene, outboxes, self._before, self.faults[name])
 
     def stopped(self, name: str, scene: Scene, numbers: Sequence[int]) -> list[tuple[int, int]]:
-        """Return the pairs of a channel between whom nothing passes now, by faults or by its models with these `numbers`."""
+        """Return the pairs of a channel that are blocked now, by faults or by its models with these `numbers`."""
         channel = self.channels[name]
         chosen = [channel.models[number] for number in numbers]
         return channel.stopped(scene, [*self._before, *self.faults[name], *chosen])
 
     def switch_off(self, node: int, cause: str) -> None:
-        """Let a node hear nothing more, and drop for `cause` what waits for it and what comes due."""
-        self._off.deaf[node] = True
+        """Let a node receive nothing; drop the packets in its inbox, and those that become due, for `cause`."""
+        self._off.off[node] = True
         self._causes[node] = cause
         for channel in self.channels.values():
-            channel.accounts.drop(channel.mail.remove_to(node), cause)
+            channel.ledger.drop(channel.queue.remove_to(node), cause)
 
     def switch_on(self, node: int) -> None:
-        """Let a node hear again; what its former incarnation sent, and nobody has received yet, is refused."""
-        self._off.deaf[node] = False
+        """Let a node receive again; drop the undelivered packets of its former incarnation."""
+        self._off.off[node] = False
         self._causes.pop(node, None)
         for channel in self.channels.values():
-            channel.accounts.drop(channel.mail.remove_from(node), "stale-incarnation")
+            channel.ledger.drop(channel.queue.remove_from(node), "stale-incarnation")
 
     def refuses(self, sender: int, message: Transmission) -> str:
-        """Return why this transmission cannot be sent at all, or an empty string."""
+        """Return the reason why this transmission cannot be sent, or an empty string."""
         channel = self.channels.get(message.channel)
         if channel is None:
             return f"no channel {message.channel!r} here"
@@ -143,29 +137,29 @@ class Medium:
         return ""
 
     def audit(self) -> None:
-        """Raise AssertionError where the books of a link do not agree with the air: a mistake of ours, not the user's."""
+        """Raise AssertionError if a ledger differs from the packets in flight: an internal error."""
         for name, channel in self.channels.items():
-            wrong = channel.accounts.imbalance(channel.mail.in_flight(channel.links.count))
+            wrong = channel.ledger.imbalance(channel.queue.in_flight(channel.links.count))
             if wrong:
                 raise AssertionError(f"channel {name}: {wrong[0]}")
 
     def summary(self) -> dict[str, Any]:
-        """Return the books over all channels: packets sent, delivered, dropped by cause, in flight; bytes; and copies.
+        """Return the counts over all channels: packets sent, delivered, dropped by cause, in flight; bytes; and copies.
 
-        `out_of_reach` are those of the dropped whose receivers were out of reach. `bytes` are payload, once a transmission.
+        `out_of_reach` are the dropped packets with receivers out of reach. `bytes` are payload, counted once a transmission.
         """
         dropped: dict[str, int] = {}
         for channel in self.channels.values():
-            for cause, column in channel.accounts.dropped().items():
+            for cause, column in channel.ledger.dropped().items():
                 dropped[cause] = dropped.get(cause, 0) + int(column.sum())
-        books = [channel.accounts for channel in self.channels.values()]
+        ledgers = [channel.ledger for channel in self.channels.values()]
         return {
-            "sent": sum(int(each.sent().sum()) for each in books),
-            "delivered": sum(int(each.delivered().sum()) for each in books),
+            "sent": sum(int(each.sent().sum()) for each in ledgers),
+            "delivered": sum(int(each.delivered().sum()) for each in ledgers),
             "dropped": {cause: count for cause, count in sorted(dropped.items()) if count},
-            "in_flight": sum(int(each.in_flight().sum()) for each in books),
-            "out_of_reach": sum(int(each.out_of_reach().sum()) for each in books),
-            "bytes": sum(int(each.node_bytes.sum()) for each in books),
-            "copies": sum(each.copies for each in books),
-            "damaged": sum(each.damaged for each in books),
+            "in_flight": sum(int(each.in_flight().sum()) for each in ledgers),
+            "out_of_reach": sum(int(each.out_of_reach().sum()) for each in ledgers),
+            "bytes": sum(int(each.node_bytes.sum()) for each in ledgers),
+            "copies": sum(each.copies for each in ledgers),
+            "damaged": sum(each.damaged for each in ledgers),
         }

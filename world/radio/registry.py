@@ -1,16 +1,19 @@
-"""The radio's models by name: the built-in table, and `module:Class` for anyone else's.
+"""Radio models by name: those of the catalogue, and `module:Class` for any other.
 
-A channel's shorthands and its `models` tables go in; models in the order of the scenario come out, or every mistake in the
-tables at once. The shorthands come first: range, line of sight, loss.
+Input: the shorthands and the `models` tables of a channel. Output: the models in the order of the scenario, or every mistake in
+the tables at once. The shorthands come first: range, line of sight, loss.
 """
 
+import inspect
+import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Final
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
+from zwerm.catalogue import RADIO_MODELS, RENAMED_RADIO_MODELS
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.diagnostics import mistakes
@@ -18,61 +21,39 @@ from zwerm.scenario.plugin_names import class_named
 from zwerm.scenario.tables import ChannelTable, Scenario
 from zwerm.scenario.types import OpenTable
 from zwerm.world.arena.arena import Arena
-from zwerm.world.radio import ROBOTS, Air, LinkModel, LinkTable, ModelPlace, NodeName, Packets, Verdict
+from zwerm.world.radio import (
+    ROBOTS,
+    ModelContext,
+    PacketJudge,
+    Packets,
+    RadioModel,
+    RadioModelTable,
+    Transmissions,
+    Verdict,
+)
 from zwerm.world.radio.links import Links
-from zwerm.world.radio.models.collision import Collision
-from zwerm.world.radio.models.corruption import Corruption
-from zwerm.world.radio.models.delay import Delay
-from zwerm.world.radio.models.duplication import Duplication
-from zwerm.world.radio.models.gilbert_elliott import GilbertElliott
-from zwerm.world.radio.models.line_of_sight import LineOfSightModel
-from zwerm.world.radio.models.loss import Loss
-from zwerm.world.radio.models.path_loss import PathLoss
-from zwerm.world.radio.models.range import DiscRange
-from zwerm.world.radio.models.rate_limit import RateLimit
-from zwerm.world.radio.models.wall_attenuation import WallAttenuation
+from zwerm.world.radio.nodes import node_count, selected
 from zwerm.world.scene import Bools
 
-BUILT_IN: Final[dict[str, type[LinkModel]]] = {
-    model.kind: model
-    for model in (
-        *(
-            DiscRange,
-            LineOfSightModel,
-            PathLoss,
-            WallAttenuation,
-            Loss,
-            GilbertElliott,
-            Delay,
-            Duplication,
-            Corruption,
-            RateLimit,
-            Collision,
-        ),
-    )
-}
+_warned: dict[str, None] = {}
 
 
 class Selected:
-    """A model that judges only what some nodes send, or some receive."""
+    """Applies a model to the packets from some senders to some receivers only."""
 
-    kind: ClassVar[str] = "selected"
-    needs_positions: ClassVar[bool] = False
-    Parameters: ClassVar[type[LinkTable]] = LinkTable
-
-    def __init__(self, model: LinkModel, senders: Bools, receivers: Bools) -> None:
+    def __init__(self, model: RadioModel, senders: Bools, receivers: Bools) -> None:
         self.cause = model.cause
-        self.out_of_reach: bool = getattr(model, "out_of_reach", False)
-        self.model = model
+        self.out_of_reach = model.out_of_reach
+        self._model = model
         self._senders = senders
         self._receivers = receivers
 
-    def judge(self, air: Air, packets: Packets) -> Verdict:
-        """Leave the others alone."""
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Return the verdict of the model; other packets are not affected."""
         chosen = np.flatnonzero(self._senders[packets.sender] & self._receivers[packets.receiver])
         if not len(chosen):
             return Verdict()
-        verdict = self.model.judge(air, packets.take(chosen))
+        verdict = self._model.judge(sent, packets.take(chosen))
 
         def spread(values: Any, others: Any) -> Any:
             if values is None:
@@ -90,37 +71,44 @@ class Selected:
         )
 
 
-def find(kind: str) -> type[LinkModel]:
-    """Return the model class that `kind` names. Raises ValueError, in one line, where there is none."""
-    if kind in BUILT_IN:
-        return BUILT_IN[kind]
-    found = class_named(kind, "model", BUILT_IN)
+def find(kind: str) -> type[RadioModel]:
+    """Return the model class that `kind` names, by a current or a former name.
+
+    Raises ValueError, in one line, if there is none or it is no radio model.
+    """
+    name = RENAMED_RADIO_MODELS.get(kind, kind)
+    found = class_named(RADIO_MODELS.get(name, name), "model", RADIO_MODELS)
     if not callable(getattr(found, "judge", None)):
-        raise ValueError(f"{kind} is no model: expected a class with a method judge(air, packets)")
-    return found
+        raise ValueError(f"{kind} is no radio model: it has no method judge(sent, packets)")
+    parameters = getattr(found, "Parameters", RadioModelTable)
+    if not isinstance(parameters, type) or not issubclass(parameters, RadioModelTable):
+        raise ValueError(f"{kind} is no radio model: its `Parameters` must be a subclass of RadioModelTable")
+    try:
+        inspect.signature(found).bind(None, None)
+    except (TypeError, ValueError):
+        raise ValueError(f"{kind} is no radio model: its constructor must take (parameters, context)") from None
+    # A class with the same methods need not inherit: it gets the defaults of the base class behind its own attributes.
+    return found if issubclass(found, RadioModel) else type(found.__name__, (found, RadioModel), {})
 
 
 def make_models(
     scenario: Scenario, names: Sequence[str], links: Mapping[str, Links], arena: Arena, draws: Draws
-) -> dict[str, tuple[list[LinkModel], Links]]:
-    """Return the models of each channel of `names`, in order, and the channel's links.
+) -> dict[str, tuple[list[PacketJudge], Links]]:
+    """Return the models of each channel of `names`, in order, and the links of the channel.
 
     Raises ScenarioError with every mistake in every table, each `path: rule, got value`.
     """
     found: list[str] = []
-    made: dict[str, tuple[list[LinkModel], Links]] = {}
+    made: dict[str, tuple[list[PacketJudge], Links]] = {}
     for name in names:
         table: ChannelTable | None = scenario.radio if name == ROBOTS else scenario.uplink
         path = "radio" if name == ROBOTS else "uplink"
-        models: list[LinkModel] = []
+        models: list[PacketJudge] = []
         counts: Counter[str] = Counter()
+        context = ModelContext(links[name], draws, f"radio/{name}", node_count(scenario), scenario.time.dt_s, arena)
         for where, model in [] if table is None else tables_of(table, path):
-            counts[model.kind] += 1
-            place = ModelPlace(
-                links[name], draws, f"radio/{name}/{model.kind}", _nodes(scenario), scenario.time.dt_s, arena
-            )
             try:
-                models.append(make_model(model, place, scenario, where, counts[model.kind], name == ROBOTS))
+                models.append(make_model(model, context, scenario, where, counts))
             except ScenarioError as error:
                 found += error.mistakes
         made[name] = models, links[name]
@@ -132,73 +120,42 @@ def make_models(
 
 
 def make_model(
-    table: OpenTable, place: ModelPlace, scenario: Scenario, path: str, number: int, has_positions: bool
-) -> LinkModel:
-    """Return the `number`-th model of its kind on a channel, as `table` at `path` describes it.
+    table: OpenTable, context: ModelContext, scenario: Scenario, path: str, counts: Counter[str]
+) -> PacketJudge:
+    """Return the model that `table` at `path` describes. `counts` has the number of earlier models of the channel by key.
 
     Raises ScenarioError with every mistake.
     """
     try:
         kind = find(table.kind)
-        if kind.needs_positions and not has_positions:
-            raise ValueError(f"the coordinator is nowhere: no {table.kind} to it, got {table.kind!r}")
+        if kind.needs_positions and not path.startswith("radio"):
+            raise ValueError(f"the coordinator has no position: no {table.kind} to it, got {table.kind!r}")
     except ValueError as error:
         raise ScenarioError([f"{path}.kind: {error}"]) from None
+    if table.kind in RENAMED_RADIO_MODELS:
+        _warn(f"{scenario.place}: {path}.kind: {table.kind!r} is deprecated, use {RENAMED_RADIO_MODELS[table.kind]!r}")
+    key = kind.draw_key or table.kind
+    counts[key] += 1
     try:
         parameters = kind.Parameters.model_validate(table.parameters)
     except ValidationError as error:
         named = f"{scenario.place}: "
         found = [line.removeprefix(named) for line in mistakes(error, scenario.place, f"{path}.")]
         raise ScenarioError(found) from None
-    purpose = f"{place.purpose}/{parameters.name or number}"
     wrong: list[str] = []
-    chosen = []
-    for key in ("senders", "receivers"):
-        names: list[NodeName] | None = getattr(parameters, key)
-        chosen.append(selected(names, scenario, f"{path}.{key}", wrong))
+    senders = selected(parameters.senders, scenario, f"{path}.senders", wrong)
+    receivers = selected(parameters.receivers, scenario, f"{path}.receivers", wrong)
     if wrong:
         raise ScenarioError(wrong)
+    purpose = f"{context.purpose}/{key}/{parameters.name or counts[key]}"
+    here = ModelContext(context.links, context.draws, purpose, context.nodes, context.dt_s, context.arena)
     try:
-        here = ModelPlace(place.links, place.draws, purpose, place.nodes, place.dt_s, place.arena)
         model = kind(parameters, here)
     except ValueError as error:
         raise ScenarioError([f"{path}: {error}"]) from None
     if parameters.senders is None and parameters.receivers is None:
         return model
-    return Selected(model, *chosen)  # type: ignore[return-value]
-
-
-def selected(names: Sequence[NodeName] | None, scenario: Scenario, path: str, wrong: list[str]) -> Bools:
-    """Return (nodes,) who is named, everyone if `names` is None; add a line to `wrong` for each that does not exist."""
-    if names is None:
-        return np.ones(_nodes(scenario), dtype=np.bool_)
-    chosen = np.zeros(_nodes(scenario), dtype=np.bool_)
-    for index, name in enumerate(names):
-        try:
-            chosen[node_id(name, scenario)] = True
-        except ValueError as error:
-            wrong.append(f"{path}.{index}: {error}")
-    return chosen
-
-
-def node_id(name: NodeName, scenario: Scenario) -> int:
-    """Return the id of the node that `name` names. Raises ValueError, in one line, where there is none."""
-    count = scenario.robots.count
-    if name == "coordinator":
-        if scenario.coordinator is None:
-            raise ValueError("the scenario has no coordinator")
-        return count
-    if name == "base":
-        if scenario.base is None:
-            raise ValueError("the scenario has no base station")
-        return 0
-    if not 0 <= name < count:
-        raise ValueError(f"no such robot: ids are 0 to {count - 1}, got {name}")
-    return name
-
-
-def _nodes(scenario: Scenario) -> int:
-    return scenario.robots.count + (scenario.coordinator is not None)
+    return Selected(model, senders, receivers)
 
 
 def tables_of(table: ChannelTable, path: str) -> list[tuple[str, OpenTable]]:
@@ -212,3 +169,10 @@ def tables_of(table: ChannelTable, path: str) -> list[tuple[str, OpenTable]]:
     if table.loss:
         found.append((f"{path}.loss", OpenTable.model_validate({"kind": "loss", "fraction": table.loss})))
     return [*found, *((f"{path}.models.{index}", model) for index, model in enumerate(table.models))]
+
+
+def _warn(line: str) -> None:
+    """Write a warning to standard error, once in a process."""
+    if line not in _warned:
+        _warned[line] = None
+        sys.stderr.write(f"zwerm: warning: {line}\n")

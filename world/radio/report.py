@@ -1,4 +1,4 @@
-"""What a run says of its radio: the books in all, by channel and by link, messages by node, and the age of information."""
+"""Report of a radio: counts in total, by channel and by link, messages by node, and the age of information."""
 
 from typing import Any, Final
 
@@ -7,33 +7,33 @@ import numpy as np
 from zwerm.world.radio.medium import Medium
 from zwerm.world.scene import Floats
 
-# The books of more links than this are not in the JSON object: it would be all that is in it.
+# Largest number of links with counts of their own in the JSON object.
 LINKS_IN_JSON_MAX: Final = 10_000
 
 
 def radio_report(medium: Medium, tick: int) -> dict[str, Any]:
-    """Return the books ready for a JSON encoder: the summary over all channels, and each channel by itself."""
+    """Return the counts for a JSON encoder: over all channels, and of each channel."""
     return {**medium.summary(), "channels": {name: _channel(medium, name, tick) for name in medium.channels}}
 
 
 def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
     channel = medium.channels[name]
-    books = channel.accounts
-    age = books.ages_s(tick)
+    ledger = channel.ledger
+    age = ledger.ages_s(tick)
     links = None
     if channel.links.count <= LINKS_IN_JSON_MAX:
-        mean_s, peak_s = (_numbers(ages[books.order()]) for ages in books.link_ages_s(tick))
-        links = books.by_link() | {"age_mean_s": mean_s, "age_max_s": peak_s}
-    delivered = int(books.delivered().sum())
+        mean_s, peak_s = (_numbers(ages[ledger.order()]) for ages in ledger.link_ages_s(tick))
+        links = ledger.by_link() | {"age_mean_s": mean_s, "age_max_s": peak_s}
+    delivered = int(ledger.delivered().sum())
     return {
-        "sent": int(books.sent().sum()),
+        "sent": int(ledger.sent().sum()),
         "delivered": delivered,
-        "dropped": {cause: int(column.sum()) for cause, column in books.dropped().items() if column.any()},
-        "out_of_reach": int(books.out_of_reach().sum()),
-        "in_flight": int(books.in_flight().sum()),
-        "messages": books.node_messages.tolist(),
-        "message_bytes": books.node_bytes.tolist(),
-        "delay_mean_s": books.delay_ticks / delivered * channel.dt_s if delivered else None,
+        "dropped": {cause: int(column.sum()) for cause, column in ledger.dropped().items() if column.any()},
+        "out_of_reach": int(ledger.out_of_reach().sum()),
+        "in_flight": int(ledger.in_flight().sum()),
+        "messages": ledger.node_messages.tolist(),
+        "message_bytes": ledger.node_bytes.tolist(),
+        "delay_mean_s": ledger.delay_ticks / delivered * channel.dt_s if delivered else None,
         "age_mean_s": None if age is None else age[0],
         "age_max_s": None if age is None else age[1],
         "links": links,
@@ -41,34 +41,34 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
 
 
 def _numbers(values: Floats) -> list[float | None]:
-    """Return numbers as JSON has them: None in the place of nan."""
+    """Return numbers for JSON: None in place of nan."""
     return [None if value != value else value for value in values.tolist()]
 
 
 def messages(medium: Medium) -> int:
-    """Return how many transmissions there were, of all nodes over all channels; a broadcast is one."""
-    return sum(int(channel.accounts.node_messages.sum()) for channel in medium.channels.values())
+    """Return the number of transmissions of all nodes over all channels; a broadcast is one."""
+    return sum(int(channel.ledger.node_messages.sum()) for channel in medium.channels.values())
 
 
 def radio_metrics(medium: Medium, robots: int, tick: int) -> dict[str, float]:
-    """Return what may be measured of a radio, over all channels; nothing where nobody sent anything."""
-    books = [channel.accounts for channel in medium.channels.values()]
-    sent = sum(int(each.sent().sum()) for each in books)
+    """Return the metrics of a radio over all channels; empty if no node sent a packet."""
+    ledgers = [channel.ledger for channel in medium.channels.values()]
+    sent = sum(int(each.sent().sum()) for each in ledgers)
     if not sent:
         return {}
-    messages = np.sum([each.node_messages[:robots] for each in books], axis=0)
-    message_bytes = np.sum([each.node_bytes[:robots] for each in books], axis=0)
-    out_of_reach = sum(int(each.out_of_reach().sum()) for each in books)
+    messages = np.sum([each.node_messages[:robots] for each in ledgers], axis=0)
+    message_bytes = np.sum([each.node_bytes[:robots] for each in ledgers], axis=0)
+    out_of_reach = sum(int(each.out_of_reach().sum()) for each in ledgers)
     found = {"out_of_reach_fraction": out_of_reach / sent}
     if sent > out_of_reach:
-        found["delivered_fraction"] = sum(int(each.delivered().sum()) for each in books) / (sent - out_of_reach)
+        found["delivered_fraction"] = sum(int(each.delivered().sum()) for each in ledgers) / (sent - out_of_reach)
     found |= {
         "messages_per_robot_mean": float(messages.mean()),
         "messages_per_robot_max": float(messages.max()),
         "bytes_per_robot_mean": float(message_bytes.mean()),
         "bytes_per_robot_max": float(message_bytes.max()),
     }
-    ages = [age for age in (each.ages_s(tick) for each in books) if age is not None]
+    ages = [age for age in (each.ages_s(tick) for each in ledgers) if age is not None]
     if ages:
         found["information_age_mean_s"] = float(np.mean([mean for mean, _ in ages]))
         found["information_age_max_s"] = max(peak for _, peak in ages)

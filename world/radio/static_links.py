@@ -1,6 +1,6 @@
-"""What holds between two places while both ends of a link stand still: asked once, and again when one has moved.
+"""Values of links that depend on the positions of both nodes only: computed once, and again after one of them moved.
 
-It is the same in both directions: the line is always drawn from the smaller id to the larger.
+A value is the same in both directions: the line is always from the smaller id to the larger.
 """
 
 from collections.abc import Callable
@@ -13,28 +13,28 @@ from zwerm.world.scene import Floats, Ints, Scene
 
 
 class StaticLinkValues:
-    """A number between two places (k, 2) to (k, 2) [m], the same in both directions and at every time."""
+    """The value of each link, by `measure` of positions (k, 2) to (k, 2) [m], which must be constant over a run."""
 
     def __init__(self, links: Links, measure: Callable[[Floats, Floats], Floats]) -> None:
         self._links = links
         self._measure = measure
         self._value = links.numbers()
-        self._asked = links.integers(-1)  # for which moves of its two ends
+        self._computed = links.integers(-1)  # number of moves of both nodes at that time
         self._position: Floats = np.zeros((0, 2))
-        self._moves: Ints = np.zeros(0, dtype=np.int64)  # how often each node has been found elsewhere
+        self._moves: Ints = np.zeros(0, dtype=np.int64)  # number of moves of each node
 
     def between(self, scene: Scene, packets: Packets) -> Floats:
-        """Return (k,) the number between the ends of each packet's link."""
-        self._look(scene)
+        """Return (k,) the value of the link of each packet."""
+        self._count_moves(scene)
         link, sender, receiver = packets.link, packets.sender, packets.receiver
-        moves = self._moves[sender] + self._moves[receiver]  # neither ever decreases, so an equal sum is no move
-        stale = np.flatnonzero(self._asked.values[link] != moves)
+        moves = self._moves[sender] + self._moves[receiver]  # neither decreases, so an equal sum means no move
+        stale = np.flatnonzero(self._computed.values[link] != moves)
         if len(stale):
-            self._ask(scene, link[stale], sender[stale], receiver[stale], moves[stale])
+            self._compute(scene, link[stale], sender[stale], receiver[stale], moves[stale])
         value: Floats = self._value.values[link]
         return value
 
-    def _look(self, scene: Scene) -> None:
+    def _count_moves(self, scene: Scene) -> None:
         if len(self._position) != len(scene.position):
             self._position = np.full(scene.position.shape, np.nan)
             self._moves = np.zeros(len(scene.position), dtype=np.int64)
@@ -42,19 +42,19 @@ class StaticLinkValues:
             self._moves += (scene.position != self._position).any(axis=1)
             self._position = scene.position
 
-    def _ask(self, scene: Scene, link: Ints, sender: Ints, receiver: Ints, moves: Ints) -> None:
-        """Measure anew, each pair once; the other direction of a pair takes what has been found for it, if it has."""
-        value, asked = self._value.values, self._asked.values
+    def _compute(self, scene: Scene, link: Ints, sender: Ints, receiver: Ints, moves: Ints) -> None:
+        """Compute each pair once: the second direction of a pair reuses the value of the first."""
+        value, computed = self._value.values, self._computed.values
         upward = sender < receiver
         self._store(scene, link[upward], sender[upward], receiver[upward], moves[upward])
         link, sender, receiver, moves = link[~upward], sender[~upward], receiver[~upward], moves[~upward]
         other = self._links.find(receiver, sender)
-        known = (other >= 0) & (asked[other] == moves)
+        known = (other >= 0) & (computed[other] == moves)
         value[link[known]] = value[other[known]]
-        asked[link[known]] = moves[known]
+        computed[link[known]] = moves[known]
         self._store(scene, link[~known], receiver[~known], sender[~known], moves[~known])
 
     def _store(self, scene: Scene, link: Ints, start: Ints, end: Ints, moves: Ints) -> None:
         if len(link):
             self._value.values[link] = self._measure(scene.position[start], scene.position[end])
-            self._asked.values[link] = moves
+            self._computed.values[link] = moves

@@ -18,10 +18,13 @@ class Extra(Sensor):
     Parameters: ClassVar[type[Table]] = Table
 
     def __init__(self, parameters: Sequence[Sensor], surroundings: object = None) -> None:
-        self._sensors = tuple(parameters)
+        self.parts = tuple(parameters)
 
     def read(self, scene: Scene, robots: Ints) -> list[dict[str, tuple[float, ...]]]:
         """Return every sensor's reading for each of `robots`."""
-        names = [sensor.field for sensor in self._sensors]
-        columns = [sensor.read(scene, robots) for sensor in self._sensors]
+        return self.joined([sensor.read(scene, robots) for sensor in self.parts])
+
+    def joined(self, columns: Sequence[Sequence[tuple[float, ...]]]) -> list[dict[str, tuple[float, ...]]]:
+        """Return one dictionary for each robot from a column of readings for each of `parts`."""
+        names = [sensor.field for sensor in self.parts]
         return [dict(zip(names, readings, strict=True)) for readings in zip(*columns, strict=True)]

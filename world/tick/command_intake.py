@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from typing import Final
 
 from zwerm.errors import ProtocolError
-from zwerm.wire.messages import BodyVelocity, Command, Failure, WheelSpeeds, open_answer
+from zwerm.wire.messages import BodyVelocity, Command, Failure, WheelSpeeds, open_answer, traced_bytes
 from zwerm.world.radio.medium import Medium
 
 NO_ANSWER: Final = b""
@@ -34,6 +34,7 @@ class CommandIntake:
         self._nodes: Sequence[int] = ()
         self._owing: dict[int, None] = {}
         self._heard: dict[int, tuple[bytes, Command | Failure]] = {}
+        self._traced: dict[int, bytes] = {}  # what the trace covers of commands with telemetry
         self._late: list[tuple[int, Command | Failure]] = []
         self._newest: dict[int, int] = {}  # the tick that a node answered last, where answers may be late
 
@@ -42,6 +43,7 @@ class CommandIntake:
         self._tick, self._nodes = tick, nodes
         self._owing = dict.fromkeys(nodes)
         self._heard = {}
+        self._traced = {}
 
     def hear(self, node: int, payload: bytes) -> Command | Failure:
         """Return what a node says, once it has been taken note of.
@@ -67,6 +69,8 @@ class CommandIntake:
         else:
             self._heard[node] = payload, answer
             del self._owing[node]
+            if type(answer) is Command and (answer.telemetry or answer.snapshot):
+                self._traced[node] = traced_bytes(answer, payload)
         if self.late_allowed:
             self._newest[node] = answer.tick
         return answer
@@ -75,14 +79,20 @@ class CommandIntake:
         """Return the nodes that were asked and have not been heard, ascending."""
         return list(self._owing)
 
-    def close(self) -> tuple[list[bytes], list[tuple[int, Command | Failure]]]:
-        """End the tick: return the bytes that each node that was asked said, in order, and all answers, late ones first."""
+    def close(self) -> tuple[list[bytes], list[bytes], list[tuple[int, Command | Failure]]]:
+        """End the tick: return the bytes of each node that was asked, in order; what the trace covers of them; the answers.
+
+        Late answers come first. The second list is the first, less telemetry and snapshots.
+        """
         heard = self._heard
         payloads = [heard[node][0] if node in heard else NO_ANSWER for node in self._nodes]
+        traced = payloads
+        if self._traced:
+            traced = [self._traced.get(node, payload) for node, payload in zip(self._nodes, payloads, strict=True)]
         answers = self._late + [(node, heard[node][1]) for node in self._nodes if node in heard]
         self._late = []
         self.ask((), self._tick + 1)
-        return payloads, answers
+        return payloads, traced, answers
 
     def _check_late(self, node: int, tick: int) -> None:
         """Raise ProtocolError, unless late answers are allowed and this one comes in order."""

@@ -1,20 +1,20 @@
-"""What a person sees of a run on the terminal: progress bars, and tables at the end."""
+"""Progress bars of a run, and the tables printed at its end."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from zwerm.run.result import RunResult
-from zwerm.scenario.tables import Scenario
+if TYPE_CHECKING:  # progress needs neither
+    from zwerm.run.result import RunResult
 
 
 class RunProgress:
-    """A run's progress on `console`: robots that have joined, then ticks. A quiet one shows nothing."""
+    """Progress of a run on `console`: robots joined, then ticks done. Shows nothing if `quiet`."""
 
     def __init__(self, console: Console, name: str, quiet: bool = False) -> None:
         self._name = name
@@ -47,11 +47,11 @@ class RunProgress:
         self._show(self._name, "ticks", tick, ticks)
 
     def covered(self, fraction: float, robots: int) -> None:
-        """Show how much of the arena is in sight, and of how many robots."""
+        """Show the fraction of the arena in sight of robots, and the number of robots."""
         self._show(f"{self._name}: in sight", f"% of the arena, of {robots} robots", round(100.0 * fraction, 1), 100)
 
     def shrunk(self, tried: int, faults: int) -> None:
-        """Show how many runs were tried, and how many faults the smallest failing schedule has."""
+        """Show the number of runs tried, and the number of faults in the smallest failing schedule."""
         self._show(f"{self._name}: shrinking", f"runs, {faults} faults still fail", tried, None)
 
     def _show(self, title: str, unit: str, done: float, total: int | None) -> None:
@@ -61,20 +61,8 @@ class RunProgress:
         self._progress.update(task, completed=done, unit=unit)
 
 
-def print_scenarios(console: Console, scenarios: Sequence[Scenario]) -> None:
-    """Print the built-in scenarios as a table."""
-    table = Table(box=None, padding=(0, 2, 0, 0), title_justify="left")
-    table.add_column("scenario", style="bold", no_wrap=True)
-    table.add_column("robots", justify="right")
-    table.add_column("duration", justify="right")
-    table.add_column("what it is")
-    for each in scenarios:
-        table.add_row(each.name, str(each.robots.count), f"{each.time.duration_s:g} s", each.summary)
-    console.print(table)
-
-
-def print_result(console: Console, result: RunResult, drawn: Sequence[Path]) -> None:
-    """Print what became of a run, its metrics, its packets, and where its pictures are."""
+def print_result(console: Console, result: "RunResult", drawn: Sequence[Path]) -> None:
+    """Print the outcome of a run, its metrics, its packet counts, and the paths of its pictures."""
     table = Table(title=result.title, title_justify="left", show_header=False, box=None, padding=(0, 2, 0, 0))
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")

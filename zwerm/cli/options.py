@@ -1,4 +1,4 @@
-"""Options that several commands of the command line share, each with its help."""
+"""Arguments and options that several commands share, with their help texts."""
 
 from pathlib import Path
 from typing import Annotated, Optional
@@ -31,7 +31,9 @@ Animation = Annotated[
 Record = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option(
-        "--record", metavar="FILE.mcap", help="Record every message and the truth, for Foxglove and the like."
+        "--record",
+        metavar="FILE.mcap",
+        help="Record every message and the true state, for Foxglove and similar viewers.",
     ),
 ]
 RealTime = Annotated[
@@ -44,6 +46,6 @@ RadioTable = Annotated[
         "--radio-table",
         min=0,
         metavar="LINKS",
-        help="Also print the radio's books: of the LINKS that lost most, and of nodes.",
+        help="Also print the radio's ledger: the LINKS links with most losses, and the nodes.",
     ),
 ]

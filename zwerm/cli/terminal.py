@@ -1,34 +1,35 @@
-"""What all commands share: where they print, how they print mistakes and JSON, and with which status they exit."""
+"""The consoles, the exit codes, and how commands print errors and JSON."""
 
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final
 
-import msgspec
 import typer
 from rich.console import Console
 
 from zwerm.errors import ZwermError
 
-EXIT_FAILED, EXIT_MISTAKE, EXIT_INTERRUPTED = 1, 2, 130
+EXIT_FAILED, EXIT_USER_ERROR, EXIT_INTERRUPTED = 1, 2, 130
 
 err: Final = Console(stderr=True)
 out: Final = Console()
 
 
 @contextmanager
-def mistakes_in_one_line() -> Iterator[None]:
-    """Print a user's mistakes as they are, one line each, and exit with status 2."""
+def errors_as_lines() -> Iterator[None]:
+    """Print each line of a ZwermError after `zwerm: `, and exit with status 2."""
     try:
         yield
     except ZwermError as error:
         for line in str(error).splitlines():
             err.print(f"zwerm: {line}", style="red", markup=False, highlight=False, soft_wrap=True)
-        raise typer.Exit(EXIT_MISTAKE) from None
+        raise typer.Exit(EXIT_USER_ERROR) from None
 
 
-def print_json(found: Mapping[str, Any]) -> None:
-    """Print one JSON object on a line of its own on standard output; what is not a number is null."""
-    sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
+def print_json(content: Mapping[str, Any]) -> None:
+    """Print one JSON object on one line of standard output. NaN and infinity become null."""
+    import msgspec
+
+    sys.stdout.write(msgspec.json.encode(content).decode() + "\n")
     sys.stdout.flush()

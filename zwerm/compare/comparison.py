@@ -1,16 +1,16 @@
-"""Variants of a scenario compared pair by pair: with the same seed, and so the same luck, at every point of the sweeps.
+"""Paired comparison of a scenario's variants: same seeds and same random draws at each point of the sweeps.
 
-A comparison is a study whose variants are its point. The first variant is what the others are compared with: for each seed
-that both have run, the difference of a metric; over all such seeds, its mean and its 95 % interval (Student's, of the
-differences). A run that failed counts with what it measured: to leave it out would flatter who fails where it is hard.
-What a run never came to (a time to coverage that it did not reach) has no value, and its pair none.
+A comparison is a study with at least two variants. The first variant is the reference. For each seed that both variants ran,
+the comparison takes the difference of a metric; over all such seeds, its mean and 95 % interval (Student's t of the
+differences). A failed run counts with its measured values: leaving it out would favour a variant that fails in hard cases.
+A metric without a value (a time to a coverage that a run did not reach) gives no difference for that seed.
 """
 
 import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -19,12 +19,12 @@ from zwerm.errors import ScenarioError
 from zwerm.maths.statistics import Sample, condense
 from zwerm.scenario.load import built_in
 from zwerm.study.plan import Point
+from zwerm.study.study_tables import Setting, Study, VariantTable, check_study
 from zwerm.study.summary import Results
-from zwerm.study.tables import Setting, Study, VariantTable, check_study
 from zwerm.study.trial import Row
 from zwerm.world.drivers.lockstep import FAILED
 
-# What is compared unless somebody says what: of these, what any run measured and not all as zero.
+# Default metrics to compare: those of them that a run measured, unless all values are zero.
 METRICS: Final = (
     *("coverage_fraction", "cell_coverage_fraction", "area_coverage_fraction", "coverage_cost", "mean_error_m"),
     *("robots_deployed", "deployment_cycles", "robots_done_fraction"),
@@ -47,12 +47,12 @@ def make_comparison(
 ) -> Study:
     """Return the study that compares `variants` of a scenario over `sweeps`, in this order.
 
-    `base` is a study to take variants, grid, settings, seeds and metrics from, where they are not given here. Raises
-    ScenarioError with every mistake.
+    Variants, grid, settings, seeds and metrics that are not given come from the study `base`. Raises ScenarioError with
+    every error.
     """
     tables = base.table.model_dump(exclude={"paper"}, exclude_unset=True) if base else {}
     place = base.path if base else Path("compare")
-    # Paths in a study start at its folder; that of the scenario is the user's.
+    # Paths in a study start at its folder; the scenario's path starts at the current folder.
     own = scenario if base is None or scenario in built_in() else str(Path(scenario).absolute())
     tables |= {"name": _name(scenario), "scenario": own, "picture": None}
     tables.setdefault("seeds", SEEDS)
@@ -61,15 +61,16 @@ def make_comparison(
     given = {each.name: each for each in sweeps}
     grid = {name: each.values for name, each in given.items()}
     tables["grid"] = grid | {axis: values for axis, values in tables.get("grid", {}).items() if axis not in grid}
-    # A sweep over words that the base has levels for is one over those levels.
+    # If the base study has levels for all values of a sweep, the sweep is over these levels.
     levels = {
         axis: each
         for axis, each in tables.get("levels", {}).items()
         if axis not in given or (not given[axis].levels and all(str(value) in each for value in given[axis].values))
     }
     tables["levels"] = levels | {name: each.levels for name, each in given.items() if each.levels}
+    chosen = bool(metrics) or "metrics" in tables
     tables["metrics"] = list(metrics or tables.get("metrics", METRICS))
-    study = check_study(tables, place)
+    study = replace(check_study(tables, place), lenient=not chosen)
     if len(study.variants) < 2:
         raise ScenarioError([f"{place}: variants: expected 2 at least to compare, got {len(study.table.variants)}"])
     return study
@@ -88,7 +89,7 @@ class SweepPoint:
 
 
 class Comparison:
-    """What a comparison's trials have come to so far."""
+    """The results of a comparison so far."""
 
     def __init__(self, results: Results) -> None:
         self.results = results
@@ -99,40 +100,40 @@ class Comparison:
             by_settings.setdefault(tuple(point.settings.items()), []).append(point)
         self.places = [SweepPoint(dict(settings), tuple(points)) for settings, points in by_settings.items()]
         rows = [row for point in results.points for row in results.every_row(point)]
-        told = {name for name in self.study.table.metrics if any(_measured(row, name) for row in rows)}
-        self.metrics = [name for name in self.study.table.metrics if name in told]
+        measured = {name for name in self.study.table.metrics if any(_measured(row, name) for row in rows)}
+        self.metrics = [name for name in self.study.table.metrics if name in measured]
         if self.study.table.metrics == list(METRICS):
             self.metrics = [name for name in self.metrics if any(row.get(name) for row in rows)]
-            # In a deployment the base or the coordinator says that all is done, and not every robot for itself.
+            # In a deployment the base or the coordinator ends the run, and robots do not report that they are done.
             if "robots_deployed" in self.metrics and "robots_done_fraction" in self.metrics:
                 self.metrics.remove("robots_done_fraction")
 
     def values(self, point: Point, metric: str) -> dict[int, float]:
-        """Return a metric of a point's runs by seed, of those that have one; every run is `completed` or not."""
+        """Return a metric of a point's runs by seed, if measured. The metric `completed` is 1 or 0 for each run."""
         if metric == COMPLETED:
             return {row["seed"]: float(row["outcome"] == COMPLETED) for row in self.results.every_row(point)}
         return {row["seed"]: row[metric] for row in self.results.every_row(point) if _measured(row, metric)}
 
     def sample(self, point: Point, metric: str) -> Sample:
-        """Return a metric of a point, condensed."""
+        """Return the statistics of a metric at a point."""
         return condense(list(self.values(point, metric).values()))
 
     def difference(self, place: SweepPoint, point: Point, metric: str) -> Sample:
-        """Return what a metric of a point has over the first variant's there, seed by seed, condensed."""
-        ours, theirs = self.values(point, metric), self.values(place.points[0], metric)
-        return condense([_less(ours[seed], theirs[seed]) for seed in sorted(ours) if seed in theirs])
+        """Return the statistics of a metric minus the first variant's, seed by seed, at a point."""
+        values, reference = self.values(point, metric), self.values(place.points[0], metric)
+        return condense([_difference(values[seed], reference[seed]) for seed in sorted(values) if seed in reference])
 
     def outcomes(self, point: Point) -> Counter[str]:
-        """Return how a point's runs ended, failed ones by their reason."""
+        """Return the number of a point's runs by outcome; failed runs by reason."""
         return Counter(_ending(row) for row in self.results.every_row(point))
 
     def seeds(self, point: Point) -> list[int]:
-        """Return the seeds that a point was run with."""
+        """Return the seeds of a point's runs."""
         return [row["seed"] for row in self.results.every_row(point)]
 
 
-def _less(one: float, other: float) -> float:
-    """Return one number less another; nothing where they differ by no more than the last digits of a computation."""
+def _difference(one: float, other: float) -> float:
+    """Return `one - other`, or 0 if they differ by rounding errors only."""
     return 0.0 if math.isclose(one, other, rel_tol=1e-9) else one - other
 
 
@@ -141,7 +142,7 @@ def _measured(row: Row, metric: str) -> bool:
 
 
 def _ending(row: Row) -> str:
-    """Return how a run ended, in words that are the same for runs that failed alike."""
+    """Return the outcome of a run, with a failure's reason without numbers, so that equal failures are counted together."""
     outcome, reason = str(row["outcome"]), str(row.get("reason", ""))
     if outcome != FAILED:
         return outcome

@@ -11,7 +11,7 @@ from zwerm.study.study_runner import StudyResult
 
 
 def comparison_json(result: StudyResult, comparison: Comparison, drawn: Sequence[Path]) -> dict[str, Any]:
-    """Return what a comparison has come to: every variant at every point, and its difference from the first."""
+    """Return the result of a comparison: each variant at each point, and its difference from the first."""
     return study_head(result, drawn) | {
         "variants": comparison.variants,
         "metrics": comparison.metrics,

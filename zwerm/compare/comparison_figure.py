@@ -1,7 +1,7 @@
-"""A comparison as a figure for a paper: each metric over the first sweep, every variant with its 95 % interval.
+"""A comparison as a figure: each metric over the first sweep, each variant with its 95 % interval.
 
-Below each panel of means is one of the paired differences from the first variant. Markers are hollow where not every run
-came to a value. With more sweeps than one there is a figure for every setting of the others.
+A panel of paired differences from the first variant is below each panel of means. Markers are hollow if not all runs have a
+value. With several sweeps there is one figure for each combination of the other sweeps' values.
 """
 
 import math
@@ -16,15 +16,15 @@ from zwerm.compare.comparison import COMPLETED, Comparison, SweepPoint
 from zwerm.errors import PictureError
 from zwerm.maths.statistics import Sample
 from zwerm.study.plan import Point
-from zwerm.study.tables import Setting
+from zwerm.study.study_tables import Setting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's colours (2008), and a marker for each, so that the figure can be told apart in grey.
+# Okabe and Ito's colours (2008), with a marker each, so that variants differ in grey too.
 STYLES: Final = (("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "^"), ("#CC79A7", "D"), ("#E69F00", "v"))
-# Unless somebody says what to compare, the figure shows the first of each of these that was measured.
+# Default metrics of the figure: from each row the first that was measured.
 SHOWN: Final = (
     ("coverage_fraction", "cell_coverage_fraction", "area_coverage_fraction", "mean_error_m", "robots_done_fraction"),
     ("robots_deployed", "coverage_cost"),
@@ -34,7 +34,7 @@ SHOWN: Final = (
 )
 UNITS: Final = {"_m_s": " [m/s]", "_m2": " [m²]", "_m": " [m]", "_s": " [s]", "_fraction": " [fraction]"}
 SUFFIXES: Final = (".png", ".pdf", ".svg")
-WORDS: Final = {COMPLETED: "runs completed [fraction]", "sim_s": "duration of the run [s]"}
+LABELS: Final = {COMPLETED: "runs completed [fraction]", "sim_s": "duration of the run [s]"}
 COLUMNS: Final = 3
 PANEL_IN: Final = (3.5, 3.6)
 HEAD_IN: Final = 0.95
@@ -46,7 +46,7 @@ DPI: Final = 200
 def check_figure(path: Path) -> Path:
     """Return the path of a figure.
 
-    Raises PictureError where it is of no kind that can be drawn.
+    Raises PictureError if its suffix is not supported.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise PictureError(f"{path}: expected a file that ends in {' or '.join(SUFFIXES)}")
@@ -56,7 +56,7 @@ def check_figure(path: Path) -> Path:
 def draw_comparison(path: Path, comparison: Comparison, metrics: Sequence[str] = ()) -> list[Path]:
     """Draw the comparison at `path` (.png, .pdf or .svg), and return the paths of all figures.
 
-    `metrics` are those to show, by default a choice of what was measured.
+    `metrics` are the metrics to show, by default a choice of the measured ones.
     """
     by_rest: dict[tuple[tuple[str, Setting], ...], list[SweepPoint]] = {}
     for place in comparison.places:
@@ -65,10 +65,10 @@ def draw_comparison(path: Path, comparison: Comparison, metrics: Sequence[str] =
     path.parent.mkdir(parents=True, exist_ok=True)
     drawn = []
     for rest, places in by_rest.items():
-        words = ", ".join(f"{axis} = {value}" for axis, value in rest)
+        subtitle = ", ".join(f"{axis} = {value}" for axis, value in rest)
         suffix = re.sub(r"[^A-Za-z0-9.=_-]+", "-", "".join(f"-{axis}={value}" for axis, value in rest))[:100]
         drawn.append(path.with_name(f"{path.stem}{suffix}{path.suffix}"))
-        _draw(comparison, _in_order(places), [*chosen, COMPLETED], words).savefig(drawn[-1], dpi=DPI)
+        _draw(comparison, _in_order(places), [*chosen, COMPLETED], subtitle).savefig(drawn[-1], dpi=DPI)
     return drawn
 
 
@@ -77,7 +77,7 @@ def _choice(comparison: Comparison) -> list[str]:
     return [each for each in found if each is not None] or comparison.metrics[:COLUMNS]
 
 
-def _draw(comparison: Comparison, places: Sequence[SweepPoint], metrics: Sequence[str], words: str) -> "Figure":
+def _draw(comparison: Comparison, places: Sequence[SweepPoint], metrics: Sequence[str], subtitle: str) -> "Figure":
     from matplotlib.figure import Figure
 
     columns = min(COLUMNS, len(metrics))
@@ -93,13 +93,13 @@ def _draw(comparison: Comparison, places: Sequence[SweepPoint], metrics: Sequenc
     handles, labels = above.get_legend_handles_labels()
     top = 1.0 - 0.12 / size[1]
     scenario = comparison.places[0].points[0].scenario
-    title = ": ".join(filter(None, [scenario.name, words]))
+    title = ": ".join(filter(None, [scenario.name, subtitle]))
     figure.text(0.01, top, title, va="top", fontsize=12, fontweight="bold")
     seeds = sorted({seed for place in places for point in place.points for seed in comparison.seeds(point)})
     about = f"{len(seeds)} seeds a point" if len(seeds) > 1 else "one seed a point"
     explained = (
         f"{about}; means with their 95 % intervals; below, the difference from {comparison.variants[0]}, paired by seed. "
-        "A run that failed counts with what it came to."
+        "A failed run counts with its measured values."
     )
     figure.text(0.01, top - 0.27 / size[1], explained, va="top", fontsize=9)
     figure.legend(
@@ -109,7 +109,7 @@ def _draw(comparison: Comparison, places: Sequence[SweepPoint], metrics: Sequenc
         figure.text(
             0.01,
             0.08 / size[1],
-            "Hollow or not there: not every run, or none, came to a value.",
+            "Hollow or missing: not every run, or none, has a value.",
             va="bottom",
             fontsize=9,
         )
@@ -130,18 +130,18 @@ def _draw_metric(
             "marker": marker,
             "markersize": 4.5,
             "linewidth": 1.3,
-            # Nothing lies between two words.
+            # No line between values that are not numbers.
             "linestyle": "none" if ticks else "solid",
             "capsize": 2.5,
             "label": variant,
         }
         shifted = x + DODGE * step * (number - (count - 1) / 2.0)
         points = [place.points[number] for place in places]
-        whole = [_whole(comparison, point, metric) for point in points]
+        whole = [_all_measured(comparison, point, metric) for point in points]
         _bars(above, shifted, [comparison.sample(point, metric) for point in points], whole, style)
         if number:
             differences = [comparison.difference(place, place.points[number], metric) for place in places]
-            both = [_whole(comparison, place.points[0], metric) for place in places]
+            both = [_all_measured(comparison, place.points[0], metric) for place in places]
             _bars(below, shifted, differences, [one and other for one, other in zip(whole, both, strict=True)], style)
     above.set_title(label(metric), fontsize=10)
     if metric.endswith("_fraction") or metric == COMPLETED:
@@ -171,7 +171,7 @@ def _bars(axes: "Axes", x: Any, samples: Sequence[Sample], whole: Sequence[bool]
 
 
 def _axis(places: Sequence[SweepPoint]) -> tuple[Any, list[str]]:
-    """Return where the places lie on the first sweep, and their names where it is not one of numbers."""
+    """Return the x coordinates of the places on the first sweep, and tick labels if it is not numeric."""
     values = [_first(place) for place in places]
     if _numeric(values):
         return np.array(values, dtype=np.float64), []
@@ -179,7 +179,7 @@ def _axis(places: Sequence[SweepPoint]) -> tuple[Any, list[str]]:
 
 
 def _in_order(places: Sequence[SweepPoint]) -> list[SweepPoint]:
-    """Return the places as a line goes through them: numbers ascend, whatever order they were given in."""
+    """Return the places in ascending order if the first sweep is numeric, else in the order given."""
     return sorted(places, key=_first) if _numeric([_first(place) for place in places]) else list(places)
 
 
@@ -191,25 +191,25 @@ def _numeric(values: Sequence[Setting]) -> bool:
     return all(isinstance(each, int | float) and not isinstance(each, bool) for each in values)
 
 
-def _whole(comparison: Comparison, point: Point, metric: str) -> bool:
-    """Tell whether every run of a point came to a value."""
+def _all_measured(comparison: Comparison, point: Point, metric: str) -> bool:
+    """Return whether every run of a point has a value."""
     return len(comparison.values(point, metric)) == len(comparison.seeds(point))
 
 
 def _some_missing(comparison: Comparison, places: Sequence[SweepPoint], metrics: Sequence[str]) -> bool:
     points = [point for place in places for point in place.points]
-    return any(not _whole(comparison, point, metric) for point in points for metric in metrics)
+    return any(not _all_measured(comparison, point, metric) for point in points for metric in metrics)
 
 
 def axis_label(axis: str) -> str:
-    """Return a sweep as words where it is of independent loss, on one channel or several alike."""
+    """Return the axis label of a sweep: its paths, or `messages lost` if all paths are a loss."""
     return "messages lost [fraction]" if all(path.endswith(".loss") for path in axis.split("+")) else axis
 
 
 def label(metric: str) -> str:
-    """Return a metric as words, with its unit: `messages_per_robot_mean` is `messages per robot`."""
-    if metric in WORDS:
-        return WORDS[metric]
+    """Return the label of a metric with its unit: `messages_per_robot_mean` is `messages per robot`."""
+    if metric in LABELS:
+        return LABELS[metric]
     unit = next((suffix for suffix in UNITS if metric.endswith(suffix)), "")
-    words = metric.removesuffix(unit).removesuffix("_mean").replace("_percent_", " % ").replace("_", " ")
-    return words + UNITS.get(unit, "")
+    name = metric.removesuffix(unit).removesuffix("_mean").replace("_percent_", " % ").replace("_", " ")
+    return name + UNITS.get(unit, "")

@@ -1,4 +1,4 @@
-"""What a person sees of a comparison on the terminal: how its runs ended, and a table for each metric."""
+"""Tables of a comparison on the terminal: outcomes of the runs, and one table for each metric."""
 
 import math
 from collections import Counter
@@ -12,19 +12,19 @@ from zwerm.compare.comparison import METRICS, Comparison, SweepPoint
 from zwerm.maths.statistics import Sample
 
 NOTHING: Final = "-"
-# Between columns; and what is wider in the column of an axis is folded.
+# Characters between columns, and the width above which a cell of an axis is folded.
 GAP: Final = 2
 AXIS_WIDTH_MAX: Final = 24
-# Wide enough for every word of how a run ended.
+# Width of the longest outcome.
 ENDING_WIDTH_MIN: Final = 12
 
 
 def print_comparison(console: Console, comparison: Comparison) -> None:
-    """Print how runs ended, then for each metric its means and the differences from the first variant, pair by pair."""
+    """Print the outcomes, then for each metric its means and its paired differences from the first variant."""
     first, *others = comparison.variants
     against = f"{', '.join(others)} against {first}"
     console.print(f"{comparison.study.name}: {against}", style="bold", markup=False, highlight=False)
-    console.print("± is half the 95 % interval, of a mean or of the paired difference; * where that leaves out zero")
+    console.print("± is half the 95 % interval of a mean or of the paired difference; * if it excludes zero")
     console.print()
     for table in _endings(comparison, console.width):
         console.print(table)
@@ -40,11 +40,11 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
 
 
 def _endings(comparison: Comparison, width: int) -> list[Table]:
-    """Return how runs ended: one table, or, where variants' names are wider than the terminal, several of the same rows."""
+    """Return the table of outcomes, split by columns if it is wider than the terminal."""
     tables: list[Table] = []
     widths = [max(len(variant), ENDING_WIDTH_MIN) + GAP for variant in comparison.variants]
     for group in _groups(widths, _room(comparison, width)):
-        table = _table("" if tables else "how runs ended")
+        table = _table("" if tables else "outcomes")
         _add_axes(table, comparison)
         for k in group:
             table.add_column(comparison.variants[k], overflow="fold", min_width=widths[k] - GAP)
@@ -60,7 +60,7 @@ def _count(outcomes: Counter[str]) -> str:
 
 
 class _Columns(NamedTuple):
-    """Columns that stand beside each other, and their cells by row."""
+    """Columns that stay together, and their cells by row."""
 
     headers: tuple[str, ...]
     rows: list[tuple[str, ...]]
@@ -72,7 +72,7 @@ class _Columns(NamedTuple):
 
 
 def _metric(comparison: Comparison, metric: str, width: int) -> list[Table]:
-    """Return the tables of a metric: one, or, where that is wider than the terminal, several of the same rows."""
+    """Return the table of a metric, split by columns if it is wider than the terminal."""
     room = _room(comparison, width)
     columns = _columns(comparison, metric, " - ")
     if sum(each.width for each in columns) > room:
@@ -90,28 +90,30 @@ def _metric(comparison: Comparison, metric: str, width: int) -> list[Table]:
 
 
 def _columns(comparison: Comparison, metric: str, less: str) -> list[_Columns]:
-    """Return each variant's means, and each other one's differences from the first, under its name `less` the first's."""
+    """Return the columns of means and of differences from the first variant; `less` joins the names in a header."""
     places, (first, *others) = comparison.places, comparison.variants
     means = [
         _Columns((variant,), [(shown(comparison.sample(place.points[k], metric)),) for place in places])
         for k, variant in enumerate(comparison.variants)
     ]
     differences = [
-        _Columns((f"{variant}{less}{first}", "pairs"), [_beside(comparison, place, k, metric) for place in places])
+        _Columns(
+            (f"{variant}{less}{first}", "pairs"), [_difference_cells(comparison, place, k, metric) for place in places]
+        )
         for k, variant in enumerate(others, 1)
     ]
     return [*means, *differences]
 
 
-def _beside(comparison: Comparison, place: SweepPoint, k: int, metric: str) -> tuple[str, str]:
-    """Return what the k-th variant has over the first at a place, and of how many pairs."""
+def _difference_cells(comparison: Comparison, place: SweepPoint, k: int, metric: str) -> tuple[str, str]:
+    """Return the k-th variant's difference from the first at a place, and the number of pairs."""
     difference = comparison.difference(place, place.points[k], metric)
     clear = abs(difference.mean) > difference.half_width
     return shown(difference, signed=True) + (" *" if clear else "  "), str(difference.n)
 
 
 def _groups(widths: Sequence[int], room: int) -> list[list[int]]:
-    """Return the indices of `widths`, in groups as long as there is room for; one alone may be too wide."""
+    """Return the indices of `widths` in groups that fit into `room`; a single column may be wider."""
     groups: list[list[int]] = [[]]
     for k, width in enumerate(widths):
         if groups[-1] and sum(widths[each] for each in groups[-1]) + width > room:
@@ -121,7 +123,7 @@ def _groups(widths: Sequence[int], room: int) -> list[list[int]]:
 
 
 def _room(comparison: Comparison, width: int) -> int:
-    """Return how much of a width the columns of axes leave."""
+    """Return the part of `width` that the columns of axes leave free."""
     return width - sum(_axis_width(comparison, number) + GAP for number in range(len(comparison.study.table.grid)))
 
 
@@ -130,7 +132,7 @@ def _table(title: str) -> Table:
 
 
 def _add_axes(table: Table, comparison: Comparison) -> None:
-    """Add a column for each axis, as wide as its values: only what is wider than any should be is folded."""
+    """Add a column for each axis, as wide as its values; wider values than AXIS_WIDTH_MAX are folded."""
     for number, axis in enumerate(comparison.study.table.grid):
         table.add_column(_broken(axis), overflow="fold", width=_axis_width(comparison, number))
 
@@ -142,13 +144,13 @@ def _axis_width(comparison: Comparison, number: int) -> int:
 
 
 def _broken(axis: str) -> str:
-    """Return the name of an axis on several lines, broken where paths are joined, and a long one at its dots."""
+    """Return the name of an axis, broken before each `+`, and after dots if it is long."""
     lines = axis.replace("+", "\n+").splitlines()
     return "\n".join(each if len(each) <= AXIS_WIDTH_MAX else each.replace(".", ".\n") for each in lines)
 
 
 def shown(sample: Sample, signed: bool = False) -> str:
-    """Return a mean and half its interval, to the same digit: four of the larger's."""
+    """Return a mean and half its interval, both with the decimals of four digits of the larger."""
     if sample.n == 0:
         return NOTHING
     size = max(abs(sample.mean), 0.0 if math.isnan(sample.half_width) else sample.half_width)

@@ -1,8 +1,8 @@
-"""What a comparison is told on the command line: variants and sweeps, each one argument.
+"""Arguments of a comparison on the command line: variants and sweeps.
 
-A variant is `NAME` or `NAME:PATH=VALUE,PATH=VALUE`. A sweep is `PATH=VALUE,VALUE`, where `A,B,...,Z` counts from A to Z in
-steps of B - A and `PATH+PATH` sets both alike; a value may be a whole table or array, led by a name if it has one:
-`radio.models=none:[],bursts:[{kind="bursts", loss_fraction=0.3}]`.
+A variant is `NAME` or `NAME:PATH=VALUE,PATH=VALUE`. A sweep is `PATH=VALUE,VALUE`: `A,B,...,Z` counts from A to Z in steps of
+B - A, and `PATH+PATH` sets both paths. A value can be a table or an array, with a name before it or without:
+`radio.models=none:[],bursts:[{kind="gilbert_elliott", loss_fraction=0.3}]`.
 """
 
 import re
@@ -12,7 +12,7 @@ from decimal import Decimal, InvalidOperation
 from typing import Any, Final, NamedTuple
 
 from zwerm.errors import ScenarioError
-from zwerm.study.tables import Setting, VariantTable
+from zwerm.study.study_tables import Setting, VariantTable
 
 _OPENING, _CLOSING = "[{", "]}"
 _NAMED: Final = re.compile(r"\s*([A-Za-z0-9][A-Za-z0-9 ._-]*):\s*(?=[\[{])")
@@ -21,7 +21,7 @@ _STEPS_MAX: Final = 1_000
 
 
 class Sweep(NamedTuple):
-    """One axis: its name is the path that it sets, its values are settings or the names of `levels`."""
+    """One axis: its name is the path that it sets; its values are settings, or names of `levels`."""
 
     name: str
     values: list[Setting]
@@ -31,7 +31,7 @@ class Sweep(NamedTuple):
 def parse_variant(text: str) -> VariantTable:
     """Return the variant that an argument describes.
 
-    Raises ScenarioError where it describes none.
+    Raises ScenarioError if the argument is malformed.
     """
     name, colon, settings = text.partition(":")
     found = split(settings) if colon else []
@@ -43,7 +43,7 @@ def parse_variant(text: str) -> VariantTable:
 def parse_sweep(text: str) -> Sweep:
     """Return the axis that an argument describes.
 
-    Raises ScenarioError where it describes none.
+    Raises ScenarioError if the argument is malformed.
     """
     name, equals, listed = text.partition("=")
     name, parts = name.strip(), split(listed)
@@ -61,7 +61,7 @@ def parse_sweep(text: str) -> Sweep:
 
 
 def split(text: str) -> list[str]:
-    """Return the parts of a text between commas that are in no bracket and in no string."""
+    """Return the parts of a text between commas outside brackets and strings."""
     parts, depth, quote = [""], 0, ""
     for letter in text:
         if quote:
@@ -78,14 +78,14 @@ def split(text: str) -> list[str]:
 
 
 def _level(name: str, part: str) -> tuple[str, list[str]]:
-    """Return the name of a value and what it sets, along every path of the axis; without a name it is its own."""
+    """Return the name of a value, by default the value, and its settings for each path of the axis."""
     named = _NAMED.match(part)
     value = part[named.end() :] if named else part
     return named[1] if named else value, [f"{path}={value}" for path in name.split("+")]
 
 
 def _count(parts: Sequence[str], text: str) -> list[Setting]:
-    """Return the numbers of `A,B,...,Z`, as exact as they are written."""
+    """Return the numbers of `A,B,...,Z`, computed in decimal."""
     try:
         first, second, dots, last = parts
         start, step, end = Decimal(first), Decimal(second) - Decimal(first), Decimal(last)
@@ -99,7 +99,7 @@ def _count(parts: Sequence[str], text: str) -> list[Setting]:
 
 
 def _value(part: str) -> Any:
-    """Return a value: TOML, or else a bare string."""
+    """Return a TOML value, or the text itself if it is not TOML."""
     try:
         return tomllib.loads(f"value = {part}")["value"]
     except tomllib.TOMLDecodeError:

@@ -1,7 +1,7 @@
 """Links carry bytes between the world and its nodes: in memory within one process, or over Zenoh between processes.
 
-A link knows nothing of what the bytes mean and makes no promise on order between nodes; from one node, messages arrive
-in the order they were sent, each exactly once, until the node is lost.
+A link does not interpret the bytes. Messages of one node arrive in the order sent, each exactly once, until the node is lost.
+The order of messages of different nodes is undefined.
 """
 
 from collections.abc import Callable, Iterable
@@ -10,13 +10,13 @@ from typing import Any, Final, NamedTuple, Protocol
 
 
 class Arrival(NamedTuple):
-    """A message from a node; `payload` None says that the node is lost: its process ended without a word."""
+    """A message from a node. `payload` None means that the node is lost: its process ended without a goodbye."""
 
     node: int
     payload: bytes | None
 
 
-# An Arrival of a pair, without the call of a Python function that its own constructor is.
+# Makes an Arrival from a pair. Faster than Arrival(...), whose constructor is a Python function.
 arrival: Final[Callable[[Iterable[Any]], Arrival]] = partial(tuple.__new__, Arrival)
 
 
@@ -30,26 +30,26 @@ class WorldLink(Protocol):
         """Return the next arrival, or None after `timeout_s` seconds without one."""
 
     def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
-        """Return all that has arrived, as soon as there are `count`, or a loss, or after `timeout_s` seconds."""
+        """Return all arrivals once there are `count`, or a node is lost, or `timeout_s` seconds have passed."""
 
     def close(self) -> None:
-        """Release all that the link holds; idempotent."""
+        """Release all resources of the link; idempotent."""
 
 
 class NodeProcesses(Protocol):
-    """Whoever runs the nodes' programs, and can do to them what faults demand."""
+    """Control of the nodes' processes, for faults."""
 
     def kill(self, node: int) -> None:
-        """End a node's program without a word; the link then reports the node lost."""
+        """Kill a node's process; the link then reports the node lost."""
 
     def start(self, node: int) -> None:
-        """Start a node's program, its next incarnation if it ran before; return when it has joined."""
+        """Start a node's process, as its next incarnation if it ran before; return when it has joined."""
 
     def pause(self, node: int) -> None:
-        """Stop a node's program where it is."""
+        """Pause a node's process."""
 
     def resume(self, node: int) -> None:
-        """Let it go on."""
+        """Resume a paused process."""
 
 
 Answer = Callable[[bytes], bytes]

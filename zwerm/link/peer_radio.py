@@ -1,11 +1,11 @@
-"""A node on a real network: where it stands, the radio it has there, and the log of what that radio sent and heard.
+"""The radio of a node on a real network, and the log of packets sent, arrived and received.
 
-In the twin of a run packets do not pass the world: every node has a Zenoh session of its own, inside a network namespace, with
-a direct link to every other node, over UDP or TCP. A broadcast is one message to each. What Zenoh, the transport and the
-network make of it is what is being looked at, so nothing here repeats, orders or repairs.
+In the twin of a run packets do not pass the world. Each node has a Zenoh session of its own, in a network namespace, with a
+direct link to every other node over UDP or TCP. A broadcast is one message to each node. The twin measures the behaviour of
+Zenoh, the transport and the network, so this module neither repeats nor orders messages.
 
-Nodes meet before the run: each says hello until it has heard everybody and everybody has heard it. Only then may the network be
-made to lose packets, because Zenoh opens a link over UDP with messages that it does not repeat.
+Nodes connect before the run: each sends hello until it has received hello from all nodes and all have received its own. Only
+then may the network lose packets, because Zenoh opens a UDP link with messages that it does not repeat.
 """
 
 import contextlib
@@ -36,17 +36,17 @@ HAIL_EVERY_S: Final = 0.05
 
 _NEW_NETWORK: Final = 0x40000000  # CLONE_NEWNET
 
-# Before a payload: the channel, the sender, its number, the tick and the time of sending [ns].
+# Header of a packet: channel, sender, packet number, tick, and time of sending [ns].
 _HEAD: Final = Layout(">BHIIQ")
 HEAD_BYTES: Final = _HEAD.size
 
-# A line of the log: what happened, the channel, the other node, the packet's number, its tick and time of sending, and now.
+# Record of the log: event, channel, other node, packet number, tick and time of sending [ns], time of the event.
 _LINE: Final = Layout(">BBHIIQQ")
 MET, SENT, ARRIVED, HEARD = range(4)
 
 
 class Station(Struct, frozen=True):
-    """Where a node stands, and whom it can hear. `hears` are (channel, sender), sender "*" for all of a channel."""
+    """A node's network namespace and addresses. `hears` are (channel, sender); sender "*" means all of a channel."""
 
     node: int
     namespace: str
@@ -59,7 +59,7 @@ class Station(Struct, frozen=True):
 
 
 class LogLine(NamedTuple):
-    """One line of a log. `at` is a time [ns] on the machine's monotonic clock, of HEARD a tick."""
+    """One record of a log. `at` is the machine's monotonic clock [ns]; for HEARD it is a tick."""
 
     what: int
     channel: int
@@ -71,16 +71,16 @@ class LogLine(NamedTuple):
 
 
 def read_log(path: Path) -> Iterator[LogLine]:
-    """Yield the whole lines of a log; the last may be half written where its process was killed."""
+    """Yield the complete records of a log; a killed process may leave an incomplete last one."""
     content = path.read_bytes() if path.exists() else b""
     whole = len(content) - len(content) % _LINE.size
     return map(LogLine._make, _LINE.iter_unpack(content[:whole]))
 
 
 def enter_namespace(path: str) -> None:
-    """Move the calling thread, and those that it will start, into the network namespace at `path`.
+    """Move the calling thread, and threads that it starts later, into the network namespace at `path`.
 
-    Raises LinkError where that is impossible.
+    Raises LinkError if the kernel refuses.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
@@ -95,12 +95,12 @@ class PeerRadio:
     """The radio of the node at `station` in the run `run`."""
 
     def __init__(self, run: str, station: Station) -> None:
-        """Open the session, and begin to say hello. Raises LinkError where the network cannot be used."""
+        """Open the session, and start to send hello. Raises LinkError if the network cannot be used."""
         self._station = station
         self._log = Path(station.log).open("ab", buffering=0)  # noqa: SIM115 - closed with the radio
         self._arrived: deque[tuple[int, int, int, bytes]] = deque()
         self._number = 0
-        self._met: dict[int, bool] = {}  # whom this node has heard, and whether they have heard it
+        self._met: dict[int, bool] = {}  # nodes received from, and whether they have received from this node
         self._meeting = threading.Event()
         node, transport = station.node, station.transport
         places = {other: f"{transport}/{address}:{PORT}" for other, address in station.addresses.items()}
@@ -108,7 +108,7 @@ class PeerRadio:
             {
                 "mode": "peer",
                 "listen/endpoints": [places[node]],
-                # One link a pair: the larger id calls the smaller.
+                # One link a pair: the node with the larger id connects.
                 "connect/endpoints": [place for other, place in sorted(places.items()) if other < node],
                 "connect/retry": {"period_init_ms": 50, "period_max_ms": 200},
                 "transport/link/tx/lease": LEASE_LOCAL_MS,
@@ -125,11 +125,11 @@ class PeerRadio:
         self._caller.start()
 
     def begin(self) -> None:
-        """Stop saying hello: the run begins."""
+        """Stop sending hello: the run begins."""
         self._meeting.set()
 
     def send(self, tick: int, message: Transmission) -> None:
-        """Send a packet to everybody on its channel, or to the one it is for."""
+        """Send a packet to all nodes on its channel, or to its receiver."""
         to = EVERYONE if message.to is None else message.to
         channel, now_ns = self._station.channels.index(message.channel), time.monotonic_ns()
         self._note(SENT, channel, to, self._number, tick, now_ns, now_ns)
@@ -138,12 +138,12 @@ class PeerRadio:
         self._publisher(air_key(self._run, message.channel, self._station.node, message.to))(frame)
 
     def take(self, tick: int) -> tuple[Packet, ...]:
-        """Return what has arrived of the packets that were sent before `tick`, in the order of arrival."""
+        """Return the arrived packets that were sent before `tick`, in the order of arrival."""
         packets: list[Packet] = []
         kept: list[tuple[int, int, int, bytes]] = []
         while self._arrived:
             arrival = channel, sender, sent_tick, frame = self._arrived.popleft()
-            if sent_tick >= tick:  # of a node that is ahead: a packet takes one tick at least
+            if sent_tick >= tick:  # from a node that is ahead: a packet takes at least one tick
                 kept.append(arrival)
                 continue
             _, _, number, _, sent_ns = _HEAD.unpack_from(frame)
@@ -154,8 +154,10 @@ class PeerRadio:
         return tuple(packets)
 
     def close(self) -> None:
-        """Stop, and close the log. The session is left to the end of the process: over a link that is blocked no goodbye comes
-        through, and Zenoh would wait for it."""
+        """Stop, and close the log.
+
+        The session stays open until the process ends: Zenoh waits for a closing message, which a blocked link loses.
+        """
         self._meeting.set()
         self._caller.join()
         self._log.close()
@@ -169,7 +171,7 @@ class PeerRadio:
             put = self._put[key] = self._session.declare_publisher(
                 key,
                 express=True,
-                congestion_control=zenoh.CongestionControl.DROP,  # a radio does not wait
+                congestion_control=zenoh.CongestionControl.DROP,  # a radio drops packets instead of waiting
                 reliability=zenoh.Reliability.BEST_EFFORT,
                 allowed_destination=zenoh.Locality.REMOTE,
             ).put
@@ -187,7 +189,7 @@ class PeerRadio:
         self._met[sender] = self._station.node in heard
 
     def _hail(self) -> None:
-        """Say who has been heard, again and again; note when everybody has heard everybody, as far as this node can tell."""
+        """Send the ids received from, repeatedly. Log MET when this node has received from all and all from it."""
         others, noted = len(self._station.addresses) - 1, False
         hail = self._publisher(hail_key(self._run, self._station.node))
         while True:

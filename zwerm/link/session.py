@@ -1,7 +1,7 @@
-"""What both ends of a Zenoh link share: the settings of every session, and the credential a node connects with.
+"""Settings of every Zenoh session, and the credential of a node.
 
-Promises: no discovery (a session talks only to the endpoints it is given), no shared memory, one queue per transport so
-that what is sent first arrives first. Says nothing about who may do what: that is the router's access control.
+Sessions use no discovery: they connect only to the given endpoints. They use no shared memory, and one queue per transport,
+so that messages arrive in the order sent. The router's access control, not this module, limits what a node may do.
 """
 
 import base64
@@ -17,28 +17,28 @@ from msgspec import Struct
 
 from zwerm.errors import LinkError
 
-# Without quality of service a transport has one queue in place of eight: declarations, queries and messages keep their
-# order. With shared memory a router refuses connections past about 350 sessions.
+# Without quality of service a transport has one queue instead of eight: declarations, queries and messages keep their
+# order. With shared memory a router refuses connections after about 350 sessions.
 SETTINGS: Final[Mapping[str, Any]] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
     "transport/shared_memory/enabled": False,
     "transport/unicast/qos/enabled": False,
-    # How many pieces of 64 KiB can wait to be sent: with the least, 2, a longer message would wait for the very thread that
-    # it is sent from. Memory for them is taken only when needed.
+    # Batches of 64 KiB that can wait to be sent. With the minimum, 2, a long message blocks on the thread that sends it.
+    # Zenoh allocates them only when needed.
     "transport/link/tx/queue/size/data": 16,
 }
 
 UNIX_PROTOCOL: Final = "unixsock-stream"
 
-# Between processes of one machine the kernel reports a death at once, so the lease only decides how long a stopped
-# process (SIGSTOP, a debugger) still counts as there. Over a network it decides how soon a cut cable is noticed.
+# On one machine the kernel reports the end of a process at once, so the lease only limits how long a stopped process
+# (SIGSTOP, a debugger) counts as connected. Over a network it is the time until a broken connection is detected.
 LEASE_LOCAL_MS: Final = 600_000
 LEASE_REMOTE_MS: Final = 10_000
 
-# Zenoh's threads, which it reads from the environment once per process. What a message costs is mostly the switches
-# from one thread to the next, so there are as few as can be: one that receives, answers and sends. Only where a slow
-# answer must not silence the lease, and in the world, does another one send.
+# Zenoh's threads, read from the environment once per process. Most of a message's cost is switches between threads, so
+# there are as few as possible: one thread receives, answers and sends. A second thread sends in the world, and in nodes
+# whose slow answers must not delay the lease messages.
 ONE_THREAD: Final = "(app:(worker_threads:1),acc:(handover:app),tx:(handover:app),rx:(handover:app),net:(handover:app))"
 TWO_THREADS: Final = (
     "(app:(worker_threads:1),acc:(handover:app),tx:(handover:app),rx:(worker_threads:1),net:(handover:app))"
@@ -47,7 +47,7 @@ _THREADS_VARIABLE: Final = "ZENOH_RUNTIME"
 
 
 class Credential(Struct, frozen=True, forbid_unknown_fields=True):
-    """What one node connects and joins with. The router admits `user` only from the session with the Zenoh id `zid`."""
+    """Credential of one node. The router admits `user` only from the session with the Zenoh id `zid`."""
 
     node: int
     incarnation: int
@@ -57,7 +57,7 @@ class Credential(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Credentials(Struct, frozen=True, forbid_unknown_fields=True):
-    """The credentials of some nodes of a run. For TLS and QUIC, `authority_pem` signed the world's certificate."""
+    """Credentials of some nodes of a run. `authority_pem` is the certificate authority for TLS and QUIC."""
 
     run: str
     nodes: tuple[Credential, ...]
@@ -65,17 +65,17 @@ class Credentials(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def is_local(endpoint: str) -> bool:
-    """Tell whether `endpoint` can only be reached from this machine's own file system."""
+    """Return whether `endpoint` is reachable only through this machine's file system."""
     return endpoint.startswith(UNIX_PROTOCOL)
 
 
 def set_threads(threads: str) -> None:
-    """Choose Zenoh's threads in this process; without effect once it has opened a session."""
+    """Set Zenoh's threads in this process; no effect after its first session is open."""
     os.environ[_THREADS_VARIABLE] = threads
 
 
 def transport_settings(endpoints: list[str]) -> dict[str, Any]:
-    """Return how long a silent transport to or from `endpoints` lives."""
+    """Return the lease of a silent transport to or from `endpoints`."""
     local = all(is_local(endpoint) for endpoint in endpoints)
     return {"transport/link/tx/lease": LEASE_LOCAL_MS if local else LEASE_REMOTE_MS}
 
@@ -90,7 +90,7 @@ def trust_settings(authority_pem: str) -> dict[str, Any]:
 def open_session(settings: Mapping[str, Any], purpose: str) -> zenoh.Session:
     """Open a session with `settings` (paths into Zenoh's configuration) on top of SETTINGS.
 
-    Raises LinkError, which begins with `purpose`, where Zenoh cannot.
+    Raises LinkError, whose text begins with `purpose`, if Zenoh cannot open it.
     """
     config = zenoh.Config()
     try:
@@ -106,11 +106,11 @@ _kept = threading.local()
 
 
 def keep_thread() -> None:
-    """Have Python keep its state of the calling thread, one of Zenoh's, from one callback to the next.
+    """Make Python keep its state of the calling thread, a thread of Zenoh, between callbacks.
 
-    For a thread that is not its own Python makes a state when a callback begins and throws it away when it returns, the stack
-    included, which is taken from the kernel anew: together a tenth of what a message costs a robot (measured).
+    For a thread that Python did not start, it makes a thread state at each callback and deletes it afterwards, including
+    memory from the kernel. This takes a tenth of a robot's time per message (measured).
     """
-    if not hasattr(_kept, "yes"):  # asked of that very state: the number of a thread may be another's next
+    if not hasattr(_kept, "yes"):  # thread-local: a thread number can be reused
         _kept.yes = True
-        ctypes.pythonapi.PyGILState_Ensure()  # once more than Zenoh will release
+        ctypes.pythonapi.PyGILState_Ensure()  # one more reference than Zenoh releases

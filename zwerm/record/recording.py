@@ -1,7 +1,8 @@
 """A recording of a run in MCAP, the log format of robotics (opens in Foxglove, Lichtblick and the `mcap` command).
 
-Topics: `/node/<id>/obs` and `/node/<id>/cmd` carry the messages as they crossed the wire (MessagePack); `/truth/poses`
-carries where every robot was (JSON), which no robot knows. Times are virtual. A recording that is closed, after Ctrl-C too,
+Topics: `/node/<id>/obs` and `/node/<id>/cmd` carry the messages as they crossed the wire (MessagePack); `/node/<id>/telemetry`
+carries the numbers that a node reports (JSON, an object of numbers by name); `/truth/poses` carries the true positions of
+the robots (JSON), which no robot knows. Times are virtual. A recording that is closed, after Ctrl-C too,
 is complete and indexed; one cut off by a kill holds all chunks written until then.
 """
 
@@ -16,6 +17,7 @@ from mcap.writer import Writer
 from zwerm.errors import ScenarioError
 from zwerm.version import __version__
 from zwerm.world.scene import Scene
+from zwerm.world.tick.telemetry import TelemetryRecord
 
 _POSES_SCHEMA: Final = {
     "title": "Poses",
@@ -28,6 +30,14 @@ _POSES_SCHEMA: Final = {
         "y_m": {"type": "array", "items": {"type": "number"}},
         "heading_rad": {"type": "array", "items": {"type": "number"}},
     },
+}
+
+
+_TELEMETRY_SCHEMA: Final = {
+    "title": "Telemetry",
+    "description": "Numbers that a node reports, by name.",
+    "type": "object",
+    "additionalProperties": {"type": "number"},
 }
 
 
@@ -47,6 +57,9 @@ class Recording:
         self._writer.add_metadata("run", about)
         schema = self._writer.register_schema("zwerm.Poses", "jsonschema", json.dumps(_POSES_SCHEMA).encode())
         self._poses = self._writer.register_channel("/truth/poses", "json", schema)
+        self._telemetry_schema = self._writer.register_schema(
+            "zwerm.Telemetry", "jsonschema", json.dumps(_TELEMETRY_SCHEMA).encode()
+        )
 
     def __enter__(self) -> Self:
         return self
@@ -74,15 +87,21 @@ class Recording:
             if answer:
                 self._write(self._channel(f"/node/{node}/cmd"), tick, answer)
 
+    def telemetry(self, record: TelemetryRecord) -> None:
+        """Write the numbers that a node reported, if any."""
+        if record.numbers:
+            channel = self._channel(f"/node/{record.node}/telemetry", "json", self._telemetry_schema)
+            self._write(channel, record.tick, json.dumps(record.numbers).encode())
+
     def close(self) -> None:
         """Write the index and close the file; idempotent."""
         if not self._file.closed:
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
 
-    def _channel(self, topic: str) -> int:
+    def _channel(self, topic: str, encoding: str = "msgpack", schema: int = 0) -> int:
         if topic not in self._channels:
-            self._channels[topic] = self._writer.register_channel(topic, "msgpack", 0)
+            self._channels[topic] = self._writer.register_channel(topic, encoding, schema)
         return self._channels[topic]
 
     def _write(self, channel: int, tick: int, message: bytes) -> None:

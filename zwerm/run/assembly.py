@@ -14,7 +14,7 @@ from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.fields import Field
 from zwerm.world.fields.registry import make_field
-from zwerm.world.metrics.observers import Observers, make_meters
+from zwerm.world.metrics.observers import Observers, make_observers
 from zwerm.world.sensors import Sensor, Surroundings
 from zwerm.world.sensors.registry import find as find_sensor
 from zwerm.world.sensors.registry import make_sensors
@@ -37,21 +37,21 @@ def assemble(scenario: Scenario, seed: int) -> World:
 
 
 class Prepared(NamedTuple):
-    """All of a world that does not depend on the seed. Sensors and meters are for one run each."""
+    """All of a world that does not depend on the seed. Sensors and observers are for one run each."""
 
     arena: Arena
     sensors: Sequence[Sensor]
-    meters: Observers
+    observers: Observers
 
 
 def prepare(scenario: Scenario) -> Prepared:
-    """Return the arena, the sensors and the meters of `scenario`.
+    """Return the arena, the sensors and the observers of `scenario`.
 
     Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
     """
     mistakes: list[str] = []
     field, table = None, scenario.field
-    sensors, meters = None, None
+    sensors, observers = None, None
     arena = _attempt(lambda: Arena.from_table(scenario.arena, scenario.folder), scenario, mistakes)
     _attempt(lambda: check_controllers(scenario), scenario, mistakes)
     if arena is not None and table is not None:
@@ -60,10 +60,10 @@ def prepare(scenario: Scenario) -> Prepared:
     # What needs the field is not told that there is none where the mistake is in the field's own table.
     if arena is not None and (field is not None or table is None):
         sensors = _attempt(lambda: _sensors(scenario, arena, field), scenario, mistakes)
-        meters = _attempt(lambda: make_meters(scenario.metrics, arena, field, scenario.time.dt_s), scenario, mistakes)
-    if arena is None or sensors is None or meters is None or mistakes:
+        observers = _attempt(lambda: make_observers(scenario, arena, field), scenario, mistakes)
+    if arena is None or sensors is None or observers is None or mistakes:
         raise ScenarioError(mistakes)
-    return Prepared(arena, sensors, meters)
+    return Prepared(arena, sensors, observers)
 
 
 def _attempt(make: Callable[[], T], scenario: Scenario, mistakes: list[str]) -> T | None:

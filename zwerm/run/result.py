@@ -3,22 +3,50 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from zwerm.catalogue import layers_of
 from zwerm.record.history import History
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
-from zwerm.world.scene import Ints
-from zwerm.world.tick.telemetry import TelemetryRecord
+from zwerm.world.scene import Bools, Floats, Ints
+from zwerm.world.tick.telemetry import TelemetryArrays, TelemetryRecord
 
 if TYPE_CHECKING:  # pictures need matplotlib
+    from pandas import DataFrame
+
     from zwerm.view.run_view import RunView
+
+
+FrameKind = Literal["positions", "metrics", "telemetry"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Positions:
+    """The true poses of n robots at k times. Where a robot is not in the arena its pose is nan.
+
+    A scenario of less than 2,000 ticks has a sample at every tick; a longer one at even intervals of at most a thousandth of
+    its duration, and at the end.
+    """
+
+    time_s: Floats  # (k,) [s]
+    node: Ints  # (n,)
+    x_m: Floats  # (k, n) [m]
+    y_m: Floats  # (k, n) [m]
+    heading_rad: Floats  # (k, n) [rad], not wrapped
+    present: Bools  # (k, n)
 
 
 @dataclass(slots=True)
 class RunResult:
-    """The result of one run. `as_json` is what `zwerm run --json` prints."""
+    """The result of one run. `as_json` is what `zwerm run --json` prints.
+
+    `metrics` are the values at the end by name, `series` the metrics that were sampled during the run, as arrays (k,) by name,
+    `time_s` among them. `telemetry` are the numbers that nodes reported. `snapshots` are records for the algorithm's own
+    pictures. `history` is what pictures are drawn from; `positions` gives it as arrays.
+    """
 
     scenario: Scenario
     seed: int
@@ -42,15 +70,36 @@ class RunResult:
     hindered: dict[str, list[int]] = field(default_factory=dict)
     faults: list[dict[str, Any]] = field(default_factory=list)
     missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
-    series: dict[str, list[float]] = field(default_factory=dict)
+    series: dict[str, Floats] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     tracebacks: dict[int, str] = field(default_factory=dict)
-    told: list[TelemetryRecord] = field(default_factory=list)
+    telemetry: TelemetryArrays = field(default_factory=TelemetryArrays.empty)
+    snapshots: list[TelemetryRecord] = field(default_factory=list)
 
     @property
     def ok(self) -> bool:
         """Tell whether the run ended as runs should: completed, or at its time limit."""
         return self.outcome in ("completed", "time-limit")
+
+    @property
+    def positions(self) -> Positions:
+        """The true poses of all robots over time."""
+        tracks = self.history.arrays()
+        x_m, y_m = np.where(tracks.present[:, :, None], tracks.position, np.nan).transpose(2, 0, 1)
+        heading = np.where(tracks.present, tracks.heading, np.nan)
+        return Positions(tracks.time_s, np.arange(self.robots), x_m, y_m, heading, tracks.present)
+
+    def to_frame(self, kind: FrameKind = "positions") -> "DataFrame":
+        """Return a pandas frame of the run.
+
+        `positions`: time_s, node, x_m, y_m, heading_rad, present, a row for each sample and robot. `metrics`: time_s and a
+        column for each metric that was sampled during the run. `telemetry`: tick, time_s, node, name, value, a row for each
+        number.
+        Raises MissingExtraError without pandas, and ValueError for another kind.
+        """
+        from zwerm.run.frames import frame_of
+
+        return frame_of(self, kind)
 
     def as_json(self) -> dict[str, Any]:
         """Return the stable summary of the run, ready for a JSON encoder."""
@@ -101,9 +150,10 @@ class RunResult:
             table.cells,
             table.sight_range_m,
             0 if self.scenario.base is None else self.scenario.base.stations,
-            self.told,
-            self.series,
+            self.snapshots,
+            {name: values.tolist() for name, values in self.series.items()},
             (*layers_of(self.scenario.robots.controller), *self.scenario.pictures.layers),
+            None if self.scenario.coordinator is None else self.robots,
         )
 
     @property

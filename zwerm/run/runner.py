@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal, Protocol
 
+import numpy as np
+
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import ScenarioError, StragglerError
@@ -16,13 +18,14 @@ from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
 from zwerm.run.assembly import assemble
+from zwerm.run.measurement import measure, truth_of
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.lockstep import FAILED, INTERRUPTED, LockStep
 from zwerm.world.drivers.realtime import RealTime
-from zwerm.world.metrics.measures import cell_counts, measure
-from zwerm.world.radio.report import messages, radio_metrics, radio_report
+from zwerm.world.metrics.coverage import cell_counts
+from zwerm.world.radio.report import radio_report
 from zwerm.world.world import World
 
 Runner = Literal["processes", "inline"]
@@ -91,7 +94,7 @@ def run(
         link = MemoryLink(
             {node: each.answer for node, each in nodes.items()},
             lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
-            world.schedule.unborn,
+            world.schedule.late_joiners,
         )
         return drive(world, link, seed, runner, realtime, watcher, record, link)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
@@ -101,7 +104,7 @@ def run(
         members,
         progress=watcher.joined,
         paced=realtime is not None,
-        unborn=world.schedule.unborn,
+        late_joiners=world.schedule.late_joiners,
         restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
     ) as swarm:
         return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm)
@@ -165,7 +168,9 @@ def drive(
     from zwerm.record.recording import Recording
 
     about = {"scenario": world.scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
-    with Recording(record, world.scenario.time.dt_s, about) as world.recording:
+    with Recording(record, world.scenario.time.dt_s, about) as recording:
+        world.recording = recording
+        world.telemetry.listeners.append(recording.telemetry)
         return _drive(world, link, seed, runner, realtime, watcher or NullProgress(), programs)
 
 
@@ -183,11 +188,12 @@ def _drive(
     stride, telling = max(1, ticks // HISTORY_SAMPLES), max(1, ticks // TOLD_TIMES)
     history = History()
     history.append(world.scene, world.dead)
-    world.meters.look(world.scene, world.dead)
+    world.observers.sample(truth_of(world))
 
     def on_tick(world: World) -> None:
-        if world.meters.look(world.scene, world.dead):
-            newest = world.meters.newest()
+        if world.observers.is_due(world.tick):
+            world.observers.sample(truth_of(world))
+            newest = world.observers.newest()
             if "coverage_fraction" in newest:
                 watcher.covered(newest["coverage_fraction"], int(newest["robots_deployed"]))
         if world.tick % stride == 0:
@@ -237,14 +243,7 @@ def _result(
     link: WorldLink,
 ) -> RunResult:
     scenario = world.scenario
-    world.meters.look(world.scene, world.dead, now=True)
-    metrics = measure(world, scenario.metrics) | world.meters.metrics()
-    if scenario.radio is not None or scenario.coordinator is not None:
-        metrics["robots_done_fraction"] = world.done_fraction
-        metrics |= radio_metrics(world.medium, world.count, world.tick)
-    if cycles := metrics.get("deployment_cycles"):
-        metrics["ticks_per_cycle_mean"] = world.tick / cycles
-        metrics["messages_per_cycle_mean"] = messages(world.medium) / cycles
+    metrics = measure(world)
     metrics["refused_messages"] = float(world.refused.total())
     if isinstance(driver, RealTime):
         metrics["late_commands"] = float(world.answers.late_count)
@@ -278,7 +277,8 @@ def _result(
         history=history,
         cell_counts=counts,
         refused=dict(world.refused + Counter(getattr(link, "refused", {}))),
-        series=world.meters.series(),
-        told=world.audience.told,
+        series={name: np.array(values) for name, values in world.observers.series().items()},
+        telemetry=world.telemetry.arrays(),
+        snapshots=world.telemetry.snapshots,
         tracebacks={node: failure.traceback for node, failure in world.failures.items()},
     )

@@ -5,12 +5,24 @@ are reported at once, each as `file: path: rule, got value`. What a sensor or a 
 to type; the tables here carry them as they are.
 """
 
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, PrivateAttr, model_validator
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    SerializeAsAny,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+    create_model,
+    model_validator,
+)
 
-from zwerm.catalogue import Variant, algorithm_of
+from zwerm.catalogue import FAULTS, METRICS, Variant, algorithm_of
+from zwerm.scenario.plugin_names import class_named
 from zwerm.scenario.services import choose, lacking
 from zwerm.scenario.types import (
     ARRAY,
@@ -145,9 +157,9 @@ class CoordinatorTable(Table):
 
 
 class ChannelTable(Table):
-    """What happens to packets on a channel: `loss` is independent loss, `models` judge in order. `check` audits every tick.
+    """The models of a channel. `loss` is independent loss; `models` judge packets in order. `check` audits every tick.
 
-    An `anonymous` channel tells no receiver who sent a packet.
+    On an `anonymous` channel no receiver gets the id of a sender.
     """
 
     loss: Fraction = 0.0
@@ -157,58 +169,83 @@ class ChannelTable(Table):
 
 
 class RadioTable(ChannelTable):
-    """The radio between robots, channel `robots`: who hears whom. Without this table there is none."""
+    """The radio between robots, channel `robots`. Without this table there is none."""
 
     range_m: Positive | None = None
     line_of_sight: bool = False
 
 
-Rate = NonNegative
+_PER_H: Final = "_per_h"
 
 
 class RandomFaultsTable(Table):
-    """Faults at random times: for each kind how many to expect an hour, over the whole swarm. Each lasts `mean_s` on average.
+    """Faults at random times. `KIND_per_h` is the mean number of faults of a kind per hour, over the whole swarm.
 
-    The schedule is drawn from `seed`, or else from the run's; the run's result holds it as `[[faults]]` tables.
+    Each fault lasts `mean_s` on average. `seed`, by default that of the run, determines the schedule; the result of the run has
+    it as `[[faults]]` tables.
     """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, NonNegative]
 
     seed: Annotated[int, Field(ge=0)] | None = None
     mean_s: Positive = 10.0
-    crash_per_h: Rate = 0.0
-    pause_per_h: Rate = 0.0
-    slow_per_h: Rate = 0.0
-    partition_per_h: Rate = 0.0
-    jam_per_h: Rate = 0.0
-    blackout_per_h: Rate = 0.0
-    cut_per_h: Rate = 0.0
-    camera_blackout_per_h: Rate = 0.0
-    dead_beacon_per_h: Rate = 0.0
-    stuck_touch_per_h: Rate = 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _only_rates(cls, given: Any) -> Any:
+        keys = given if isinstance(given, dict) else ()
+        unknown = [key for key in keys if key not in cls.model_fields and not _is_rate(key)]
+        if unknown:
+            raise ValueError(
+                f"expected seed, mean_s, or KIND{_PER_H} with a built-in fault ({', '.join(FAULTS)}) or module:Class, "
+                f"got {', '.join(unknown)}"
+            )
+        return given
+
+    @property
+    def rates_per_h(self) -> dict[str, float]:
+        """The rate of each kind that is given [1/h]."""
+        return {key.removesuffix(_PER_H): rate for key, rate in (self.__pydantic_extra__ or {}).items()}
 
 
-class VoronoiMetricsTable(Table):
-    """Coverage of the field by Voronoi cells: errors, cost, when statistics of the error fall below `converged_m`.
-
-    With `peak_m` also the density in `rings` about it. The first `stationary` robots have cells, and no errors.
-    """
-
-    converged_m: Positive = 1e-7
-    peak_m: Point | None = None
-    rings: Count = 10
-    stationary: Annotated[int, Field(ge=0)] = 0
+def _is_rate(key: str) -> bool:
+    """Return whether a key is the rate of a kind of fault: one of the catalogue, or `module:Class`."""
+    kind = key.removesuffix(_PER_H)
+    return kind != key and (kind in FAULTS or ":" in kind)
 
 
 class MetricsTable(Table):
-    """What is measured of the run; metrics whose settings are absent are not computed.
+    """What is measured of the run. Each other key switches on the metrics of its row in the catalogue, and is typed there.
 
-    What is measured all through the run is looked at every `every_s`.
+    Metrics that sample during a run do so every `every_s`. `own` names metrics of the user's own as `module:name`: a
+    subclass of `zwerm.Metric`, or a function of the truth.
     """
 
-    cells: Grid | None = None
-    coverage_radius_m: Positive | None = None
-    sight_range_m: Positive | None = None
     every_s: Positive | None = None
-    voronoi: VoronoiMetricsTable | None = None
+    own: list[str] = []
+
+    def __getattr__(self, name: str) -> Any:
+        """Return None for a key of the catalogue that the scenario does not give."""
+        if name in METRICS:
+            return None
+        return super().__getattr__(name)  # type: ignore[misc]
+
+
+@cache
+def metrics_table(keys: tuple[str, ...] = tuple(METRICS)) -> type[MetricsTable]:
+    """Return the table `[metrics]` with these keys of the catalogue, each typed by the `Parameters` of its row's class."""
+    fields: dict[str, Any] = {
+        key: (class_named(METRICS[key], "metric", METRICS).Parameters | None, None) for key in keys
+    }
+    return create_model("MetricsTable", __base__=MetricsTable, __doc__=MetricsTable.__doc__, **fields)
+
+
+def _metrics(given: Any, otherwise: ValidatorFunctionWrapHandler) -> Any:
+    """Validate `[metrics]` by the rows of the keys that it has."""
+    if isinstance(given, dict):
+        return metrics_table(tuple(key for key in METRICS if key in given)).model_validate(given)
+    return otherwise(given)
 
 
 class PicturesTable(Table):
@@ -235,7 +272,7 @@ class Scenario(Table):
     uplink: ChannelTable | None = None
     faults: list[OpenTable] = []
     random_faults: RandomFaultsTable | None = None
-    metrics: MetricsTable = MetricsTable()
+    metrics: Annotated[SerializeAsAny[MetricsTable], WrapValidator(_metrics)] = MetricsTable()
     pictures: PicturesTable = PicturesTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")

@@ -1,6 +1,6 @@
-"""Studies: one scenario, or several, run over a grid of settings and many seeds, and set beside a paper's numbers.
+"""Studies: scenarios run over a grid of settings and many seeds, compared with a paper's numbers.
 
-`tables` types the TOML file, `plan` makes trials of it, `trial` runs one, `pool` runs many, `rows` keeps what they gave,
-`summary` condenses it, `pictures` draws it and `running` does it all. What a study adds to the trace of a run is nothing:
-every row can be had again with `zwerm run`.
+`study_tables` types the TOML file, `plan` makes its trials, `trial` runs one, `pool` runs many, `rows` stores results,
+`summary` computes statistics, `study_figure` draws them, `study_runner` does all of this. A study changes no trace: `zwerm run`
+reproduces each row.
 """

@@ -10,7 +10,7 @@ from zwerm.study.summary import SummaryLine
 
 
 def study_json(result: StudyResult, drawn: Sequence[Path]) -> dict[str, Any]:
-    """Return what a study has come to: every metric at every point, beside the paper's value where it has one."""
+    """Return the result of a study: each metric at each point, with the paper's value if it has one."""
     results = result.results
     points = [
         {
@@ -24,7 +24,7 @@ def study_json(result: StudyResult, drawn: Sequence[Path]) -> dict[str, Any]:
 
 
 def study_head(result: StudyResult, drawn: Sequence[Path]) -> dict[str, Any]:
-    """Return what every study or comparison reports: how many trials ran, and the files written."""
+    """Return the part common to studies and comparisons: the numbers of trials, and the files written."""
     return {
         "study": result.results.study.name,
         "planned": result.planned,

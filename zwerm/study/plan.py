@@ -1,7 +1,7 @@
-"""From a study to its trials: every variant at every point of the grid with every seed, each scenario checked beforehand.
+"""The trials of a study: each variant at each point of the grid with each seed. All scenarios are checked first.
 
-A point's fingerprint names everything that decides what a trial gives, but for its seed and Zwerm's own code between two
-releases: the scenario, the shape of the arena, the files it names and the user's own modules that it names.
+The fingerprint of a point depends on all inputs of its trials except the seed: the scenario, the shape of the arena, the
+contents of files and user modules that the scenario names, and Zwerm's version (not its code between two releases).
 """
 
 import itertools
@@ -15,30 +15,33 @@ from typing import Any
 
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import prepare
+from zwerm.run.measurement import metric_names
 from zwerm.run.runner import Runner
 from zwerm.scenario.load import built_in as built_in_scenarios
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
-from zwerm.study.tables import Setting, Study, VariantTable
+from zwerm.study.study_tables import CELL_METRICS, REPORTABLE_COLUMNS, Setting, Study, VariantTable
 from zwerm.version import __version__
+from zwerm.world.metrics.observers import is_measured
 
-# What a scenario says of itself and no run depends on.
-_WORDS = {"name", "summary", "source"}
+# Descriptive keys of a scenario; runs do not depend on them.
+_DESCRIPTIVE = {"name", "summary", "source"}
 _PATH_LENGTH_MAX = 255
 
 
 @dataclass(frozen=True)
 class Point:
-    """One variant at one point of the grid: a scenario that is ready to run."""
+    """One variant at one point of the grid, with its checked scenario."""
 
     variant: str
     settings: dict[str, Setting]
     scenario: Scenario
     fingerprint: str
+    metrics: tuple[str, ...] = ()  # names of what it measures, where `*` stands for any characters
 
     @property
     def label(self) -> str:
-        """The point in words."""
+        """The variant and the settings as text."""
         return label(self.variant, self.settings)
 
 
@@ -54,7 +57,7 @@ class Trial:
 
     @property
     def key(self) -> tuple[str, str, int]:
-        """What tells this trial from all others, whatever file it is in."""
+        """Identity of the trial in any results file: variant, fingerprint, seed."""
         return self.point.variant, self.point.fingerprint, self.seed
 
 
@@ -64,7 +67,7 @@ def label(variant: str, settings: dict[str, Setting]) -> str:
 
 
 def make_points(study: Study, sets: Sequence[str] = ()) -> list[Point]:
-    """Return the points of `study`, by variant and then in the order of the grid; `sets` override what the file sets.
+    """Return the points of `study`, by variant and then in the order of the grid; `sets` override the file's settings.
 
     Raises ScenarioError with every mistake at every point, each mistake once.
     """
@@ -79,13 +82,31 @@ def make_points(study: Study, sets: Sequence[str] = ()) -> list[Point]:
                 where = label(variant.name, settings)
                 for line in error.mistakes:
                     found.setdefault(line, f"{study.path}: {where}: {line}" if where else f"{study.path}: {line}")
+    if not found and not study.lenient:
+        found = _unmeasured(study, points)
     if found:
         raise ScenarioError(list(found.values()))
     return points
 
 
+def _unmeasured(study: Study, points: Sequence[Point]) -> dict[str, str]:
+    """Return one line for every metric of a study that no scenario of it measures."""
+    names = list(dict.fromkeys(name for point in points for name in point.metrics))
+    known = [
+        *names,
+        *REPORTABLE_COLUMNS,
+        *(CELL_METRICS if any(point.scenario.metrics.cells for point in points) else ()),
+    ]
+    listed = ", ".join(sorted(known))
+    return {
+        metric: f"{study.path}: metrics: expected names of metrics that its scenarios measure ({listed}), got {metric!r}"
+        for metric in study.table.metrics
+        if not is_measured(metric, known)
+    }
+
+
 def make_trials(study: Study, points: Sequence[Point], seeds: Sequence[int], runner: Runner = "inline") -> list[Trial]:
-    """Return the trials by seed and then by point, so that whatever part of them is done says something of every point."""
+    """Return the trials by seed and then by point, so that an interrupted study has results for every point."""
     series = tuple(study.table.series)
     return [Trial(study.name, point, seed, series, runner) for seed in seeds for point in points]
 
@@ -97,12 +118,13 @@ def _make_point(study: Study, variant: VariantTable, settings: dict[str, Setting
         name = str(beside)
     axes = [each for axis, value in settings.items() for each in _assignments(study, variant, axis, value)]
     scenario = load(name, (*study.table.set, *variant.set, *sets, *axes))
-    arena = prepare(scenario).arena
-    return Point(variant.name, settings, scenario, _fingerprint(scenario, arena.segments.tobytes()))
+    prepared = prepare(scenario)
+    fingerprint = _fingerprint(scenario, prepared.arena.segments.tobytes())
+    return Point(variant.name, settings, scenario, fingerprint, tuple(metric_names(scenario, prepared.observers)))
 
 
 def _assignments(study: Study, variant: VariantTable, axis: str, value: Setting) -> list[str]:
-    """Return what a value of an axis sets in a variant."""
+    """Return the settings, `PATH=VALUE`, of a value of an axis in a variant."""
     if axis in study.table.levels:
         return study.table.levels[axis][str(value)]
     return [f"{path}={json.dumps(value)}" for path in variant.axes.get(axis, axis).split("+")]
@@ -110,7 +132,7 @@ def _assignments(study: Study, variant: VariantTable, axis: str, value: Setting)
 
 def _fingerprint(scenario: Scenario, walls: bytes) -> str:
     digest = blake2b(__version__.encode(), digest_size=16)
-    tables = scenario.model_dump(mode="json", exclude=_WORDS)
+    tables = scenario.model_dump(mode="json", exclude=_DESCRIPTIVE)
     digest.update(json.dumps(tables, sort_keys=True).encode())
     digest.update(walls)
     for text in _strings(tables):
@@ -121,7 +143,7 @@ def _fingerprint(scenario: Scenario, walls: bytes) -> str:
 
 
 def _source(text: str) -> Path | None:
-    """Return the file of the user's module that `module:Class` names, and that checking the scenario has imported."""
+    """Return the file of the user module that `module:Class` names; checking the scenario has imported it."""
     name, colon, _ = text.partition(":")
     module = sys.modules.get(name) if colon and not name.startswith("zwerm.") else None
     file = getattr(module, "__file__", None)

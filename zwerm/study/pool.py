@@ -1,8 +1,8 @@
-"""Many trials at a time, each in one of `jobs` worker processes that compute with one thread each.
+"""Run trials in parallel, in `jobs` worker processes with one thread each.
 
-Rows come as trials end, in any order. A worker that dies (out of memory, a fault in a library) takes no trial with it:
-those that were under way are run again one by one, and the one that kills its process becomes a failed row. When the
-iteration ends, is closed, or its process is killed, no worker is left.
+Rows arrive as trials end, in any order. If a worker dies (out of memory, a crash in a library), the running trials are
+repeated one by one, and the trial that kills its process becomes a failed row. No worker remains after the iteration ends,
+is closed, or its process is killed.
 """
 
 import os
@@ -26,7 +26,7 @@ def run_trials(trials: Sequence[Trial], jobs: int) -> Generator[Row, None, None]
         yield from map(run_trial, trials)
         return
     with warnings.catch_warnings():
-        # joblib warns of results that nobody takes when it is closed early, and of workers that it replaces.
+        # joblib warns of unread results when it is closed early, and of workers that it replaces.
         warnings.simplefilter("ignore", UserWarning)
         try:
             with parallel_config(backend="loky", inner_max_num_threads=1):
@@ -59,7 +59,7 @@ def _in_parallel(trials: Sequence[Trial], jobs: int) -> Iterator[Row]:
 
 
 def _alone(trial: Trial) -> Row:
-    """Return the row of a trial that has a pool of its own."""
+    """Run a trial in a pool of its own, and return its row."""
     try:
         _, row = Parallel(n_jobs=2, batch_size=1)([delayed(_work)(0, trial, os.getpid())])[0]
     except BrokenProcessPool as error:
@@ -70,21 +70,21 @@ def _alone(trial: Trial) -> Row:
 
 
 _watched: list[int] = []
-_LOOK_S = 1.0
+_POLL_S = 1.0
 
 
 def _work(index: int, trial: Trial, parent: int) -> tuple[int, Row]:
-    """Run a trial in a worker. Ctrl-C at a terminal reaches workers too; it is for the parent to end them."""
+    """Run a trial in a worker. A worker ignores SIGINT: the parent ends its workers."""
     if not _watched:
         _watched.append(parent)
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        threading.Thread(target=_die_with, args=(parent,), daemon=True).start()
+        threading.Thread(target=_exit_with_parent, args=(parent,), daemon=True).start()
     return index, run_trial(trial)
 
 
-def _die_with(parent: int) -> None:
-    """End this worker once `parent` is no longer its parent, because it was killed."""
+def _exit_with_parent(parent: int) -> None:
+    """Exit this worker when `parent` is no longer its parent, because the parent was killed."""
     never = threading.Event()
     while os.getppid() == parent:
-        never.wait(_LOOK_S)
+        never.wait(_POLL_S)
     os._exit(1)

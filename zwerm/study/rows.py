@@ -1,7 +1,7 @@
-"""The rows of a study on disk: one Parquet file, and beside it, while a study runs, a journal of what is new.
+"""The rows of a study on disk: one Parquet file, and a journal of new rows while a study runs.
 
-A row is written to the journal the moment its trial ends, and survives whatever happens to the process then; `merge` turns
-file and journal into a new file, all or nothing. One study at a time writes to a file.
+Each row is written to the journal when its trial ends, so it survives a crash of the process. `merge` replaces the file
+atomically by one with all rows. One study at a time writes to a file.
 """
 
 import fcntl
@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from zwerm.errors import ScenarioError
-from zwerm.study.tables import RESERVED
+from zwerm.study.study_tables import RESERVED
 from zwerm.study.trial import Row
 
 Key = tuple[str, str, int]
@@ -25,14 +25,14 @@ _FIRST = ("seed", "outcome", "reason", "trace", "fingerprint", "ticks", "sim_s",
 
 
 def key_of(row: Row) -> Key:
-    """Return what tells a row's trial from all others: variant, fingerprint of the scenario, seed."""
+    """Return the identity of a row's trial: variant, fingerprint of the scenario, seed."""
     return row["variant"], row["fingerprint"], row["seed"]
 
 
 def read_rows(path: Path) -> list[Row]:
     """Return the rows of a Parquet file of results, without their empty fields.
 
-    Raises ScenarioError where it is none.
+    Raises ScenarioError if the file is not one.
     """
     try:
         rows = pq.read_table(path).to_pylist()
@@ -44,7 +44,7 @@ def read_rows(path: Path) -> list[Row]:
 
 
 class Rows:
-    """The rows in `path` and in its journal, by key; more can be added."""
+    """The rows in `path` and in its journal, by key."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -76,12 +76,12 @@ class Rows:
         self._journal.close()
 
     def add(self, row: Row) -> None:
-        """Take a row, and keep it."""
+        """Store a row."""
         self._journal.write(msgspec.json.encode(row) + b"\n")
         self.held[key_of(row)] = row
 
     def merge(self, axes: Sequence[str], superseded: Iterable[Key] = ()) -> None:
-        """Write all rows but the `superseded` to the Parquet file, with the settings `axes` first, and end the journal."""
+        """Write all rows except `superseded` to the Parquet file, the columns `axes` first, and delete the journal."""
         for key in superseded:
             self.held.pop(key, None)
         rows = sorted(self.held.values(), key=lambda row: _order(row, axes))
@@ -93,7 +93,7 @@ class Rows:
         self._journal_path.unlink()
 
     def _replay(self) -> None:
-        """Take the rows of a study that was cut short; its last line may be half of one."""
+        """Read the journal of an interrupted study; its last line may be incomplete."""
         self._journal.seek(0)
         text = self._journal.read()
         whole = text.rfind(b"\n") + 1
@@ -112,7 +112,7 @@ def _order(row: Row, axes: Sequence[str]) -> tuple[Any, ...]:
 
 
 def _schema(rows: Sequence[Row], axes: Sequence[str]) -> pa.Schema:
-    """Return columns for whatever the rows hold: who they are, settings, how it went, metrics by name, and lists."""
+    """Return the columns of all rows: identity, settings, outcome, metrics by name, then lists."""
     names = dict.fromkeys(name for row in rows for name in row)
     lists = [name for name in names if name == "cell_counts" or name.endswith(("_series", "series_time_s"))]
     known = dict.fromkeys(["study", "variant", *axes, *_FIRST])
@@ -138,5 +138,5 @@ def _type(name: str, values: Sequence[Any]) -> pa.DataType:
 
 
 def _fitted(row: Row, schema: pa.Schema) -> Row:
-    """Return `row` with text where the column is of text, for settings whose type changed between two studies."""
+    """Return `row` with text in text columns, for settings whose type changed between two studies."""
     return {name: str(value) if pa.types.is_string(schema.field(name).type) else value for name, value in row.items()}

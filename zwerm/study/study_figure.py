@@ -1,9 +1,7 @@
-"""A study as one PNG: lines over an axis of the grid, bars of the variants, heat maps of the cells, or what changes over time.
+"""A study as one PNG: lines over an axis of the grid, bars of variants, heat maps of cells, or series over time.
 
-What shows the swarm itself is in `pictures_swarm`.
-
-Bands and error bars are the 95 % interval of the mean, the paler band one standard deviation; diamonds are the paper's
-values, and triangles point upward from bounds that it claims.
+`swarm_figures` draws the figures that show robots. Bands and error bars are the 95 % interval of the mean; the paler band is
+one standard deviation. Diamonds are the paper's values; triangles that point up are its lower bounds.
 """
 
 import math
@@ -29,7 +27,7 @@ _DPI: Final = 150
 
 
 def draw_study(path: Path, results: Results) -> Path:
-    """Draw `results` at `path`, in the way the study asks for or else the one that suits its axes, and return the path."""
+    """Draw `results` at `path` and return the path. The kind of figure is the study's, or follows from its axes."""
     from matplotlib.figure import Figure
 
     table = results.study.table
@@ -48,7 +46,7 @@ def draw_study(path: Path, results: Results) -> Path:
 
 
 def _lines(figure: "Figure", results: Results) -> None:
-    """One panel a metric: its mean over the first axis of the grid, one line for each variant and other setting."""
+    """Draw one panel a metric: its mean over the first axis of the grid, one line for each variant and other setting."""
     metrics = results.study.table.metrics
     axis = next(iter(results.study.table.grid))
     panels = _panels(figure, len(metrics), len(metrics))
@@ -72,7 +70,7 @@ def _lines(figure: "Figure", results: Results) -> None:
 
 
 def _bars(figure: "Figure", results: Results) -> None:
-    """One panel a metric, one bar a point."""
+    """Draw one panel a metric, one bar a point."""
     metrics = results.study.table.metrics
     panels = _panels(figure, len(metrics), len(metrics))
     names = [point.label or results.study.name for point in results.points]
@@ -104,7 +102,7 @@ def _draw_paper(panel: "Axes", places: Sequence[float], lines: Sequence[SummaryL
 
 
 def _heat_maps(figure: "Figure", results: Results) -> None:
-    """One panel a point: the mean number of robots in each cell at the end, one scale for all, numbers written in."""
+    """Draw one panel a point: the mean number of robots in each cell at the end, with one colour scale."""
     shown = [(point, cells) for point in results.points if (cells := point.scenario.metrics.cells)]
     shown = [(point, cells) for point, cells in shown if len(results.cell_counts(point))]
     means = [results.cell_counts(point).mean(axis=0).reshape(cells[::-1]) for point, cells in shown]
@@ -125,7 +123,7 @@ def _heat_maps(figure: "Figure", results: Results) -> None:
 
 
 def _series(figure: "Figure", results: Results) -> None:
-    """One panel a series: its mean over time with the standard deviation, one line a point."""
+    """Draw one panel a series: its mean over time with the standard deviation, one line a point."""
     names = results.study.table.series
     panels = _panels(figure, max(1, len(names)), max(1, len(names)))
     for panel, name in zip(panels, names, strict=False):
@@ -133,14 +131,14 @@ def _series(figure: "Figure", results: Results) -> None:
             rows = [row for row in results.rows(point) if row.get("series_time_s")]
             if not rows:
                 continue
-            # A run that completed early is followed as far as the shortest.
+            # Runs that complete early are cut to the shortest.
             length = min(len(row["series_time_s"]) for row in rows)
             time_s = np.array(rows[0]["series_time_s"][:length])
             counts = np.array([row[f"{name}_series"][:length] for row in rows], dtype=np.float64)
             mean, sd = counts.mean(axis=0), counts.std(axis=0)
             panel.fill_between(time_s, mean - sd, mean + sd, color=f"C{number % 10}", alpha=0.2, linewidth=0)
             panel.plot(time_s, mean, color=f"C{number % 10}", label=point.label or "ours")
-        # What decays is seen to decay, or not, on a logarithmic axis.
+        # An error that decays exponentially is a line on a logarithmic axis.
         panel.set(xlabel="time_s", ylabel=name, yscale="log" if name == "mean_error_m" else "linear")
         panel.grid(alpha=0.3)
         if panel.get_legend_handles_labels()[1]:
@@ -159,7 +157,7 @@ def _panels(figure: "Figure", count: int, columns: int, size: tuple[float, float
 
 
 def _show_range(panel: "Axes", metric: str) -> None:
-    """Show all of what a fraction can be, and no more: few trials make wide intervals."""
+    """Label the axis; limit it to [0, 1] for a fraction, because few trials make wide intervals."""
     panel.set(ylabel=metric)
     if metric.endswith("_fraction"):
         panel.set_ylim(0.0, 1.02)

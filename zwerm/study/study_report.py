@@ -1,4 +1,4 @@
-"""What a person sees of a study on the terminal: its progress, and the table at its end."""
+"""Progress and result tables of a study on the terminal."""
 
 import math
 from collections.abc import Sequence
@@ -10,15 +10,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from zwerm.study.summary import Results, SummaryLine
-from zwerm.study.tables import Study
 
-# Speed is estimated over this long: a study's trials are long, and of different length.
+# Period of the speed estimate: trials are long and differ in length.
 _ESTIMATE_S = 600.0
 _REASONS_SHOWN = 5
 
 
 class StudyProgress:
-    """A study's progress on `console`: trials done, failed and to come. A quiet one shows nothing."""
+    """Progress of a study on `console`: trials done, failed and remaining. Shows nothing if `quiet`."""
 
     def __init__(self, console: Console, name: str, quiet: bool = False) -> None:
         self._progress = Progress(
@@ -46,32 +45,19 @@ class StudyProgress:
             self._progress.stop()
 
     def begin(self, total: int) -> None:
-        """Take note that `total` trials are to be run now."""
+        """Start the progress bar of `total` trials."""
         self._progress.start()
         self._task = self._progress.add_task(self._name, total=total, failed="")
 
     def ended(self, failed: bool) -> None:
-        """Take note that a trial has ended."""
+        """Count an ended trial."""
         self._failed += failed
         note = f", [red]{self._failed} failed[/red]" if self._failed else ""
         self._progress.update(self._task, advance=1, failed=note)
 
 
-def print_studies(console: Console, studies: list[Study]) -> None:
-    """Print the built-in studies as a table."""
-    table = Table(box=None, padding=(0, 2, 0, 0), title_justify="left")
-    table.add_column("study", style="bold", no_wrap=True)
-    table.add_column("trials", justify="right")
-    table.add_column("what it is")
-    for study in studies:
-        grid = math.prod(len(axis) for axis in study.table.grid.values())
-        trials = len(study.variants) * grid * len(study.table.seeds)
-        table.add_row(study.name, str(trials), study.table.summary)
-    console.print(table)
-
-
 def print_results(console: Console, results: Results) -> None:
-    """Print a table for each metric, each point with its mean, interval and paper's value; then what went wrong."""
+    """Print a table for each metric, with mean, interval and the paper's value of each point; then the failures."""
     study = results.study
     console.print(": ".join(filter(None, [study.name, study.table.summary])), style="bold", markup=False)
     for metric in study.table.metrics:
@@ -86,7 +72,7 @@ def print_results(console: Console, results: Results) -> None:
 
 
 def _table(metric: str, lines: Sequence[SummaryLine], axes: Sequence[str]) -> Table:
-    """Return a table of one metric: who and where, ours, the paper's."""
+    """Return the table of one metric: variant and settings, measured values, the paper's values."""
     named = any(line.variant for line in lines)
     compared = any(line.published for line in lines)
     table = Table(title=metric, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0))
@@ -95,8 +81,8 @@ def _table(metric: str, lines: Sequence[SummaryLine], axes: Sequence[str]) -> Ta
     for heading in ["n", "mean", "± 95 %", "sd", *(["paper", "difference", ""] if compared else [])]:
         table.add_column(heading, justify="right", no_wrap=True)
     for line in lines:
-        who = [*([line.variant] if named else []), *(f"{value}" for value in line.settings.values())]
-        table.add_row(*who, *_ours(line), *(_theirs(line) if compared else []))
+        point = [*([line.variant] if named else []), *(f"{value}" for value in line.settings.values())]
+        table.add_row(*point, *_measured_cells(line), *(_paper_cells(line) if compared else []))
     return table
 
 
@@ -111,19 +97,19 @@ def _print_failures(console: Console, results: Results) -> None:
         console.print(f"  and {len(results.failures) - _REASONS_SHOWN} other reasons", style="red")
 
 
-def _ours(line: SummaryLine) -> list[str]:
+def _measured_cells(line: SummaryLine) -> list[str]:
     n, *numbers = line.sample.n, line.sample.mean, line.sample.half_width, line.sample.sd
     return [str(n), *map(_readable, numbers)]
 
 
 def _readable(number: float) -> str:
-    """Return four decimals, or three digits of what is too small for them."""
+    """Return a number with four decimals, or three digits if it is below 0.01."""
     if math.isnan(number):
         return "-"
     return f"{number:.4f}" if number == 0.0 or abs(number) >= 0.01 else f"{number:.3g}"
 
 
-def _theirs(line: SummaryLine) -> list[str]:
+def _paper_cells(line: SummaryLine) -> list[str]:
     if line.paper is None:
         return ["", "", ""]
     verdict = {True: "[green]within", False: "[bold red]OUTSIDE", None: "?"}[line.agrees]

@@ -1,7 +1,7 @@
-"""Running a study: what is not yet in its file is run, kept row by row, and condensed.
+"""Run the trials of a study that its file does not have yet, store each row, and summarise all rows.
 
-A study that was cut short, or whose seeds or grid have grown, goes on where it was. What the file holds of points that the
-study no longer has stays there; rows of a point whose scenario has changed make room for new ones.
+An interrupted study, or one with new seeds or grid values, continues with the missing trials. Rows of points that are no
+longer in the study stay in the file. Rows of a point whose scenario has changed are replaced.
 """
 
 from collections.abc import Sequence
@@ -17,17 +17,17 @@ from zwerm.run.runner import Runner
 from zwerm.study.plan import Trial, make_points, make_trials
 from zwerm.study.pool import run_trials
 from zwerm.study.rows import Key, Rows
+from zwerm.study.study_tables import Setting, Study
 from zwerm.study.summary import Results
-from zwerm.study.tables import Setting, Study
 from zwerm.study.trial import Row
 from zwerm.world.drivers.lockstep import FAILED
 
 
 class StudyListener(Protocol):
-    """Somebody to tell how a study is getting on."""
+    """Receiver of a study's progress."""
 
     def begin(self, total: int) -> None:
-        """`total` trials are to be run."""
+        """`total` trials will be run."""
 
     def ended(self, failed: bool) -> None:
         """A trial has ended."""
@@ -35,7 +35,7 @@ class StudyListener(Protocol):
 
 @dataclass(frozen=True)
 class StudyResult:
-    """What a study has come to: `planned` trials, of which `ran` were run now and `done` are in the file `path`."""
+    """The result of a study: of `planned` trials, `ran` were run now, and `done` are in the file `path`."""
 
     results: Results
     path: Path
@@ -46,7 +46,7 @@ class StudyResult:
 
     @property
     def failed(self) -> int:
-        """How many of the trials that are done have failed."""
+        """Number of failed trials."""
         return self.results.failures.total()
 
 
@@ -59,13 +59,13 @@ def run_study(
     sets: Sequence[str] = (),
     retry: bool = False,
     runner: Runner = "inline",
-    watcher: StudyListener | None = None,
+    listener: StudyListener | None = None,
 ) -> StudyResult:
-    """Run what `out` does not hold yet of `study`, `jobs` trials at a time, and return what is known then.
+    """Run the trials of `study` that the file `out` does not have, `jobs` at a time, and return the results.
 
-    `seeds` replaces the study's own, `sets` overrides its scenarios, `retry` runs trials again that failed. Ctrl-C keeps
-    every row that is done, and is told by the result. In `processes`, a trial has the machine for itself. Raises
-    ScenarioError for mistakes, before anything is run.
+    `seeds` replaces the study's seeds, `sets` overrides its scenarios, `retry` repeats failed trials. After Ctrl-C all rows
+    so far are kept, and the result says that it was interrupted. With the runner `processes` one trial runs at a time.
+    Raises ScenarioError for errors in the input, before any trial runs.
     """
     if jobs is not None and jobs < 1:
         raise ScenarioError([f"jobs: expected >= 1, got {jobs}"])
@@ -75,16 +75,16 @@ def run_study(
         distinct = _distinct(trials)
         todo = [trial for trial in distinct if _wanted(rows.held.get(trial.key), retry)]
         ran, interrupted = 0, False
-        if watcher is not None:
-            watcher.begin(len(todo))
+        if listener is not None:
+            listener.begin(len(todo))
         try:
             workers = 1 if runner == "processes" else min(jobs or cpu_count(), max(1, len(todo)))
             with closing(run_trials(todo, workers)) as ending:
                 for row in ending:
                     rows.add(row)
                     ran += 1
-                    if watcher is not None:
-                        watcher.ended(row["outcome"] == FAILED)
+                    if listener is not None:
+                        listener.ended(row["outcome"] == FAILED)
         except KeyboardInterrupt:
             interrupted = True
         axes = list(study.table.grid)
@@ -94,7 +94,7 @@ def run_study(
 
 
 def _distinct(trials: Sequence[Trial]) -> list[Trial]:
-    """Return each trial once: a setting may do nothing to a variant, as a coordinator's crash to one that has none."""
+    """Return each trial once: two settings can give a variant the same scenario."""
     found: dict[Key, Trial] = {}
     for trial in trials:
         found.setdefault(trial.key, trial)
@@ -106,7 +106,7 @@ def _wanted(row: Row | None, retry: bool) -> bool:
 
 
 def _superseded(held: dict[Key, Row], trials: Sequence[Trial], axes: Sequence[str]) -> list[Key]:
-    """Return the rows that stand in the place of a trial which is done, and are of an earlier scenario."""
+    """Return the rows of an earlier scenario whose variant, settings and seed have a new row."""
 
     def place(variant: str, settings: dict[str, Setting], seed: int) -> tuple[object, ...]:
         return variant, seed, *(settings.get(axis) for axis in axes)

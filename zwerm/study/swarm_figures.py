@@ -1,6 +1,6 @@
-"""Pictures of a study that show swarms and not numbers only: where robots went, and how densely they stand in the end.
+"""Figures of a study that show robots: their paths, and their density at the end of a run.
 
-The rows of a study keep no positions. So the first trial of a point is run again for its picture: the same seed is the same
+The rows of a study hold no positions, so the first trial of a point is run again for its figure. The same seed gives the same
 run.
 """
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _PANEL_IN: Final = 3.6
 _TITLE_IN: Final = 0.8
 
-# Whose coordinates are followed over time.
+# The robot whose coordinates are drawn over time.
 _FOLLOWED: Final = 0
 
 
@@ -52,7 +52,7 @@ def draw_tracks(figure: "Figure", results: Results) -> None:
 
 
 def draw_density(figure: "Figure", results: Results) -> None:
-    """Draw a column for each point: where robots stand in the end, and their density against the distance from the peak."""
+    """Draw a column for each point: final positions, and density over the distance from the field's peak."""
     points = [point for point in results.points if _rings(point) is not None]
     figure.set_size_inches(_PANEL_IN * max(1, len(points)), 2 * _PANEL_IN + _TITLE_IN)
     if not points:
@@ -102,7 +102,7 @@ def _draw_arena(panel: "Axes", point: Point, arena: Arena) -> None:
 
 
 def _draw_cells(panel: "Axes", point: Point, arena: Arena, position: Floats) -> None:
-    """Draw where robots stand, and their Voronoi cells where the arena and the field have such."""
+    """Draw the robots, and their Voronoi cells if the arena is convex and has a field."""
     scenario = point.scenario
     if arena.is_convex and scenario.field is not None:
         field = make_field(scenario.field, arena.bounds, scenario.folder, scenario.place)

@@ -1,6 +1,6 @@
-"""One trial of a study: a run in this process, condensed to one row.
+"""One trial of a study: a run and its row of results.
 
-A trial that fails is a row like any other, with its outcome and its reason; only an interruption leaves none.
+A failed trial gives a row too, with its outcome and reason. Only an interrupted trial gives none.
 """
 
 import traceback
@@ -16,14 +16,14 @@ from zwerm.world.drivers.lockstep import FAILED, INTERRUPTED
 
 Row = dict[str, Any]
 
-# A series is sampled at so many even intervals of the run.
+# Number of equal intervals at which a series is sampled.
 SERIES_INTERVALS: Final = 120
 
 
 def run_trial(trial: Trial) -> Row:
     """Return the row of `trial`.
 
-    Raises KeyboardInterrupt where it is interrupted.
+    Raises KeyboardInterrupt if the run is interrupted.
     """
     try:
         result = run(trial.point.scenario, trial.seed, trial.runner)
@@ -51,7 +51,7 @@ def run_trial(trial: Trial) -> Row:
 
 
 def failed_row(trial: Trial, reason: str) -> Row:
-    """Return the row of a trial that gave no result."""
+    """Return the row of a trial without a result."""
     return _head(trial) | {"outcome": FAILED, "reason": reason}
 
 
@@ -67,9 +67,9 @@ def _head(trial: Trial) -> Row:
 
 
 def _series(result: RunResult, names: tuple[str, ...]) -> Row:
-    """Return each named series, at even intervals of the scenario's duration, as far as the run went.
+    """Return each named series at equal intervals of the scenario's duration, up to the end of the run.
 
-    It is a count of robots, or what a meter of the run noted: then the newest at each time, and nothing where none looked.
+    A series is a count of robots, or the newest sample of an observer at each time. A series without samples is left out.
     """
     tracks = result.history.arrays()
     time_s = np.linspace(0.0, result.scenario.time.duration_s, SERIES_INTERVALS + 1)
@@ -79,9 +79,9 @@ def _series(result: RunResult, names: tuple[str, ...]) -> Row:
         "robots_in_arena": tracks.present.sum(axis=1),
         "robots_entered": np.logical_or.accumulate(tracks.present, axis=0).sum(axis=1),
     }
-    noted = {name: np.array(values) for name, values in result.series.items()}
-    looks = np.searchsorted(noted["time_s"], time_s + 1e-9) - 1 if noted else at
+    sampled = {name: np.array(values) for name, values in result.series.items()}
+    newest = np.searchsorted(sampled["time_s"], time_s + 1e-9) - 1 if sampled else at
     series = {
-        name: (found[name][at] if name in found else noted[name][looks]) for name in names if name in found | noted
+        name: (found[name][at] if name in found else sampled[name][newest]) for name in names if name in found | sampled
     }
     return {"series_time_s": time_s.tolist()} | {f"{name}_series": values.tolist() for name, values in series.items()}

@@ -1,4 +1,5 @@
-"""The twin: the same scenario over a real network, beside what the radio's models make of the very same packets.
+"""The twin: a scenario with its packets on a real network, compared with the radio's models for the same packets.
 
-`running` runs it, `comparison` holds the two against each other, `report` prints it. Needs Linux and root.
+`twin_runner` runs it, `packet_comparison` compares real and modelled packets, `twin_report` prints the result. Needs Linux and
+root.
 """

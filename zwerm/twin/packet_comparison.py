@@ -1,10 +1,10 @@
-"""Two fates of every packet, held against each other: what the models said, and what the network did.
+"""Compare the modelled and the real result of each packet of a twin run.
 
-Compared is the fraction that got through: the models' over all packets that were sent, less those dropped; the network's over
-all that were sent, those that arrived before the end. The half width is that of a 99 % confidence interval for the difference
-of the two, both being random: a link of n modelled and m real packets adds `p (1 - p) g (n/N^2 + m/M^2)` to the variance, where
-N and M are those of all links, and g > 1 says that packets in bursts are not independent. The two agree where that difference
-is within the interval, and so is that of every single link, with an interval for all links together.
+The compared quantity is the fraction of packets that pass: for the models, sent packets less dropped ones; for the network,
+packets that arrive before the end of the run. The half width belongs to a 99 % confidence interval of the difference. A link
+with n modelled and m real packets adds `p (1 - p) g (n/N^2 + m/M^2)` to the variance. N and M are the totals over all links;
+g > 1 accounts for the correlation of packets in bursts. The two sides agree if the difference is within the interval, and
+the difference of each link is within a joint interval for all links.
 """
 
 import itertools
@@ -37,8 +37,8 @@ def compare(run: TwinRun) -> dict[str, Any]:
     counts = _counts(run, modelled, sent, arrived)
     half, links = half_width(counts), agreeing(counts)
     channels = run.world.medium.channels.values()
-    delivered = sum(int(each.accounts.delivered().sum()) for each in channels)
-    model_delay_s = sum(each.accounts.delay_ticks for each in channels) * dt_s / delivered if delivered else None
+    delivered = sum(int(each.ledger.delivered().sum()) for each in channels)
+    model_delay_s = sum(each.ledger.delay_ticks for each in channels) * dt_s / delivered if delivered else None
     return {
         "outcome": run.outcome,
         "ticks": run.world.tick,
@@ -72,7 +72,7 @@ def compare(run: TwinRun) -> dict[str, Any]:
 
 
 def _real(run: TwinRun) -> tuple[dict[Link, list[int]], dict[Link, set[int]], list[int], list[int]]:
-    """Return by link the numbers sent and those that arrived; and of all packets the delay [ns] and ticks until heard."""
+    """Return by link the packet numbers sent and arrived; for all packets the delays [ns] and the ticks until received."""
     audience: dict[tuple[str, int], list[int]] = defaultdict(list)
     for name, pairs in run.links.items():
         for sender, receiver in pairs:
@@ -96,13 +96,13 @@ def _real(run: TwinRun) -> tuple[dict[Link, list[int]], dict[Link, set[int]], li
 
 
 def _modelled(run: TwinRun) -> dict[Link, tuple[int, int]]:
-    """Return by link the packets sent and not dropped, as the world's books have it."""
+    """Return by link the numbers of packets sent and not dropped, from the world's ledgers."""
     found: dict[Link, tuple[int, int]] = {}
     for name, channel in run.world.medium.channels.items():
-        books = channel.accounts.by_link()
-        dropped = [sum(column) for column in zip(*books["dropped"].values(), strict=True)] or [0] * len(books["sent"])
+        ledger = channel.ledger.by_link()
+        dropped = [sum(column) for column in zip(*ledger["dropped"].values(), strict=True)] or [0] * len(ledger["sent"])
         for sender, receiver, sent, lost in zip(
-            books["sender"], books["receiver"], books["sent"], dropped, strict=True
+            ledger["sender"], ledger["receiver"], ledger["sent"], dropped, strict=True
         ):
             if sent:
                 found[name, sender, receiver] = sent, sent - lost
@@ -116,32 +116,32 @@ def lost_runs(sent: list[int], arrived: set[int]) -> list[int]:
 
 
 class LinkCounts(NamedTuple):
-    """A link's packets: modelled, of them passed; real, of them passed; and how much bursts widen its variance."""
+    """Packets of a link: modelled, passed in the model, sent, arrived; `variance_factor` is the variance factor g of bursts."""
 
     modelled: int
     passed: int
     real: int
-    came: int
-    grown: float
+    arrived_count: int
+    variance_factor: float
 
     @property
     def variance(self) -> float:
-        """Of one packet's fate, as both sides together have it."""
-        p = (self.passed + self.came) / (self.modelled + self.real)
-        return p * (1.0 - p) * self.grown
+        """Variance of one packet's result, p (1 - p) g, with p over both sides."""
+        p = (self.passed + self.arrived_count) / (self.modelled + self.real)
+        return p * (1.0 - p) * self.variance_factor
 
 
 def _counts(
     run: TwinRun, modelled: dict[Link, tuple[int, int]], sent: dict[Link, list[int]], arrived: dict[Link, set[int]]
 ) -> list[LinkCounts]:
-    """Return the counts of every link."""
-    grown: dict[tuple[int, int], float] = {}
+    """Return the counts of each link."""
+    variance_factor: dict[tuple[int, int], float] = {}
     for rule in run.impairments.rules:
         if rule.bursts:
-            again = 1.0 - rule.leave - rule.enter
-            grown |= dict.fromkeys(rule.pairs, (1.0 + again) / (1.0 - again))
+            correlation = 1.0 - rule.leave - rule.enter
+            variance_factor |= dict.fromkeys(rule.pairs, (1.0 + correlation) / (1.0 - correlation))
     return [
-        LinkCounts(*modelled.get(link, (0, 0)), len(sent[link]), len(arrived[link]), grown.get(link[1:], 1.0))
+        LinkCounts(*modelled.get(link, (0, 0)), len(sent[link]), len(arrived[link]), variance_factor.get(link[1:], 1.0))
         for link in {**modelled, **sent}
     ]
 
@@ -156,14 +156,17 @@ def half_width(counts: Sequence[LinkCounts]) -> float:
 
 
 def agreeing(counts: Sequence[LinkCounts]) -> int:
-    """Return how many links agree. All do in 99 % of runs where both sides have the same chances (Bonferroni)."""
+    """Return the number of links that agree.
+
+    If both sides have the same probabilities, all links agree in 99 % of runs (Bonferroni).
+    """
     z = NormalDist().inv_cdf(1.0 - 0.005 / max(1, len(counts)))
 
     def agrees(each: LinkCounts) -> bool:
         if not each.modelled or not each.real:
             return False
         half = z * math.sqrt(each.variance * (1.0 / each.modelled + 1.0 / each.real))
-        return abs(each.passed / each.modelled - each.came / each.real) <= half
+        return abs(each.passed / each.modelled - each.arrived_count / each.real) <= half
 
     return sum(map(agrees, counts))
 
@@ -179,7 +182,7 @@ def _spread(delay_ns: list[int]) -> dict[str, float] | None:
 def _by_link(
     modelled: dict[Link, tuple[int, int]], sent: dict[Link, list[int]], arrived: dict[Link, set[int]]
 ) -> dict[str, list[Any]]:
-    """Return every link as columns, sorted."""
+    """Return all links as columns, sorted by channel, sender and receiver."""
     links = sorted({*modelled, *sent})
     counts = Counter({link: len(numbers) for link, numbers in sent.items()})
     return {

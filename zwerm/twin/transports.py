@@ -1,4 +1,4 @@
-"""What `zwerm twin` does: one run a transport, each compared, and all told at the end."""
+"""Run the twin of a scenario over each transport, and print the comparison with the models."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -9,18 +9,18 @@ from typing import Any
 import msgspec
 from rich.console import Console
 
-from zwerm.deploy.network.impairments import possible
+from zwerm.deploy.network.impairments import supported
 from zwerm.link.peer_radio import Transport
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import ProgressListener
 from zwerm.scenario.tables import Scenario
 from zwerm.twin.packet_comparison import compare
 from zwerm.twin.twin_report import print_twin
-from zwerm.twin.twin_runner import run_twin, usable
+from zwerm.twin.twin_runner import require_namespaces, run_twin
 
 
 class Transports(StrEnum):
-    """What the twin's packets may cross the network by."""
+    """Transport of the twin's packets."""
 
     udp = "udp"
     tcp = "tcp"
@@ -31,7 +31,7 @@ class Transports(StrEnum):
         return ("udp", "tcp") if self is Transports.both else ("udp",) if self is Transports.udp else ("tcp",)
 
 
-def run_and_tell(
+def run_and_report(
     scenario: Scenario,
     seed: int,
     transports: Sequence[Transport],
@@ -40,27 +40,26 @@ def run_and_tell(
     err: Console,
     progress: Callable[[str], AbstractContextManager[ProgressListener]],
 ) -> set[str]:
-    """Run a scenario's twin over each transport, tell on `out` or as JSON what became of its packets; return the outcomes.
+    """Run a scenario's twin over each transport, print the comparison on `out` or as JSON, and return the outcomes.
 
-    `progress`, of a run's name, shows how it is getting on.
-
-    Raises LinkError where this machine cannot have a network of a run's own, ScenarioError for what no network could do.
+    `progress` returns the progress listener of a run from its name. Raises LinkError if this machine cannot create network
+    namespaces, and ScenarioError for a scenario that a real network cannot reproduce.
     """
-    usable()
-    assemble(scenario, seed)  # for the mistakes in what may be left out
-    chosen, skipped = possible(scenario)
+    require_namespaces()
+    assemble(scenario, seed)  # reports errors also in models that may be skipped
+    chosen, skipped = supported(scenario)
     found: dict[str, dict[str, Any]] = {}
     for transport in transports:
-        with progress(f"{scenario.name}, {transport}") as watcher:
-            result = run_twin(chosen, seed, transport, watcher)
+        with progress(f"{scenario.name}, {transport}") as listener:
+            result = run_twin(chosen, seed, transport, listener)
         found[transport] = compare(result)
         if result.reason:
             err.print(f"zwerm: {result.reason}", style="red", markup=False, highlight=False, soft_wrap=True)
         if result.outcome == "interrupted":
             break
     if as_json:
-        told = {"scenario": scenario.name, "seed": seed, "skipped": skipped, "transports": found}
-        sys.stdout.write(msgspec.json.encode(told).decode() + "\n")
+        report = {"scenario": scenario.name, "seed": seed, "skipped": skipped, "transports": found}
+        sys.stdout.write(msgspec.json.encode(report).decode() + "\n")
     else:
         print_twin(out, f"{scenario.name}, seed {seed}: its twin on a real network", found, skipped)
     return {each["outcome"] for each in found.values()}

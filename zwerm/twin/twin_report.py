@@ -1,4 +1,4 @@
-"""What `zwerm twin` prints: for each transport the modelled and the real network side by side, and what TCP made of loss."""
+"""The table of `zwerm twin`: the modelled and the real network side by side, for each transport."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,11 +6,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-Found = Mapping[str, Any]
+Comparison = Mapping[str, Any]
 
 
-def print_twin(console: Console, title: str, found: Mapping[str, Found], skipped: Sequence[str]) -> None:
-    """Print a column for the models and one for the network, for each transport of `found`."""
+def print_twin(console: Console, title: str, found: Mapping[str, Comparison], skipped: Sequence[str]) -> None:
+    """Print one column for the models and one for the network, for each transport of `found`."""
     table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
     table.add_column("", style="bold", no_wrap=True)
     for transport in found:
@@ -18,7 +18,7 @@ def print_twin(console: Console, title: str, found: Mapping[str, Found], skipped
         table.add_column(f"real, {transport.upper()}", justify="right")
 
     def row(name: str, model: str, real: str) -> None:
-        cells = [cell for each in found.values() for cell in (_told(each, model), _told(each, real))]
+        cells = [cell for each in found.values() for cell in (_shown(each, model), _shown(each, real))]
         if any(cells):
             table.add_row(name, *cells)
 
@@ -46,8 +46,8 @@ def print_twin(console: Console, title: str, found: Mapping[str, Found], skipped
         console.print(f"left out, here and there: {line}", markup=False, highlight=False, soft_wrap=True)
 
 
-def _told(found: Any, path: str) -> str:
-    """Return what stands at a path, in few characters; nothing where there is nothing."""
+def _shown(found: Any, path: str) -> str:
+    """Return the value at a dotted path as short text; an empty string if there is none."""
     for key in path.split(".") if path else ():
         found = found.get(key) if found is not None else None
     if not path or found is None:

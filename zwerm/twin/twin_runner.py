@@ -1,8 +1,8 @@
-"""Running a scenario in real time with its packets on a real network.
+"""Run a scenario in real time with its packets on a real network.
 
-The world senses, moves bodies and observes nodes as ever, over a Unix socket that loses nothing. What nodes send each other
-crosses the network, and they hear what came through and nothing else. The world is told what was sent all the same, and
-its models judge it: so every packet has two fates, a modelled and a real one, at the same tick and between the same places.
+Observations and commands go over a Unix socket that loses nothing. Packets between nodes go over the network, and nodes
+receive only the packets that arrive there. The world gets a copy of each packet sent, and its models decide about it. So each
+packet has a modelled and a real result, at the same tick and the same positions.
 """
 
 import time
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from zwerm.deploy.network.impairments import Impairments, Network, translate
-from zwerm.deploy.network.namespaces import Namespaces, address_of, missing
+from zwerm.deploy.network.namespaces import Namespaces, address_of, unavailable_reason
 from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.deploy.swarm import LocalSwarm, Members
@@ -26,15 +26,15 @@ from zwerm.world.radio import ROBOTS
 from zwerm.world.world import World
 
 MEET_DEADLINE_S: Final = 30.0
-_LOOK_EVERY_S: Final = 0.02
+_POLL_S: Final = 0.02
 
-# How long nodes go on listening after the last tick: TCP may wait seconds before it sends once more.
+# Seconds that nodes listen after the last tick: TCP may wait seconds before it retransmits.
 DRAIN_S: Final[dict[Transport, float]] = {"udp": 0.5, "tcp": 3.0}
 
 
 @dataclass(slots=True)
 class TwinRun:
-    """One run: the world with its books, what every node's radio noted, and what the network says it did."""
+    """One run: the world with its ledgers, the log of each node's radio, and the counters of the network."""
 
     world: World
     transport: Transport
@@ -51,20 +51,20 @@ class TwinRun:
     segments: int
 
 
-def usable() -> None:
-    """Raise LinkError, with the reason, where this machine cannot have a network of a run's own."""
-    reason = missing()
+def require_namespaces() -> None:
+    """Raise LinkError, with the reason, if this machine cannot create network namespaces."""
+    reason = unavailable_reason()
     if reason:
         raise LinkError(f"the twin on a real network {reason}")
 
 
-def run_twin(scenario: Scenario, seed: int, transport: Transport, watcher: ProgressListener | None = None) -> TwinRun:
-    """Run a scenario, one that is `possible` here, with its packets on a network of its own.
+def run_twin(scenario: Scenario, seed: int, transport: Transport, listener: ProgressListener | None = None) -> TwinRun:
+    """Run a scenario that `supported` returned, with its packets on a network of its own.
 
-    Raises LinkError where this machine cannot have one, and ScenarioError for a mistake in the scenario.
+    Raises LinkError if this machine cannot create network namespaces, and ScenarioError for an error in the scenario.
     """
-    usable()
-    watcher = watcher or NullProgress()
+    require_namespaces()
+    listener = listener or NullProgress()
     world = assemble(scenario, seed)
     links = {name: channel.pairs() for name, channel in world.medium.channels.items()}
     impairments = translate(scenario, links)
@@ -75,11 +75,11 @@ def run_twin(scenario: Scenario, seed: int, transport: Transport, watcher: Progr
     ):
         stations = _stations(scenario, members, namespaces, transport, directory)
         logs = {node: Path(station.log) for node, station in stations.items()}
-        with LocalSwarm(new_run_id(), members, progress=watcher.joined, paced=True, stations=stations) as swarm:
-            _wait_until_met(logs)
+        with LocalSwarm(new_run_id(), members, progress=listener.joined, paced=True, stations=stations) as swarm:
+            _wait_until_connected(logs)
             network = Network(namespaces, impairments, transport)
             network.impair(world.draws)
-            driver = _driver(world, swarm, network, impairments, watcher)
+            driver = _driver(world, swarm, network, impairments, listener)
             before, start = _segments(namespaces, members), time.monotonic()
             try:
                 outcome, reason = driver.run(), driver.reason
@@ -109,9 +109,9 @@ def run_twin(scenario: Scenario, seed: int, transport: Transport, watcher: Progr
 
 
 def _driver(
-    world: World, swarm: LocalSwarm, network: Network, impairments: Impairments, watcher: ProgressListener
+    world: World, swarm: LocalSwarm, network: Network, impairments: Impairments, listener: ProgressListener
 ) -> RealTime:
-    """Return what drives the world, and the network along with it."""
+    """Return the real-time driver of the world; it updates the network's blocked pairs at every tick."""
     table = world.scenario.time
     ticks = round(table.duration_s / table.dt_s)
 
@@ -124,7 +124,7 @@ def _driver(
         network.block(pairs)
 
     def on_tick(world: World) -> None:
-        watcher.ticked(world.tick, ticks)
+        listener.ticked(world.tick, ticks)
 
     return RealTime(world, swarm.link, 1.0, on_tick, swarm, on_sense)
 
@@ -132,7 +132,7 @@ def _driver(
 def _stations(
     scenario: Scenario, members: Members, namespaces: Namespaces, transport: Transport, directory: Path
 ) -> dict[int, Station]:
-    """Return where each node stands, and whom it hears: all robots each other, and all of them the coordinator."""
+    """Return each node's station. Robots receive from robots; the coordinator and all other nodes from each other."""
     addresses = {node: address_of(node) for node in members}
     coordinator = scenario.robots.count if scenario.coordinator is not None else None
     channels: dict[str, bool] = {}
@@ -164,8 +164,8 @@ def _stations(
     }
 
 
-def _wait_until_met(logs: dict[int, Path]) -> None:
-    """Return when every two nodes have heard each other."""
+def _wait_until_connected(logs: dict[int, Path]) -> None:
+    """Return when each pair of nodes has exchanged hellos. Raises LinkError after MEET_DEADLINE_S."""
     end_s = time.monotonic() + MEET_DEADLINE_S
     waiting = list(logs)
     while waiting := [node for node in waiting if not any(line.what == MET for line in read_log(logs[node]))]:
@@ -173,11 +173,11 @@ def _wait_until_met(logs: dict[int, Path]) -> None:
             raise LinkError(
                 f"the twin on a real network: node {min(waiting)} has not met all others within {MEET_DEADLINE_S:g} s"
             )
-        time.sleep(_LOOK_EVERY_S)
+        time.sleep(_POLL_S)
 
 
 def _segments(namespaces: Namespaces, members: Members) -> tuple[int, int]:
-    """Return the TCP segments that all nodes have sent so far, and those that they sent again."""
+    """Return the numbers of TCP segments sent and retransmitted by all nodes so far."""
     sent = again = 0
     for node in members:
         lines = [line.split() for line in namespaces.run(["cat", "/proc/net/snmp"], node=node).splitlines()]

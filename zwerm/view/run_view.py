@@ -12,8 +12,8 @@ from zwerm.world.tick.telemetry import TelemetryRecord
 class RunView:
     """The drawable part of one run: `name` is its scenario and seed, `ending` says how it ended.
 
-    `cells` is (columns, rows); `told` and `series` are those of the run's result. `layers` are classes of picture layers, as
-    `module:Class`, drawn in this order over the arena.
+    `cells` is (columns, rows); `snapshots` and `series` are those of the run's result; `coordinator` is the id of its node.
+    `layers` are classes of picture layers, as `module:Class`, drawn in this order over the arena.
     """
 
     arena: Arena
@@ -25,9 +25,10 @@ class RunView:
     cells: tuple[int, int] | None = None
     sight_range_m: float | None = None
     bases: int = 0
-    told: Sequence[TelemetryRecord] = ()
+    snapshots: Sequence[TelemetryRecord] = ()
     series: Mapping[str, Sequence[float]] = field(default_factory=dict)
     layers: Sequence[str] = ()
+    coordinator: int | None = None
 
     @property
     def title(self) -> str:

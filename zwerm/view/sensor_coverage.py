@@ -14,6 +14,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, decode_snapshot
 from zwerm.maths.keyed_random import Draws
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.record.history import Tracks
@@ -61,9 +62,10 @@ class Snapshot(NamedTuple):
         return np.array(FlagComplex(lists).triangles, dtype=np.int64).reshape(-1, 3)
 
 
-def snapshots(told: Sequence[TelemetryRecord]) -> list[Snapshot]:
-    """Return the snapshots that a run's coordinator or base station reported, in order."""
-    return [_snapshot(each, each.told["complex"]) for each in told if "complex" in each.told]
+def snapshots(records: Sequence[TelemetryRecord], coordinator: int | None = None) -> list[Snapshot]:
+    """Return the complexes that the node `coordinator` reported, in order; where that is None, those of any node."""
+    decoded = ((each, decode_snapshot(each.snapshot)) for each in records if coordinator in (None, each.node))
+    return [_snapshot(each, found) for each, found in decoded if isinstance(found, ComplexSnapshot)]
 
 
 def true_snapshot(time_s: float, position: Floats, standing: Bools, arena: Arena, range_m: float) -> Snapshot:
@@ -77,12 +79,13 @@ def true_snapshot(time_s: float, position: Floats, standing: Bools, arena: Arena
     return Snapshot(None, time_s, position, standing, Visibility().pairs(scene, range_m), none, none, ())
 
 
-def _snapshot(moment: TelemetryRecord, told: dict[str, Any]) -> Snapshot:
+def _snapshot(moment: TelemetryRecord, reported: ComplexSnapshot) -> Snapshot:
     edges, frontier, obstacle = (
-        np.array(told[name], dtype=np.int64).reshape(-1, 2) for name in ("edges", "frontier", "obstacle")
+        np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        for pairs in (reported.edges, reported.frontier, reported.obstacle)
     )
-    paths = tuple(tuple(path) for path in told["paths"] if path)
-    return Snapshot(told["cycle"], moment.time_s, moment.position, moment.present, edges, frontier, obstacle, paths)
+    paths = tuple(path for path in reported.paths if path)
+    return Snapshot(reported.cycle, moment.time_s, moment.position, moment.present, edges, frontier, obstacle, paths)
 
 
 class ComplexLayer(Layer):
@@ -102,7 +105,7 @@ class ComplexLayer(Layer):
         self._axes = sheet.axes
         self._names = names
         self._view = view
-        self._snapshots = snapshots(view.told)
+        self._snapshots = snapshots(view.snapshots, view.coordinator)
         self._beside = 0.7 * view.radius_m * sheet.inches_per_m * 72.0 + 1.0
         self._arrow_m = ARROW_POINTS / 72.0 / sheet.inches_per_m
         self._triangles = PolyCollection([], **TRIANGLE, linewidths=0, zorder=1.2)
@@ -118,12 +121,12 @@ class ComplexLayer(Layer):
     @classmethod
     def applies(cls, view: RunView) -> bool:
         """Tell whether there is a complex: a reported one, or the true one of a swarm from base stations."""
-        return any("complex" in each.told for each in view.told) or (view.bases > 0 and view.sight_range_m is not None)
+        return bool(cls.stages(view)) or (view.bases > 0 and view.sight_range_m is not None)
 
     @classmethod
     def stages(cls, view: RunView) -> Sequence[Snapshot]:
         """Return the reported snapshots."""
-        return snapshots(view.told)
+        return snapshots(view.snapshots, view.coordinator)
 
     @property
     def artists(self) -> list[Any]:

@@ -12,12 +12,13 @@ are radians in (-pi, pi], counter-clockwise; a bearing is measured in the body f
 import re
 from collections.abc import Callable
 from math import isfinite
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 from msgspec import Struct
 
 from zwerm.errors import ProtocolError
+from zwerm.wire.telemetry import plain_numbers, telemetry_error
 
 PROTOCOL_VERSION: Final = 1
 
@@ -176,9 +177,11 @@ class Command(
 
     `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation
     at every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of
-    the task is complete, `gave_up`, unless empty, why it never will be. `told` is what the node has to tell those who
-    watch the run, numbers and more; nobody in the run hears it. `tick` is set by whatever runs the controller: the tick of
-    the observation answered.
+    the task is complete, `gave_up`, unless empty, why it never will be. `tick` is set by whatever runs the controller: the
+    tick of the observation answered.
+
+    `telemetry` is named numbers for the observers of the run; no node receives them. `snapshot` is one record in the
+    algorithm's own encoding for its metric and picture classes. The trace covers neither.
     """
 
     tick: int = 0
@@ -188,7 +191,8 @@ class Command(
     release: bool = False
     done: bool = False
     gave_up: str = ""
-    told: dict[str, Any] = {}
+    telemetry: dict[str, float | bool] = {}
+    snapshot: bytes = b""
 
 
 class Failure(_Message, frozen=True, tag=f"failure/{PROTOCOL_VERSION}"):
@@ -263,14 +267,16 @@ def open_answer(payload: bytes) -> Command | Failure:
     """Return the command or failure in `payload`.
 
     Raises ProtocolError with the reasons of `refusal`, or `oversized`, or `not-finite` for a number that is none in the
-    drive or the wake.
+    drive or the wake, or `telemetry` for a name or number that breaks the rules of `zwerm.wire.telemetry`.
     """
     if len(payload) > MESSAGE_BYTES_MAX:
         raise ProtocolError("oversized", f"{len(payload)} bytes, at most {MESSAGE_BYTES_MAX}")
     try:
         answer: Command | Failure = decode_answer(payload)
     except REFUSABLE as error:
-        raise refusal(error) from None
+        found = refusal(error)
+        # A number of another type: the decoder names the field, not the key.
+        raise ProtocolError("telemetry", str(found)) if "`$.telemetry" in str(found) else found from None
     if type(answer) is Command:
         drive, wake = answer.drive, answer.wake
         # Most drives are finite velocities: those are seen to be without a call.
@@ -282,7 +288,31 @@ def open_answer(payload: bytes) -> Command | Failure:
             raise ProtocolError("not-finite", repr(drive))
         if wake is not None and wake.at_s is not None and not isfinite(wake.at_s):
             raise ProtocolError("not-finite", repr(wake))
+        if answer.telemetry and (rule := telemetry_error(answer.telemetry)):
+            raise ProtocolError("telemetry", rule)
     return answer
+
+
+def encode_command(command: Command) -> bytes:
+    """Return a controller's command as it crosses the wire, its telemetry as plain floats.
+
+    Raises TypeError or ValueError that names the field, the rule and the value.
+    """
+    if command.telemetry:
+        command.telemetry = plain_numbers(command.telemetry)
+    if command.snapshot and type(command.snapshot) is not bytes:
+        raise TypeError(f"snapshot: expected bytes, got {type(command.snapshot).__name__}")
+    return encode(command)
+
+
+def traced_bytes(command: Command, payload: bytes) -> bytes:
+    """Return the bytes of a command that the trace covers: those of the command without `telemetry` and `snapshot`.
+
+    They are `payload` itself where the command carries neither.
+    """
+    if not command.telemetry and not command.snapshot:
+        return payload
+    return encode(msgspec.structs.replace(command, telemetry={}, snapshot=b""))
 
 
 def is_finite_drive(drive: BodyVelocity | WheelSpeeds) -> bool:

@@ -1,1 +1,1 @@
-"""Where a swarm ends and where it may go on: the geometry of bearings that the coordinator and the robots share."""
+"""Geometry of bearings that the coordinator and the robots share: fence, frontier, holes, paths, and slots."""

@@ -1,14 +1,14 @@
-"""What was tried, and failed: kept by place and side, since robots come and go."""
+"""Deployments that were tried and failed, by slot and side, because robots change their slots."""
 
-from zwerm.agents.sensor_coverage.frontier.services import Plan
-
+# Names one side of an edge, or one gap around a slot.
 Key = tuple[int, ...]
 
 
 class AttemptLog:
-    """Attempts by what they would have expanded; what is `closed` is not tried again, `failed` only from another place.
+    """Attempts by the key of what they would expand.
 
-    `blocked` has the directions in which a wall stopped a drive, by the place that it began at.
+    A key in `closed` is not tried again. A (key, slot) in `failed` is not tried again from that slot. `blocked` has the
+    directions [rad] in which a wall stopped a drive, by the slot where the drive began.
     """
 
     def __init__(self, attempts_max: int, near_wall_m: float, blocked: dict[int, list[float]] | None = None) -> None:
@@ -19,19 +19,19 @@ class AttemptLog:
         self._attempts_max = attempts_max
         self._near_wall_m = near_wall_m
 
-    def note_attempt(self, plan: Plan) -> None:
-        """Take note that a plan is being tried; the same side is not tried for ever."""
-        self.attempts[plan.key] = self.attempts.get(plan.key, 0) + 1
-        if self.attempts[plan.key] >= self._attempts_max:
-            self.closed[plan.key] = None
+    def note_attempt(self, key: Key) -> None:
+        """Count an attempt, and close the key after `attempts_max` of them."""
+        self.attempts[key] = self.attempts.get(key, 0) + 1
+        if self.attempts[key] >= self._attempts_max:
+            self.closed[key] = None
 
-    def note_failure(self, plan: Plan, driven_m: float) -> None:
-        """Take note that a wall was in the way after so far.
+    def note_failure(self, key: Key, mover: int, direction_rad: float, driven_m: float) -> None:
+        """Record that a wall stopped the mover after `driven_m`.
 
-        One failure closes an edge's side, unless it was so near to one end that it says nothing about the other.
+        One failure closes an edge's side. A failure within `near_wall_m` says nothing about the other end of the edge.
         """
-        elsewhere = any((plan.key, end) in self.failed for end in plan.key[:2] if end != plan.mover)
-        if driven_m > self._near_wall_m or plan.key[2] == 0 or elsewhere:
-            self.closed[plan.key] = None
-        self.failed[plan.key, plan.mover] = None
-        self.blocked.setdefault(plan.mover, []).append(plan.direction)
+        elsewhere = any((key, end) in self.failed for end in key[:2] if end != mover)
+        if driven_m > self._near_wall_m or key[2] == 0 or elsewhere:
+            self.closed[key] = None
+        self.failed[key, mover] = None
+        self.blocked.setdefault(mover, []).append(direction_rad)

@@ -1,8 +1,9 @@
-"""The fence of a swarm: which sides of which edges are uncovered, and where a robot would go to cover them.
+"""The fence of a swarm: the uncovered sides of its edges, and the bearings at which a new robot covers them.
 
-Algorithms 3 and 4 of Ramaithitima et al. 2015, from bearings alone. Every question is about one edge and what its two ends see,
-or one robot and its neighbours: views are each in the robot's own frame, and only differences of bearings of one robot are
-ever taken. Positive is to the left. The printed formula for a relative bearing is off by pi; here it is the plain difference.
+Algorithms 3 and 4 of Ramaithitima et al. 2015, from bearings alone. Each function needs the views of one edge's two
+ends, or of one robot and its neighbours. A view is in its robot's own frame, so only differences of one robot's
+bearings are used. Positive angles are to the left. The printed formula for a relative bearing is off by pi; here it is
+the plain difference.
 """
 
 import math
@@ -11,15 +12,18 @@ from typing import NamedTuple
 
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
+# The bearing [rad] of each visible slot, by the slot that sees it.
 Views = Mapping[int, Mapping[int, float]]
 
 SIXTY_RAD = math.pi / 3.0
+# A deployment into a gap around one slot keeps at least this angle [rad] to both neighbours beside the gap.
+VERTEX_BESIDE_RAD = math.radians(75.0)
 
 
 class Side(NamedTuple):
-    """One uncovered side of an edge i < j: `sign` is +1 where it is on the left of the way from i to j.
+    """One uncovered side of an edge i < j: `sign` is +1 on the left of the direction from i to j, and -1 on the right.
 
-    `angle_i_rad` and `angle_j_rad` are the magnitudes of the bearings, off the edge, at which a new robot shall be seen.
+    `angle_i_rad` and `angle_j_rad` are the angles between the edge and the new robot, as i and j see it.
     """
 
     i: int
@@ -30,42 +34,42 @@ class Side(NamedTuple):
 
     @property
     def edge(self) -> Edge:
-        """The edge."""
+        """The edge (i, j)."""
         return self.i, self.j
 
 
 class Fence(NamedTuple):
-    """The uncovered sides, but for those at convex corners, and the edges that are obstacle edges because of a corner."""
+    """The uncovered sides that are not at convex corners, and the edges that a corner makes obstacle edges."""
 
     sides: tuple[Side, ...]
     corners: tuple[Edge, ...]
 
 
 def relative(view: Mapping[int, float], j: int, k: int) -> float:
-    """Return theta_jk [rad] in [-pi, pi]: the bearing to k from that to j, positive to the left."""
+    """Return theta_jk [rad] in [-pi, pi]: the bearing to k minus the bearing to j, positive to the left."""
     return math.remainder(view[k] - view[j], math.tau)
 
 
 def side_of(views: Views, i: int, j: int, k: int) -> int:
-    """Return on which side of the way from i to j their common neighbour k is, by both ends' bearings."""
+    """Return +1 if the common neighbour k is on the left of the direction from i to j, else -1, by both ends' bearings."""
     return 1 if math.sin(relative(views[i], j, k)) - math.sin(relative(views[j], i, k)) > 0.0 else -1
 
 
 def uncovered(views: Views, complex_: FlagComplex, i: int, j: int) -> tuple[int, ...]:
-    """Return the sides of edge {i, j} without a triangle. Algorithm 3, line 4."""
+    """Return the signs of the sides of edge {i, j} that have no triangle. Algorithm 3, line 4."""
     covered = {side_of(views, i, j, k) for k in complex_.common(i, j)}
     return tuple(sign for sign in (1, -1) if sign not in covered)
 
 
 def is_exception(views: Views, complex_: FlagComplex, i: int, j: int) -> bool:
-    """Tell whether {i, j} lies within other triangles of a common neighbour k. Section III-A.1.
+    """Return whether {i, j} lies within other triangles of a common neighbour k. Section III-A.1.
 
-    Seen from k, a chain of triangles leads from i to j without turning back. The chain's ends must be beyond the edge: else
-    it passes this side of it and covers nothing behind.
+    Seen from k, a chain of triangles leads from i to j without turning back. The chain's ends must be beyond the edge.
+    Otherwise the chain passes on the near side of the edge and covers nothing behind it.
     """
     for k in complex_.common(i, j):
         whole = relative(views[k], i, j)
-        if whole == 0.0:  # all three stand along a wall, or two at one spot
+        if whole == 0.0:  # all three stand in one line along a wall, or two at the same point
             continue
         side = side_of(views, i, j, k)
         between = [
@@ -87,14 +91,14 @@ def is_exception(views: Views, complex_: FlagComplex, i: int, j: int) -> bool:
 
 
 def _beyond(views: Views, complex_: FlagComplex, i: int, j: int, each: int, side: int) -> bool:
-    """Tell whether a robot is on the other side of edge {i, j} than `side`, by whichever of its ends sees it."""
+    """Return whether a robot is on the side of edge {i, j} opposite to `side`, by the bearing of an end that sees it."""
     if edge(i, each) in complex_:
         return math.sin(relative(views[i], j, each)) * side < 0.0
     return -math.sin(relative(views[j], i, each)) * side < 0.0
 
 
 def nearest_on_side(views: Views, complex_: FlagComplex, i: int, j: int, sign: int) -> int | None:
-    """Return the neighbour of i next to j on one side of the ray from i to j. Algorithm 4, lines 3 to 6."""
+    """Return the neighbour of i with the smallest angle to j on one side of edge {i, j}. Algorithm 4, lines 3 to 6."""
     found = [
         (sign * relative(views[i], j, each), each)
         for each in complex_.neighbours[i]
@@ -104,10 +108,10 @@ def nearest_on_side(views: Views, complex_: FlagComplex, i: int, j: int, sign: i
 
 
 def fence(views: Views, complex_: FlagComplex, corner_margin_rad: float, edges: Iterable[Edge] | None = None) -> Fence:
-    """Return the fence, or what `edges` have of it. Algorithm 3 without the touch sensors.
+    """Return the fence, or the part of it on `edges`. Algorithm 3 without the touch sensors.
 
-    A corner narrower than 60 degrees and a margin is closed: its robots are so near to each other that they see all of it.
-    The paper's margin is -2 beta, for a bearing error beta.
+    A corner narrower than 60 degrees plus the margin is closed: its robots are so close that they cover it. The paper's
+    margin is -2 beta, for a bearing error beta.
     """
     sides: list[Side] = []
     corners: dict[Edge, None] = {}
@@ -135,10 +139,10 @@ def fence(views: Views, complex_: FlagComplex, corner_margin_rad: float, edges: 
 def wedges(
     views: Views, complex_: FlagComplex, vertices: Iterable[int] | None = None
 ) -> Iterable[tuple[int, int, int, float]]:
-    """Yield (i, a, b, gap_rad) for every pair of neighbours a, b of i, b the next to the left of a, with no triangle iab.
+    """Yield (i, a, b, gap_rad) for all neighbours a and b of i, b the next to the left of a, that form no triangle iab.
 
-    A robot with one neighbour has one such gap, all around: a is b. Together their edges are a closed chain around all
-    that is uncovered, where the edges of the sign rule may not be.
+    A robot with one neighbour has one gap of a full turn, and a equals b. The edges of all wedges contain a closed
+    chain around all uncovered space. The edges of the sign rule alone may not.
     """
     for i in complex_.vertices if vertices is None else vertices:
         around = sorted(complex_.neighbours[i], key=lambda each: (math.remainder(views[i][each], math.tau), each))

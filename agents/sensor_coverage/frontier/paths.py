@@ -1,7 +1,7 @@
-"""Paths to push along: Dijkstra over the graph of who sees whom, from several sources at once.
+"""Paths to push along: Dijkstra's algorithm on the 1-skeleton, from several sources at once.
 
-Edges next to obstacles cost more, since driving is harder there (Ramaithitima et al. 2015, section III-B). Equal costs are
-decided by the ids, so a path is a function of the graph.
+Edges beside obstacles cost more, because driving there is harder (Ramaithitima et al. 2015, section III-B). Equal costs
+are decided by the slots' numbers, so a path is a function of the graph.
 """
 
 import heapq
@@ -12,7 +12,7 @@ from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
 
 class Reach(NamedTuple):
-    """The cheapest way to every vertex that can be reached: its cost, and the vertex before it (None at a source)."""
+    """The cost of the cheapest route to every reachable vertex, and the vertex before it (None at a source)."""
 
     cost: dict[int, float]
     before: dict[int, int | None]
@@ -32,9 +32,10 @@ def reach(
     obstacle_cost: float,
     shut: Collection[int] = (),
 ) -> Reach:
-    """Return the cheapest ways from `sources` (vertex: cost to start there). An edge costs 1, one of `obstacle` more.
+    """Return the cheapest routes from `sources` (vertex: cost to start there).
 
-    Ways may begin at vertices that are `shut`, but none leads there.
+    An edge costs 1, and an edge of `obstacle` costs `obstacle_cost`. A route may begin at a vertex in `shut` but does
+    not lead through one.
     """
     cost: dict[int, float] = {}
     before: dict[int, int | None] = {}
@@ -53,17 +54,17 @@ def reach(
 
 
 class Dijkstra:
-    """The path service of who knows the whole graph."""
+    """The path service of a node that knows the whole graph."""
 
     def __init__(self, obstacle_cost: float) -> None:
         self._obstacle_cost = obstacle_cost
 
-    def ways(
+    def routes(
         self,
         complex_: FlagComplex,
         sources: Mapping[int, float],
         obstacle: Collection[Edge],
         shut: Collection[int] = (),
     ) -> Reach:
-        """Return the cheapest ways from `sources` (place: cost to start there), and to none that is `shut`."""
+        """Return the cheapest routes from `sources` (slot: cost to start there); none leads through a slot in `shut`."""
         return reach(complex_, sources, obstacle, self._obstacle_cost, shut)

@@ -1,116 +1,96 @@
-"""What a deployment needs to have decided, one interface for each decision.
+"""Decisions of a deployment, one interface each: frontier, path, redundancy, assignment, termination.
 
-Behind each stands a central piece (Dijkstra, relative H2, ...) or one that robots agree on among themselves; who composes
-them does not know which. All speak of places, and none of them moves anybody.
+A central algorithm or an agreement among robots implements an interface, and the caller does not know which. All
+interfaces speak of slots, and none of them moves a robot.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from zwerm.agents.sensor_coverage.frontier.fence import Views
+from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
+from zwerm.agents.sensor_coverage.frontier.fence import Fence
 from zwerm.agents.sensor_coverage.frontier.paths import Reach
+from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.maths.simplicial import Edge, FlagComplex
 
-
-class ScanResult(NamedTuple):
-    """What a survey found: who sees whom and where, and the places of base stations."""
-
-    views: Views
-    complex_: FlagComplex
-    bases: tuple[int, ...]
-
-
-class Plan(NamedTuple):
-    """One deployment: the robot at `mover` goes along `direction`, and the robots on the path follow.
-
-    `key` is what is expanded, an edge's side or a robot's gap; `anchors` are the places that tell the new robot's distance.
-    The path leads from a source to the mover, once there is one.
-    """
-
-    key: tuple[int, ...]
-    mover: int
-    direction: float
-    hop_m: float
-    clear_m: float
-    anchors: tuple[int, ...]
-    path: tuple[int, ...] = ()
-
-
-# Sources of robots (place: cost to start there) to the cheapest ways from them.
-Ways = Callable[[FlagComplex, Mapping[int, float]], Reach]
+# Returns the cheapest routes from sources (slot: cost to start there) through a complex.
+FindRoutes = Callable[[FlagComplex, Mapping[int, float]], Reach]
 
 
 class FrontierService(Protocol):
-    """Where could the swarm go on? It remembers what was tried, and failed."""
+    """Finds where the swarm can expand, and remembers failed attempts."""
+
+    attempt_log: AttemptLog
+    fence: Fence
 
     @property
     def frontier(self) -> tuple[Edge, ...]:
-        """The edges that can be expanded, as of the last look."""
+        """Edges that can be expanded, in the latest scan."""
 
     @property
     def obstacle(self) -> tuple[Edge, ...]:
-        """The edges beside obstacles, as of the last look."""
+        """Edges beside obstacles, in the latest scan."""
 
-    def look(self, picture: ScanResult) -> None:
-        """Take what the places see now."""
+    def update(self, scan: ScanResult, edges: Iterable[Edge] | None = None) -> None:
+        """Take a new scan; consider only `edges` if they are given."""
 
     def plans(self) -> Iterable[Sequence[Plan]]:
-        """Yield the deployments there could be: first those wanted most, and others for when none of these can be reached."""
+        """Yield groups of possible deployments by falling priority; use a group only if no earlier one has a path."""
 
-    def rim(self) -> tuple[Edge, ...]:
-        """Return edges with a closed chain among them around all that is uncovered."""
+    def boundary_edges(self) -> tuple[Edge, ...]:
+        """Return edges that contain a closed chain around all uncovered space."""
 
     def note_attempt(self, plan: Plan) -> None:
-        """Take note that a plan is being tried."""
+        """Record that a plan is tried."""
 
     def note_failure(self, plan: Plan, driven_m: float) -> None:
-        """Take note that a wall was in the way after so far."""
+        """Record that a wall stopped the plan's mover after `driven_m`."""
 
 
 class PathService(Protocol):
-    """By which way do robots come?"""
+    """Finds the routes along which robots push."""
 
-    def ways(
+    def routes(
         self,
         complex_: FlagComplex,
         sources: Mapping[int, float],
         obstacle: Collection[Edge],
         shut: Collection[int] = (),
     ) -> Reach:
-        """Return the cheapest ways from `sources` (place: cost to start there); obstacle edges are dear.
+        """Return the cheapest routes from `sources` (slot: cost to start there); edges of `obstacle` cost more.
 
-        Ways may begin at places that are `shut`, but none leads there.
+        A route may begin at a slot in `shut` but does not lead through one.
         """
 
 
 class RedundancyService(Protocol):
-    """Who can be spared?"""
+    """Finds robots that coverage does not need."""
 
-    def redundant(self, picture: ScanResult, rim: Collection[Edge]) -> tuple[int, ...]:
-        """Return places that can all be left at once and leave nothing uncovered."""
+    def redundant(self, scan: ScanResult, boundary_edges: Collection[Edge]) -> tuple[int, ...]:
+        """Return slots that can all be vacated together without uncovering anything."""
 
 
 class AssignmentService(Protocol):
-    """Which of the deployments that there could be come next?"""
+    """Chooses the deployments of one cycle."""
 
     def assign(
-        self, plans: Iterable[Sequence[Plan]], picture: ScanResult, sources: Mapping[int, float], ways: Ways
+        self, plans: Iterable[Sequence[Plan]], scan: ScanResult, sources: Mapping[int, float], find_routes: FindRoutes
     ) -> tuple[Plan, ...]:
-        """Return the plans to carry out at once, with their paths; none if no path leads to any."""
+        """Return the plans to carry out concurrently, with their paths; an empty tuple if no plan has a path."""
 
 
 class TerminationService(Protocol):
-    """Is it over?"""
+    """Decides when the deployment ends."""
 
     def judge(self, assigned: bool, frontier: bool) -> str:
-        """Return the outcome, or nothing while it goes on.
+        """Return the outcome, or an empty string while the deployment goes on.
 
-        `assigned`: there is something to do; `frontier`: there is something left to expand.
+        `assigned`: a deployment was found in this cycle. `frontier`: frontier edges are left.
         """
 
 
 class Services(NamedTuple):
-    """One of each."""
+    """One implementation of each interface."""
 
     frontier: FrontierService
     paths: PathService

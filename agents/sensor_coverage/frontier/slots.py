@@ -1,99 +1,102 @@
-"""What the coordinator knows: places, who stands on them, and in which directions they see each other.
+"""The coordinator's memory: slots, their occupants, and the directions in which robots see each other.
 
-A place (slot) outlives its robots: pushing moves robots, not places. Directions are told in the frame of a base station,
-into which every robot's bearings are turned by its heading; headings come from reciprocal bearings alone, since the bearing
-from a to b and that from b to a are opposite. There are no positions and no distances.
+A slot outlives its robots: a push moves robots, not slots. Directions are in the frame of a base station. A robot's
+bearings are turned into that frame by its heading. Headings come from reciprocal bearings alone, because the bearing
+from a to b and the bearing from b to a are opposite. There are no positions and no distances.
 
-How the frames of two stations are turned to each other nobody knows until robots of both see each other. So every robot's
-heading is in the frame of one robot, its own to begin with; where two frames meet they become one.
+The rotation between the frames of two stations is unknown until their robots see each other. So each heading is in the
+frame of one robot, at first the robot's own. Two frames that meet become one.
 """
 
 import cmath
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
+from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_heading, refined_reference
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
-
-# How much of a new reading goes into a place's reference directions, once there are some.
-REFERENCE_WEIGHT = 0.1
-# A reference that is further off than this is no longer true: something was knocked over [rad].
-REFERENCE_OFF_RAD = 0.35
 
 
 class Slots:
-    """Places by number, and what is remembered of each. The first are those of the base stations."""
+    """Slots by number, and what is remembered of each. The first slots are those of the base stations.
+
+    `occupant` has the robot at each slot. `heading` [rad] and `frame` are each robot's heading and the robot in whose
+    frame it is. `view` has the bearings that each robot sees in its own frame. `walls` and `blocked` have, by slot, the
+    directions of walls, and of drives that a wall stopped.
+    """
 
     def __init__(self) -> None:
         self.occupant: dict[int, int] = {}
         self.heading: dict[int, float] = {}
-        self.view: dict[int, dict[int, float]] = {}  # robot: robot: bearing in the first one's frame
-        self.touched: dict[int, dict[int, None]] = {}
-        self.walls: dict[int, list[float]] = {}  # place: directions of walls
-        self.blocked: dict[int, list[float]] = {}  # place: directions in which a wall stopped a drive
-        self.frame: dict[int, int] = {}  # robot: the robot in whose frame its heading is
-        self._headings_known: dict[int, int] = {}
-        self._reference: dict[tuple[int, int], tuple[complex, int]] = {}
+        self.view: dict[int, dict[int, float]] = {}
+        self.walls: dict[int, list[float]] = {}
+        self.blocked: dict[int, list[float]] = {}
+        self.frame: dict[int, int] = {}
+        self._heading_readings: dict[int, int] = {}
+        self._reference: dict[tuple[int, int], Reference] = {}
         self._next = 0
 
-    def found(self, robot: int) -> int:
-        """Make a place for a robot, and return it. Of a robot that nothing is known of, its own is its frame."""
-        place = self._next
+    # --- slots and occupants ----------------------------------------------------------------------------------------
+
+    def add(self, robot: int) -> int:
+        """Create a slot for a robot, and return its number. A robot of unknown heading gets a frame of its own."""
+        slot = self._next
         self._next += 1
-        self.occupant[place] = robot
+        self.occupant[slot] = robot
         if robot not in self.heading:
             self.orient(robot, robot, 0.0)
-        return place
+        return slot
 
     def orient(self, robot: int, frame: int, heading: float) -> None:
-        """Take a robot's heading in a frame for known, for the first time."""
+        """Set a robot's heading [rad] in a frame for the first time."""
         self.heading[robot], self.frame[robot] = heading, frame
-        self._headings_known[robot] = 0
+        self._heading_readings[robot] = 0
 
-    def place_of(self) -> dict[int, int]:
-        """Return the place of every robot."""
-        return {robot: place for place, robot in self.occupant.items()}
+    def slot_of(self) -> dict[int, int]:
+        """Return the slot of every robot."""
+        return {robot: slot for slot, robot in self.occupant.items()}
 
-    def drop(self, place: int) -> None:
-        """Forget a place: nobody is there."""
-        robot = self.occupant.pop(place, None)
+    def drop(self, slot: int) -> None:
+        """Forget a slot that no robot occupies."""
+        robot = self.occupant.pop(slot, None)
         if robot is not None:
             self.view.pop(robot, None)
-        self.walls.pop(place, None)
+        self.walls.pop(slot, None)
 
     def take(self, robot: int, sightings: Iterable[Sighting]) -> None:
-        """Take what a robot says it sees, in its own frame."""
+        """Store the bearings that a robot reports, in its own frame."""
         self.view[robot] = {each.node: each.bearing_rad for each in sightings}
 
     def views(self) -> dict[int, dict[int, float]]:
-        """Return what every place sees of the others, as directions in its frame."""
-        place_of = self.place_of()
+        """Return the directions [rad] of the slots that each slot sees, in its frame."""
+        slot_of = self.slot_of()
         return {
-            place: {
-                place_of[node]: bearing + self.heading[robot]
+            slot: {
+                slot_of[node]: bearing + self.heading[robot]
                 for node, bearing in sorted(self.view.get(robot, {}).items())
-                if node in place_of
+                if node in slot_of
             }
-            for place, robot in sorted(self.occupant.items())
+            for slot, robot in sorted(self.occupant.items())
         }
+
+    # --- headings and frames ----------------------------------------------------------------------------------------
 
     def learn_headings(self, fresh: Iterable[int]) -> None:
         """Refine the headings of the robots that have new readings, by their reciprocal bearings."""
         fresh = tuple(fresh)
-        while any(self._meet(robot) for robot in fresh):
+        while any(self._merge_frames(robot) for robot in fresh):
             pass
         for robot in fresh:
             if robot == self.frame[robot]:
                 continue
-            off = 0j
-            for node, (bearing, back) in self._mutual(robot).items():
-                off += cmath.exp(1j * (self.heading[node] + back + math.pi - self.heading[robot] - bearing))
-            if off:
-                known = self._headings_known.get(robot, 0)
-                self.heading[robot] += cmath.phase(off) / min(known + 1, 20)
-                self._headings_known[robot] = known + 1
+            pairs = ((self.heading[node] + back, bearing) for node, (bearing, back) in self._mutual(robot).items())
+            readings = self._heading_readings.get(robot, 0)
+            refined = refined_heading(self.heading[robot], readings, pairs)
+            if refined is not None:
+                self.heading[robot] = refined
+                self._heading_readings[robot] = readings + 1
 
-    def _meet(self, robot: int) -> bool:
-        """Make one frame of a robot's and another's, if it and any robots of that see each other; tell whether it did."""
+    def _merge_frames(self, robot: int) -> bool:
+        """Merge a robot's frame with that of a robot it sees, if they differ; return whether that happened."""
         mine, others = self.frame[robot], self.frame
         met = min((others[node] for node in self._mutual(robot) if others[node] != mine), default=None)
         if met is None:
@@ -107,7 +110,7 @@ class Slots:
         return True
 
     def _mutual(self, robot: int) -> dict[int, tuple[float, float]]:
-        """Return (bearing there, bearing back) by the robots that this one sees, and that see it."""
+        """Return (bearing there, bearing back) [rad] of the robots that this robot sees and that see it."""
         views = self.view
         return {
             node: (bearing, views[node][robot])
@@ -116,53 +119,46 @@ class Slots:
         }
 
     def _turn(self, old: int, new: int, by: float) -> None:
-        """Tell in a new frame what is known in an old one, which is turned by so much against it."""
-        turned = [place for place, robot in self.occupant.items() if self.frame[robot] == old]
+        """Turn all directions that are known in the frame `old` by `by` [rad] into the frame `new`."""
+        turned = [slot for slot, robot in self.occupant.items() if self.frame[robot] == old]
         for robot, frame in self.frame.items():
             if frame == old:
                 self.heading[robot] += by
                 self.frame[robot] = new
-        for place in turned:
+        for slot in turned:
             for known in (self.walls, self.blocked):
-                if place in known:
-                    known[place] = [each + by for each in known[place]]
+                if slot in known:
+                    known[slot] = [each + by for each in known[slot]]
         spin = cmath.exp(1j * by)
         for (a, b), (mean, count) in self._reference.items():
             if a in turned:
                 self._reference[a, b] = mean * spin, count
 
+    # --- directions between slots -----------------------------------------------------------------------------------
+
     def direction(self, a: int, b: int) -> float | None:
-        """Return the remembered direction from one place to another, if there is one."""
+        """Return the reference direction [rad] from slot a to slot b, or None if there is none."""
         known = self._reference.get((a, b))
         return None if known is None else cmath.phase(known[0])
 
     def remember(self, a: int, b: int, direction: float) -> None:
-        """Take the direction from one place to another from who remembers it."""
+        """Set the reference direction [rad] from slot a to slot b, as another robot remembers it."""
         mean = cmath.rect(1.0, direction)
         self._reference[a, b], self._reference[b, a] = (mean, 1), (-mean, 1)
 
     def learn_references(self, views: Mapping[int, Mapping[int, float]]) -> None:
-        """Let the remembered directions follow what is seen, slowly: else errors would walk at random."""
+        """Refine the reference directions of all slots that see each other."""
         for a, seen in views.items():
             for b, there in seen.items():
                 back = views.get(b, {}).get(a)
                 if back is None or b < a:
                     continue
-                now = cmath.exp(1j * there) + cmath.exp(1j * (back + math.pi))
-                now /= abs(now) or 1.0
-                mean, count = self._reference.get((a, b), (now, 0))
-                if abs(cmath.phase(now / mean)) > REFERENCE_OFF_RAD:
-                    mean, count = now, 0
-                weight = max(1.0 / (count + 1), REFERENCE_WEIGHT)
-                mean += weight * (now - mean)
-                mean /= abs(mean) or 1.0
-                self._reference[a, b] = mean, count + 1
-                self._reference[b, a] = -mean, count + 1
+                mean, count = refined_reference(self._reference.get((a, b)), there, back)
+                self._reference[a, b] = mean, count
+                self._reference[b, a] = -mean, count
 
-    def known_from(self, place: int) -> list[tuple[int, float]]:
-        """Return (place, direction) of every place that was ever seen from this one and still is one."""
-        return [
-            (b, cmath.phase(mean))
-            for (a, b), (mean, _) in sorted(self._reference.items())
-            if a == place and b in self.occupant
-        ]
+    def known_from(self, slot: int) -> Iterator[tuple[int, float]]:
+        """Yield (slot, direction [rad]) of every occupied slot that was ever seen from this one, ascending."""
+        for (a, b), (mean, _) in sorted(self._reference.items()):
+            if a == slot and b in self.occupant:
+                yield b, cmath.phase(mean)

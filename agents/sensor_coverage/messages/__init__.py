@@ -1,1 +1,1 @@
-"""The messages of sensor coverage: between robots, with a coordinator, and with the redundancy advisor."""
+"""Messages of sensor coverage: commands of the coordinator, advice, and messages between neighbours."""

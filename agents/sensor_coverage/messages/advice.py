@@ -1,8 +1,9 @@
-"""What robots that find their way by themselves, and a coordinator that finds only who can be spared, say to each other.
+"""Messages between decentralised robots and a coordinator that only finds redundant robots.
 
-All of it crosses the uplink, under a checksum, and may get lost, come late, or twice. A robot says how it stands until it
-hears that this was noted. What it is told to rely on are versions of lists, which never come again: so an old word is either
-still true or is found out by those whose lists it names; nobody needs to know which life of the coordinator spoke.
+All of them cross the uplink under a checksum, and may be lost, late or repeated. A robot repeats its report until it is
+noted. Advice names versions of neighbour lists, and a version never occurs twice. So an old message is either still
+true, or the neighbours whose lists it names detect that it is not. No receiver needs to know which incarnation of the
+coordinator sent it.
 """
 
 from collections.abc import Callable
@@ -18,15 +19,15 @@ Count = Annotated[int, Meta(ge=0, le=2**62)]
 
 
 class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A whole message, led by its name."""
+    """A whole message, which begins with its tag."""
 
 
 class StandingReport(_Message, frozen=True, tag="standing"):
-    """How the sender stands in the complex.
+    """The sender's part of the complex.
 
-    `number` grows with everything new that it says. It sees those in `listed`, ascending, as its list of that version has it,
-    and shares an edge of the rim of what is covered with those in `fenced`. `stands`: it is one of the complex. `willing`: it
-    has no frontier, no place at a base station, and no side that would come open without it, as far as it knows.
+    `number` grows with every new report. `listed` are the robots that the sender sees, ascending, in its neighbour list
+    of that `version`. The sender shares a boundary edge with the robots in `fenced`. `stands`: it is in the complex.
+    `willing`: it has no frontier, is no base station, and opens no side if it leaves, as far as it knows.
     """
 
     number: Count
@@ -38,23 +39,23 @@ class StandingReport(_Message, frozen=True, tag="standing"):
 
 
 class ReportNoted(_Message, frozen=True, tag="noted"):
-    """What the receiver said under this number has been noted."""
+    """The coordinator has noted the receiver's report of this number."""
 
     number: Count
 
 
 class CollectReports(_Message, frozen=True, tag="collect"):
-    """The sender lacks the receiver's word."""
+    """The coordinator lacks the receiver's report."""
 
 
 class RedundantAdvice(_Message, frozen=True, tag="spare"):
-    """The receiver can be spared as long as each of its neighbours' lists is of this version; it sees nobody else."""
+    """The receiver is redundant while it sees exactly these neighbours, and each has its list of this version."""
 
     versions: tuple[tuple[Count, Count], ...]
 
 
-Word = StandingReport | ReportNoted | CollectReports | RedundantAdvice
+AdviceMessage = StandingReport | ReportNoted | CollectReports | RedundantAdvice
 
-_sealed: Final = Sealed(Word)
-write: Final[Callable[[Word], bytes]] = _sealed.write
-read: Final[Callable[[bytes], Word | None]] = _sealed.read
+_sealed: Final = Sealed(AdviceMessage)
+write: Final[Callable[[AdviceMessage], bytes]] = _sealed.write
+read: Final[Callable[[bytes], AdviceMessage | None]] = _sealed.read

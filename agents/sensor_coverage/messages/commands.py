@@ -1,10 +1,11 @@
-"""What robots, base and coordinator say to each other to deploy a swarm by pushing: all of it crosses the radio.
+"""Messages between the coordinator and the robots and base stations, on the uplink.
 
-Directions are bearings in the frame of the robot that is spoken to, or that speaks; the coordinator translates. No message
-tells a position, and no distance but those that a robot drove by its own odometry.
+Directions are bearings in the frame of the robot that receives or sends the message; the coordinator translates. No
+message contains a position. The only distances are those that a robot drives by its own odometry.
 
-The uplink may lose, repeat, delay and damage. So an order comes as a `Request` with a number of its own, again and again until
-it is answered, and an answer as a `Response` to that number; both under a checksum. Who begins anew has a new life.
+The uplink may lose, repeat, delay and corrupt messages. So a command is sent as a `Request` with a number, again and
+again until it is answered, and an answer is a `Response` to that number. Both are under a checksum. A node that starts
+again has a new random incarnation number.
 """
 
 from collections.abc import Callable
@@ -14,24 +15,26 @@ from msgspec import Struct
 
 from zwerm.wire.checksum import Sealed
 
+UPLINK: Final = "uplink"
+
 
 class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A part of a message that comes in numbers."""
+    """A part of a message."""
 
 
 class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A whole message, led by its name."""
+    """A whole message, which begins with its tag."""
 
 
 class Sighting(_Part, frozen=True):
-    """A robot seen, and its bearing, averaged while nothing moved."""
+    """A visible robot and its bearing [rad], averaged while nothing moved."""
 
     node: int
     bearing_rad: float
 
 
 class Landmark(_Part, frozen=True):
-    """Where a robot shall be seen from the place to go to. `still`: it does not move meanwhile."""
+    """The bearing [rad] of a robot as seen from the goal of a move. `still`: the robot does not move meanwhile."""
 
     node: int
     bearing_rad: float
@@ -42,35 +45,32 @@ class Landmark(_Part, frozen=True):
 
 
 class RollCall(_Message, frozen=True, tag="muster"):
-    """To all: stand still, look around anew, and say what you see and touch."""
+    """To all: stop, average bearings anew, and report."""
 
     cycle: int
 
 
 class ScanRequest(_Message, frozen=True, tag="survey"):
-    """Say what you see and touch. These robots have moved since the last survey."""
+    """Report visible robots and touched walls. The robots in `moved` have moved since the last scan."""
 
     cycle: int
     moved: tuple[int, ...]
 
 
 class NegotiateLeave(_Message, frozen=True, tag="confer"):
-    """To a robot that is not on the fence: leave the complex, if your neighbours agree, and report."""
+    """Leave the complex if the neighbours agree, and report. Sent to robots that are not on the fence."""
 
     cycle: int
 
 
 class Release(_Message, frozen=True, tag="release"):
-    """To the base: let a robot out."""
+    """To a base station: release a robot from the depot."""
 
     cycle: int
 
 
 class Deploy(_Message, frozen=True, tag="deploy"):
-    """Drive into the unknown along a bearing.
-
-    If a wall stops it before `clear_m`, the robot drives back; else it goes on to `hop_m`.
-    """
+    """Drive into unknown space along a bearing [rad], up to `hop_m`. Drive back if a wall stops the robot before `clear_m`."""
 
     cycle: int
     bearing_rad: float
@@ -79,7 +79,7 @@ class Deploy(_Message, frozen=True, tag="deploy"):
 
 
 class Move(_Message, frozen=True, tag="move"):
-    """Take the place about `hop_m` away along a bearing, from which the landmarks are seen as told."""
+    """Drive to the slot about `hop_m` away along a bearing [rad], from which the landmarks have the given bearings."""
 
     cycle: int
     bearing_rad: float
@@ -88,9 +88,9 @@ class Move(_Message, frozen=True, tag="move"):
 
 
 class Correct(_Message, frozen=True, tag="correct"):
-    """Correct the scale: break and re-establish the visual link to each anchor, one after the other.
+    """Correct the scale: break and re-establish the visual link to each anchor in turn.
 
-    `anchors` give the bearing at which each should about be.
+    `anchors` give the approximate bearing of each.
     """
 
     cycle: int
@@ -101,9 +101,10 @@ class Correct(_Message, frozen=True, tag="correct"):
 
 
 class Report(_Message, frozen=True, tag="report"):
-    """The answer to a survey or a muster.
+    """The answer to a scan request or a roll call.
 
-    `sightings` None: nothing has changed. `touched` are bearings of walls touched. `home`: it still stands where it came out.
+    `sightings` is None if nothing has changed. `touched` are bearings [rad] of touched walls. `home`: the robot still
+    stands where it came out of the depot.
     """
 
     cycle: int
@@ -113,23 +114,23 @@ class Report(_Message, frozen=True, tag="report"):
 
 
 class LeftComplex(Report, frozen=True, tag="aside"):
-    """The same from a robot that has left the complex by agreement with its neighbours, and stands there in body."""
+    """The same report from a robot that has left the complex by agreement, and whose body still stands there."""
 
 
 class Released(_Message, frozen=True, tag="released"):
-    """The base's answer to a release: the robot that came out, if one did."""
+    """The base station's answer to a release: the robot that came out, or None."""
 
     robot: int | None
 
 
 class Emerged(_Message, frozen=True, tag="emerged"):
-    """A robot came out of the depot and sees this."""
+    """The robot has come out of the depot and sees these robots."""
 
     sightings: tuple[Sighting, ...]
 
 
 class Cleared(_Message, frozen=True, tag="cleared"):
-    """The robot that deploys has gone far enough to be replaced."""
+    """The deploying robot has driven far enough for its follower to take its slot."""
 
     cycle: int
 
@@ -137,62 +138,63 @@ class Cleared(_Message, frozen=True, tag="cleared"):
 class Arrived(_Message, frozen=True, tag="arrived"):
     """The end of a drive.
 
-    `ok` False: the robot is back where it was, or never got to its place. `loose`: bearings did not tell how far to go,
-    odometry did. `leaned`: robots that were driving themselves had to serve as landmarks. `touched` are bearings of walls
-    touched, `driven_m` is how far it came.
+    With `ok` False the robot is back at its start, or did not reach its goal. `used_odometry`: bearings did not
+    determine the distance. `used_moving_landmarks`: some landmarks were driving themselves. `touched` are bearings
+    [rad] of touched walls.
     """
 
     cycle: int
     ok: bool
-    loose: bool
-    leaned: bool
+    used_odometry: bool
+    used_moving_landmarks: bool
     driven_m: float
     touched: tuple[float, ...]
 
 
 class Ack(_Message, frozen=True, tag="heard"):
-    """The order has come, and is being carried out."""
+    """The command has arrived and is being carried out."""
 
 
-Order = RollCall | ScanRequest | NegotiateLeave | Release | Deploy | Move | Correct
+RobotCommand = RollCall | ScanRequest | NegotiateLeave | Release | Deploy | Move | Correct
 Answer = Report | LeftComplex | Released | Emerged | Cleared | Arrived | Ack
 
 # --- how they cross the radio ---------------------------------------------------------------------------------------
 
-# The life of whom nothing is known; and below this there are so many others.
+# Incarnation number of a node of which nothing is known, and the bound of all others.
 UNKNOWN: Final = 0
-LIVES: Final = 2**16
+INCARNATIONS: Final = 2**16
 
 
 class Request(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """An order: the `number`-th to this robot in the coordinator's `life`, said for the `attempt`-th time.
+    """A command: the `number`-th to this robot from this `incarnation` of the coordinator, sent for the `attempt`-th time.
 
-    It is meant for the robot in its life `to_life`, or in any if that is unknown. Everyone's number 0 is the muster.
+    It is for the incarnation `to_incarnation` of the robot, or for any if that is UNKNOWN. Number 0 is the roll call.
     """
 
-    life: int
+    incarnation: int
     number: int
     attempt: int
-    to_life: int
-    order: Order
+    to_incarnation: int
+    command: RobotCommand
 
 
 class Response(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """An answer of a robot in its `life` to the order `number` of the coordinator in its life `to_life`.
+    """An answer of an `incarnation` of a robot to the request `number` of the incarnation `to_incarnation` of the coordinator.
 
-    `heard` is how often the order was heard up to its attempt `attempt`. A robot that came out answers nobody: all are 0.
+    `heard` counts the copies of the request that arrived, up to its attempt `attempt`. A robot that has come out of the
+    depot answers no request, and all these numbers are 0.
     """
 
-    life: int
-    to_life: int
+    incarnation: int
+    to_incarnation: int
     number: int
     attempt: int
     heard: int
     answer: Answer
 
 
-_dispatches: Final = Sealed(Request)
-_replies: Final = Sealed(Response)
-write: Final[Callable[[Request | Response], bytes]] = _dispatches.write
-read_dispatch: Final[Callable[[bytes], Request | None]] = _dispatches.read
-read_reply: Final[Callable[[bytes], Response | None]] = _replies.read
+_requests: Final = Sealed(Request)
+_responses: Final = Sealed(Response)
+write: Final[Callable[[Request | Response], bytes]] = _requests.write
+read_request: Final[Callable[[bytes], Request | None]] = _requests.read
+read_response: Final[Callable[[bytes], Response | None]] = _responses.read

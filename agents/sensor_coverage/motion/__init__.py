@@ -1,1 +1,1 @@
-"""Motion of sensor coverage: visual homing, and the frame of odometry."""
+"""Motion of sensor coverage: drives as generators, visual homing, odometry, and the geometry of a push."""

@@ -1,33 +1,37 @@
-"""Bearing-only visual homing in the plane: where am I from the place at which I would see these bearings?
+"""Bearing-only visual homing in the plane: the offset to the goal from which landmarks have the desired bearings.
 
-With g the unit vector towards a landmark as it is seen, and g* as it is to be seen, the gradient of Tron and Daniilidis 2014
-is sum(g - g*). Near the place it is -M x offset / distance, where M = sum(I - g* g*^T); dividing by M is the paper's
-"adaptive gain" (Ramaithitima et al. 2015, section II-D). Landmarks in one line leave one direction of M empty: there bearings
-say nothing.
+With g the unit vector towards a landmark as it is seen, and g* as it shall be seen, the gradient of Tron and Daniilidis
+2014 is sum(g - g*). Near the goal it is -M x offset / distance, where M = sum(I - g* g*^T). Division by M is the
+paper's "adaptive gain" (Ramaithitima et al. 2015, section II-D). Landmarks in one line leave one direction of M empty:
+bearings do not determine the offset in that direction.
 """
 
 import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-# An eigenvalue of M below this: all landmarks are within about 22 degrees of one line.
+# An eigenvalue of M below this means that all landmarks are within about 22 degrees of one line.
 EIGENVALUE_MIN = 0.15
 
 Vector = tuple[float, float]
 
 
 class Offset(NamedTuple):
-    """How far the place is, in units of the landmarks' distance, and the unit direction that is unknown, if one is."""
+    """The offset to the goal, in units of the landmarks' distance.
+
+    `blind` is the unit direction in which the offset is unknown, or None. `known` is False if bearings determine
+    nothing. `spread` is the trace of M^-1: the variance of the offset per variance of a bearing.
+    """
 
     x: float
     y: float
     blind: Vector | None
     known: bool
-    spread: float = 0.0  # trace of M^-1: the variance per that of a bearing
+    spread: float = 0.0
 
 
 def offset(pairs: Iterable[tuple[Vector, Vector]]) -> Offset:
-    """Return where the place is, from (g, g*) pairs: `known` is False where the pairs tell nothing at all."""
+    """Return the offset to the goal, from (g, g*) pairs of unit vectors."""
     ex = ey = mxx = mxy = myy = 0.0
     for (gx, gy), (wx, wy) in pairs:
         ex += gx - wx
@@ -42,7 +46,7 @@ def offset(pairs: Iterable[tuple[Vector, Vector]]) -> Offset:
     if small >= EIGENVALUE_MIN:
         det = mxx * myy - mxy * mxy
         return Offset((myy * ex - mxy * ey) / det, (mxx * ey - mxy * ex) / det, None, True, (mxx + myy) / det)
-    # The direction of the large eigenvalue; with several landmarks in line it is across that line.
+    # The direction of the large eigenvalue. With several landmarks in one line it is perpendicular to that line.
     angle = 0.5 * math.atan2(2.0 * mxy, mxx - myy)
     ux, uy = math.cos(angle), math.sin(angle)
     along = (ux * ex + uy * ey) / large
@@ -54,8 +58,8 @@ def unit(angle_rad: float) -> Vector:
     return math.cos(angle_rad), math.sin(angle_rad)
 
 
-def slid(x: float, y: float, touched: Iterable[float]) -> Vector:
-    """Return a velocity less what would push into walls touched at these bearings: the robot slides along them."""
+def slide(x: float, y: float, touched: Iterable[float]) -> Vector:
+    """Return a velocity without its components into walls touched at these bearings [rad]: the robot slides along them."""
     for bearing in touched:
         nx, ny = unit(bearing)
         into = x * nx + y * ny

@@ -1,21 +1,23 @@
-"""What a robot makes of its readings: where odometry says it is, whom it sees, and which walls it touches.
+"""A robot's position by odometry, and its readings in a frame that does not turn with the body.
 
-All of it is in the frame the robot had when it came out, whatever that is: a robot that is turned keeps its directions by
-the odometry's turn. Bearings of robots that stand still are averaged while this robot does too.
+The frame is the body frame at the moment when the robot came out of the depot. Bearings of visible robots are averaged
+while this robot and they stand still.
 """
 
 import cmath
 import math
+from collections.abc import Iterable
 
-from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.wire.messages import Observation
 
-# A touch switch faces a robot, not a wall, if one is seen this far beside its sector [rad].
+# A closed touch switch faces a robot, not a wall, if a robot is visible within this angle of the switch's sector.
 ROBOT_BESIDE_RAD = 0.2
+# Readings that an average needs before its spread is used.
+SPREAD_READINGS_MIN = 4
 
 
 class OdometryFrame:
-    """One robot's knowledge of the moment, and its averages."""
+    """Position [m], turn [rad], bearings [rad] of visible robots and touched walls, and averages of bearings."""
 
     def __init__(self) -> None:
         self.x_m = 0.0
@@ -25,7 +27,7 @@ class OdometryFrame:
         self.touched: tuple[float, ...] = ()
         self._sums: dict[int, tuple[complex, int]] = {}
 
-    def take(self, observation: Observation) -> None:
+    def update(self, observation: Observation) -> None:
         """Take in one observation."""
         moved = observation.odometry
         if moved is not None:
@@ -45,15 +47,18 @@ class OdometryFrame:
             )
         )
 
-    def forget(self, nodes: tuple[int, ...] | None = None) -> None:
-        """Drop the averages of `nodes`, or all."""
+    # --- averages -----------------------------------------------------------------------------------------------------
+
+    def forget(self, nodes: Iterable[int] | None = None) -> None:
+        """Drop the averages of `nodes`, or all averages."""
         if nodes is None:
             self._sums.clear()
-        for node in nodes or ():
-            self._sums.pop(node, None)
+        else:
+            for node in nodes:
+                self._sums.pop(node, None)
 
     def average(self) -> None:
-        """Add what is seen now to the averages; who is out of sight is forgotten."""
+        """Add the visible robots' bearings to the averages, and drop the averages of all other robots."""
         sums = self._sums
         self._sums = {}
         for node, bearing in self.seen.items():
@@ -61,21 +66,25 @@ class OdometryFrame:
             self._sums[node] = total + cmath.exp(1j * bearing), count + 1
 
     def averaged(self, samples: int) -> bool:
-        """Tell whether everyone in sight was averaged over `samples`, and nobody else is on record."""
+        """Return whether exactly the visible robots are averaged, each over at least `samples` readings."""
         return self._sums.keys() == self.seen.keys() and all(n >= samples for _, n in self._sums.values())
 
     def count(self, node: int) -> int:
-        """Return how many readings the average of a robot's bearing has."""
+        """Return the number of readings in the average of a robot's bearing."""
         return self._sums[node][1] if node in self._sums else 0
 
+    def averages(self) -> dict[int, float]:
+        """Return the averaged bearings [rad] by robot, ascending."""
+        return {node: cmath.phase(total) for node, (total, _) in sorted(self._sums.items())}
+
     def spread(self) -> float | None:
-        """Return how much one bearing errs [rad], by the averages with at least 4 readings, or None if there are none.
+        """Return the standard deviation [rad] of one bearing, or None without an average of enough readings.
 
-        It is the median over the robots in sight, the lower of two: some of them may have moved.
+        It is the lower median over the visible robots, because some of them may have moved.
         """
-        found = sorted(2.0 * max(0.0, 1.0 - abs(total) / n) * n / (n - 1) for total, n in self._sums.values() if n >= 4)
+        found = sorted(
+            2.0 * max(0.0, 1.0 - abs(total) / n) * n / (n - 1)
+            for total, n in self._sums.values()
+            if n >= SPREAD_READINGS_MIN
+        )
         return math.sqrt(found[(len(found) - 1) // 2]) if found else None
-
-    def sightings(self) -> tuple[Sighting, ...]:
-        """Return the averages, ascending by id."""
-        return tuple(Sighting(node, cmath.phase(total)) for node, (total, _) in sorted(self._sums.items()))

@@ -1,1 +1,1 @@
-"""What a robot knows about its neighbours: their states, the local map, and failures."""
+"""A decentralised robot's knowledge of its neighbourhood: neighbour table, local map, failure detector, beaconing."""

@@ -1,93 +1,118 @@
-"""What a robot tells all who hear it: its state and its way, when they are new, when asked, and now and then."""
+"""Beaconing: a robot broadcasts its state and its route when they change, on request, and periodically."""
 
-from typing import Final
+from collections.abc import Callable
+from typing import ClassVar, Final
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.messages.peers import UNSAID, PathVector, StateBeacon, Word
+from zwerm.agents.sensor_coverage.messages.beacons import UNSAID, PathVector, StateBeacon, StateRequest
+from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
+from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 
-# Where words were lost of late, when what is new is told again, and after how long a silence the state as it is [ticks].
-AGAIN_TICKS: Final = (4, 10, 22)
+# Ticks after which a change is broadcast again, and the period of the heartbeat, while messages are lost.
+REPEAT_TICKS: Final = (4, 10, 22)
 LOSSY_HEARTBEAT_TICKS: Final = 24
+# Ticks after a loss during which messages count as being lost.
 LOSSY_TICKS: Final = 600
-# Who is new cannot know, and speaks for so long as if they were.
+# A new robot does not know whether messages are lost. It assumes so for this many ticks.
 NEW_TICKS: Final = 100
-# A way is often found by and by: it is told no more often than that.
-WAY_TICKS: Final = 4
-# The same where nothing is lost.
+# Minimum ticks between broadcasts of the route alone: a route is often found in several steps.
+ROUTE_TICKS: Final = 4
+# Period of the heartbeat while no message is lost.
 HEARTBEAT_TICKS: Final = 100
 
 
-class Beaconing:
-    """One robot's broadcasts. `heartbeat` is the tick at which it speaks, whatever happens."""
+class Beaconing(Component):
+    """One robot's broadcasts. `heartbeat` is the tick of the next broadcast without any change.
 
-    def __init__(self, node: int) -> None:
+    `waiting` tells whether the robot stands at the base, ready to go.
+    """
+
+    channel: ClassVar[str] = CHANNEL
+    accepts: ClassVar[tuple[type, ...]] = (StateRequest,)
+
+    def __init__(self, local_map: LocalMap, waiting: Callable[[], bool] = lambda: False) -> None:
         self.heartbeat = 0
-        self._node = node
+        self._local_map = local_map
+        self._waiting = waiting
+        self._tick = 0
         self._state: StateBeacon | None = None
-        self._of: object = None
+        self._state_basis: object = None
         self._number = 0
-        self._again: list[int] = []
-        self._way = UNSAID
-        self._way_again: list[int] = []
-        self._way_at = -WAY_TICKS
+        self._due: list[int] = []
+        self._sent = UNSAID
+        self._route_due: list[int] = []
+        self._sent_at = -ROUTE_TICKS
         self._lossy_until: int | None = None
 
-    def again(self, tick: int) -> None:
-        """Tell the state at this tick: somebody asked, or may know less than it should."""
-        self._again[:0] = [tick]
+    def repeat(self, tick: int) -> None:
+        """Broadcast the state in this tick: a neighbour asked for it, or may lack it."""
+        self._due[:0] = [tick]
 
     def missed(self, tick: int) -> None:
-        """Take note that words are lost."""
+        """Record that a message was lost."""
         self._lossy_until = tick + LOSSY_TICKS
 
-    def say(self, tick: int, vicinity: LocalMap, waiting: bool) -> list[Word]:
-        """Return what to tell now."""
+    def receive(self, sender: int, message: StateRequest, tick: int) -> None:
+        """Take in a request for states."""
+        if not message.nodes or self._local_map.node in message.nodes:
+            self.repeat(tick)
+
+    def poll(self, tick: int) -> None:
+        """Set the time of this tick."""
+        self._tick = tick
+
+    def outgoing(self) -> list[Outgoing]:
+        """Return the broadcasts of this tick, by the state at its end."""
         if self._lossy_until is None:
-            self._lossy_until = tick + NEW_TICKS
-        return [*self._say_state(tick, vicinity, waiting), *self._say_way(tick, vicinity)]
+            self._lossy_until = self._tick + NEW_TICKS
+        return [*self._state_beacon(), *self._route_alone()]
 
-    def next_tick(self) -> int:
-        """Return when there is something to tell, if nothing else happens."""
-        return min((self.heartbeat, *self._again[:1], *self._way_again[:1]))
+    def next_wake(self) -> int:
+        """Return the tick of the next broadcast if nothing else happens."""
+        return min((self.heartbeat, *self._due[:1], *self._route_due[:1]))
 
-    def _say_state(self, tick: int, vicinity: LocalMap, waiting: bool) -> list[Word]:
-        of = vicinity.version, vicinity.looks, waiting
-        if of != self._of:
-            self._of = of
-            state = vicinity.state(waiting)
+    def _state_beacon(self) -> list[Outgoing]:
+        tick, local_map, waiting = self._tick, self._local_map, self._waiting()
+        basis = local_map.version, local_map.plan_count, waiting
+        if basis != self._state_basis:
+            self._state_basis = basis
+            state = local_map.state(waiting)
             if state != self._state:
                 self._state = state
                 self._number += 1
-                self._again = self._times(tick, tick)
-        if self._state is None or not (tick >= self.heartbeat or (self._again and tick >= self._again[0])):
+                self._due = self._times(tick)
+        if self._state is None or not (tick >= self.heartbeat or (self._due and tick >= self._due[0])):
             return []
-        self._again = [each for each in self._again if each > tick]
-        self._way_again = [each for each in self._way_again if each > tick]
-        self.heartbeat = tick + (LOSSY_HEARTBEAT_TICKS if self._lossy(tick) else HEARTBEAT_TICKS) + self._node % 10
-        return [msgspec.structs.replace(self._state, number=self._number, way=self._now(tick, vicinity))]
+        self._due = [each for each in self._due if each > tick]
+        self._route_due = [each for each in self._route_due if each > tick]
+        period = LOSSY_HEARTBEAT_TICKS if self._lossy else HEARTBEAT_TICKS
+        self.heartbeat = tick + period + local_map.node % 10
+        beacon = msgspec.structs.replace(self._state, number=self._number, path_vector=self._path_vector())
+        return [Outgoing(None, beacon)]
 
-    def _say_way(self, tick: int, vicinity: LocalMap) -> list[Word]:
-        """Tell the way alone, where nothing else is new."""
-        told = self._way
-        if not self._way_again and (told.place, told.route) != (vicinity.place, vicinity.route):
-            self._way_again = self._times(tick, max(tick, self._way_at + WAY_TICKS))
-        if not self._way_again or tick < self._way_again[0]:
+    def _route_alone(self) -> list[Outgoing]:
+        """Return the path vector, if nothing but the route has changed."""
+        tick, local_map = self._tick, self._local_map
+        if not self._route_due and (self._sent.slot, self._sent.route) != (local_map.slot, local_map.route):
+            self._route_due = self._times(max(tick, self._sent_at + ROUTE_TICKS))
+        if not self._route_due or tick < self._route_due[0]:
             return []
-        self._way_again = [each for each in self._way_again if each > tick]
-        return [self._now(tick, vicinity)]
+        self._route_due = [each for each in self._route_due if each > tick]
+        return [Outgoing(None, self._path_vector())]
 
-    def _times(self, tick: int, first: int) -> list[int]:
-        return [first, *(first + each for each in AGAIN_TICKS if self._lossy(tick))]
+    def _times(self, first: int) -> list[int]:
+        return [first, *(first + each for each in REPEAT_TICKS if self._lossy)]
 
-    def _lossy(self, tick: int) -> bool:
-        return self._lossy_until is not None and tick < self._lossy_until
+    @property
+    def _lossy(self) -> bool:
+        return self._lossy_until is not None and self._tick < self._lossy_until
 
-    def _now(self, tick: int, vicinity: LocalMap) -> PathVector:
-        """Return the way as it is now."""
-        self._way_at = tick
-        place, route, home = vicinity.place, vicinity.route, vicinity.home
-        if (self._way.place, self._way.route, self._way.home) != (place, route, home):
-            self._way = PathVector(self._way.number + 1, place, route, vicinity.gradient.ended, home)
-        return self._way
+    def _path_vector(self) -> PathVector:
+        """Return the path vector with the present route."""
+        self._sent_at = self._tick
+        slot, route, home = self._local_map.slot, self._local_map.route, self._local_map.home
+        if (self._sent.slot, self._sent.route, self._sent.home) != (slot, route, home):
+            self._sent = PathVector(self._sent.number + 1, slot, route, self._local_map.path_vectors.ended, home)
+        return self._sent

@@ -1,55 +1,69 @@
-"""Asking those whose word is missing or does not fit what one sees; who does not answer for long is dead."""
+"""Failure detector: it asks neighbours whose state is missing or does not agree, and declares silent ones dead."""
 
 from collections.abc import Mapping
-from typing import Final
+from typing import ClassVar, Final
 
-from zwerm.agents.sensor_coverage.messages.peers import StateRequest
+from zwerm.agents.sensor_coverage.messages.beacons import StateRequest
+from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
+from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 
-# When to ask for the first time, and again, and how often before somebody is taken for dead [ticks].
+# Ticks before the first request, ticks between requests, and requests before a robot is declared dead.
 FIRST_TICKS: Final = 8
-AGAIN_TICKS: Final = 2
-ASKS_MAX: Final = 150
-# Whose last word is older than this is asked, too.
+REPEAT_TICKS: Final = 2
+REQUESTS_MAX: Final = 150
+# A robot whose latest state is older than this is asked, too.
 SILENT_TICKS: Final = 260
 
 
-class FailureDetector:
-    """One robot's. `dead` are those who did not answer, `at` is when to ask next."""
+class FailureDetector(Component):
+    """One robot's failure detector. `dead` are robots that did not answer, `due` is the tick of the next request."""
+
+    channel: ClassVar[str] = CHANNEL
 
     def __init__(self) -> None:
         self.dead: dict[int, None] = {}
-        self.at: int | None = None
-        self._asked: dict[int, int] = {}
+        self.due: int | None = None
+        self._requests: dict[int, int] = {}
+        self._outbox: list[Outgoing] = []
 
     def answered(self, node: int) -> bool:
-        """Take note that a robot said something; tell whether it was thought to be dead."""
-        self._asked.pop(node, None)
+        """Record that a robot has sent its state; return whether it was declared dead."""
+        self._requests.pop(node, None)
         dead = node in self.dead
         self.dead.pop(node, None)
         return dead
 
-    def turn(self, tick: int, sight: NeighbourTable, seen: Mapping[int, float], samples: int) -> StateRequest | None:
-        """Return whom to ask now, if anybody; looking around takes `samples` ticks."""
-        wanted = [node for node in dict.fromkeys(sight.stale(seen)) if node not in self.dead]
-        wanted += [node for node in seen if node not in wanted and tick - sight.heard.get(node, tick) > SILENT_TICKS]
+    def check(self, tick: int, table: NeighbourTable, visible: Mapping[int, float], samples: int) -> None:
+        """Ask the robots whose states are needed, if it is time; averaging bearings takes `samples` ticks."""
+        wanted = [node for node in dict.fromkeys(table.stale(visible)) if node not in self.dead]
+        wanted += [node for node in visible if node not in wanted and tick - table.heard.get(node, tick) > SILENT_TICKS]
         wanted = [
             node
             for node in wanted
-            if node not in sight.states or not sight.states[node].moving or tick - sight.heard[node] > SILENT_TICKS
+            if node not in table.states or not table.states[node].moving or tick - table.heard[node] > SILENT_TICKS
         ]
         if not wanted:
-            self._asked.clear()
-            self.at = None
-            return None
-        if self.at is None:
-            self.at = tick + FIRST_TICKS + samples
-        if tick < self.at:
-            return None
-        self.at = tick + AGAIN_TICKS
-        self._asked = {node: self._asked.get(node, 0) + 1 for node in wanted}
-        for node, times in self._asked.items():
-            if times > ASKS_MAX and tick - sight.heard.get(node, -SILENT_TICKS) > SILENT_TICKS:
-                sight.forget(node)
+            self._requests.clear()
+            self.due = None
+            return
+        if self.due is None:
+            self.due = tick + FIRST_TICKS + samples
+        if tick < self.due:
+            return
+        self.due = tick + REPEAT_TICKS
+        self._requests = {node: self._requests.get(node, 0) + 1 for node in wanted}
+        for node, requests in self._requests.items():
+            if requests > REQUESTS_MAX and tick - table.heard.get(node, -SILENT_TICKS) > SILENT_TICKS:
+                table.forget(node)
                 self.dead[node] = None
-        return StateRequest(tuple(wanted))
+        self._outbox.append(Outgoing(None, StateRequest(tuple(wanted))))
+
+    def outgoing(self) -> list[Outgoing]:
+        """Return the request of this tick."""
+        sent, self._outbox = self._outbox, []
+        return sent
+
+    def next_wake(self) -> int | None:
+        """Return the tick of the next request."""
+        return self.due

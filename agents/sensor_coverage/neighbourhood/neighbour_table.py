@@ -1,41 +1,43 @@
-"""What a robot knows of those around it: what they say, where it sees them, and its own heading.
+"""A robot's table of its neighbours: their states, where it sees them, and its own heading.
 
-Robots tell each other what they see in one frame, that of the base: each knows its heading from reciprocal bearings, and who
-comes out of the depot sees what the base sees. Every sighting names the drive since which it holds, so that a robot knows
-whether two views belong together.
+Robots announce what they see in one frame, that of the base. Each robot knows its heading from reciprocal bearings. A
+robot that comes out of the depot sees what the base sees. Every sighting names the drive since which it holds, so a
+robot knows whether two views belong together.
 """
 
 import cmath
-import math
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.messages.peers import FAR, NOWHERE, StateBeacon
+from zwerm.agents.sensor_coverage.frontier.directions import refined_heading
+from zwerm.agents.sensor_coverage.messages.beacons import FAR, NOWHERE, StateBeacon
 
-# How long a place may be on its way from one robot to the next [ticks].
-AWAIT_TICKS: Final = 80
+# Bound of the ticks that a slot may take to pass from one robot to the next.
+HANDOVER_TICKS_MAX: Final = 80
 
 
 class NeighbourRecord(NamedTuple):
-    """A robot as this one sees it: since which of its drives (-1: not known yet), at which place, and the bearing."""
+    """A visible robot: the number of its latest drive (-1: unknown), the slot that it holds, and its bearing [rad]."""
 
     epoch: int
-    place: int
+    slot: int
     bearing_rad: float
 
 
 class NeighbourTable:
-    """One robot's. `place` is where it stands, `heading` its own in the base's frame, once known.
+    """One robot's table.
 
-    `version` counts all that robots said, and all that this one saw or did: while it stands, nothing new follows.
+    `slot` is where the robot stands. `redundant`: it has left the complex, and its body still stands there. `home` is
+    the number of hops to the base. `epoch` counts its drives, and `samples` its averages of bearings. `heading` [rad]
+    is in the base's frame, or None if unknown. `version` counts all changes: between two changes, no decision changes.
     """
 
     def __init__(self, node: int) -> None:
         self.node = node
-        self.place = NOWHERE
-        self.spare = False  # it has left the complex, and still stands there in body
+        self.slot = NOWHERE
+        self.redundant = False
         self.home = FAR
         self.epoch = 0
         self.moving = False
@@ -43,24 +45,24 @@ class NeighbourTable:
         self.samples = 0
         self.version = 0
         self.states: dict[int, StateBeacon] = {}
-        self.heard: dict[int, int] = {}  # node: tick
-        self._heard_in: dict[int, int] = {}  # node: this robot's drive then
+        self.heard: dict[int, int] = {}  # node: tick of its latest state
         self.seen: dict[int, NeighbourRecord] = {}
-        self._headings = 0
-        self._awaited: dict[int, int] = {}  # places beside this one that change hands, and since when
-        self._backs: dict[int, tuple[int, float]] = {}  # node: for which drive of this robot, and where it sees it
+        self._heard_in: dict[int, int] = {}  # node: this robot's epoch at that tick
+        self._heading_readings = 0
+        self._handovers: dict[int, int] = {}  # neighbouring slot that changes hands: tick since which it does
+        self._backs: dict[int, tuple[int, float]] = {}  # node: this robot's epoch and direction, as that node sees it
         self._mutual: dict[int, StateBeacon] | None = None
         self._stale: tuple[tuple[int, ...], list[int]] | None = None
 
     def change(self) -> None:
-        """Take note that something is new."""
+        """Record a change, and drop what was derived from the table."""
         self.version += 1
         self._mutual = self._stale = None
 
-    # --- what others say --------------------------------------------------------------------------------------------
+    # --- neighbours' states -------------------------------------------------------------------------------------------
 
-    def hear(self, sender: int, state: StateBeacon, tick: int) -> bool:
-        """Take in a neighbour's state; tell whether its bearing so far holds no more."""
+    def receive(self, sender: int, state: StateBeacon, tick: int) -> bool:
+        """Take in a neighbour's state; return whether the average of its bearing no longer holds."""
         known = self.states.get(sender)
         self.heard[sender] = tick
         self._heard_in[sender] = self.epoch
@@ -72,25 +74,25 @@ class NeighbourTable:
         for mine in state.seen:
             if mine.node == self.node:
                 self._backs[sender] = mine.epoch, mine.direction_rad
-        if state.place in self._awaited and not state.moving:
-            del self._awaited[state.place]
-        left = known is not None and (state.moving or known.place != state.place)
+        if state.slot in self._handovers and not state.moving:
+            del self._handovers[state.slot]
+        left = known is not None and (state.moving or known.slot != state.slot)
         held = known is not None and _held(known) != NOWHERE and not known.moving
         if known is not None and left and held and sender in self.seen:
-            self._awaited[known.place] = tick
+            self._handovers[known.slot] = tick
         sighting = self.seen.get(sender)
         if sighting is not None and not state.moving and sighting.epoch in (-1, state.epoch):
             self.seen[sender] = NeighbourRecord(state.epoch, _held(state), sighting.bearing_rad)
-        if state.place != NOWHERE:
+        if state.slot != NOWHERE:
             for node, each in self.states.items():
-                if node != sender and each.place == state.place:  # who leads a push has left it to its follower
-                    self.states[node] = _elsewhere(each)
+                if node != sender and each.slot == state.slot:  # the leader of a push has left it to its follower
+                    self.states[node] = _without_slot(each)
         if known is None:
             return state.samples == 0
         return bool(state.epoch != known.epoch or (known.moving and not state.moving))
 
     def missed(self, sender: int, state: StateBeacon) -> bool:
-        """Tell whether a state before this one was lost: neither its sender nor this robot has moved meanwhile."""
+        """Return whether a state before this one was lost, while neither its sender nor this robot has moved."""
         known = self.states.get(sender)
         if known is None or sender not in self.seen or self._heard_in.get(sender) != self.epoch:
             return False
@@ -98,34 +100,35 @@ class NeighbourTable:
         return stood and state.number > known.number + 1
 
     def forget(self, node: int) -> None:
-        """Forget a robot that is dead or far away."""
+        """Forget a robot that is dead or out of range."""
         self.states.pop(node, None)
         self.heard.pop(node, None)
         self.change()
 
-    def at(self, place: int) -> int | None:
-        """Return who stands at a place, as far as this robot has heard."""
-        if place == self.place:
+    def at(self, slot: int) -> int | None:
+        """Return the robot at a slot, or None if this robot has heard of none."""
+        if slot == self.slot:
             return self.node
-        return next((node for node, state in self.states.items() if state.place == place), None)
+        return next((node for node, state in self.states.items() if state.slot == slot), None)
 
-    def go(self) -> None:
-        """Begin a drive: what was seen holds no more."""
+    # --- this robot's drives and bearings
+    # -------------------------------------------------------------------------------
+
+    def begin_drive(self) -> None:
+        """Begin a drive: earlier bearings no longer hold."""
         self.epoch += 1
         self.moving = True
         self.samples = 0
         self.seen = {}
         self.change()
 
-    def rest(self) -> None:
-        """Stand again."""
+    def end_drive(self) -> None:
+        """End a drive: the robot stands still."""
         self.moving = False
         self.change()
 
-    # --- what this robot sees ---------------------------------------------------------------------------------------
-
-    def look(self, bearings: Mapping[int, float]) -> None:
-        """Take what this robot sees, averaged."""
+    def update_bearings(self, bearings: Mapping[int, float]) -> None:
+        """Take in averaged bearings [rad] of visible robots."""
         self.seen = {}
         for node, bearing in bearings.items():
             state = self.states.get(node)
@@ -139,23 +142,20 @@ class NeighbourTable:
 
     def _learn_heading(self) -> None:
         """Refine the heading by reciprocal bearings."""
-        if self.place in (0, NOWHERE) or self.heading is None:  # on top of the base there is no bearing to it
+        if self.slot in (0, NOWHERE) or self.heading is None:  # at the base's own point there is no bearing to the base
             return
-        off = 0j
-        for node, (_, _, bearing) in self.seen.items():
-            back = self._back(node)
-            if back is not None:
-                off += cmath.exp(1j * (back + math.pi - self.heading - bearing))
-        if off:
-            self.heading += cmath.phase(off) / min(self._headings + 1, 20)
-            self._headings += 1
+        pairs = [(back, each.bearing_rad) for node, each in self.seen.items() if (back := self._back(node)) is not None]
+        refined = refined_heading(self.heading, self._heading_readings, pairs)
+        if refined is not None:
+            self.heading = refined
+            self._heading_readings += 1
 
     def find_heading(self) -> None:
-        """Take the heading from the base, if this robot stands there: it sees what the base sees."""
-        base = next((state for state in self.states.values() if state.place == 0), None)
+        """Take the heading from the base if this robot stands at the base's point: both see the same directions."""
+        base = next((state for state in self.states.values() if state.slot == 0), None)
         if base is None or self.heading is not None or not self.samples:
             return
-        there = {each.node: each for each in base.seen if each.place != NOWHERE}
+        there = {each.node: each for each in base.seen if each.slot != NOWHERE}
         off = 0j
         for node, (epoch, _, bearing) in self.seen.items():
             if node in there and epoch == there[node].epoch != -1:
@@ -165,32 +165,34 @@ class NeighbourTable:
             self.change()
 
     def _back(self, node: int) -> float | None:
-        """Return the direction in which a neighbour sees this robot where it stands now."""
+        """Return the direction [rad] in which a neighbour sees this robot where it stands now, or None."""
         state = self.states.get(node)
-        if state is None or state.moving or state.place == NOWHERE:
+        if state is None or state.moving or state.slot == NOWHERE:
             return None
         if node not in self.seen or self.seen[node].epoch != state.epoch or node not in self._backs:
             return None
         epoch, direction = self._backs[node]
         return direction if epoch == self.epoch else None
 
+    # --- agreement of views -------------------------------------------------------------------------------------------
+
     def mutual(self) -> dict[int, StateBeacon]:
-        """Return the robots of the complex that see this one and are seen by it, both since they last moved."""
+        """Return the robots of the complex that this robot sees and that see it, both since their latest drives."""
         if self._mutual is None:
             both = [node for node in self.seen if self._back(node) is not None]
-            self._mutual = {node: self.states[node] for node in both if not self.states[node].spare}
+            self._mutual = {node: self.states[node] for node in both if not self.states[node].redundant}
         return self._mutual
 
-    def stale(self, sight: Mapping[int, float]) -> list[int]:
-        """Return the robots in sight whose word is missing, or does not fit what this robot sees; it should wait for them."""
-        nodes = tuple(sight)
+    def stale(self, visible: Mapping[int, float]) -> list[int]:
+        """Return the visible robots whose state is missing, or does not agree with this robot's view."""
+        nodes = tuple(visible)
         if self._stale is not None and self._stale[0] == nodes:
             return self._stale[1]
         found = []
         mutual = self.mutual()
         for node in nodes:
             state = self.states.get(node)
-            if state is None or (state.place != NOWHERE and node not in mutual and self._back(node) is None):
+            if state is None or (state.slot != NOWHERE and node not in mutual and self._back(node) is None):
                 found.append(node)
         for node, state in mutual.items():
             if any(s.node in mutual and s.epoch != mutual[s.node].epoch for s in state.seen):
@@ -199,20 +201,20 @@ class NeighbourTable:
         return found
 
     @property
-    def awaits_until(self) -> int | None:
-        """When it waits no more for places that change hands."""
-        return min(self._awaited.values()) + AWAIT_TICKS if self._awaited else None
+    def handovers_until(self) -> int | None:
+        """Tick until which this robot waits for the oldest slot that changes hands, or None."""
+        return min(self._handovers.values()) + HANDOVER_TICKS_MAX if self._handovers else None
 
-    def changing(self, sight: Mapping[int, float], tick: int) -> bool:
-        """Tell whether robots around are on their way: what this robot sees is then no picture of places."""
-        self._awaited = {place: since for place, since in self._awaited.items() if tick - since < AWAIT_TICKS}
-        return bool(self._awaited) or bool(self.stale(sight))
+    def changing(self, visible: Mapping[int, float], tick: int) -> bool:
+        """Return whether slots around are changing hands, or views do not agree yet."""
+        self._handovers = {slot: since for slot, since in self._handovers.items() if tick - since < HANDOVER_TICKS_MAX}
+        return bool(self._handovers) or bool(self.stale(visible))
 
 
 def _held(state: StateBeacon) -> int:
-    """Return the place of the complex that a robot holds."""
-    return NOWHERE if state.spare else state.place
+    """Return the slot of the complex that a robot holds."""
+    return NOWHERE if state.redundant else state.slot
 
 
-def _elsewhere(state: StateBeacon) -> StateBeacon:
-    return msgspec.structs.replace(state, place=NOWHERE)
+def _without_slot(state: StateBeacon) -> StateBeacon:
+    return msgspec.structs.replace(state, slot=NOWHERE)

@@ -1,1 +1,1 @@
-"""Protocols between neighbours: path vector, leave lock, census, token push, membership, mailbox."""
+"""Protocols of sensor coverage, each a component of a robot: commands, routes, locks, census, pushes, membership."""

@@ -1,107 +1,109 @@
-"""What a robot tells a coordinator that finds who can be spared, and what it is told: the robot's end of the uplink.
+"""A robot's end of the uplink to a coordinator that finds redundant robots.
 
-It says how it stands once that has been the same for a while, and again, less and less often, until that was noted. A
-coordinator that begins anew asks. While none answers, nobody is spared, and nothing else is different.
+The robot reports its part of the complex once it has been the same for a while, and again, less and less often, until
+the report is noted. A coordinator that starts again asks for reports. While no coordinator answers, no robot leaves,
+and nothing else changes.
 
-What makes it safe that a robot leaves upon somebody else's word. The criterion by which b0 and b1 stay as they are speaks of
-the lists of its neighbours and of nothing else; a verdict names the version of each list for which the coordinator found that
-it holds. The robot asks those neighbours for the same locks as if it had found so by itself (`redundancy`), with the same
-versions, and a neighbour whose list is of another version, or who is missing in the verdict, prevents it. To neighbours that
-is one and the same question, whoever thought of it: what was explored for robots that know old lists of each neighbour holds
-for verdicts from old lists. So lost, late, repeated or wrong words of the uplink, and a coordinator that dies, forgets, or
-overlooks a push, cost time; what they cannot do is open a hole.
+Why it is safe that a robot leaves on advice: the criterion by which b0 and b1 stay the same depends on its neighbours'
+lists and on nothing else. Advice names the version of each list for which the coordinator found that the criterion
+holds. The robot requests the same locks as if it had found that itself (`leave_lock`), with these versions. A neighbour
+whose list has another version, or which the advice does not name, prevents the departure. So lost, late, repeated or
+wrong advice, and a coordinator that dies, forgets, or misses a push, cost time and cannot open a hole.
 """
 
 from collections.abc import Iterable
-from typing import Final
+from typing import ClassVar, Final
 
 import msgspec
 
 from zwerm.agents.sensor_coverage.messages.advice import (
+    CHANNEL,
     CollectReports,
     RedundantAdvice,
     ReportNoted,
     StandingReport,
-    read,
-    write,
 )
+from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 
-# How long it has to stand as it does before it says so, and how soon it says so again, at first and at most [ticks].
+# Ticks for which a report must stay the same before it is sent, and ticks between repetitions, at first and at most.
 SETTLED_TICKS: Final = 5
-AGAIN_TICKS: Final = 4
-AGAIN_TICKS_MAX: Final = 160
-# For how long it believes that it can be spared [ticks].
-BELIEVED_TICKS: Final = 120
-# What is new is numbered by the robot's clock in these units at least: one that lost its memory repeats no number.
+REPEAT_TICKS: Final = 4
+REPEAT_TICKS_MAX: Final = 160
+# Ticks for which advice holds.
+ADVICE_TICKS: Final = 120
+# Report numbers are never below the robot's clock in these units, so that a robot that lost its memory repeats none.
 TICKS_PER_S: Final = 1_000
 
 
-class AdviceClient:
-    """One robot's part. `note` comes in every tick that it is awake in, before what is sent is taken."""
+class AdviceClient(Component):
+    """One robot's part. `update` comes in every tick in which the robot is awake, before `outgoing`."""
+
+    channel: ClassVar[str] = CHANNEL
+    accepts: ClassVar[tuple[type, ...]] = (ReportNoted, CollectReports, RedundantAdvice)
 
     def __init__(self, dt_s: float) -> None:
         self._dt_s = dt_s
         self._tick = 0
         self._number = 0
-        self._newest: StandingReport | None = None  # its number is given when it is told
+        self._newest: StandingReport | None = None  # its number is set when it is sent
         self._since = 0
-        self._told: StandingReport | None = None
-        self._again_at: int | None = None
-        self._wait_ticks = AGAIN_TICKS
-        self._verdict: tuple[tuple[int, int], ...] | None = None
-        self._verdict_until = 0
+        self._sent: StandingReport | None = None
+        self._due: int | None = None
+        self._wait_ticks = REPEAT_TICKS
+        self._advice: tuple[tuple[int, int], ...] | None = None
+        self._advice_until = 0
 
-    def note(self, tick: int, standing: StandingReport | None) -> None:
-        """Take in how the robot stands; None while that means nothing. The number is left to this."""
+    def update(self, tick: int, standing: StandingReport | None) -> None:
+        """Take in the robot's report, with any number; None while the robot does not know."""
         self._tick = tick
         if standing != self._newest:
             self._newest, self._since = standing, tick
         if standing is None or tick < self._since + SETTLED_TICKS:
             return
-        if not self._known:
+        if not self._current:
             self._number = max(self._number + 1, round(tick * self._dt_s * TICKS_PER_S))
-            self._told = msgspec.structs.replace(standing, number=self._number)
-            self._tell_now()
+            self._sent = msgspec.structs.replace(standing, number=self._number)
+            self._send_now()
 
-    def hear(self, tick: int, payload: bytes) -> None:
-        """Take in a packet of the uplink."""
-        match read(payload):
+    def receive(self, sender: int, message: ReportNoted | CollectReports | RedundantAdvice, tick: int) -> None:
+        """Take in a message of the coordinator."""
+        match message:
             case ReportNoted(number):
-                if self._told is not None and number == self._told.number:
-                    self._again_at = None
+                if self._sent is not None and number == self._sent.number:
+                    self._due = None
             case CollectReports():
                 self._tick = tick
-                if self._told is not None:
-                    self._tell_now()
+                if self._sent is not None:
+                    self._send_now()
             case RedundantAdvice(versions):
-                self._verdict, self._verdict_until = versions, tick + BELIEVED_TICKS
+                self._advice, self._advice_until = versions, tick + ADVICE_TICKS
 
-    def verdict(self, tick: int, listed: Iterable[int]) -> tuple[tuple[int, int], ...] | None:
-        """Return the versions of the neighbours' lists by which a robot that sees these can be spared, if it was told so."""
-        said = self._verdict
-        if said is None or tick >= self._verdict_until or tuple(node for node, _ in said) != tuple(listed):
+    def advice(self, tick: int, listed: Iterable[int]) -> tuple[tuple[int, int], ...] | None:
+        """Return the list versions under which a robot that sees `listed` is redundant, or None without valid advice."""
+        advice = self._advice
+        if advice is None or tick >= self._advice_until or tuple(node for node, _ in advice) != tuple(listed):
             return None
-        return said
+        return advice
 
-    def letters(self) -> list[bytes]:
-        """Return what is to be sent now."""
-        if self._told is None or self._again_at is None or self._tick < self._again_at or not self._known:
+    def outgoing(self) -> list[Outgoing]:
+        """Return the report if it is due."""
+        if self._sent is None or self._due is None or self._tick < self._due or not self._current:
             return []
-        self._again_at = self._tick + self._wait_ticks
-        self._wait_ticks = min(2 * self._wait_ticks, AGAIN_TICKS_MAX)
-        return [write(self._told)]
+        self._due = self._tick + self._wait_ticks
+        self._wait_ticks = min(2 * self._wait_ticks, REPEAT_TICKS_MAX)
+        return [Outgoing(None, self._sent)]
 
-    def next_ticks(self) -> list[int]:
-        """Return when to be looked after, at the latest."""
-        if not self._known:
-            return [] if self._newest is None else [self._since + SETTLED_TICKS]
-        return [] if self._again_at is None else [self._again_at]
+    def next_wake(self) -> int | None:
+        """Return the tick at which the report settles or is repeated."""
+        if not self._current:
+            return None if self._newest is None else self._since + SETTLED_TICKS
+        return self._due
 
     @property
-    def _known(self) -> bool:
-        """Whether the robot stands as it said last."""
-        newest, told = self._newest, self._told
-        return newest is not None and told is not None and newest == msgspec.structs.replace(told, number=newest.number)
+    def _current(self) -> bool:
+        """Whether the report that was sent last still holds."""
+        newest, sent = self._newest, self._sent
+        return newest is not None and sent is not None and newest == msgspec.structs.replace(sent, number=newest.number)
 
-    def _tell_now(self) -> None:
-        self._again_at, self._wait_ticks = self._tick, AGAIN_TICKS
+    def _send_now(self) -> None:
+        self._due, self._wait_ticks = self._tick, REPEAT_TICKS

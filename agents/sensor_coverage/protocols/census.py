@@ -1,78 +1,44 @@
-"""Is it over? A census that the base station takes by itself, over links between neighbours, again and again.
+"""A census by which the base station detects the end of the deployment, over links between neighbours.
 
-A wave goes out from the base; every robot joins it on hearing of it first, and that neighbour is its parent. Once all its
-neighbours have joined, and its children have counted, it counts too: robots, claims to a frontier, and the latest wave in which
-any of them was stirred, that is claimed a frontier, was busy, or saw neighbours come or go (propagation of information with
-feedback, Segall 1983). Who lacks an answer asks again, so a lost message costs time.
+A wave starts at the base. Each robot joins it when it first hears of it, and that neighbour is its parent. Once all
+neighbours of a robot have joined and its children have counted, the robot counts too: robots, frontier claims, and the
+latest wave in which any of them was disturbed (propagation of information with feedback, Segall 1983). A robot is
+disturbed when it claims a frontier, is busy, or sees neighbours come or go. A robot that lacks an answer asks again, so
+a lost message costs only time.
 
-The base concludes after two waves that nobody claimed anything in, that the same robots counted in, and the same lives of
-them, and since the first of which nobody was stirred: between the two there was a moment at which all were quiet. What is in
-flight between two robots has to keep one of them busy. So a conclusion is wrong only if a robot was no neighbour of anybody
-who was counted, or if robots lost their memory in both waves and late messages of their former lives were believed.
+The base concludes after two waves without claims, which counted the same robots in the same incarnations, and since the
+first of which no robot was disturbed: between the two waves there was a moment at which all robots were quiet. A
+message in flight between two robots must keep one of them busy. So a conclusion is wrong only in two cases: a robot was
+no neighbour of any counted robot, or robots lost their memory in both waves and late messages of their earlier
+incarnations were accepted.
 """
 
 from collections.abc import Iterable
-from typing import Annotated, Final, NamedTuple
+from typing import Final
 
-from msgspec import Meta, Struct
+from zwerm.agents.sensor_coverage.messages.waves import CensusMessage, CensusTally, CensusWave
+from zwerm.agents.sensor_coverage.protocols.component import Outgoing
 
-Count = Annotated[int, Meta(ge=0, le=2**62)]
-
-# Waves are numbered by the base's clock in these units at least, so that one that lost its memory repeats no number.
+# Wave numbers are never below the base's clock in these units, so that a base that lost its memory repeats none.
 TICKS_PER_S: Final = 1_000
-# How much longer a wave may take after so many that took too long: this many doublings at most.
+# The permitted duration of a wave doubles after each wave that took too long, at most this many times.
 DOUBLINGS_MAX: Final = 6
-# Sums of lives are taken modulo this.
-LIVES: Final = 2**62
-
-
-class CensusWave(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag="wave"):
-    """The sender has joined this wave, by `parent` (None: it is the base), and waits for the neighbours in `missing`.
-
-    `again`: it has waited for so long that those which have joined shall say so once more.
-    """
-
-    number: Count
-    parent: Count | None
-    missing: tuple[Count, ...]
-    again: bool
-
-
-class CensusTally(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag="tally"):
-    """To the parent: how many robots counted, what they claim, and the latest wave in which one of them was stirred.
-
-    `lives` is the sum of their lives' numbers.
-    """
-
-    number: Count
-    robots: Count
-    claims: Count
-    stirred: Count
-    lives: Count
-
-
-Message = CensusWave | CensusTally
-
-
-class CensusMessage(NamedTuple):
-    """A message to one robot, or to all that hear it."""
-
-    to: int | None
-    message: Message
+# Sums of incarnation numbers are taken modulo this.
+INCARNATIONS: Final = 2**62
 
 
 class Census:
-    """One robot's part; that of the base, if `base`.
+    """One robot's part, or that of the base if `base`.
 
-    `note` comes first in every tick, then `hear` for what was heard, then `tick`. Who lacks an answer asks every `poll_s`; a
-    wave begins every `every_s`, or if the one before has not come back, after twice that, and longer every time. `now_s` is
-    the robot's own clock; that of the base must not be set back, not even by a restart. `life` is a number drawn at random:
-    another one if the robot loses its memory.
+    In every tick `update` comes first, then `receive` for each message, then `poll`. A robot that lacks an answer asks
+    every `poll_s`. A wave begins every `every_s`. If the wave before has not come back, the interval doubles each time.
+    `now_s` is the robot's own clock; that of the base must not be set back, not even by a restart. `incarnation` is a
+    random number, another one after each loss of memory.
     """
 
-    def __init__(self, me: int, poll_s: float, every_s: float, life: int, base: bool = False) -> None:
+    def __init__(self, me: int, poll_s: float, every_s: float, incarnation: int, base: bool = False) -> None:
         self._me = me
-        self._life = life
+        self._incarnation = incarnation
         self._poll_s = poll_s
         self._every_s = every_s
         self._base = base
@@ -80,10 +46,10 @@ class Census:
         self._claims = 0
         self._number = 0
         self._parent: int | None = None
-        self._joined: dict[int, None] = {}  # neighbours that have joined by somebody else
+        self._joined: dict[int, None] = {}  # neighbours that have joined by another parent
         self._tallies: dict[int, CensusTally] = {}  # of children
-        self._told: CensusTally | None = None
-        self._stirred = 0
+        self._counted: CensusTally | None = None
+        self._disturbed = 0
         self._poll_at_s = 0.0
         self._begun_s = 0.0
         self._doublings = 0
@@ -92,102 +58,102 @@ class Census:
 
     @property
     def concluded(self) -> bool:
-        """Whether the base knows that all was quiet, and has heard of nothing since."""
+        """Whether the base has concluded that all was quiet, and was not disturbed since."""
         return self._concluded
 
     @property
     def waits(self) -> bool:
         """Whether the robot has joined a wave and lacks an answer."""
-        return self._number > 0 and self._told is None
+        return self._number > 0 and self._counted is None
 
     @property
     def last(self) -> CensusTally | None:
-        """What the latest wave that came back to the base has counted."""
+        """The tally of the latest wave that came back to the base."""
         return self._last
 
-    def note(self, neighbours: Iterable[int], claims: int, busy: bool) -> None:
-        """Take in whom the robot sees, how many frontiers it claims, and whether it moves or waits for an answer."""
+    def update(self, neighbours: Iterable[int], claims: int, busy: bool) -> None:
+        """Take in the visible robots, the number of frontier claims, and whether the robot moves or waits for an answer."""
         listed = tuple(sorted(neighbours))
         if listed != self._listed or claims or busy:
-            self._stirred = self._number
+            self._disturbed = self._number
             self._concluded = False
         self._listed, self._claims = listed, claims
 
-    def hear(self, sender: int, message: Message, now_s: float) -> list[CensusMessage]:
-        """Take in a message from another robot, and return what to answer."""
+    def receive(self, sender: int, message: CensusMessage, now_s: float) -> list[Outgoing]:
+        """Take in a message from another robot, and return the answers."""
         match message:
             case CensusWave():
-                return self._hear_wave(sender, message, now_s)
-            case CensusTally() if message.number == self._number and self._told is None:
+                return self._receive_wave(sender, message, now_s)
+            case CensusTally() if message.number == self._number and self._counted is None:
                 self._tallies[sender] = message
                 return self._count()
         return []
 
-    def tick(self, now_s: float) -> list[CensusMessage]:
-        """Ask those again that have not answered; at the base, begin another wave when it is time."""
+    def poll(self, now_s: float) -> list[Outgoing]:
+        """Ask neighbours again that have not answered; at the base, begin another wave when it is due."""
         if self._base and (self._number == 0 or now_s >= self._begun_s + self._every_s * 2.0**self._doublings):
             self._begun_s = now_s
-            # Counted back to none when a wave returns.
+            # Set back to zero when a wave comes back.
             self._doublings = min(self._doublings + 1, DOUBLINGS_MAX)
             return self._join(max(self._number + 1, int(now_s * TICKS_PER_S)), None, now_s)
-        if self._number == 0 or self._told is not None or now_s < self._poll_at_s:
+        if self._number == 0 or self._counted is not None or now_s < self._poll_at_s:
             return []
-        if not self._missing():  # those who were missing are no neighbours any more
+        if not self._missing():  # the missing robots are no longer neighbours
             return self._count()
         return self._ask(again=True, now_s=now_s)
 
-    def _hear_wave(self, sender: int, wave: CensusWave, now_s: float) -> list[CensusMessage]:
+    def _receive_wave(self, sender: int, wave: CensusWave, now_s: float) -> list[Outgoing]:
         mine = wave.parent == self._me
         if wave.number > self._number and self._me in wave.missing and not mine and not self._base:
             return self._join(wave.number, sender, now_s)
         if wave.number != self._number:
             return []
-        sent: list[CensusMessage] = []
-        if not mine and self._told is None:
+        sent: list[Outgoing] = []
+        if not mine and self._counted is None:
             self._joined[sender] = None
             sent = self._count()
         if wave.again and self._me in wave.missing:
             if sender != self._parent:
-                sent.append(CensusMessage(sender, CensusWave(self._number, self._parent, (), False)))
-            elif self._told is not None and not sent:
-                sent.append(CensusMessage(sender, self._told))
+                sent.append(Outgoing(sender, CensusWave(self._number, self._parent, (), False)))
+            elif self._counted is not None and not sent:
+                sent.append(Outgoing(sender, self._counted))
         return sent
 
-    def _join(self, number: int, parent: int | None, now_s: float) -> list[CensusMessage]:
+    def _join(self, number: int, parent: int | None, now_s: float) -> list[Outgoing]:
         self._number, self._parent = number, parent
         self._joined = {} if parent is None else {parent: None}
         self._tallies = {}
-        self._told = None
+        self._counted = None
         return [*self._ask(again=False, now_s=now_s), *self._count()]
 
-    def _ask(self, again: bool, now_s: float) -> list[CensusMessage]:
+    def _ask(self, again: bool, now_s: float) -> list[Outgoing]:
         self._poll_at_s = now_s + self._poll_s
-        return [CensusMessage(None, CensusWave(self._number, self._parent, self._missing(), again))]
+        return [Outgoing(None, CensusWave(self._number, self._parent, self._missing(), again))]
 
     def _missing(self) -> tuple[int, ...]:
         return tuple(node for node in self._listed if node not in self._joined and node not in self._tallies)
 
-    def _count(self) -> list[CensusMessage]:
-        """Count, if all neighbours have answered."""
+    def _count(self) -> list[Outgoing]:
+        """Count if all neighbours have answered: send the tally to the parent, or conclude at the base."""
         if self._missing():
             return []
         tallies = list(self._tallies.values())
-        told = CensusTally(
+        counted = CensusTally(
             self._number,
             1 + sum(each.robots for each in tallies),
             self._claims + sum(each.claims for each in tallies),
-            max([self._stirred, *(each.stirred for each in tallies)]),
-            (self._life + sum(each.lives for each in tallies)) % LIVES,
+            max([self._disturbed, *(each.stirred for each in tallies)]),
+            (self._incarnation + sum(each.lives for each in tallies)) % INCARNATIONS,
         )
-        self._told = told
+        self._counted = counted
         if self._parent is not None:
-            return [CensusMessage(self._parent, told)]
+            return [Outgoing(self._parent, counted)]
         self._doublings = 0
-        before, self._last = self._last, told
+        before, self._last = self._last, counted
         self._concluded = (
             before is not None
-            and before.claims == told.claims == 0
-            and before.lives == told.lives
-            and told.stirred < before.number
+            and before.claims == counted.claims == 0
+            and before.lives == counted.lives
+            and counted.stirred < before.number
         )
         return []

@@ -1,58 +1,70 @@
-"""Whether it is over, as one robot lives it: the census is taken where the base asks for it, and answered everywhere else."""
+"""The census as a component: the base begins waves, and every robot answers them."""
 
-from collections.abc import Collection
-from typing import Final
+from collections.abc import Callable, Collection
+from typing import ClassVar, Final
 
 import numpy as np
 
 from zwerm.agents.runtime.contract import Setup
-from zwerm.agents.sensor_coverage.protocols.census import LIVES, Census, CensusMessage, CensusTally, Message
+from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
+from zwerm.agents.sensor_coverage.messages.waves import CensusMessage, CensusTally, CensusWave
+from zwerm.agents.sensor_coverage.protocols.census import INCARNATIONS, Census
+from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 
-# Who lacks an answer asks so often, and a wave is begun so often [ticks].
+# Ticks between repeated questions of a robot, and between waves.
 POLL_TICKS: Final = 6
 WAVE_TICKS: Final = 60
 
 
-class CompletionProtocol:
-    """One robot's part in the census."""
+class CompletionProtocol(Component):
+    """One robot's part in the census. `asks` tells whether the base may begin waves in this tick."""
 
-    def __init__(self, setup: Setup, random: np.random.Generator, base: bool = False) -> None:
+    channel: ClassVar[str] = CHANNEL
+    accepts: ClassVar[tuple[type, ...]] = (CensusWave, CensusTally)
+
+    def __init__(
+        self, setup: Setup, random: np.random.Generator, base: bool = False, asks: Callable[[], bool] = lambda: True
+    ) -> None:
         self._dt_s = setup.dt_s
-        life = int(random.integers(LIVES))
-        self._census = Census(setup.node, POLL_TICKS * setup.dt_s, WAVE_TICKS * setup.dt_s, life, base)
-        self._sent: list[CensusMessage] = []
-        self._noted: tuple[tuple[int, ...], int] | None = None
+        incarnation = int(random.integers(INCARNATIONS))
+        self._census = Census(setup.node, POLL_TICKS * setup.dt_s, WAVE_TICKS * setup.dt_s, incarnation, base)
+        self._asks = asks
+        self._outbox: list[Outgoing] = []
+        self._updated: tuple[tuple[int, ...], int] | None = None
         self._tick = 0
 
     @property
     def concluded(self) -> bool:
-        """Whether the base knows that all was quiet."""
+        """Whether the base has concluded that all was quiet."""
         return self._census.concluded
 
     @property
     def last(self) -> CensusTally | None:
-        """What the latest wave has counted."""
+        """The tally of the latest wave that came back to the base."""
         return self._census.last
 
-    def note(self, tick: int, neighbours: Collection[int], claims: int, busy: bool) -> None:
-        """Take in whom the robot sees, how many frontiers it claims, and whether it has something to do; before it hears."""
+    def update(self, tick: int, neighbours: Collection[int], claims: int, busy: bool) -> None:
+        """Take in the visible robots, the number of frontier claims, and whether the robot is busy; first in every tick."""
         self._tick = tick
-        noted = tuple(neighbours), claims
-        if busy or claims or noted != self._noted:
-            self._noted = noted
-            self._census.note(noted[0], claims, busy)
+        updated = tuple(neighbours), claims
+        if busy or claims or updated != self._updated:
+            self._updated = updated
+            self._census.update(updated[0], claims, busy)
 
-    def hear(self, sender: int, message: Message) -> None:
-        """Take in what another robot says of the census."""
-        self._sent += self._census.hear(sender, message, self._tick * self._dt_s)
+    def receive(self, sender: int, message: CensusMessage, tick: int) -> None:
+        """Take in a message of the census."""
+        self._outbox += self._census.receive(sender, message, tick * self._dt_s)
 
-    def letters(self, asks: bool = True) -> list[CensusMessage]:
-        """Return what is to be sent now, with whom it is for (None: all that hear it); the base begins waves if it `asks`."""
-        if asks:
-            self._sent += self._census.tick(self._tick * self._dt_s)
-        sent, self._sent = self._sent, []
+    def poll(self, tick: int) -> None:
+        """Ask neighbours again that have not answered; at the base, begin a wave when it is due."""
+        if self._asks():
+            self._outbox += self._census.poll(self._tick * self._dt_s)
+
+    def outgoing(self) -> list[Outgoing]:
+        """Return the messages to send now."""
+        sent, self._outbox = self._outbox, []
         return sent
 
-    def next_tick(self) -> int | None:
-        """Return when there is somebody to ask again."""
+    def next_wake(self) -> int | None:
+        """Return the tick at which to ask again, if the robot waits for an answer."""
         return self._tick + POLL_TICKS if self._census.waits else None

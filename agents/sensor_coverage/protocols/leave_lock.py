@@ -1,81 +1,38 @@
-"""Who may leave, agreed upon among neighbours: the link criterion, and the locks that make it safe.
+"""Locks with which neighbours agree that one of them leaves the complex.
 
 A robot may leave iff the flag complex of the graph that its neighbours induce is non-empty, connected and without holes
-(`zwerm.maths.simplicial.may_leave`): then neither b0 nor b1 changes. It knows that graph from its neighbours' lists. Lists
-may be old, and two neighbours must not leave at once; so it asks every neighbour for a lock, naming the version of the list it
-relies on, and leaves only with a grant from each.
+(`zwerm.maths.simplicial.may_leave`): then neither b0 nor b1 changes. It knows that graph from its neighbours' lists.
+Lists may be old, and two neighbours must not leave together. So the robot requests a lock from every neighbour, names
+the version of the list it relies on, and leaves only with a grant from each.
 
-Why no loss, delay, copy or crash makes that unsafe. Who grants a lock has the list that was relied on, and neither moves nor
-leaves, nor grants anybody else, until the asker says that it is over or `lease_s` has passed since the grant. The asker leaves
-within half of `lease_s` since it first asked, which is before any grant: its neighbours then all stand as they stood when they
-granted, so the edges among them are those of the lists, as long as clocks do not differ in pace by a factor of 2. Who else
-stands there the asker sees itself. A robot that has left, or moves, or lost its memory less than `lease_s` ago, grants
-nothing: where it is still seen, nobody leaves.
+Why no loss, delay, copy or crash makes that unsafe: a robot that grants a lock has the list that the requester relies
+on. It neither moves nor leaves nor grants a lock to another robot until the requester releases it or `lease_s` has
+passed since the grant. The requester leaves within half of `lease_s` since its first request, which is before any
+grant. So its neighbours still stand as they stood when they granted, and the edges among them are those of the lists,
+as long as clocks do not differ in pace by a factor of 2. The requester itself sees any other robot that stands there. A
+robot that has left, or moves, or lost its memory less than `lease_s` ago, grants nothing: while it is visible, no
+neighbour leaves.
 
-Promised is safety; liveness needs that messages get through now and then.
+Safety is guaranteed. Liveness needs that messages arrive now and then.
 """
 
 from collections.abc import Iterable
-from typing import Annotated, Final, NamedTuple
+from typing import Final, NamedTuple
 
-from msgspec import Meta, Struct
-
+from zwerm.agents.sensor_coverage.messages.locks import (
+    LockDenial,
+    LockGrant,
+    LockProtocolMessage,
+    LockRelease,
+    LockRequest,
+    NeighbourList,
+)
+from zwerm.agents.sensor_coverage.protocols.component import Outgoing
 from zwerm.maths.simplicial import may_leave
 
-Count = Annotated[int, Meta(ge=0, le=2**62)]
-
-# Versions and numbers are never below the robot's clock in these units, so that one that lost its memory repeats none.
+# Versions and numbers are never below the robot's clock in these units, so that a robot that lost its memory repeats
+# none.
 TICKS_PER_S: Final = 1_000
-
-
-class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A whole message, led by its name."""
-
-
-class NeighbourList(_Message, frozen=True, tag="neighbours"):
-    """Whom the sender sees, ascending; the version is another one whenever that is another list.
-
-    `over` says what `LockRelease` says, in case that was lost.
-    """
-
-    version: Count
-    listed: tuple[Count, ...]
-    over: Count = 0
-
-
-class LockRequest(_Message, frozen=True, tag="ask"):
-    """To all neighbours: the sender wants to leave, relying on these (neighbour, version of its list)."""
-
-    number: Count
-    versions: tuple[tuple[Count, Count], ...]
-
-
-class LockGrant(_Message, frozen=True, tag="grant"):
-    """The sender will stand still for the one who asked."""
-
-    number: Count
-
-
-class LockDenial(_Message, frozen=True, tag="deny"):
-    """The sender will not."""
-
-    number: Count
-
-
-class LockRelease(_Message, frozen=True, tag="over"):
-    """To all neighbours: the sender has left, or never will upon this or an earlier number."""
-
-    number: Count
-
-
-Message = NeighbourList | LockRequest | LockGrant | LockDenial | LockRelease
-
-
-class LockMessage(NamedTuple):
-    """A message to one robot, or to all that hear it."""
-
-    to: int | None
-    message: Message
 
 
 class _Lock(NamedTuple):
@@ -87,25 +44,25 @@ class _Lock(NamedTuple):
 
 
 class _LeaveRequest(NamedTuple):
-    """This robot wants to leave; who has granted it is in `granted`."""
+    """This robot's request to leave, the version of its own list, and the neighbours that have granted it, ascending."""
 
-    ask: LockRequest
-    version: int  # of this robot's own list
+    message: LockRequest
+    version: int
     until_s: float
     granted: tuple[int, ...]
 
 
 class LeaveLock:
-    """One robot's part: what it knows of its neighbours, whom it stands still for, and whether it may leave.
+    """One robot's part: the neighbours' lists, the lock it has granted, and its own request.
 
-    In every tick `see` comes first, with everyone that the robot sees now, standing or not. Robots on the fence and base
-    stations never `ask`, but they answer. While `locked` a robot must not move; before it moves for another reason than
-    this it calls `depart`, and `settle` where it stands again. `now_s` is the robot's own clock, which must not be set back,
+    In every tick `update` comes first, with all robots that are visible, standing or not. Robots on the fence and base
+    stations never `request`, but they answer. While `locked` a robot must not move. Before it moves for another reason
+    it calls `depart`, and `settle` where it stands again. `now_s` is the robot's own clock, which must not be set back,
     not even by a restart.
     """
 
     def __init__(self, me: int, lease_s: float, now_s: float, quiet_s: float | None = None) -> None:
-        """Stand still for `quiet_s`, since there may be grants that were forgotten: `lease_s`, unless this is a first life."""
+        """Stand still for `quiet_s`, because grants may have been forgotten: `lease_s`, except in a first incarnation."""
         self._me = me
         self._lease_s = lease_s
         self._quiet_until_s = now_s + (lease_s if quiet_s is None else quiet_s)
@@ -116,29 +73,29 @@ class LeaveLock:
         self._lists: dict[int, NeighbourList] = {}
         self._over: dict[int, int] = {}
         self._lock: _Lock | None = None
-        self._wish: _LeaveRequest | None = None
+        self._request: _LeaveRequest | None = None
 
     @property
     def wants(self) -> bool:
-        """Whether it has asked, and neither left nor given up."""
-        return self._wish is not None
+        """Whether the robot has requested locks, and neither left nor given up."""
+        return self._request is not None
 
     @property
     def stands(self) -> bool:
-        """Whether it is one of the swarm that stands."""
+        """Whether the robot is in the complex and stands still."""
         return self._stands
 
     @property
     def listed(self) -> tuple[int, ...]:
-        """Whom it sees, ascending."""
+        """The visible robots, ascending."""
         return self._listed
 
     def locked(self, now_s: float) -> bool:
-        """Tell whether this robot has to stand still."""
+        """Return whether this robot must stand still."""
         return now_s < self._quiet_until_s or (self._lock is not None and now_s < self._lock.until_s)
 
-    def see(self, neighbours: Iterable[int], now_s: float) -> None:
-        """Take in whom the robot sees now."""
+    def update(self, neighbours: Iterable[int], now_s: float) -> None:
+        """Take in the visible robots."""
         listed = tuple(sorted(neighbours))
         if listed != self._listed:
             self._listed = listed
@@ -146,12 +103,12 @@ class LeaveLock:
             self._lists = {node: each for node, each in self._lists.items() if node in listed}
             self._over = {node: each for node, each in self._over.items() if node in listed}
 
-    def tell(self) -> NeighbourList:
-        """Return what to tell all neighbours now and then, and whenever it has changed; for some time after leaving, too."""
-        return NeighbourList(self._version, self._listed, self._number if self._wish is None else self._number - 1)
+    def neighbour_list(self) -> NeighbourList:
+        """Return the list to send to all neighbours periodically, when it has changed, and for some time after leaving."""
+        return NeighbourList(self._version, self._listed, self._number if self._request is None else self._number - 1)
 
     def redundant(self) -> bool:
-        """Tell whether the robot could leave, if all lists that it knows are true."""
+        """Return whether the robot could leave, if all lists that it knows are true."""
         lists = {node: each.listed for node, each in self._lists.items()}
         if lists.keys() != set(self._listed) or not all(self._me in each for each in lists.values()):
             return False
@@ -160,21 +117,22 @@ class LeaveLock:
 
     # --- leaving ----------------------------------------------------------------------------------------------------
 
-    def ask(self, now_s: float, versions: tuple[tuple[int, int], ...] | None = None) -> list[LockMessage]:
-        """Ask for locks, or ask again; give up once it has been too long.
+    def request(self, now_s: float, versions: tuple[tuple[int, int], ...] | None = None) -> list[Outgoing]:
+        """Request locks, or request the missing ones again; give up when the request has expired.
 
-        `versions`: somebody has found that the criterion holds for these lists of all neighbours, ascending; else the robot
-        has to find so by those that it knows. What neighbours answer does not depend on who found it.
+        `versions` are (neighbour, version of its list), ascending, for which another node has found that the criterion
+        holds. Without them the robot checks the criterion on the lists that it knows. Neighbours answer the same in
+        both cases.
 
-        To ask again after giving up is better left for later, and for longer each time: all who want to leave disturb each
+        After giving up, wait before the next request, and longer each time: robots that want to leave disturb each
         other.
         """
-        wish = self._wish
-        if wish is not None:
-            if not self._may_still_act(wish, now_s):
+        request = self._request
+        if request is not None:
+            if not self._may_still_act(request, now_s):
                 return self.give_up()
-            missing = tuple(each for each in wish.ask.versions if each[0] not in wish.granted)
-            return [LockMessage(None, LockRequest(wish.ask.number, missing))] if missing else []
+            missing = tuple(each for each in request.message.versions if each[0] not in request.granted)
+            return [Outgoing(None, LockRequest(request.message.number, missing))] if missing else []
         if not self._free_to_act(now_s):
             return []
         if versions is None:
@@ -184,45 +142,45 @@ class LeaveLock:
         elif tuple(node for node, _ in versions) != self._listed:
             return []
         self._number = _fresh(self._number, now_s)
-        ask = LockRequest(self._number, versions)
-        self._wish = _LeaveRequest(ask, self._version, now_s + self._lease_s / 2.0, ())
-        return [LockMessage(None, ask)]
+        message = LockRequest(self._number, versions)
+        self._request = _LeaveRequest(message, self._version, now_s + self._lease_s / 2.0, ())
+        return [Outgoing(None, message)]
 
-    def give_up(self) -> list[LockMessage]:
-        """Want to leave no more."""
-        wish, self._wish = self._wish, None
-        return [] if wish is None else [LockMessage(None, LockRelease(wish.ask.number))]
+    def give_up(self) -> list[Outgoing]:
+        """Withdraw the request."""
+        request, self._request = self._request, None
+        return [] if request is None else [Outgoing(None, LockRelease(request.message.number))]
 
     def may_leave(self, now_s: float) -> bool:
-        """Tell whether the robot may leave now: all that it sees have granted it, and nothing it knows has changed."""
-        wish = self._wish
+        """Return whether the robot may leave now: all visible robots have granted, and nothing it knows has changed."""
+        request = self._request
         return (
-            wish is not None
+            request is not None
             and self._free_to_act(now_s)
-            and self._may_still_act(wish, now_s)
-            and wish.granted == self._listed
+            and self._may_still_act(request, now_s)
+            and request.granted == self._listed
         )
 
-    def leave(self, now_s: float) -> list[LockMessage]:
-        """Leave, if that is allowed: from now on the robot is none of the swarm that stands, and `wants` no more."""
+    def leave(self, now_s: float) -> list[Outgoing]:
+        """Leave the complex if that is allowed; return the release, or nothing if it is not allowed."""
         if not self.may_leave(now_s):
             return []
         self._stands = False
         return self.give_up()
 
-    def depart(self) -> list[LockMessage]:
-        """Begin to move, for another reason; not while `locked`."""
+    def depart(self) -> list[Outgoing]:
+        """Begin to move for another reason; not while `locked`."""
         self._stands = False
         return self.give_up()
 
     def settle(self) -> None:
-        """Stand again."""
+        """Stand still again."""
         self._stands = True
 
     # --- answering --------------------------------------------------------------------------------------------------
 
-    def hear(self, sender: int, message: Message, now_s: float) -> list[LockMessage]:
-        """Take in a message from another robot, and return what to answer."""
+    def receive(self, sender: int, message: LockProtocolMessage, now_s: float) -> list[Outgoing]:
+        """Take in a message from another robot, and return the answers."""
         match message:
             case NeighbourList():
                 known = self._lists.get(sender)
@@ -232,45 +190,45 @@ class LeaveLock:
             case LockRequest():
                 return self._answer(sender, message, now_s)
             case LockGrant():
-                wish = self._wish
-                if wish is not None and message.number == wish.ask.number:
-                    self._wish = wish._replace(granted=tuple(sorted({*wish.granted, sender})))
+                request = self._request
+                if request is not None and message.number == request.message.number:
+                    self._request = request._replace(granted=tuple(sorted({*request.granted, sender})))
             case LockDenial():
-                if self._wish is not None and message.number == self._wish.ask.number:
+                if self._request is not None and message.number == self._request.message.number:
                     return self.give_up()
             case LockRelease():
                 self._end(sender, message.number)
         return []
 
-    def _answer(self, asker: int, ask: LockRequest, now_s: float) -> list[LockMessage]:
-        relied_on = dict(ask.versions).get(self._me)
-        if relied_on is None or ask.number <= self._over.get(asker, 0):
+    def _answer(self, requester: int, request: LockRequest, now_s: float) -> list[Outgoing]:
+        relied_on = dict(request.versions).get(self._me)
+        if relied_on is None or request.number <= self._over.get(requester, 0):
             return []
         lock = self._lock if self._lock is not None and now_s < self._lock.until_s else None
-        if lock is not None and lock.holder == asker and lock.number >= ask.number:
-            return [LockMessage(asker, LockGrant(ask.number))] if lock.number == ask.number else []
+        if lock is not None and lock.holder == requester and lock.number >= request.number:
+            return [Outgoing(requester, LockGrant(request.number))] if lock.number == request.number else []
         stands = self._stands and now_s >= self._quiet_until_s
-        if not stands or (lock is not None and lock.holder != asker) or (self.wants and self._me < asker):
-            return [LockMessage(asker, LockDenial(ask.number))]
-        if relied_on != self._version or asker not in self._listed:
-            return [LockMessage(asker, LockDenial(ask.number)), LockMessage(asker, self.tell())]
+        if not stands or (lock is not None and lock.holder != requester) or (self.wants and self._me < requester):
+            return [Outgoing(requester, LockDenial(request.number))]
+        if relied_on != self._version or requester not in self._listed:
+            return [Outgoing(requester, LockDenial(request.number)), Outgoing(requester, self.neighbour_list())]
         given_up = self.give_up()
-        self._lock = _Lock(asker, ask.number, now_s + self._lease_s)
-        return [*given_up, LockMessage(asker, LockGrant(ask.number))]
+        self._lock = _Lock(requester, request.number, now_s + self._lease_s)
+        return [*given_up, Outgoing(requester, LockGrant(request.number))]
 
-    def _end(self, asker: int, number: int) -> None:
-        """Take note that the asker will not act upon this or an earlier number."""
-        self._over[asker] = max(number, self._over.get(asker, 0))
-        if self._lock is not None and self._lock.holder == asker and self._lock.number <= number:
+    def _end(self, requester: int, number: int) -> None:
+        """Record that the requester will not act on this or an earlier request."""
+        self._over[requester] = max(number, self._over.get(requester, 0))
+        if self._lock is not None and self._lock.holder == requester and self._lock.number <= number:
             self._lock = None
 
-    # --- means ------------------------------------------------------------------------------------------------------
+    # --- helpers ----------------------------------------------------------------------------------------------------
 
     def _free_to_act(self, now_s: float) -> bool:
         return self._stands and not self.locked(now_s)
 
-    def _may_still_act(self, wish: _LeaveRequest, now_s: float) -> bool:
-        return now_s < wish.until_s and wish.version == self._version
+    def _may_still_act(self, request: _LeaveRequest, now_s: float) -> bool:
+        return now_s < request.until_s and request.version == self._version
 
 
 def _fresh(last: int, now_s: float) -> int:

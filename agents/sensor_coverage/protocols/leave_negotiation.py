@@ -1,178 +1,194 @@
-"""How a robot comes to leave the complex: when it asks its neighbours, how often, and what it sends for that.
+"""The negotiation by which a robot leaves the complex: when it requests locks, how often, and with which messages.
 
-What makes leaving safe is agreed upon in `redundancy`; here is when to begin, and when to try again. Who leaves stays where it
-is in body until it is called to be the rear of a push: nothing moves, and nobody's landmark is lost.
+The locks make leaving safe (`leave_lock`). This component decides when to request them, and when to try again. A robot
+that leaves stays in body where it is until it is called to be the rear of a push. Nothing moves, so no robot loses a
+landmark.
 """
 
 from collections.abc import Iterable
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
-from zwerm.agents.sensor_coverage.messages.peers import ListRequest, Word
-from zwerm.agents.sensor_coverage.protocols import leave_lock as redundancy
-from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, LockMessage
+from zwerm.agents.sensor_coverage.messages.locks import (
+    ListRequest,
+    LockDenial,
+    LockGrant,
+    LockProtocolMessage,
+    LockRelease,
+    LockRequest,
+    NeighbourList,
+)
+from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
+from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
+from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock
 
 LEASE_S: Final = 40.0
-# When it first tries, once it is redundant: by chance, since neighbours are so at once; and when it asks again [ticks].
+# Bound of the random delay before the first attempt: neighbours become redundant at the same time.
 SPREAD_TICKS: Final = 8
-ASK_TICKS: Final = 3
-ENQUIRE_TICKS: Final = 4
-ENQUIRIES_MAX: Final = 25
-# How long to wait after a wish that came to nothing [ticks]: doubled every time.
+# Ticks between repeated lock requests, and between repeated list requests, and the bound of the latter.
+REQUEST_TICKS: Final = 3
+LIST_REQUEST_TICKS: Final = 4
+LIST_REQUESTS_MAX: Final = 25
+# Ticks to wait after a failed attempt, doubled each time up to a bound.
 WAIT_TICKS: Final = 8
 WAIT_TICKS_MAX: Final = 40
-# When to say again that a wish is over [ticks after].
-AGAIN_TICKS: Final = (4, 8, 14, 22, 32, 48, 70)
+# Ticks after the end of a request at which the end is announced again.
+ANNOUNCE_TICKS: Final = (4, 8, 14, 22, 32, 48, 70)
 
 
-class LeaveNegotiation:
-    """One robot's part. `watch` comes first in every tick that it is awake in."""
+class LeaveNegotiation(Component):
+    """One robot's part. `observe` comes first in every tick in which the robot is awake.
 
-    def __init__(self, node: int, dt_s: float, random: np.random.Generator, newborn: bool) -> None:
+    Set `wanted` before `poll`: the robot is redundant as far as it knows, and shall leave. `versions` are neighbours'
+    list versions for which a coordinator has found that. After `poll`, `left` tells whether the robot left in this
+    tick. `tries` counts failed attempts since `begin`.
+    """
+
+    channel: ClassVar[str] = CHANNEL
+    accepts: ClassVar[tuple[type, ...]] = (NeighbourList, LockRequest, LockGrant, LockDenial, LockRelease, ListRequest)
+
+    def __init__(self, node: int, dt_s: float, random: np.random.Generator, first_incarnation: bool) -> None:
+        self.wanted = False
+        self.versions: tuple[tuple[int, int], ...] | None = None
+        self.left = False
+        self.tries = 0
         self._node = node
         self._dt_s = dt_s
         self._random = random
-        self._newborn = newborn
+        self._first_incarnation = first_incarnation
         self._tick = 0
-        self._agreement: LeaveLock | None = None
-        self._outbox: list[tuple[int | None, Word]] = []
-        self._again: list[int] = []
-        self._try_at: int | None = None  # None as long as there never was anything to try
-        self._redundant = False
-        self.tries = 0
-        self._enquiries = 0
+        self._lock: LeaveLock | None = None
+        self._outbox: list[Outgoing] = []
+        self._announce_at: list[int] = []
+        self._try_at: int | None = None  # None until there was something to try
+        self._trying = False
+        self._list_requests = 0
         self._unanswered: tuple[int, ...] = ()
-        self._wanted = False
+        self._had_request = False
 
     # --- every tick -------------------------------------------------------------------------------------------------
 
-    def watch(self, tick: int, sight: Iterable[int]) -> None:
-        """Take in whom the robot sees."""
+    def observe(self, tick: int, visible: Iterable[int]) -> None:
+        """Take in the visible robots."""
         self._tick = tick
-        if self._agreement is None:
-            self._agreement = LeaveLock(self._node, LEASE_S, self._now_s, 0.0 if self._newborn else None)
-            self._agreement.depart()
-        self._agreement.see(sight, self._now_s)
+        if self._lock is None:
+            self._lock = LeaveLock(self._node, LEASE_S, self._now_s, 0.0 if self._first_incarnation else None)
+            self._lock.depart()
+        self._lock.update(visible, self._now_s)
 
-    def note(self, stands: bool) -> None:
-        """Take in whether the robot stands at a place of the complex, and has nothing else to do."""
-        agreement = self._agreement
-        if agreement is None or agreement.stands == stands:
+    def update(self, stands: bool) -> None:
+        """Take in whether the robot stands at a slot of the complex, and has nothing else to do."""
+        lock = self._lock
+        if lock is None or lock.stands == stands:
             return
         if stands:
-            agreement.settle()
+            lock.settle()
         else:
-            self._send(agreement.depart())
+            self._outbox += lock.depart()
 
     @property
-    def told(self) -> redundancy.NeighbourList | None:
-        """What it tells of whom it sees, and under which version."""
-        return self._agreement.tell() if self._agreement is not None else None
+    def neighbour_list(self) -> NeighbourList | None:
+        """The list of visible robots with its version, or None before the first observation."""
+        return self._lock.neighbour_list() if self._lock is not None else None
 
     @property
     def locked(self) -> bool:
-        """Whether the robot has to stand still."""
-        return self._agreement is not None and self._agreement.locked(self._now_s)
-
-    def hear(self, sender: int, word: redundancy.Message | ListRequest) -> None:
-        """Take in what another robot says."""
-        agreement = self._agreement
-        if agreement is None:
-            return
-        if isinstance(word, redundancy.NeighbourList):
-            self._unanswered = tuple(each for each in self._unanswered if each != sender)
-        if not isinstance(word, ListRequest):
-            self._send(agreement.hear(sender, word, self._now_s))
-        elif self._node in word.nodes:
-            self._outbox.append((sender, agreement.tell()))
-
-    def begin(self) -> None:
-        """Try anew, as if for the first time; `tries` is how often that has come to nothing since."""
-        self.tries = 0
-        self._try_at = None
+        """Whether the robot must stand still."""
+        return self._lock is not None and self._lock.locked(self._now_s)
 
     @property
     def stays(self) -> bool:
-        """Whether, by lists that are all new, the robot cannot leave."""
-        agreement = self._agreement
-        return agreement is not None and self._enquiries > 0 and not self._unanswered and not agreement.redundant()
+        """Whether the robot cannot leave, by lists that are all new."""
+        lock = self._lock
+        return lock is not None and self._list_requests > 0 and not self._unanswered and not lock.redundant()
 
-    def turn(self, redundant: bool, versions: tuple[tuple[int, int], ...] | None = None) -> bool:
-        """Go on; tell whether the robot leaves now.
+    def begin(self) -> None:
+        """Start over, as if the robot had never tried."""
+        self.tries = 0
+        self._try_at = None
 
-        `redundant`: by all that it knows it could, and it should. `versions`: it was told so, for these of neighbours' lists.
-        """
-        agreement, tick = self._agreement, self._tick
-        if agreement is None:
-            return False
-        if self._wanted and not agreement.wants:
-            self._end()
-        left = redundant and bool(self._send(agreement.leave(self._now_s)))
-        if agreement.wants and not redundant:
-            self._send(agreement.give_up())
-        self._redundant = redundant and not left
-        if not redundant:
-            self._enquiries = 0
-        if self._redundant and self._try_at is None:
+    def receive(self, sender: int, message: LockProtocolMessage | ListRequest, tick: int) -> None:
+        """Take in a message about neighbour lists and locks."""
+        lock = self._lock
+        if lock is None:
+            return
+        if isinstance(message, NeighbourList):
+            self._unanswered = tuple(each for each in self._unanswered if each != sender)
+        if not isinstance(message, ListRequest):
+            self._outbox += lock.receive(sender, message, self._now_s)
+        elif self._node in message.nodes:
+            self._outbox.append(Outgoing(sender, lock.neighbour_list()))
+
+    def poll(self, tick: int) -> None:
+        """Leave if all neighbours have agreed; otherwise go on with the negotiation."""
+        lock = self._lock
+        self.left = False
+        if lock is None:
+            return
+        if self._had_request and not lock.wants:
+            self._request_ended()
+        if self.wanted:
+            release = lock.leave(self._now_s)
+            self._outbox += release
+            self.left = bool(release)
+        if lock.wants and not self.wanted:
+            self._outbox += lock.give_up()
+        self._trying = self.wanted and not self.left
+        if not self.wanted:
+            self._list_requests = 0
+        if self._trying and self._try_at is None:
             self._try_at = tick + 1 + int(self._random.integers(SPREAD_TICKS))
-        elif self._redundant and tick >= (self._try_at or 0):
-            self._try(agreement, versions)
-        if self._wanted and not agreement.wants:
-            self._end()
-        self._wanted = agreement.wants
-        if self._again and tick >= self._again[0]:
-            del self._again[0]
-            self._outbox.append((None, agreement.tell()))
-        return left
+        elif self._trying and tick >= (self._try_at or 0):
+            self._try(lock)
+        if self._had_request and not lock.wants:
+            self._request_ended()
+        self._had_request = lock.wants
+        if self._announce_at and tick >= self._announce_at[0]:
+            del self._announce_at[0]
+            self._outbox.append(Outgoing(None, lock.neighbour_list()))
 
-    def letters(self) -> list[tuple[int | None, Word]]:
-        """Return what is to be sent now, with whom it is for (None: all that hear it)."""
+    def outgoing(self) -> list[Outgoing]:
+        """Return the messages to send now."""
         found, self._outbox = self._outbox, []
         return found
 
-    def next_tick(self) -> int | None:
-        """Return when to be looked after, at the latest."""
-        times = [*self._again[:1], *([self._try_at] if self._redundant and self._try_at is not None else [])]
+    def next_wake(self) -> int | None:
+        """Return the next tick of an attempt or an announcement."""
+        times = [*self._announce_at[:1], *([self._try_at] if self._trying and self._try_at is not None else [])]
         return min(times, default=None)
 
-    # --- means ------------------------------------------------------------------------------------------------------
+    # --- attempts -----------------------------------------------------------------------------------------------------
 
     @property
     def _now_s(self) -> float:
         return self._tick * self._dt_s
 
-    def _try(self, agreement: LeaveLock, versions: tuple[tuple[int, int], ...] | None) -> None:
-        """Ask for lists that are new, unless it is known which to rely on, and then for locks."""
-        if not self._enquiries:
-            self._unanswered = agreement.listed if versions is None else ()
-        if agreement.wants or not self._unanswered:
-            self._send(agreement.ask(self._now_s, versions))
-            self._try_at = self._tick + ASK_TICKS
-            if not agreement.wants:
-                self._wait()
-        elif self._enquiries < ENQUIRIES_MAX:
-            self._enquiries += 1
-            self._try_at = self._tick + ENQUIRE_TICKS
-            self._outbox.append((None, ListRequest(self._unanswered)))
+    def _try(self, lock: LeaveLock) -> None:
+        """Request new lists unless `versions` are known, and then locks."""
+        if not self._list_requests:
+            self._unanswered = lock.listed if self.versions is None else ()
+        if lock.wants or not self._unanswered:
+            self._outbox += lock.request(self._now_s, self.versions)
+            self._try_at = self._tick + REQUEST_TICKS
+            if not lock.wants:
+                self._back_off()
+        elif self._list_requests < LIST_REQUESTS_MAX:
+            self._list_requests += 1
+            self._try_at = self._tick + LIST_REQUEST_TICKS
+            self._outbox.append(Outgoing(None, ListRequest(self._unanswered)))
         else:
-            self._wait()
+            self._back_off()
 
-    def _end(self) -> None:
-        """A wish is over, and neighbours may not have heard so."""
-        self._again = [self._tick + each for each in AGAIN_TICKS]
-        self._wait()
+    def _request_ended(self) -> None:
+        """Announce the end of a request again and again, because neighbours may have missed it."""
+        self._announce_at = [self._tick + each for each in ANNOUNCE_TICKS]
+        self._back_off()
 
-    def _wait(self) -> None:
-        if self._try_at is None or self._try_at <= self._tick + ASK_TICKS:
+    def _back_off(self) -> None:
+        """Wait before the next attempt: longer after every failure, and for a random time."""
+        if self._try_at is None or self._try_at <= self._tick + REQUEST_TICKS:
             self.tries += 1
-            self._try_at = self._tick + self._patience()
-            self._enquiries = 0
-
-    def _patience(self) -> int:
-        """Return how long to wait: longer after every wish that came to nothing, and by chance."""
-        return int(min(WAIT_TICKS * 2.0**self.tries, WAIT_TICKS_MAX) * (0.5 + float(self._random.random())))
-
-    def _send(self, sent: list[LockMessage]) -> list[LockMessage]:
-        self._outbox += [(each.to, each.message) for each in sent]
-        return sent
+            wait = min(WAIT_TICKS * 2.0**self.tries, WAIT_TICKS_MAX)
+            self._try_at = self._tick + int(wait * (0.5 + float(self._random.random())))
+            self._list_requests = 0

@@ -1,139 +1,136 @@
-"""Robots that have left the complex, and how the base calls them: before it lets another one out, it pushes from there.
+"""Robots that have left the complex, and how the base calls them: it pushes from there before it releases another robot.
 
-    offer   spare robot to base, hop by hop, each to the neighbour that is nearest to the base
-    call    base to spare robot: by the places that the offer came through, whoever holds them now
-    end     rear of the push to base: what came of it
+    offer   redundant robot to base, hop by hop, each to the neighbour that is nearest to the base
+    call    base to redundant robot: through the slots that the offer came through, whoever occupies them now
+    end     rear of the push to base: the outcome
 
-Each hop is a letter, acknowledged and sent again; who passes one on keeps nothing. The base has one push at a time, its own or
-one that it called for, and gives the new place its id: no place has two names, and no name two places. An offer or a call
-that is lost costs time. A base that never hears of an end goes on after a while.
+Each hop is a reliable message, and a robot that forwards one keeps nothing. The base has one push at a time, its own or
+one that it called for, and gives the new slot its number. So no slot has two numbers, and no number two slots. An offer
+or a call that is lost costs time. A base that never receives an end continues after a while.
 """
 
-from typing import Final, Protocol
+from collections.abc import Callable
+from typing import ClassVar, Final
 
-from zwerm.agents.sensor_coverage.messages.peers import (
-    FAR,
-    Errand,
+from zwerm.agents.sensor_coverage.messages.beacons import FAR
+from zwerm.agents.sensor_coverage.messages.pushes import (
+    Body,
     PushAborted,
     PushDone,
     RedundantCall,
     RedundantOffer,
     RedundantPushEnd,
+    RelayedMessage,
 )
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
-from zwerm.agents.sensor_coverage.protocols.push_host import PushHost
-from zwerm.agents.sensor_coverage.protocols.token_push import TokenPush
+from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
+from zwerm.agents.sensor_coverage.protocols.component import Component
 
-# When to offer, and again, at first and at most [ticks].
-SOON_TICKS: Final = 10
+# Ticks before the first offer, and between offers, at first and at most.
+FIRST_OFFER_TICKS: Final = 10
 OFFER_TICKS: Final = 200
 OFFER_TICKS_MAX: Final = 3200
-# Ways longer than this are none.
+# Bound of the hops of an offer.
 HOPS_MAX: Final = 64
 
 
-class PoolHost(PushHost, Protocol):
-    """The robot that offers itself, or passes on."""
+class RedundantPool(Component):
+    """One robot's part in offers, calls and ends. `begin_push` makes the robot the rear of a push."""
 
-    @property
-    def ready(self) -> bool:
-        """Whether it can take part in a push."""
+    accepts: ClassVar[tuple[type, ...]] = (RedundantOffer, RedundantCall, RedundantPushEnd)
 
-    def begin(self, push: int) -> None:
-        """Be the rear of a push."""
-
-
-class RedundantPool:
-    """One robot's part in offers, calls and ends."""
-
-    def __init__(self, robot: PoolHost) -> None:
-        self._robot = robot
-        self._pending: list[Errand] = []
+    def __init__(self, situation: Situation, begin_push: Callable[[int], None]) -> None:
+        self._situation = situation
+        self._begin_push = begin_push
+        self._pending: list[RelayedMessage] = []
         self._offer_at: int | None = None
         self._wait_ticks = OFFER_TICKS
         self._called: int | None = None
 
-    def read(self, errand: Errand) -> None:
-        """Take in a letter, and pass it on."""
-        match errand:
-            case RedundantOffer():
-                place = self._robot.vicinity.place
-                if place not in errand.places and len(errand.places) < HOPS_MAX:
-                    self._pending.append(RedundantOffer(errand.push, (*errand.places, place)))
+    def receive(self, sender: int, message: RelayedMessage, tick: int) -> None:
+        """Take in a message, and forward it."""
+        match message:
+            case RedundantOffer(push, slots):
+                slot = self._situation.local_map.slot
+                if slot not in slots and len(slots) < HOPS_MAX:
+                    self._pending.append(RedundantOffer(push, (*slots, slot)))
             case RedundantCall():
-                self._take_call(errand)
+                self._take_call(message)
             case RedundantPushEnd():
-                self._pending.append(errand)
-        self.turn()
+                self._pending.append(message)
+        self.poll(tick)
 
-    def lost(self, errand: Errand) -> None:
-        """A letter was never acknowledged: try another way."""
-        self._pending.append(
-            RedundantPushEnd(errand.push, False, False) if isinstance(errand, RedundantCall) else errand
-        )
+    def lost(self, body: Body) -> None:
+        """Send a message that was never acknowledged by another neighbour; a lost call ends its push."""
+        match body:
+            case RedundantCall(push):
+                self._pending.append(RedundantPushEnd(push, False, False))
+            case RedundantOffer() | RedundantPushEnd():
+                self._pending.append(body)
+            case _:
+                pass
 
-    def over(self, push: TokenPush) -> None:
-        """A push is over that this robot was part of."""
-        if push.id != self._called:
+    def push_over(self, push: int, end: Body | None) -> None:
+        """Report the outcome of a push, if this robot was called for it."""
+        if push != self._called:
             return
         self._called = None
-        done = isinstance(push.end, PushDone)
-        tried = done or (isinstance(push.end, PushAborted) and push.end.tried)
-        self._pending.append(RedundantPushEnd(push.id, tried, done))
+        done = isinstance(end, PushDone)
+        tried = done or (isinstance(end, PushAborted) and end.tried)
+        self._pending.append(RedundantPushEnd(push, tried, done))
         if tried:
-            self._offer_at = self._robot.tick + SOON_TICKS
+            self._offer_at = self._situation.tick + FIRST_OFFER_TICKS
 
-    def turn(self) -> None:
-        """Offer, if it is time to, and send what waits for a way."""
-        robot, vicinity = self._robot, self._robot.vicinity
-        vicinity.home = _home(vicinity)
-        if not vicinity.spare:
+    def poll(self, tick: int) -> None:
+        """Offer if it is time, and send the pending messages to the neighbour that is nearest to the base."""
+        local_map = self._situation.local_map
+        local_map.home = _hops_to_base(local_map)
+        if not local_map.redundant:
             self._offer_at, self._wait_ticks = None, OFFER_TICKS
         elif self._offer_at is None:
-            self._offer_at = robot.tick + SOON_TICKS
-        elif self._offers(self._offer_at):
-            self._offer_at = robot.tick + self._wait_ticks
+            self._offer_at = tick + FIRST_OFFER_TICKS
+        elif tick >= self._offer_at and self._called is None and local_map.has_route:
+            self._offer_at = tick + self._wait_ticks
             self._wait_ticks = min(2 * self._wait_ticks, OFFER_TICKS_MAX)
-            self._pending.append(RedundantOffer(0, (vicinity.place,)))
-        towards = _homeward(vicinity) if self._pending else None
+            self._pending.append(RedundantOffer(0, (local_map.slot,)))
+        towards = _neighbour_nearest_to_base(local_map) if self._pending else None
         if towards is not None:
             for each in self._pending:
-                robot.post.write(towards, each)
+                self._situation.mailbox.write(towards, each)
             self._pending = []
 
-    def next_tick(self) -> int | None:
-        """Return when to be looked after, at the latest."""
+    def next_wake(self) -> int | None:
+        """Return the tick of the next offer, or the next tick if messages are pending."""
         if self._pending:
-            return self._robot.tick + 1
-        wanted = self._offer_at is None or self._robot.vicinity.leads
+            return self._situation.tick + 1
+        wanted = self._offer_at is None or self._situation.local_map.has_route
         return self._offer_at if wanted and self._called is None else None
 
-    def _offers(self, at: int) -> bool:
-        """Tell whether it is time to offer, and there is anything to be called for."""
-        return self._robot.tick >= at and self._called is None and self._robot.vicinity.leads
-
     def _take_call(self, call: RedundantCall) -> None:
-        robot, vicinity = self._robot, self._robot.vicinity
-        if len(call.places) > 1:
-            node = vicinity.at(call.places[-2])
-            if node is not None and node in robot.bearings:
-                robot.post.write(node, RedundantCall(call.push, call.places[:-1]))
+        """Forward a call, be the rear of its push, or report that neither is possible."""
+        situation, local_map = self._situation, self._situation.local_map
+        if len(call.slots) > 1:
+            node = local_map.at(call.slots[-2])
+            if node is not None and node in situation.bearings:
+                situation.mailbox.write(node, RedundantCall(call.push, call.slots[:-1]))
                 return
-        elif vicinity.spare and vicinity.place == call.places[0] and robot.ready and self._called is None:
+        elif local_map.redundant and local_map.slot == call.slots[0] and situation.free and self._called is None:
             self._called = call.push
-            robot.begin(call.push)
+            self._begin_push(call.push)
             return
         self._pending.append(RedundantPushEnd(call.push, False, False))
 
 
-def _home(vicinity: LocalMap) -> int:
-    """Return how many hops it is to the base, by what neighbours said last."""
-    homes = vicinity.gradient.homes
-    return 0 if vicinity.place == 0 else min([FAR, *(1 + homes.get(s.place, FAR) for s in vicinity.mutual().values())])
+def _hops_to_base(local_map: LocalMap) -> int:
+    """Return the number of hops to the base, by the neighbours' latest messages."""
+    homes = local_map.path_vectors.homes
+    if local_map.slot == 0:
+        return 0
+    return min([FAR, *(1 + homes.get(state.slot, FAR) for state in local_map.mutual().values())])
 
 
-def _homeward(vicinity: LocalMap) -> int | None:
-    """Return the neighbour that is nearest to the base."""
-    homes = vicinity.gradient.homes
-    found = min(((homes.get(state.place, FAR), node) for node, state in vicinity.mutual().items()), default=None)
+def _neighbour_nearest_to_base(local_map: LocalMap) -> int | None:
+    homes = local_map.path_vectors.homes
+    neighbours = ((homes.get(state.slot, FAR), node) for node, state in local_map.mutual().items())
+    found = min(neighbours, default=None)
     return found[1] if found is not None and found[0] < FAR else None

@@ -1,28 +1,31 @@
-"""One push, as each robot of its path lives it: a token goes out along the gradient, and robots move up behind its leader.
+"""One push, as one robot of its path takes part in it: a token searches the leader, and robots move up behind it.
 
-    token       base to leader, hop by hop: the path, rear to front, is locked by it
-    ready       leader to its follower: the memory of the leader's place; then the leader goes into the unknown
-    abort       leader to base: a wall was in the way, nobody has moved
-    gone        the leader is far enough away; told on by neighbours, since its follower is out of its reach
-    take        front to rear, each to its follower: the memory of the place it leaves; each goes once it was acknowledged
-    stand       front to rear: all ahead of you stand
-    settled     rear to front: all behind you have found their places
-    done        front to rear, and the base
+    token       base to leader, hop by hop: the token locks the path, rear to front ready       leader to its follower:
+    the memory of the leader's slot; then the leader drives into unknown space abort       leader to base: a wall was in
+    the way, and no robot has moved vacated     the leader is far enough away; neighbours forward it, because the
+    follower is out of range take        front to rear, each to its follower: the memory of the slot it leaves; each
+    drives once that is acknowledged standing    front to rear: all robots ahead of you stand still settled     rear to
+    front: all robots behind you have reached their slots done        front to rear, and to the base
 
-Letters are sent again until they are acknowledged. Who hears nothing for too long goes on alone: that may leave a hole, which
-becomes frontier again; and a leader that is back, and its follower beside it after all, take the two names that the push has.
+Messages are repeated until they are acknowledged. A robot that waits too long continues alone. That may leave a hole,
+which becomes frontier again. If a leader is back and its follower has come all the same, they occupy the old and the
+new slot.
+
+`PHASES` is the state machine: for each phase, the conditions under which it ends, the action at the end of a drive, and
+the time of the next wake-up.
 """
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.frontier.services import Plan
-from zwerm.agents.sensor_coverage.messages.commands import Arrived, Correct, Deploy, Landmark, Move, Sighting
-from zwerm.agents.sensor_coverage.messages.peers import (
-    NOWHERE,
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrapped
+from zwerm.agents.sensor_coverage.frontier.plan import Plan
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.commands import Sighting
+from zwerm.agents.sensor_coverage.messages.pushes import (
     AllSettled,
     AllStanding,
     Body,
@@ -30,376 +33,424 @@ from zwerm.agents.sensor_coverage.messages.peers import (
     LeaderReady,
     PushAborted,
     PushDone,
+    PushMessage,
     PushToken,
-    ReferenceBearing,
     SlotMemory,
     TakeSlot,
 )
-from zwerm.agents.sensor_coverage.protocols.push_host import PushHost
+from zwerm.agents.sensor_coverage.motion.drives import DriveResult
+from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
+from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
+from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 
-# How long to wait for what others do [ticks]: a path to be walked twice, a drive, a look around.
+# Bounds of the ticks to wait: for the token, for another robot's drive, for the leader to leave or to give up, for the
+# leader's neighbours to agree, for a robot out of range, and for this robot's neighbours to agree at the end.
 LINK_TICKS: Final = 1000
 WAVE_TICKS: Final = 600
-GONE_TICKS: Final = 80
+VACATED_TICKS: Final = 80
 ARMED_TICKS: Final = 300
 HOLD_TICKS: Final = 600
 LOST_TICKS: Final = 100
 CLOSE_TICKS: Final = 80
-TOLD_TICKS: Final = 4
-
-# A leader is still at its place, or back, if it is seen that near to the place's direction [rad].
+TELL_TICKS: Final = 4
+# After VACATED_TICKS a follower checks this often [ticks] whether the leader's slot is vacant.
+VACANCY_PERIOD_TICKS: Final = 20
+# A leader that is visible within this angle [rad] of its slot's direction is still there, or back.
 BACK_RAD: Final = 0.3
-
-# The bearings to try from the base, when nobody is out yet.
-FIRST_RAD: Final = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
 
 
 class TokenPush:
-    """One robot's part in one push. `over` once it is done with; `end` is how it ended, as far as this robot knows."""
+    """One robot's part in one push. `over` once it has ended; `end` is its last message, as far as this robot knows.
+
+    `chain` are the robots of the push, rear to front, each with its slot before the push. `back` is the robot or base
+    that sent the token. `first`: no robot has left the base yet.
+    """
 
     def __init__(
-        self, host: PushHost, push: int, fresh: int, chain: Chain, back: int | None, first: bool = False
+        self,
+        situation: Situation,
+        announce_vacated: Callable[[int], None],
+        push: int,
+        fresh: int,
+        chain: Chain,
+        back: int | None,
+        first: bool = False,
     ) -> None:
         self.id = push
         self.phase = "link"
         self.over = False
-        self.since = host.tick
-        self._host = host
+        self.end: Body | None = None
+        self._situation = situation
+        self._map = situation.local_map
+        self._announce_vacated = announce_vacated
+        self._since = situation.tick
         self._fresh = fresh
-        self._chain = chain
-        self._index = next(n for n, (_, node) in enumerate(chain) if node == host.node)
-        self._back = back if self._index == 0 else chain[self._index - 1][1]
+        self._chain = PushChain(chain, situation.node)
+        self._back = back if self._chain.is_rear else self._chain.behind
         self._memory: SlotMemory | None = None
         self._plan: Plan | None = None
-        self._first = list(FIRST_RAD) if first else []
-        self._gone = False
+        self._first_bearings = list(FIRST_BEARINGS_RAD) if first else []
+        self._vacated = False
         self._ahead_stands = self._behind_settled = False
-        self._loose = self._leaned = False
-        self.end: Body | None = None
-        self._epoch = -1
+        self._result = DriveResult(True)
+        self._anchors: tuple[Sighting, ...] = ()
+        self._leader_epoch = -1
 
-    # --- what comes -------------------------------------------------------------------------------------------------
+    # --- events -------------------------------------------------------------------------------------------------------
 
-    def take(self, body: Body) -> None:
-        """Take in a letter of this push."""
+    def receive(self, body: PushMessage) -> None:
+        """Take in a message of this push."""
         match body:
             case LeaderReady():
-                self._chain, self._memory = body.chain, body.memory
-                self._epoch = body.epoch
+                self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
+                self._leader_epoch = body.epoch
                 self._enter("armed")
             case TakeSlot():
-                self._chain, self._memory = body.chain, body.memory
+                self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
                 self._call()
             case PushAborted():
-                self._close(body)
+                self.close(body)
             case AllStanding():
                 self._ahead_stands = True
             case AllSettled():
                 self._behind_settled = True
             case PushDone():
-                self._close(body)
+                self.close(body)
 
-    def hear_gone(self) -> None:
-        """The leader is gone."""
+    def leader_vacated(self) -> None:
+        """Take in that the leader has left its slot."""
         if self.phase == "armed":
             self._call()
 
     def acknowledged(self, body: Body, lost: bool) -> None:
-        """A letter has arrived, or has not and never will."""
+        """Take in that a message of this robot was acknowledged, or was given up."""
         match body:
             case LeaderReady() if self.phase == "offering":
                 if lost:
-                    self._close(PushAborted(self.id, False))
+                    self.close(PushAborted(self.id, False))
                 else:
                     self._deploy()
             case TakeSlot() if self.phase == "calling":
                 self._follow()
             case PushToken() if lost:
-                self._close(PushAborted(self.id, False))
+                self.close(PushAborted(self.id, False))
             case PushAborted() | PushDone() if self.phase == "telling":
                 self.over = True
             case _:
                 pass
 
-    # --- the leader -------------------------------------------------------------------------------------------------
+    def cleared(self) -> None:
+        """Take in that the leader has driven far enough for its follower to take its slot."""
+        if not self._vacated and not self._first_bearings:
+            self._vacated = True
+            self._announce_vacated(self.id)
+
+    def arrived(self, result: DriveResult) -> None:
+        """Take in the end of a drive."""
+        PHASES[self.phase].arrived(self, result)
+
+    def poll(self) -> None:
+        """Take the first transition of the present phase whose condition holds."""
+        for condition, action in PHASES[self.phase].transitions:
+            if condition(self):
+                action(self)
+                return
+
+    def next_wake(self) -> int:
+        """Return the latest tick of the next poll."""
+        return PHASES[self.phase].wake(self)
+
+    # --- the leader ---------------------------------------------------------------------------------------------------
 
     def lead(self) -> None:
-        """Be the leader, once this robot's word of its neighbours is good."""
+        """Be the leader, once this robot's view agrees with its neighbours' states."""
         self._enter("holding")
 
     def _offer(self) -> None:
-        host, vicinity = self._host, self._host.vicinity
-        plan = vicinity.best()
-        if self._first:
-            self._enter("deploying")
+        self._map.update_plans()
+        self._plan = None if self._first_bearings else self._map.best_plan()
+        behind = self._chain.behind
+        if self._first_bearings or (self._plan is not None and behind is None):
             self._deploy()
-            return
-        if plan is None:
-            self._close(PushAborted(self.id, False))
-            return
-        self._plan = plan
-        if self._index == 0:
-            self._deploy()
-            return
-        self._enter("offering")
-        host.post.write(
-            self._chain[self._index - 1][1], LeaderReady(self.id, self._chain, vicinity.memory(), vicinity.epoch)
-        )
+        elif self._plan is None or behind is None:
+            self.close(PushAborted(self.id, False))
+        else:
+            self._enter("offering")
+            ready = LeaderReady(self.id, self._chain.links, self._map.memory(), self._map.epoch)
+            self._situation.mailbox.write(behind, ready)
 
     def _deploy(self) -> None:
-        rules, vicinity = self._host.vicinity.rules, self._host.vicinity
         self._enter("deploying")
-        if self._first:
-            hop_m = rules.link_m - rules.margin_m
-            self._host.drive(Deploy(0, self._first[0], hop_m, rules.clear_m))
+        parameters = self._map.parameters
+        if self._first_bearings:
+            self._situation.deploy(self._first_bearings[0], parameters.hop_m, parameters.clear_m)
         elif self._plan is not None:
-            vicinity.note_attempt(self._plan)
-            bearing = math.remainder(self._plan.direction - self._heading, math.tau)
-            self._host.drive(Deploy(0, bearing, self._plan.hop_m, self._plan.clear_m))
+            self._map.note_attempt(self._plan)
+            bearing_rad = wrapped(self._plan.direction - self._heading)
+            self._situation.deploy(bearing_rad, self._plan.hop_m, self._plan.clear_m)
 
-    def cleared(self) -> None:
-        """The leader has come far enough."""
-        if not self._gone and not self._first:
-            self._gone = True
-            self._host.tell_gone(self.id)
-
-    def _deployed(self, arrived: Arrived) -> None:
-        vicinity = self._host.vicinity
-        if not arrived.ok:
-            if self._plan is not None:
-                vicinity.note_failure(self._plan, arrived.driven_m)
-            elif len(self._first) > 1:
-                del self._first[0]
-                self._deploy()
-                return
-            self._host.rest()
-            self._close(PushAborted(self.id, True))
+    def _deployed(self, result: DriveResult) -> None:
+        if not result.ok:
+            self._blocked(result)
             return
-        self._anchors = self._who_anchors()
-        vicinity.found(self._fresh)
-        if self._first:
-            vicinity.heading = 0.0
-            self._correct(self._anchors)
+        self._anchors = self._find_anchors()
+        self._map.occupy(self._fresh)
+        if self._first_bearings:
+            self._map.heading = 0.0
+            self._correct()
             return
         self._enter("out")
         self._write(AllStanding(self.id))
 
-    def _who_anchors(self) -> tuple[Sighting, ...]:
-        """Return whom to hold on to, and where each should about be."""
-        if self._first:
-            return (Sighting(self._back or 0, math.remainder(self._first[0] + math.pi, math.tau)),)
+    def _blocked(self, result: DriveResult) -> None:
+        """End the push after a test drive that met a wall; the first robot tries its other bearings before."""
+        if self._plan is not None:
+            self._map.note_failure(self._plan, result.driven_m)
+        elif len(self._first_bearings) > 1:
+            del self._first_bearings[0]
+            self._deploy()
+            return
+        self._situation.stand()
+        self.close(PushAborted(self.id, True))
+
+    def _find_anchors(self) -> tuple[Sighting, ...]:
+        """Return the robots that determine the leader's distance, with their approximate bearings."""
+        if self._first_bearings:
+            return (Sighting(self._back or 0, wrapped(self._first_bearings[0] + math.pi)),)
         if self._plan is None:
             return ()
-        back = math.remainder(self._plan.direction + math.pi - self._heading, math.tau)
-        future = self._future()
-        nodes = [future.get(place, self._host.vicinity.at(place)) for place in self._plan.anchors]
-        return tuple(Sighting(node, back) for node in nodes if node is not None)
+        back_rad = wrapped(self._plan.direction + math.pi - self._heading)
+        future = self._chain.future()
+        nodes = [future.get(slot, self._map.at(slot)) for slot in self._plan.anchors]
+        return tuple(Sighting(node, back_rad) for node in nodes if node is not None)
 
-    # --- the followers ----------------------------------------------------------------------------------------------
+    # --- the followers ------------------------------------------------------------------------------------------------
 
     def _call(self) -> None:
-        """Let who is behind come, and go once it knows."""
+        """Let the follower come, and drive once it knows."""
         self._enter("calling")
-        if self._index == 0:
+        behind = self._chain.behind
+        if behind is None:
             self._follow()
-            return
-        self._host.post.write(
-            self._chain[self._index - 1][1], TakeSlot(self.id, self._chain, self._host.vicinity.memory())
-        )
+        else:
+            self._situation.mailbox.write(behind, TakeSlot(self.id, self._chain.links, self._map.memory()))
 
     def _follow(self) -> None:
+        """Drive to the slot ahead, and inherit it."""
         memory = self._memory
         if memory is None:
             return
         self._enter("following")
-        origin = self._chain[self._index][0]
-        there = next((each.direction_rad + math.pi for each in memory.references if each.place == origin), None)
-        landmarks = self._landmarks(memory.references, self._future(), origin)
-        rules = self._host.vicinity.rules
-        heading, hop_m = self._heading, rules.link_m - rules.margin_m
-        if there is None:
-            there, hop_m = heading, 0.0
-        self._host.vicinity.enter(memory)
-        self._host.drive(Move(0, math.remainder(there - heading, math.tau), hop_m, landmarks))
+        origin = self._chain.origin
+        back_rad = direction_to(memory, origin)
+        landmarks = self._chain.landmarks(memory.references, self._chain.future(), self._heading, origin)
+        hop_m = self._map.parameters.hop_m if back_rad is not None else 0.0
+        bearing_rad = wrapped(back_rad + math.pi - self._heading) if back_rad is not None else 0.0
+        self._map.inherit(memory)
+        self._situation.move(bearing_rad, hop_m, landmarks)
 
-    def _future(self) -> dict[int, int]:
-        """Return who will be where among the places that change hands."""
-        chain = self._chain
-        return {place: before for (place, _), (_, before) in zip(chain[1:], chain[:-1], strict=True)}
+    # --- after the drive ----------------------------------------------------------------------------------------------
 
-    def _landmarks(
-        self, references: Sequence[ReferenceBearing], future: dict[int, int], origin: int
-    ) -> tuple[Landmark, ...]:
-        heading, rear = self._heading, self._chain[0][0]
-        found = []
-        for each in references:
-            node = future.get(each.place, each.node)
-            if node == self._host.node or (each.place == rear and rear not in (0, NOWHERE)):
-                continue
-            bearing = math.remainder(each.direction_rad - heading, math.tau)
-            found.append((each.place, Landmark(node, bearing, each.place not in future)))
-        if origin == 0 and sum(each.still for _, each in found) > 2:
-            found = [each for each in found if each[0] != 0]
-        return tuple(each for _, each in found)
+    def _followed(self, result: DriveResult) -> None:
+        self._result = result
+        if not (result.used_odometry or result.used_moving_landmarks):
+            self._situation.stand()
+        self._enter("there")
 
-    # --- the end ----------------------------------------------------------------------------------------------------
-
-    def arrived(self, arrived: Arrived) -> None:
-        """A drive of this push is over."""
-        match self.phase:
-            case "deploying":
-                self._deployed(arrived)
-            case "following":
-                self._loose, self._leaned = arrived.loose, arrived.leaned
-                if not (self._loose or self._leaned):
-                    self._host.rest()
-                self._enter("there")
-            case "straightening":
-                self._home()
-            case "homing" | "correcting":
-                self._settled()
-            case _:
-                self._host.rest()
-
-    def turn(self) -> None:
-        """Go on, if what was waited for has come, or never will."""
-        waited = self._host.tick - self.since
-        match self.phase:
-            case "link" if waited > LINK_TICKS:
-                self._finish()
-            case "holding":
-                if self._host.clear or waited > HOLD_TICKS:
-                    self._host.vicinity.plan()
-                    self._offer()
-            case "armed" if self._leader_epoch() > self._epoch or waited > ARMED_TICKS:
-                self._close(PushAborted(self.id, True))  # it is back, and its word that it failed was lost
-            case "armed" if waited > GONE_TICKS and waited % 20 == 1 and self._vacant():
-                self._call()
-            case "there" if self._ahead_stands or waited > self._patience(self._index + 1):
-                self._enter("standing")
-                if self._index:
-                    self._write(AllStanding(self.id))
-                else:
-                    self._behind_settled = True
-            case "standing" if self._behind_settled or waited > self._patience(self._index - 1):
-                self._straighten()
-            case "out" if self._behind_settled or waited > self._patience(self._index - 1):
-                self._correct(self._anchors)
-            case "await" if waited > self._patience(self._index + 1):
-                self._close(PushDone(self.id))
-            case "telling" if self._index and waited > TOLD_TICKS and self._back not in self._host.bearings:
-                self._host.post.drop(self.id)  # out of reach; it finds out by itself that it is over
-                self.over = True
-            case "closing":
-                leads = self._index == len(self._chain) - 1  # others hear of its drive's end first
-                if (self._host.clear and waited > leads) or waited > CLOSE_TICKS:
-                    self._finish()
-            case _:
-                pass
-
-    def next_tick(self) -> int | None:
-        """Return when to be looked after, at the latest."""
-        match self.phase:
-            case "link":
-                return self.since + LINK_TICKS + 1
-            case "holding" | "closing" | "telling":
-                return self._host.tick + 1
-            case "there" | "await":
-                return max(self._host.tick + 1, self.since + self._patience(self._index + 1) + 1)
-            case "standing" | "out":
-                return max(self._host.tick + 1, self.since + self._patience(self._index - 1) + 1)
-            case "armed":
-                waited = self._host.tick - self.since
-                return self.since + max(GONE_TICKS + 1, (waited // 20 + 1) * 20 + 1)
-            case _:
-                return self.since + WAVE_TICKS + 1
-
-    def _leader_epoch(self) -> int:
-        """Return since which drive the leader stands at its place, as far as is known."""
-        place, leader = self._chain[-1]
-        state = self._host.vicinity.states.get(leader)
-        return -1 if state is None or state.moving or state.place != place else state.epoch
-
-    def _patience(self, index: int) -> int:
-        """Return how long to wait for a letter of one of the path: not long for one who is out of sight and so of reach."""
-        there = 0 <= index < len(self._chain) and self._chain[index][1] in self._host.bearings
-        return WAVE_TICKS if there else LOST_TICKS
-
-    def _vacant(self) -> bool:
-        """Tell whether the leader is out of sight, or beside its place: its word that it is gone was lost."""
-        memory, leader = self._memory, self._chain[-1][1]
-        if memory is None or leader not in self._host.bearings:
-            return True
-        me = self._chain[self._index][0]
-        there = next((each.direction_rad + math.pi for each in memory.references if each.place == me), None)
-        seen = self._host.bearings[leader] + self._heading
-        return there is not None and abs(math.remainder(there - seen, math.tau)) > BACK_RAD
+    def _report_standing(self) -> None:
+        self._enter("standing")
+        if self._chain.is_rear:
+            self._behind_settled = True
+        else:
+            self._write(AllStanding(self.id))
 
     def _straighten(self) -> None:
-        """In single file bearings did not tell how far to go, the range of sight does."""
-        rear = self._back if self._index == 0 else self._chain[self._index - 1][1]
-        if self._loose and rear is not None:
+        """Correct the distance in a single file, where bearings did not determine it."""
+        if self._result.used_odometry and self._back is not None:
             self._enter("straightening")
-            self._host.drive(Correct(0, (Sighting(rear, self._behind()),)))
+            self._situation.correct((Sighting(self._back, self._back_bearing_rad()),))
         else:
             self._home()
 
-    def _behind(self) -> float:
-        """Return the bearing at which whoever has taken this robot's former place should about be."""
-        references = self._memory.references if self._memory is not None else ()
-        origin = self._chain[self._index][0]
-        there = next((each.direction_rad for each in references if each.place == origin), self._heading)
-        return math.remainder(there - self._heading, math.tau)
+    def _back_bearing_rad(self) -> float:
+        """Return the approximate bearing of the robot that has taken this robot's former slot."""
+        there_rad = direction_to(self._memory, self._chain.origin)
+        return 0.0 if there_rad is None else wrapped(there_rad - self._heading)
 
     def _home(self) -> None:
-        """Who leaned on moving robots finds its place again, now that they stand."""
-        states = self._host.vicinity.states
-        if not self._leaned or self._memory is None:
+        """Home again on landmarks that were moving and stand still now."""
+        states = self._map.states
+        if not self._result.used_moving_landmarks or self._memory is None:
             self._settled()
             return
         self._enter("homing")
-        moving = {p: n for p, n in self._future().items() if n not in states or states[n].moving}
-        still = {p: n for p, n in self._future().items() if p not in moving}
-        references = [msgspec.structs.replace(r, node=still.get(r.place, r.node)) for r in self._memory.references]
-        self._host.drive(Move(0, 0.0, 0.0, self._landmarks(references, moving, NOWHERE)))
+        future = self._chain.future()
+        moving = {slot: node for slot, node in future.items() if node not in states or states[node].moving}
+        still = {slot: node for slot, node in future.items() if slot not in moving}
+        references = [msgspec.structs.replace(r, node=still.get(r.slot, r.node)) for r in self._memory.references]
+        self._situation.move(0.0, 0.0, self._chain.landmarks(references, moving, self._heading, NOWHERE))
 
-    def _correct(self, anchors: Sequence[Sighting]) -> None:
+    def _correct(self) -> None:
         self._enter("correcting")
-        self._host.drive(Correct(0, tuple(anchors)))
+        self._situation.correct(self._anchors)
 
     def _settled(self) -> None:
-        self._host.rest()
-        if self._index == len(self._chain) - 1:
-            self._close(PushDone(self.id))
+        """Stand at the new slot, and tell the robot ahead; the leader ends the push."""
+        self._situation.stand()
+        ahead = self._chain.ahead
+        if ahead is None:
+            self.close(PushDone(self.id))
             return
-        self._host.post.write(self._chain[self._index + 1][1], AllSettled(self.id))
+        self._situation.mailbox.write(ahead, AllSettled(self.id))
         self._enter("await")
 
-    def _close(self, end: Body) -> None:
-        """Tell who is behind how it ended, once this robot's word of its neighbours is good again."""
-        if self._index == len(self._chain) - 1 and isinstance(end, PushAborted):
-            self._host.vicinity.stay(self._fresh, self._back)
+    # --- the end ------------------------------------------------------------------------------------------------------
+
+    def close(self, end: Body) -> None:
+        """End the push, once this robot's view agrees with its neighbours' states again."""
+        if self._chain.leads and isinstance(end, PushAborted):
+            self._map.abandon_push(self._fresh, self._back)
         self.end = end
         self._enter("closing")
 
     def _finish(self) -> None:
-        """Tell it, and stay out of other pushes until that was heard."""
-        if self._host.vicinity.moving:
-            self._host.rest()
+        """Tell the robot behind how the push ended; join no other push until that is acknowledged."""
+        if self._map.moving:
+            self._situation.stand()
         self.over = self.end is None or self._back is None
         if self.end is not None:
             self._write(self.end)
         self._enter("telling")
 
-    # --- means ------------------------------------------------------------------------------------------------------
+    def _drop(self) -> None:
+        """End without telling: the robot behind is out of range, and finds out by itself."""
+        self._situation.mailbox.drop(self.id)
+        self.over = True
 
-    def _enter(self, phase: str) -> None:
-        self.phase, self.since = phase, self._host.tick
+    # --- conditions ---------------------------------------------------------------------------------------------------
 
-    def _write(self, body: Body) -> None:
-        if self._back is not None:
-            self._host.post.write(self._back, body)
+    @property
+    def _waited(self) -> int:
+        """Ticks since the present phase began."""
+        return self._situation.tick - self._since
 
     @property
     def _heading(self) -> float:
-        return self._host.vicinity.heading or 0.0
+        return self._map.heading or 0.0
+
+    def _wait_ticks(self, node: int | None) -> int:
+        """Return the ticks to wait for a robot of the chain: few if it is not visible and so out of range."""
+        return WAVE_TICKS if node is not None and node in self._situation.bearings else LOST_TICKS
+
+    def _leader_is_back(self) -> bool:
+        """Return whether the leader stands at its slot after a later drive than the one it announced."""
+        slot, leader = self._chain.leader
+        state = self._map.states.get(leader)
+        return state is not None and not state.moving and state.slot == slot and state.epoch > self._leader_epoch
+
+    def _leader_is_gone(self) -> bool:
+        """Return whether the leader is not visible, or visible beside its slot: its announcement was lost."""
+        memory, (_, leader) = self._memory, self._chain.leader
+        if memory is None or leader not in self._situation.bearings:
+            return True
+        back_rad = direction_to(memory, self._chain.origin)
+        seen_rad = self._situation.bearings[leader] + self._heading
+        return back_rad is not None and angle_between(back_rad + math.pi, seen_rad) > BACK_RAD
+
+    def _vacancy_check_due(self) -> bool:
+        return self._waited > VACATED_TICKS and self._waited % VACANCY_PERIOD_TICKS == 1
+
+    # --- helpers ------------------------------------------------------------------------------------------------------
+
+    def _enter(self, phase: str) -> None:
+        self.phase, self._since = phase, self._situation.tick
+
+    def _write(self, body: Body) -> None:
+        """Write to the robot behind, or to the sender of the token."""
+        if self._back is not None:
+            self._situation.mailbox.write(self._back, body)
+
+    def _wake_after(self, ticks: int) -> int:
+        """Return the tick after `ticks` of this phase, or the next tick if that has passed."""
+        return max(self._situation.tick + 1, self._since + ticks + 1)
+
+    def _next_vacancy_check(self) -> int:
+        checks = self._waited // VACANCY_PERIOD_TICKS + 1
+        return self._since + max(VACATED_TICKS + 1, checks * VACANCY_PERIOD_TICKS + 1)
+
+
+class Phase(NamedTuple):
+    """One row of the state machine.
+
+    `transitions` are (condition, action) in order of priority. `arrived` takes the result of a drive that ends in this
+    phase. `wake` returns the latest tick of the next poll.
+    """
+
+    transitions: tuple[tuple[Callable[[TokenPush], bool], Callable[[TokenPush], None]], ...] = ()
+    arrived: Callable[[TokenPush, DriveResult], None] = lambda push, result: push._situation.stand()
+    wake: Callable[[TokenPush], int] = lambda push: push._since + WAVE_TICKS + 1
+
+
+def _next_tick(push: TokenPush) -> int:
+    return push._situation.tick + 1
+
+
+def _wake_for_ahead(push: TokenPush) -> int:
+    return push._wake_after(push._wait_ticks(push._chain.ahead))
+
+
+def _wake_for_behind(push: TokenPush) -> int:
+    return push._wake_after(push._wait_ticks(push._chain.behind))
+
+
+def _waited_for_ahead(push: TokenPush) -> bool:
+    return push._waited > push._wait_ticks(push._chain.ahead)
+
+
+def _settled_behind(push: TokenPush) -> bool:
+    return push._behind_settled or push._waited > push._wait_ticks(push._chain.behind)
+
+
+def _may_offer(push: TokenPush) -> bool:
+    return push._situation.clear or push._waited > HOLD_TICKS
+
+
+def _may_finish(push: TokenPush) -> bool:
+    # Neighbours hear of the end of the leader's drive one tick later.
+    return (push._situation.clear and push._waited > push._chain.leads) or push._waited > CLOSE_TICKS
+
+
+def _out_of_range(push: TokenPush) -> bool:
+    return not push._chain.is_rear and push._waited > TELL_TICKS and push._back not in push._situation.bearings
+
+
+# fmt: off
+PHASES: Final[Mapping[str, Phase]] = {
+    # The token passes on along the path.
+    "link": Phase(((lambda push: push._waited > LINK_TICKS, TokenPush._finish),),
+                  wake=lambda push: push._since + LINK_TICKS + 1),
+    # Leader: wait until the local map is right, offer the slot, drive, and wait for the followers.
+    "holding": Phase(((_may_offer, TokenPush._offer),), wake=_next_tick),
+    "offering": Phase(),
+    "deploying": Phase(arrived=TokenPush._deployed),
+    "out": Phase(((_settled_behind, TokenPush._correct),), wake=_wake_for_behind),
+    "correcting": Phase(arrived=lambda push, _: push._settled()),
+    # Follower of the leader: wait until the leader's slot is vacant.
+    "armed": Phase(((lambda push: push._leader_is_back() or push._waited > ARMED_TICKS,
+                     lambda push: push.close(PushAborted(push.id, True))),
+                    (lambda push: push._vacancy_check_due() and push._leader_is_gone(), TokenPush._call)),
+                   wake=TokenPush._next_vacancy_check),
+    # Followers: let the next one come, drive, and wait until all ahead stand and all behind have settled.
+    "calling": Phase(),
+    "following": Phase(arrived=TokenPush._followed),
+    "there": Phase(((lambda push: push._ahead_stands or _waited_for_ahead(push), TokenPush._report_standing),),
+                   wake=_wake_for_ahead),
+    "standing": Phase(((_settled_behind, TokenPush._straighten),), wake=_wake_for_behind),
+    "straightening": Phase(arrived=lambda push, _: push._home()),
+    "homing": Phase(arrived=lambda push, _: push._settled()),
+    "await": Phase(((_waited_for_ahead, lambda push: push.close(PushDone(push.id))),), wake=_wake_for_ahead),
+    # All: wait until the view agrees with the neighbours, tell the robot behind, and end.
+    "closing": Phase(((_may_finish, TokenPush._finish),), wake=_next_tick),
+    "telling": Phase(((_out_of_range, TokenPush._drop),), wake=_next_tick),
+}
+# fmt: on

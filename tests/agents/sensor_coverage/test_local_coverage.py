@@ -3,29 +3,23 @@
 import pytest
 
 from zwerm.agents.runtime.node import Node
-from zwerm.agents.sensor_coverage.frontier.planner import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
-from zwerm.agents.sensor_coverage.messages.peers import (
-    NOWHERE,
-    UNSAID,
-    PushDone,
-    PushToken,
-    Segment,
-    StateBeacon,
-    read,
-    write,
-)
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, UNSAID, StateBeacon
+from zwerm.agents.sensor_coverage.messages.peers import read, write
+from zwerm.agents.sensor_coverage.messages.pushes import PushDone, PushToken, Segment, SegmentAck
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
-from zwerm.agents.sensor_coverage.protocols.mailbox import TRIES_MAX, ReliableMailbox
+from zwerm.agents.sensor_coverage.protocols.transport.mailbox import TRIES_MAX, ReliableMailbox
 from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
+from zwerm.run.measurement import measure
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.lockstep import LockStep
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 HALL = ("arena.size_m=[2.2,1.7]", "base.pose=[0.2,0.8,0.0]", "robots.count=18")
@@ -50,7 +44,7 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
         robots = out()
         seen.update(dict.fromkeys(each.node for each in robots))
         assert len(seen) == len(robots), "nobody that was let out is lost"
-        held = [each.vicinity.place for each in robots if each.push is None and each.vicinity.place != NOWHERE]
+        held = [each.local_map.slot for each in robots if each.push is None and each.local_map.slot != NOWHERE]
         assert len(held) == len(set(held)), f"tick {world.tick}: each has a place of its own, but {sorted(held)}"
 
     driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), watch)
@@ -60,18 +54,18 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
 # --- words and letters ----------------------------------------------------------------------------------------------
 
 
-def test_a_damaged_word_says_nothing() -> None:
+def test_a_corrupt_message_is_ignored() -> None:
     payload = write(Segment(1, PushDone(7)))
     assert read(payload) == Segment(1, PushDone(7))
-    for place in range(len(payload)):
+    for position in range(len(payload)):
         damaged = bytearray(payload)
-        damaged[place] ^= 4
+        damaged[position] ^= 4
         assert read(bytes(damaged)) is None
     assert read(payload[:-1]) is None
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.5, 0.9])
-def test_letters_arrive_once_and_in_order_whatever_is_lost(lost: float) -> None:
+def test_segments_arrive_once_and_in_order_at_any_loss(lost: float) -> None:
     import random
 
     luck = random.Random(3)
@@ -80,32 +74,36 @@ def test_letters_arrive_once_and_in_order_whatever_is_lost(lost: float) -> None:
         here.write(2, PushToken(number, 0, (), 0))
     told: list[int] = []
     for tick in range(12_000):
-        for _, word in here.due(tick):
-            assert isinstance(word, Segment)
+        here.poll(tick)
+        for _, segment in here.outgoing():
+            assert isinstance(segment, Segment)
             if luck.random() >= lost:
-                receipt, body = there.take(1, word)
+                body = there.accept(1, segment)
                 told += [] if body is None else [body.push]
                 if luck.random() >= lost:
-                    here.acknowledge(2, receipt)
+                    here.receive(2, SegmentAck(segment.number), tick)
     assert told == sorted(set(told))
     assert {body.push for _, body in here.sent} <= set(told)
     assert len(here.sent) + len(here.lost) == 20
     assert lost > 0.5 or told == list(range(20))
 
 
-def test_a_letter_that_nobody_acknowledges_is_given_up() -> None:
-    post = ReliableMailbox()
-    post.write(2, PushDone(1))
-    tries = sum(len(post.due(tick)) for tick in range(10 * TRIES_MAX))
+def test_a_segment_without_acknowledgement_is_given_up() -> None:
+    mailbox = ReliableMailbox()
+    mailbox.write(2, PushDone(1))
+    tries = 0
+    for tick in range(10 * TRIES_MAX):
+        mailbox.poll(tick)
+        tries += len(mailbox.outgoing())
     assert tries == TRIES_MAX
-    assert post.lost == [(2, PushDone(1))]
+    assert mailbox.lost == [(2, PushDone(1))]
 
 
 # --- the whole swarm ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("noise", "seeds"), [((), (1,)), ((NOISE,), (1, 2, 3))])
-def test_robots_alone_cover_a_small_hall_about_as_well_as_with_a_coordinator(
+def test_decentralised_robots_cover_a_small_hall_about_as_well_as_under_a_coordinator(
     noise: tuple[str, ...], seeds: tuple[int, ...]
 ) -> None:
     cycles = 0.0
@@ -125,23 +123,23 @@ def test_robots_alone_cover_a_small_hall_about_as_well_as_with_a_coordinator(
     [
         (),
         ("radio.loss=0.5",),
-        ('radio.models=[{kind="bursts", loss_fraction=0.3, burst_packets=16.0}]',),
+        ('radio.models=[{kind="gilbert_elliott", loss_fraction=0.3, burst_packets=16.0}]',),
         ('radio.models=[{kind="delay", delay_s=0.3, jitter_s=0.3}, {kind="duplication", fraction=0.3}]',),
     ],
 )
-def test_nobody_is_lost_or_counted_twice_whatever_the_radio_does(air: tuple[str, ...]) -> None:
+def test_no_robot_is_lost_or_counted_twice_on_a_lossy_radio(air: tuple[str, ...]) -> None:
     scenario = load("sensor-coverage", (*ALONE, *air))
     outcome, world, robots = drive(scenario)
-    found = measure(world, scenario.metrics)
-    places = [robot.vicinity.place for robot in robots if not robot._waiting]
+    found = measure(world)
+    slots = [robot.local_map.slot for robot in robots if not robot.situation.waiting]
     assert outcome == "completed"
     assert found["coverage_fraction"] >= 0.98
     assert found["concluded_early"] == 0.0
-    assert len(places) == len(set(places)) >= len(robots) - 1, "each holds a place of its own, but for one at the base"
-    assert found["robots_released"] == len(robots) == found["pushes"] + len(robots) - len(places)
+    assert len(slots) == len(set(slots)) >= len(robots) - 1, "each holds a place of its own, but for one at the base"
+    assert found["robots_released"] == len(robots) == found["pushes"] + len(robots) - len(slots)
 
 
-def test_a_coordinator_that_is_killed_changes_nothing_where_there_is_none() -> None:
+def test_a_crash_of_the_coordinator_changes_nothing_in_a_run_without_one() -> None:
     kill = 'faults=[{kind="crash", at_s=10.0, nodes=["coordinator"]}]'
     settings = [*ALONE, "time.duration_s=30.0"]
     alone, killed = (run("sensor-coverage", runner="inline", overrides=[*settings, *each]) for each in ((), (kill,)))
@@ -150,14 +148,14 @@ def test_a_coordinator_that_is_killed_changes_nothing_where_there_is_none() -> N
     assert alone.metrics["robots_deployed"] > 2
 
 
-def test_robots_alone_leave_the_same_trace_in_processes() -> None:
+def test_decentralised_robots_leave_the_same_trace_inline_and_in_processes() -> None:
     settings = ["arena.size_m=[2.0,1.4]", "base.pose=[0.2,0.7,0.0]", "robots.count=10", "services.path=gradient"]
     inline, processes = (run("sensor-coverage", runner=each, overrides=settings) for each in ("inline", "processes"))
     assert inline.outcome == processes.outcome == "completed"
     assert inline.trace == processes.trace
 
 
-def test_an_empty_depot_is_noticed_by_the_base() -> None:
+def test_the_decentralised_base_reports_an_empty_depot() -> None:
     result = run("sensor-coverage", runner="inline", overrides=[*ALONE, "robots.count=4"])
     assert result.outcome == "failed"
     assert "depot-dry: the depot is empty" in result.reason
@@ -166,26 +164,26 @@ def test_an_empty_depot_is_noticed_by_the_base() -> None:
 # --- places ---------------------------------------------------------------------------------------------------------
 
 
-def at(place: int) -> StateBeacon:
-    return StateBeacon(1, place, 3, False, False, 1, (), (), (), UNSAID)
+def at(slot: int) -> StateBeacon:
+    return StateBeacon(1, slot, 3, False, False, 1, (), (), (), UNSAID)
 
 
 @pytest.mark.parametrize(
-    ("sender", "place", "name"),
+    ("sender", "slot", "name"),
     [(8, 4, 17), (8, 3, 4), (9, 4, 4)],
     ids=["the follower took its place", "the follower stayed", "somebody else was there before"],
 )
-def test_a_leader_that_stays_takes_the_new_name_if_its_follower_came_after_all(
-    sender: int, place: int, name: int
+def test_a_leader_that_stays_occupies_the_new_slot_if_its_follower_came_after_all(
+    sender: int, slot: int, name: int
 ) -> None:
-    leader = LocalMap(7, PlannerParameters())
-    leader.found(4)
-    leader.stay(17, 8)
-    leader.part()
-    assert leader.place == 4
-    leader.hear(sender, at(place), 10)
-    leader.part()
-    assert leader.place == name
+    leader = LocalMap(7, PlannerParameters(), Planner)
+    leader.occupy(4)
+    leader.abandon_push(17, 8)
+    leader.resolve_duplicate()
+    assert leader.slot == 4
+    leader.receive(sender, at(slot), 10)
+    leader.resolve_duplicate()
+    assert leader.slot == name
 
 
 # --- who provides what ----------------------------------------------------------------------------------------------
@@ -199,7 +197,7 @@ def test_a_leader_that_stays_takes_the_new_name_if_its_follower_came_after_all(
         (("services.path=gradient",), "services.path: robots find the path from one base station"),
     ],
 )
-def test_a_mistake_in_the_services_is_one_clear_line(settings: tuple[str, ...], line: str) -> None:
+def test_an_invalid_choice_of_services_is_one_line(settings: tuple[str, ...], line: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         load("sensor-coverage-multi-source" if settings == ("services.path=gradient",) else "sensor-coverage", settings)
     assert len(caught.value.mistakes) == 1
@@ -216,5 +214,5 @@ def test_every_combination_of_services_covers_a_small_hall(path: str, redundancy
     assert result.metrics["coverage_fraction"] >= 0.99
 
 
-def test_a_state_tells_no_position() -> None:
+def test_a_state_beacon_has_no_field_in_metres() -> None:
     assert not any(name.endswith("_m") for name in StateBeacon.__struct_fields__)

@@ -8,21 +8,22 @@ import pytest
 from halls import HALL, NOISE, OBSTACLE, Link, drive
 
 from zwerm.agents.runtime.contract import Body, Setup
-from zwerm.agents.sensor_coverage import CentralRobot
+from zwerm.agents.sensor_coverage.central_robot import CentralRobot
 from zwerm.agents.sensor_coverage.messages.commands import (
     Answer,
     Arrived,
     Correct,
     Deploy,
-    Order,
     Report,
     Request,
+    RobotCommand,
     ScanRequest,
     Sighting,
-    read_reply,
+    read_response,
     write,
 )
-from zwerm.agents.sensor_coverage.motion.homing import offset, slid, unit
+from zwerm.agents.sensor_coverage.motion.homing import offset, slide, unit
+from zwerm.run.measurement import measure
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.wire.messages import (
@@ -37,14 +38,13 @@ from zwerm.wire.messages import (
     open_answer,
 )
 from zwerm.wire.messages import encode as to_wire
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 # --- the mathematics of one robot -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("aside", [(0.05, 0.0), (-0.03, 0.04), (0.0, -0.06)])
-def test_homing_tells_how_far_the_place_is(aside: tuple[float, float]) -> None:
+def test_homing_returns_the_offset_to_the_goal(aside: tuple[float, float]) -> None:
     landmarks = [unit(math.radians(each)) for each in (10, 130, 200, 290)]
     pairs = []
     for x, y in landmarks:
@@ -55,15 +55,15 @@ def test_homing_tells_how_far_the_place_is(aside: tuple[float, float]) -> None:
     assert (found.x, found.y) == pytest.approx((-aside[0], -aside[1]), abs=0.01)
 
 
-def test_landmarks_in_one_line_leave_the_way_along_it_unknown() -> None:
+def test_landmarks_in_one_line_leave_the_offset_along_it_unknown() -> None:
     found = offset([((1.0, 0.0), (1.0, 0.0)), ((-1.0, 0.0), (-1.0, 0.0))])
     assert found.blind is not None
     assert abs(found.blind[0]) == pytest.approx(1.0)
 
 
 def test_a_robot_slides_along_a_wall_and_away_from_it() -> None:
-    assert slid(1.0, 1.0, (0.0,)) == pytest.approx((0.0, 1.0))
-    assert slid(-1.0, 1.0, (0.0,)) == pytest.approx((-1.0, 1.0))
+    assert slide(1.0, 1.0, (0.0,)) == pytest.approx((0.0, 1.0))
+    assert slide(-1.0, 1.0, (0.0,)) == pytest.approx((-1.0, 1.0))
 
 
 class OneRobot:
@@ -78,7 +78,7 @@ class OneRobot:
         self.said: list[Answer] = []
         self.number = 0
 
-    def tick(self, *orders: Order) -> Command:
+    def tick(self, *orders: RobotCommand) -> Command:
         dx, dy = self.neighbour[0] - self.x, self.neighbour[1] - self.y
         seen = (Bearing(7, math.atan2(dy, dx)),) if math.hypot(dx, dy) <= 1.0 else ()
         touch = (Contact(0.0, math.pi / 12.0),) if self.x >= self.wall_x_m - 0.075 else ()
@@ -97,15 +97,15 @@ class OneRobot:
         x = min(self.x + 0.1 * drive.forward_m_s, self.wall_x_m - 0.07)
         self.moved = (x - self.x, 0.1 * drive.left_m_s)
         self.x, self.y = x, self.y + self.moved[1]
-        replies = [read_reply(each.payload) for each in command.outbox]
+        replies = [read_response(each.payload) for each in command.outbox]
         self.said += [each.answer for each in replies if each is not None]
         return command
 
-    def packet(self, order: Order) -> Packet:
+    def packet(self, order: RobotCommand) -> Packet:
         self.number += 1
         return Packet("uplink", write(Request(1, self.number, 1, 0, order)), 9)
 
-    def until_arrived(self, order: Order) -> Arrived:
+    def until_arrived(self, order: RobotCommand) -> Arrived:
         for _ in range(30):
             self.tick()
         self.tick(order)
@@ -126,7 +126,7 @@ def test_a_test_drive_that_meets_a_wall_leads_back() -> None:
     assert (alone.x, alone.y) == pytest.approx((0.0, 0.0), abs=0.01)
 
 
-def test_a_wall_behind_the_clear_distance_is_where_the_new_place_is() -> None:
+def test_a_deployment_that_meets_a_wall_beyond_the_clear_distance_stays_there() -> None:
     alone = OneRobot((-0.9, 0.0), 0.93)
     arrived = alone.until_arrived(Deploy(1, 0.0, 0.95, 0.8))
     assert arrived.ok
@@ -134,14 +134,14 @@ def test_a_wall_behind_the_clear_distance_is_where_the_new_place_is() -> None:
 
 
 @pytest.mark.parametrize("start", [-0.7, -0.9, -1.1])
-def test_the_ruler_sets_the_distance_whatever_it_was(start: float) -> None:
+def test_scale_correction_sets_the_distance_from_any_start(start: float) -> None:
     """Scale correction: break the link, re-establish it, and a margin."""
     alone = OneRobot((start, 0.0), 9.0)
     assert alone.until_arrived(Correct(1, (Sighting(7, math.pi),))).ok
     assert math.dist((alone.x, alone.y), alone.neighbour) == pytest.approx(0.95, abs=0.011)
 
 
-def test_a_robot_that_a_wall_keeps_off_its_place_answers_a_survey_at_once_and_rests_where_it_is() -> None:
+def test_a_robot_that_a_wall_keeps_off_its_point_of_rest_reports_at_once_and_rests_where_it_is() -> None:
     """It arrived pressed against the wall, which then pushed it out by more than it tolerates."""
     alone = OneRobot((-0.9, 0.0), 0.86)
     assert alone.until_arrived(Deploy(1, 0.0, 0.95, 0.7)).ok
@@ -238,7 +238,7 @@ def scrambled(multiple: int, straight: tuple[int, ...]) -> Callable[[int, Link],
         ),
     ],
 )
-def test_scrambling_the_frames_of_robots_and_stations_gives_the_same_places(
+def test_turning_the_frames_of_robots_and_stations_gives_the_same_positions(
     scenario: str, settings: tuple[str, ...], straight: tuple[int, ...]
 ) -> None:
     loaded = load(scenario, (*settings, "robots.sensors.2.distance_sd_fraction=0.0"))
@@ -246,8 +246,8 @@ def test_scrambling_the_frames_of_robots_and_stations_gives_the_same_places(
     unturned, *turned = [world.scene.position[world.scene.present] for world in worlds]
     for there in turned:
         assert len(there) == len(unturned) > 8
-        for place in unturned:
-            assert np.hypot(*(there - place).T).min() < 0.01
+        for slot in unturned:
+            assert np.hypot(*(there - slot).T).min() < 0.01
 
 
 def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
@@ -261,7 +261,7 @@ def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
             world.crash(killed[-1], "struck by lightning")
 
     outcome, world = drive(scenario, kill)
-    found = measure(world, scenario.metrics)
+    found = measure(world)
     assert outcome == "completed"
     assert len(killed) == 2
     assert found["coverage_fraction"] >= 0.99
@@ -269,7 +269,7 @@ def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
 
 
 @pytest.mark.parametrize("unlucky", [1, 2, 9])
-def test_a_robot_that_dies_at_the_door_is_followed_by_another(unlucky: int) -> None:
+def test_a_robot_that_dies_at_the_depots_door_is_followed_by_another(unlucky: int) -> None:
     scenario = load("sensor-coverage", (*HALL, "robots.on_crash=continue"))
 
     def kill(world: World) -> None:
@@ -279,7 +279,7 @@ def test_a_robot_that_dies_at_the_door_is_followed_by_another(unlucky: int) -> N
     outcome, world = drive(scenario, kill)
     assert outcome == "completed"
     assert unlucky in world.crashed
-    assert measure(world, scenario.metrics)["coverage_fraction"] >= 0.99
+    assert measure(world)["coverage_fraction"] >= 0.99
 
 
 def test_robots_in_processes_leave_the_same_trace() -> None:

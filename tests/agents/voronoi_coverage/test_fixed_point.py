@@ -54,7 +54,7 @@ for _name, _kind in {
     setattr(Tally, f"__{_name}__", _operate)
     if _kind != "compare":
         setattr(Tally, f"__r{_name}__", _reflected(_operate))
-Tally.__neg__ = lambda self: Tally(-int(self))
+Tally.__neg__ = lambda self: Tally(-int(self))  # type: ignore[method-assign]
 
 
 def cases(count, robots, size_m=1.0):
@@ -98,7 +98,7 @@ def test_everything_fits_into_64_bits_in_a_room_of_four_metres():
     Tally.reset()
     for robots in (2, 10, 100):
         for case in cases(200, robots, size_m=4.0):
-            target(*in_units(*case, kind=Tally))
+            target(*in_units(*case, kind=Tally))  # type: ignore[misc]
     assert 40 < Tally.widest_bits <= 64
 
 

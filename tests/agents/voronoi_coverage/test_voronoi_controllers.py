@@ -1,6 +1,7 @@
 """The controllers of Voronoi coverage: one observation in, one command out, whatever is observed."""
 
 import math
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -45,7 +46,7 @@ def observe(here, others, value=1.0, gradient=(0.0, 0.0), heading=0.0, region=SQ
         neighbours=tuple(Neighbour(node, *seen(other)) for node, other in enumerate(others, 1)),
         boundary=tuple(seen(corner) for corner in region),
         field=FieldSample(value, *into_body(*gradient)),
-        pose=Pose(*here, heading),
+        pose=Pose(here[0], here[1], heading),
     )
 
 
@@ -170,7 +171,7 @@ def test_within_the_threshold_and_as_a_beacon_a_robot_stays():
 
 
 def heard(node, time_s, place, value=1.0):
-    return Packet(CHANNEL, pack(node, NeighbourReport(time_s, *place, value)))
+    return Packet(CHANNEL, pack(node, NeighbourReport(time_s, place[0], place[1], value)))
 
 
 def test_what_is_heard_counts_as_what_is_sensed():
@@ -238,7 +239,8 @@ def test_a_quadratic_field_is_fitted_exactly_and_its_centroid_is_exact(seed):
     random = np.random.default_rng(seed)
     others = random.uniform(-0.5, 0.5, (9, 2))
     bend = Curvature(*random.uniform(-2.0, 2.0, 3))
-    field = Paraboloid(4.0, *random.uniform(-1.0, 1.0, 2), bend)
+    gx, gy = random.uniform(-1.0, 1.0, 2)
+    field: Any = Paraboloid(4.0, gx, gy, bend)
     samples = [
         NeighbourSample(x, y, z) for (x, y), z in zip(others.tolist(), field.value(others).tolist(), strict=True)
     ]

@@ -10,8 +10,8 @@ from zwerm.errors import ScenarioError
 from zwerm.run.runner import run
 from zwerm.scenario.load import built_in
 from zwerm.study.plan import make_points, make_trials
-from zwerm.study.tables import built_in as built_in_studies
-from zwerm.study.tables import load_study
+from zwerm.study.study_tables import built_in as built_in_studies
+from zwerm.study.study_tables import load_study
 from zwerm.study.trial import run_trial
 from zwerm.world.arena.arena import Arena
 from zwerm.world.fields.lamp import Lamp

@@ -1,4 +1,4 @@
-"""A coordinator of sensor coverage whose uplink loses, repeats and delays: nothing is done twice, and nobody counted twice."""
+"""A coordinator whose uplink loses, repeats and delays: no command is carried out twice, and no robot is counted twice."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,39 +12,39 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Arrived,
     Deploy,
     Emerged,
-    Order,
     Release,
     Released,
     Report,
     Request,
     Response,
+    RobotCommand,
     RollCall,
     ScanRequest,
     Sighting,
-    read_dispatch,
-    read_reply,
+    read_request,
     write,
 )
-from zwerm.agents.sensor_coverage.protocols.deduplication import COPIES_MAX, RequestDeduplicator
-from zwerm.coordinator.sensor_coverage.command_mailbox import HASTE_COPIES, MUSTER_COPIES, CommandMailbox
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, decode_snapshot
+from zwerm.agents.sensor_coverage.protocols.transport.deduplication import COPIES_MAX, RequestDeduplicator
+from zwerm.coordinator.sensor_coverage.command_mailbox import RECOVERY_COPIES, ROLL_CALL_COPIES, CommandMailbox
 from zwerm.coordinator.sensor_coverage.coordinator import SensorCoverageCoordinator
 from zwerm.coordinator.sensor_coverage.retry_policy import BURST_TRIES, RetryPolicy
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
+from zwerm.run.measurement import measure
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Packet
 from zwerm.world.drivers.lockstep import LockStep
-from zwerm.world.metrics.measures import measure
 from zwerm.world.world import World
 
 HALL = ("arena.size_m=[2.2,1.7]", "base.pose=[0.2,0.8,0.0]", "robots.count=18")
 AHEAD = Deploy(1, 0.0, 0.95, 0.8)
 DONE = Arrived(1, True, False, False, 0.95, ())
-BURSTS = 'uplink.models=[{kind="bursts", loss_fraction=0.3, burst_packets=16.0}]'
+BURSTS = 'uplink.models=[{kind="gilbert_elliott", loss_fraction=0.3, burst_packets=16.0}]'
 MANGLED = (
     'uplink.models=[{kind="delay", delay_s=0.2, jitter_s=0.3}, {kind="duplication", fraction=0.3}, '
     '{kind="corruption", bit_error_rate=0.002}]'
@@ -54,108 +54,123 @@ MANGLED = (
 # --- a robot ----------------------------------------------------------------------------------------------------------
 
 
-def said(payloads: list[bytes]) -> list[Answer]:
-    replies = [read_reply(each) for each in payloads]
-    return [each.answer for each in replies if each is not None]
+class OneRobot:
+    """A robot's end of the command protocol."""
+
+    def __init__(self, incarnation: int) -> None:
+        self.began: list[RobotCommand] = []
+        self.commands = RequestDeduplicator(incarnation, self.began.append)
+
+    def takes(self, request: Request) -> RobotCommand | None:
+        """Give the robot a request; return the command that it begins."""
+        self.began.clear()
+        self.commands.receive(9, request, 0)
+        return self.began[0] if self.began else None
+
+    def says(self, *new: Answer) -> list[Answer]:
+        """Return the answers that the robot sends in a tick in which it has these new ones."""
+        for each in new:
+            self.commands.answer(each)
+        return [each.message.answer for each in self.commands.outgoing()]
 
 
-def test_an_order_that_comes_again_is_not_carried_out_again_but_answered_again() -> None:
-    duty = RequestDeduplicator(7)
-    assert duty.take(write(Request(1, 4, 1, 0, AHEAD))) == AHEAD
-    assert said(duty.say([])) == []
-    assert duty.take(write(Request(1, 4, 2, 0, AHEAD))) is None
-    assert said(duty.say([])) == [Ack()], "it is on its way"
-    assert said(duty.say([DONE])) == [DONE]
+def test_a_repeated_command_is_not_carried_out_again_but_answered_again() -> None:
+    robot = OneRobot(7)
+    assert robot.takes(Request(1, 4, 1, 0, AHEAD)) == AHEAD
+    assert robot.says() == []
+    assert robot.takes(Request(1, 4, 2, 0, AHEAD)) is None
+    assert robot.says() == [Ack()], "it is being carried out"
+    assert robot.says(DONE) == [DONE]
     for attempt in (3, 4):
-        assert duty.take(write(Request(1, 4, attempt, 0, AHEAD))) is None
-        assert said(duty.say([])) == [DONE]
-    assert said(duty.say([])) == []
+        assert robot.takes(Request(1, 4, attempt, 0, AHEAD)) is None
+        assert robot.says() == [DONE]
+    assert robot.says() == []
 
 
-def test_an_order_is_known_by_its_number_and_not_by_what_it_says() -> None:
-    duty = RequestDeduplicator(7)
-    assert duty.take(write(Request(1, 4, 1, 0, AHEAD))) == AHEAD
-    assert duty.take(write(Request(1, 5, 1, 0, AHEAD))) == AHEAD
-    assert duty.take(write(Request(1, 4, 2, 0, AHEAD))) is None, "it was late"
-    assert said(duty.say([])) == [], "and wants no answer any more"
-    assert duty.take(write(Request(2, 1, 1, 0, AHEAD))) == AHEAD, "another coordinator counts anew"
+def test_a_command_is_identified_by_its_number_and_not_by_its_content() -> None:
+    robot = OneRobot(7)
+    assert robot.takes(Request(1, 4, 1, 0, AHEAD)) == AHEAD
+    assert robot.takes(Request(1, 5, 1, 0, AHEAD)) == AHEAD
+    assert robot.takes(Request(1, 4, 2, 0, AHEAD)) is None, "it is late"
+    assert robot.says() == [], "a late command needs no answer"
+    assert robot.takes(Request(2, 1, 1, 0, AHEAD)) == AHEAD, "another coordinator counts anew"
 
 
-def test_who_begins_anew_does_not_do_what_its_former_life_was_told_but_says_that_it_is_new() -> None:
-    duty = RequestDeduplicator(8)
-    assert said(duty.say([Emerged(())])) == [Emerged(())]
-    assert duty.take(write(Request(1, 4, 9, 7, AHEAD))) is None
-    assert said(duty.say([])) == [Emerged(())]
+def test_a_restarted_robot_ignores_commands_to_its_earlier_incarnation_and_reports_that_it_is_new() -> None:
+    robot = OneRobot(8)
+    assert robot.says(Emerged(())) == [Emerged(())]
+    assert robot.takes(Request(1, 4, 9, 7, AHEAD)) is None
+    assert robot.says() == [Emerged(())]
 
 
 @pytest.mark.parametrize(("attempt", "copies"), [(1, 1), (2, 2), (50, COPIES_MAX)])
-def test_the_more_often_an_order_was_missed_the_more_copies_its_answer_has(attempt: int, copies: int) -> None:
-    duty = RequestDeduplicator(7)
-    duty.take(write(Request(1, 4, attempt, 0, AHEAD)))
-    assert said(duty.say([DONE])) == [DONE] * copies
+def test_an_answer_has_more_copies_the_more_copies_of_its_command_were_lost(attempt: int, copies: int) -> None:
+    robot = OneRobot(7)
+    robot.takes(Request(1, 4, attempt, 0, AHEAD))
+    assert robot.says(DONE) == [DONE] * copies
 
 
 # --- the coordinator --------------------------------------------------------------------------------------------------
 
 
 class Desk:
-    """A post, and what comes and goes."""
+    """A command mailbox, and the packets that it receives and sends."""
 
     def __init__(self) -> None:
-        self.post = CommandMailbox(0.1, life=3)
+        self.mailbox = CommandMailbox(0.1, incarnation=3)
         self.tick = 0
 
     def turn(self, *replies: tuple[int, Response]) -> list[tuple[int | None, int, int]]:
         """Let a tick pass; return (receiver, number, attempt) of what is sent."""
         self.tick += 1
-        self.post.take(0.1 * self.tick, [Packet("uplink", write(each), sender) for sender, each in replies])
+        self.mailbox.receive(0.1 * self.tick, [Packet("uplink", write(each), sender) for sender, each in replies])
         found = []
-        for each in self.post.sent():
-            dispatch = read_dispatch(each.payload)
+        for each in self.mailbox.outgoing():
+            dispatch = read_request(each.payload)
             assert dispatch is not None
             found.append((each.to, dispatch.number, dispatch.attempt))
         return found
 
-    def say(self, node: int, order: Order) -> None:
-        self.post.say(node, order)
-        assert self.turn() == [(node, self.post._number[node], 1)]
+    def say(self, node: int, order: RobotCommand) -> None:
+        self.mailbox.send(node, order)
+        assert self.turn() == [(node, self.mailbox._number[node], 1)]
 
 
-def answered(number: int, answer: Answer, attempt: int = 1, heard: int = 1, life: int = 5) -> Response:
-    return Response(life, 3, number, attempt, heard, answer)
+def answered(number: int, answer: Answer, attempt: int = 1, heard: int = 1, incarnation: int = 5) -> Response:
+    return Response(incarnation, 3, number, attempt, heard, answer)
 
 
 REPORT = Report(1, (), ())
 
 
-def test_an_answer_is_read_once_and_an_old_one_never() -> None:
+def test_the_coordinator_reads_an_answer_once_and_an_old_answer_never() -> None:
     desk = Desk()
     desk.say(9, ScanRequest(1, ()))
     old = answered(1, REPORT)
     desk.turn((9, old), (9, old))
-    assert desk.post.rest() == [(9, REPORT)]
+    assert desk.mailbox.take_unread() == [(9, REPORT)]
     desk.say(9, ScanRequest(2, ()))
     desk.turn((9, old))
-    assert desk.post.rest() == []
-    assert desk.post.waits_for(9)
+    assert desk.mailbox.take_unread() == []
+    assert desk.mailbox.waits_for(9)
 
 
-def test_an_answer_to_a_coordinator_that_is_no_more_is_not_read() -> None:
+def test_the_coordinator_ignores_answers_to_its_earlier_incarnation() -> None:
     desk = Desk()
     desk.say(9, ScanRequest(1, ()))
     desk.turn((9, Response(5, 2, 1, 1, 1, REPORT)))
-    assert desk.post.rest() == []
+    assert desk.mailbox.take_unread() == []
 
 
-def test_a_robot_comes_out_once_in_each_life() -> None:
+def test_the_coordinator_reads_one_first_report_of_each_incarnation_of_a_robot() -> None:
     desk = Desk()
-    came = [Response(life, 0, 0, 0, 0, Emerged(())) for life in (5, 5, 6, 6)]
+    came = [Response(incarnation, 0, 0, 0, 0, Emerged(())) for incarnation in (5, 5, 6, 6)]
     for each in came:
         desk.turn((9, each))
-    assert desk.post.rest() == [(9, Emerged(()))] * 2
+    assert desk.mailbox.take_unread() == [(9, Emerged(()))] * 2
 
 
-def test_without_a_loss_an_order_is_said_once_until_it_is_overdue_and_after_the_first_loss_again_and_again() -> None:
+def test_without_losses_a_command_is_repeated_only_when_overdue_and_after_the_first_loss_every_round_trip() -> None:
     desk = Desk()
     desk.say(9, ScanRequest(1, ()))
     assert [desk.turn() for _ in range(18)] == [[]] * 18
@@ -165,82 +180,84 @@ def test_without_a_loss_an_order_is_said_once_until_it_is_overdue_and_after_the_
     assert [desk.turn() for _ in range(4)] == [[(9, 2, 2)], [], [(9, 2, 3)], []]
 
 
-def mustered() -> Desk:
-    """Return the desk of a coordinator that has begun anew, a tick after its muster, with one station."""
+def after_roll_call() -> Desk:
+    """Return the desk of a restarted coordinator, one tick after its roll call, with one station."""
     desk = Desk()
-    desk.post.muster(RollCall(1), MUSTER_COPIES)
-    desk.post.expect(0)
-    assert desk.turn() == [(None, 0, attempt) for attempt in range(1, MUSTER_COPIES + 1)]
+    desk.mailbox.roll_call(RollCall(1), ROLL_CALL_COPIES)
+    desk.mailbox.expect(0)
+    assert desk.turn() == [(None, 0, attempt) for attempt in range(1, ROLL_CALL_COPIES + 1)]
     return desk
 
 
 SEES_4 = Report(1, (Sighting(4, 0.0),), ())
 
 
-def test_after_a_muster_whoever_is_seen_is_asked_at_once_and_in_copies_where_something_was_lost() -> None:
-    desk = mustered()
-    asked = desk.turn((9, answered(0, SEES_4, attempt=MUSTER_COPIES, heard=5)))
-    assert asked == [(node, 0, MUSTER_COPIES + copy) for node in (0, 4) for copy in (1, 2, 3)]
+def test_after_a_roll_call_visible_robots_are_asked_at_once_and_in_copies_if_messages_were_lost() -> None:
+    desk = after_roll_call()
+    asked = desk.turn((9, answered(0, SEES_4, attempt=ROLL_CALL_COPIES, heard=5)))
+    assert asked == [(node, 0, ROLL_CALL_COPIES + copy) for node in (0, 4) for copy in (1, 2, 3)]
     assert desk.turn((0, answered(0, REPORT, heard=1)), (4, answered(0, REPORT, heard=1))) == []
-    desk.post.say(9, AHEAD, drive=True)
-    assert desk.turn() == [(9, 1, attempt) for attempt in range(1, 2 * HASTE_COPIES + 1)]
+    desk.mailbox.send(9, AHEAD, drive=True)
+    assert desk.turn() == [(9, 1, attempt) for attempt in range(1, 2 * RECOVERY_COPIES + 1)]
     assert desk.turn((9, answered(1, Ack(), attempt=6, heard=2))) == []
-    desk.say(4, AHEAD)  # once: there is no haste any more
+    desk.say(4, AHEAD)  # once: the recovery burst has ended
 
 
-def test_where_nothing_is_lost_no_order_after_a_muster_has_copies() -> None:
-    desk = mustered()
-    every = answered(0, SEES_4, attempt=MUSTER_COPIES, heard=MUSTER_COPIES)
+def test_without_losses_commands_after_a_roll_call_have_no_copies() -> None:
+    desk = after_roll_call()
+    every = answered(0, SEES_4, attempt=ROLL_CALL_COPIES, heard=ROLL_CALL_COPIES)
     assert desk.turn(*((node, every) for node in (9, 0, 4))) == []
     desk.say(9, AHEAD)
     assert [desk.turn() for _ in range(18)] == [[]] * 18
 
 
-def test_a_muster_is_called_again_where_somebody_missed_it_and_nobody_had_time_to_look() -> None:
-    again = [(None, 0, MUSTER_COPIES + copy) for copy in range(1, MUSTER_COPIES + 1)]
-    some = answered(0, Ack(), attempt=MUSTER_COPIES, heard=5)
+def test_a_roll_call_is_repeated_if_a_robot_missed_it_before_any_robot_could_report() -> None:
+    again = [(None, 0, ROLL_CALL_COPIES + copy) for copy in range(1, ROLL_CALL_COPIES + 1)]
+    some = answered(0, Ack(), attempt=ROLL_CALL_COPIES, heard=5)
     for heard in ([], [(9, some)], [(0, some)]):
-        desk = mustered()
+        desk = after_roll_call()
         assert desk.turn(*heard) == again
         assert desk.turn() == [], "once"
-    later = desk.turn((0, answered(0, SEES_4, attempt=2 * MUSTER_COPIES, heard=9)))
-    assert later == [(4, 0, 2 * MUSTER_COPIES + copy) for copy in (1, 2, 3)]
+    later = desk.turn((0, answered(0, SEES_4, attempt=2 * ROLL_CALL_COPIES, heard=9)))
+    assert later == [(4, 0, 2 * ROLL_CALL_COPIES + copy) for copy in (1, 2, 3)]
 
 
-def test_to_have_heard_a_muster_is_no_answer_to_it() -> None:
-    desk = mustered()
-    heard = [(node, answered(0, Ack(), attempt=MUSTER_COPIES, heard=MUSTER_COPIES)) for node in (0, 9)]
+def test_an_acknowledged_roll_call_is_not_answered_yet() -> None:
+    desk = after_roll_call()
+    heard = [(node, answered(0, Ack(), attempt=ROLL_CALL_COPIES, heard=ROLL_CALL_COPIES)) for node in (0, 9)]
     assert desk.turn(*heard) == []
-    assert desk.post.rest() == []
-    assert desk.post.waits_for(9)
-    desk.turn((9, answered(0, REPORT, attempt=MUSTER_COPIES, heard=MUSTER_COPIES)))
-    assert desk.post.rest() == [(9, REPORT)]
+    assert desk.mailbox.take_unread() == []
+    assert desk.mailbox.waits_for(9)
+    desk.turn((9, answered(0, REPORT, attempt=ROLL_CALL_COPIES, heard=ROLL_CALL_COPIES)))
+    assert desk.mailbox.take_unread() == [(9, REPORT)]
 
 
-def test_who_is_on_the_way_is_asked_less_often() -> None:
+def test_a_robot_that_acknowledges_a_drive_is_asked_less_often() -> None:
     desk = Desk()
-    desk.post.patience.note(2, 1)
-    desk.post.say(9, AHEAD, drive=True)
+    desk.mailbox.retry_policy.update(2, 1)
+    desk.mailbox.send(9, AHEAD, drive=True)
     sent = [len(desk.turn(*([(9, answered(1, Ack()))] if tick % 4 == 0 else []))) for tick in range(40)]
     assert sum(sent) == 1, "as long as it says so"
 
 
-def test_a_release_is_one_order_however_often_it_is_said() -> None:
+def test_all_copies_of_a_release_have_one_number_and_its_answer_is_read_once() -> None:
     desk = Desk()
-    desk.post.patience.note(2, 1)
+    desk.mailbox.retry_policy.update(2, 1)
     desk.say(0, Release(1))
     numbers = {number for _ in range(100) for _, number, _ in desk.turn()}
     assert numbers == {1}
     desk.turn((0, answered(1, Released(4))), (0, answered(1, Released(4))))
-    assert desk.post.rest() == [(0, Released(4))]
+    assert desk.mailbox.take_unread() == [(0, Released(4))]
 
 
 @pytest.mark.parametrize(("lost", "least", "most"), [(0, 0, 0), (50, BURST_TRIES, 260), (90, 1200, 1600)])
-def test_the_dead_are_waited_for_as_long_as_losses_may_explain_their_silence(lost: int, least: int, most: int) -> None:
-    patience = RetryPolicy()
+def test_a_silent_robot_counts_as_dead_only_when_losses_cannot_explain_its_silence(
+    lost: int, least: int, most: int
+) -> None:
+    retry_policy = RetryPolicy()
     for _ in range(2000):
-        patience.note(100, 100 - lost)
-    assert least <= patience.tries_max <= most
+        retry_policy.update(100, 100 - lost)
+    assert least <= retry_policy.tries_max <= most
 
 
 # --- the whole swarm --------------------------------------------------------------------------------------------------
@@ -263,11 +280,11 @@ def drive(scenario: Scenario) -> tuple[str, World, SensorCoverageCoordinator]:
 
 
 @pytest.mark.parametrize("air", ["uplink.loss=0.1", "uplink.loss=0.5", "uplink.loss=0.8", BURSTS, MANGLED])
-def test_nobody_is_lost_or_counted_twice_whatever_the_uplink_does(air: str) -> None:
+def test_no_robot_is_lost_or_counted_twice_on_a_lossy_uplink(air: str) -> None:
     scenario = load("sensor-coverage", (*HALL, air))
     outcome, world, coordinator = drive(scenario)
-    found: dict[str, Any] = measure(world, scenario.metrics)
-    placed = [robot for robot in coordinator.places.occupant.values() if robot]
+    found: dict[str, Any] = measure(world)
+    placed = [robot for robot in coordinator.slots.occupant.values() if robot]
     waiting = list(coordinator.sources.waiting.values())
     out = [robot for robot in world.scene.present_ids().tolist() if robot]
     assert outcome == "completed"
@@ -277,7 +294,7 @@ def test_nobody_is_lost_or_counted_twice_whatever_the_uplink_does(air: str) -> N
     assert sorted(coordinator.sources.out) == out
 
 
-def test_what_the_uplink_does_is_the_same_in_processes() -> None:
+def test_losses_on_the_uplink_are_the_same_inline_and_in_processes() -> None:
     settings = ["arena.size_m=[2.0,1.4]", "base.pose=[0.2,0.7,0.0]", "robots.count=10", "uplink.loss=0.5"]
     inline, processes = (run("sensor-coverage", runner=each, overrides=settings) for each in ("inline", "processes"))
     other = run("sensor-coverage", seed=2, runner="inline", overrides=settings)
@@ -293,7 +310,7 @@ def crash(at_s: float, more: str = "") -> str:
 
 
 @pytest.mark.parametrize("at_s", [0.5, 23.7, 41.2])
-def test_a_coordinator_that_is_gone_for_good_ends_the_run_and_the_base_says_why(at_s: float) -> None:
+def test_the_base_ends_the_run_when_the_coordinator_is_gone_for_good(at_s: float) -> None:
     result = run("sensor-coverage", runner="inline", overrides=[*HALL, crash(at_s)])
     assert result.outcome == "failed"
     assert result.reason == "node 0 gave up: coordinator-lost: not a word from the coordinator for 120 s"
@@ -301,14 +318,14 @@ def test_a_coordinator_that_is_gone_for_good_ends_the_run_and_the_base_says_why(
 
 
 @pytest.mark.parametrize("at_s", [0.5, 8.0])
-def test_a_base_that_is_out_of_reach_for_twenty_seconds_before_anything_was_lost_is_waited_for(at_s: float) -> None:
+def test_the_coordinator_waits_for_a_base_that_is_out_of_reach_for_20_s_before_any_loss(at_s: float) -> None:
     fault = f"faults=[{{kind='partition', groups=[[0]], at_s={at_s}, for_s=20.0}}]"
     result = run("sensor-coverage", runner="inline", overrides=[*HALL, fault])
     assert result.outcome == "completed", result.reason
     assert result.metrics["coverage_fraction"] > 0.99
 
 
-def test_a_coordinator_that_is_away_for_long_is_waited_for() -> None:
+def test_the_robots_wait_for_a_coordinator_that_is_away_for_300_s() -> None:
     result = run("sensor-coverage", runner="inline", overrides=[*HALL, crash(20.0, ", for_s=300.0")])
     assert result.outcome == "completed"
     assert result.metrics["coverage_fraction"] >= 0.99
@@ -316,21 +333,24 @@ def test_a_coordinator_that_is_away_for_long_is_waited_for() -> None:
 
 def resumed(result: RunResult, from_s: float) -> None:
     """Check that the coordinator, begun anew, has everybody again within two seconds, and goes on to the end."""
-    anew = next(each for each in result.told if each.time_s >= from_s and "complex" in each.told)
-    complex_ = anew.told["complex"]
+    anew = next(each for each in result.snapshots if each.time_s >= from_s)
+    complex_ = decode_snapshot(anew.snapshot)
+    assert isinstance(complex_, ComplexSnapshot)
     assert anew.time_s <= from_s + 2.0
-    assert complex_["cycle"] == 1, "it remembers nothing"
-    assert complex_["paths"], "and somebody is about to go"
-    seen = len({node for each in complex_["edges"] for node in each})
+    assert complex_.cycle == 1, "it remembers nothing"
+    assert complex_.paths, "and somebody is about to go"
+    seen = len({node for each in complex_.edges for node in each})
     assert anew.present.sum() - 1 <= seen <= anew.present.sum() > 3, "all but one who waits at the base"
     assert result.outcome == "completed"
     assert result.metrics["coverage_fraction"] >= 0.99
     assert result.metrics["robots_released"] == result.metrics["robots_deployed"] - 1
     lives = [
-        [each for each in result.told if "complex" in each.told and (each.time_s < from_s) == old]
+        [decode_snapshot(each.snapshot) for each in result.snapshots if (each.time_s < from_s) == old]
         for old in (True, False)
     ]
-    assert result.metrics["deployment_cycles"] == sum(life[-1].told["complex"]["cycle"] for life in lives)
+    assert result.metrics["deployment_cycles"] == sum(
+        life[-1].cycle for life in lives if isinstance(life[-1], ComplexSnapshot)
+    )
 
 
 NOISE = "robots.sensors.0.sd_rad=0.0436332"
@@ -351,7 +371,7 @@ def test_a_coordinator_that_begins_anew_goes_on_within_two_seconds(at_s: float, 
     resumed(run("sensor-coverage", runner="inline", overrides=[*HALL, *more, crash(at_s, ", for_s=3.0")]), at_s + 3.0)
 
 
-def test_a_coordinator_that_begins_anew_in_a_process_of_its_own_asks_the_robots_by_radio() -> None:
+def test_a_coordinator_that_restarts_in_its_own_process_asks_the_robots_by_radio() -> None:
     inline, processes = (
         run("sensor-coverage", runner=each, overrides=[*HALL, crash(35.0, ", for_s=3.0")])
         for each in ("inline", "processes")

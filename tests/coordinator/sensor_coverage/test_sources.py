@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.assignment import CheapestFirst
 from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
-from zwerm.agents.sensor_coverage.frontier.services import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
-from zwerm.coordinator.sensor_coverage.command_mailbox import together
+from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
+from zwerm.coordinator.sensor_coverage.command_mailbox import run_concurrently
 from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.maths.simplicial import FlagComplex
@@ -69,7 +69,7 @@ def test_every_station_is_a_node_and_only_the_coordinator_knows_which() -> None:
         (("robots.count=3",), "robots.count: expected more than the 3 base stations, got 3"),
     ],
 )
-def test_stations_that_cannot_be_are_one_line(settings: tuple[str, ...], line: str) -> None:
+def test_invalid_base_stations_are_one_line(settings: tuple[str, ...], line: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         assemble(load("sensor-coverage-multi-source", settings), 1)
     assert [each.partition(": ")[2] for each in caught.value.mistakes] == [line]
@@ -91,18 +91,18 @@ class Truth:
 
     position: dict[int, Point]
     turned: dict[int, float]
-    places: Slots = field(default_factory=Slots)
+    slots: Slots = field(default_factory=Slots)
 
-    def look(self, *pairs: tuple[int, int]) -> None:
+    def update(self, *pairs: tuple[int, int]) -> None:
         sees: dict[int, list[int]] = {robot: [] for robot in self.position}
         for a, b in pairs:
             sees[a].append(b)
             sees[b].append(a)
         for robot, others in sees.items():
             seen = [Sighting(each, self.bearing(robot, each) - self.turned[robot]) for each in sorted(others)]
-            self.places.take(robot, seen)
-        self.places.learn_headings(sorted(self.position))
-        self.places.learn_references(self.places.views())
+            self.slots.take(robot, seen)
+        self.slots.learn_headings(sorted(self.position))
+        self.slots.learn_references(self.slots.views())
 
     def bearing(self, a: int, b: int) -> float:
         (ax, ay), (bx, by) = self.position[a], self.position[b]
@@ -110,50 +110,50 @@ class Truth:
 
     def off(self, robot: int) -> float:
         """By how much directions told of a robot are turned against the truth."""
-        return math.remainder(self.places.heading[robot] - self.turned[robot], math.tau)
+        return math.remainder(self.slots.heading[robot] - self.turned[robot], math.tau)
 
 
 def two_swarms() -> Truth:
     position = {0: (0.0, 0.0), 1: (3.0, 0.0), 2: (0.9, 0.1), 3: (0.5, 0.8), 4: (2.1, 0.0), 5: (2.5, 0.8)}
     truth = Truth(position, {0: 0.3, 1: 2.0, 2: -1.0, 3: 3.0, 4: 0.7, 5: -2.2})
     for robot in position:
-        truth.places.found(robot)
+        truth.slots.add(robot)
     return truth
 
 
 def test_a_swarms_directions_are_in_the_frame_of_its_station() -> None:
     truth = two_swarms()
-    truth.look((0, 2), (0, 3), (2, 3), (1, 4), (1, 5), (4, 5))
-    assert [truth.places.frame[robot] for robot in range(6)] == [0, 1, 0, 0, 1, 1]
+    truth.update((0, 2), (0, 3), (2, 3), (1, 4), (1, 5), (4, 5))
+    assert [truth.slots.frame[robot] for robot in range(6)] == [0, 1, 0, 0, 1, 1]
     assert [truth.off(robot) for robot in (0, 2, 3)] == pytest.approx([-0.3] * 3)
     assert [truth.off(robot) for robot in (1, 4, 5)] == pytest.approx([-2.0] * 3)
 
 
-def test_where_two_swarms_see_each_other_their_frames_become_one_and_all_that_is_remembered_turns() -> None:
+def test_two_frames_merge_where_swarms_see_each_other_and_all_remembered_directions_turn() -> None:
     truth = two_swarms()
     apart = ((0, 2), (0, 3), (2, 3), (1, 4), (1, 5), (4, 5))
-    truth.look(*apart)
-    truth.places.walls[4] = [truth.bearing(4, 5) + truth.off(4)]
-    truth.places.blocked[5] = [truth.bearing(5, 1) + truth.off(5)]
-    truth.places.walls[2] = [0.25]
-    truth.look(*apart, (2, 4), (3, 4))
-    assert set(truth.places.frame.values()) == {0}
+    truth.update(*apart)
+    truth.slots.walls[4] = [truth.bearing(4, 5) + truth.off(4)]
+    truth.slots.blocked[5] = [truth.bearing(5, 1) + truth.off(5)]
+    truth.slots.walls[2] = [0.25]
+    truth.update(*apart, (2, 4), (3, 4))
+    assert set(truth.slots.frame.values()) == {0}
     assert [truth.off(robot) for robot in range(6)] == pytest.approx([-0.3] * 6)
-    assert truth.places.walls[4] == pytest.approx([truth.bearing(4, 5) - 0.3])
-    assert truth.places.blocked[5] == pytest.approx([truth.bearing(5, 1) - 0.3])
-    assert truth.places.walls[2] == [0.25]
+    assert truth.slots.walls[4] == pytest.approx([truth.bearing(4, 5) - 0.3])
+    assert truth.slots.blocked[5] == pytest.approx([truth.bearing(5, 1) - 0.3])
+    assert truth.slots.walls[2] == [0.25]
     for a, b in (*apart, (2, 4), (3, 4)):
         for one, other in ((a, b), (b, a)):
-            found = truth.places.direction(one, other)
-            assert found is not None
-            assert math.remainder(found - truth.bearing(one, other) + 0.3, math.tau) == pytest.approx(0.0, abs=1e-9)
+            add = truth.slots.direction(one, other)
+            assert add is not None
+            assert math.remainder(add - truth.bearing(one, other) + 0.3, math.tau) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_three_frames_become_one_in_a_single_look() -> None:
+def test_three_frames_merge_in_a_single_scan() -> None:
     truth = Truth({n: (0.9 * n, 0.1 * (n % 2)) for n in range(3)}, {0: 1.0, 1: -1.0, 2: 2.5})
     for robot in range(3):
-        truth.places.found(robot)
-    truth.look((0, 1), (1, 2))
+        truth.slots.add(robot)
+    truth.update((0, 1), (1, 2))
     assert [truth.off(robot) for robot in range(3)] == pytest.approx([-1.0] * 3)
 
 
@@ -171,11 +171,11 @@ def plan(mover: int, *key: int) -> Plan:
 def assigned(
     complex_: FlagComplex, sources: dict[int, float], *tiers: list[Plan], pushes_max: int = 9
 ) -> list[tuple[int, ...]]:
-    def ways(part: FlagComplex, starts: dict[int, float]) -> Reach:
-        return Dijkstra(3.0).ways(part, starts, ())
+    def routes(part: FlagComplex, starts: dict[int, float]) -> Reach:
+        return Dijkstra(3.0).routes(part, starts, ())
 
-    found = CheapestFirst(Slots(), pushes_max).assign(tiers, ScanResult({}, complex_, ()), sources, ways)  # type: ignore[arg-type]
-    return [each.path for each in found]
+    add = CheapestFirst(Slots(), pushes_max).assign(tiers, ScanResult({}, complex_, ()), sources, routes)  # type: ignore[arg-type]
+    return [each.path for each in add]
 
 
 def test_pushes_from_two_stations_go_at_once_where_their_paths_have_no_landmark_in_common() -> None:
@@ -185,7 +185,7 @@ def test_pushes_from_two_stations_go_at_once_where_their_paths_have_no_landmark_
 
 
 @pytest.mark.parametrize("mover", [5, 4, 3])
-def test_a_path_near_another_waits(mover: int) -> None:
+def test_a_push_whose_path_is_near_another_waits(mover: int) -> None:
     assert assigned(line_of(10), {0: 0.0, 9: 0.0}, [plan(3), plan(mover)])[1:] == []
 
 
@@ -194,7 +194,7 @@ def test_two_pushes_from_one_station_never_go_at_once() -> None:
     assert assigned(star, {0: 0.0}, [plan(4), plan(8)]) == [(0, 1, 2, 3, 4)]
 
 
-def test_what_is_less_wanted_is_done_only_where_nothing_else_can_be() -> None:
+def test_a_plan_of_low_priority_is_assigned_only_without_a_reachable_plan_of_high_priority() -> None:
     two = FlagComplex({0: [1], 1: [0, 2], 2: [1], 5: [6], 6: [5]})
     edges, gaps = [plan(2)], [plan(1), plan(6)]
     assert assigned(two, {0: 0.0, 5: 0.0}, edges, gaps) == [(5, 6), (0, 1, 2)]
@@ -202,7 +202,7 @@ def test_what_is_less_wanted_is_done_only_where_nothing_else_can_be() -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_pushes_at_once_have_no_place_and_no_landmark_in_common(seed: int) -> None:
+def test_concurrent_pushes_have_no_slot_and_no_landmark_in_common(seed: int) -> None:
     random = np.random.default_rng(seed)
     position = random.uniform(0.0, 9.0, (300, 2))
     apart = np.hypot(*(position[:, None] - position[None, :]).transpose(2, 0, 1))
@@ -211,20 +211,20 @@ def test_pushes_at_once_have_no_place_and_no_landmark_in_common(seed: int) -> No
     paths = assigned(complex_, sources, [plan(int(n)) for n in random.choice(300, 60, replace=False)], pushes_max=99)
     taken: set[int] = set()
     for path in paths:
-        around = {*path, *(each for place in path for each in complex_.neighbours[place])}
+        around = {*path, *(each for slot in path for each in complex_.neighbours[slot])}
         assert not around & taken
         assert path[0] in sources
         taken |= around
     assert len(paths) > 2
 
 
-def test_stories_told_at_once_end_when_the_last_does_and_wake_for_the_first() -> None:
-    def story(times: list[float]):  # type: ignore[no-untyped-def]
+def test_concurrent_routines_end_with_the_last_and_wake_for_the_first() -> None:
+    def story(times: list[float]):
         for at_s in times:
             yield Wake(at_s=at_s, on_packet=at_s > 2.0)
         return times
 
-    both = together([story([1.0, 3.0]), story([2.0]), story([])])
+    both = run_concurrently([story([1.0, 3.0]), story([2.0]), story([])])
     assert [next(both), next(both)] == [Wake(at_s=1.0), Wake(at_s=3.0, on_packet=True)]
     with pytest.raises(StopIteration) as end:
         next(both)

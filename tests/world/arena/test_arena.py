@@ -49,7 +49,7 @@ def walls_of(arena: Arena) -> shapely.Geometry:
 
 @contextmanager
 def answered(by: str) -> Iterator[None]:
-    settings = {
+    settings: Any = {
         "comparing all with all": {"_DENSE_LINES": 10**9, "_DENSE_POINTS": 10**9},
         "blocks": {"_DENSE_LINES": 64, "_DENSE_POINTS": -1},
         "the index": {"_DENSE_LINES": -1, "_DENSE_POINTS": -1, "_FEW_SEGMENTS": -1},

@@ -232,6 +232,7 @@ BROKEN = {
 
 @pytest.mark.parametrize("case", BROKEN)
 def test_every_mistake_in_a_ros_map_is_one_line(folder: Path, case: str) -> None:
+    changes: Any
     changes, line = BROKEN[case]
     path = folder / "room.yaml"
     write_yaml(path, **changes)

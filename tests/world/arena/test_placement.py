@@ -86,7 +86,7 @@ def test_a_robot_out_of_everyones_way_is_where_it_would_be_alone() -> None:
 
 def test_uniform_places_fill_the_arena_evenly() -> None:
     position, heading = placed(SQUARE, 3000, body_m=1e-4)
-    counts, _, _ = np.histogram2d(*position.T, bins=3, range=[[0, 3], [0, 3]])
+    counts, _, _ = np.histogram2d(position[:, 0], position[:, 1], bins=3, range=((0.0, 3.0), (0.0, 3.0)))
     assert np.abs(counts - 3000 / 9).max() < 5 * np.sqrt(3000 / 9)
     turns, _ = np.histogram(heading, bins=8, range=(-np.pi, np.pi))
     assert np.abs(turns - 3000 / 8).max() < 5 * np.sqrt(3000 / 8)
@@ -101,7 +101,7 @@ def test_a_disc_lies_about_its_centre_and_is_filled_evenly() -> None:
 
 
 def test_a_random_disc_lies_within_the_arenas_bounds_and_not_always_at_one_place() -> None:
-    keys = {"kind": "disc", "radius_m": 0.5}
+    keys: Any = {"kind": "disc", "radius_m": 0.5}
     centers = []
     for seed in range(30):
         position, _ = place(table(**keys), SQUARE, 20, RADIUS_M, Draws(seed))

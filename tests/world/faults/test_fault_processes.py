@@ -11,7 +11,7 @@ from support import robots_of_this_process, scenario, until
 from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError, ScenarioError, StragglerError
-from zwerm.link.node import ZenohNodeLink
+from zwerm.link.node_link import ZenohNodeLink
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import NullProgress, drive, new_run_id, run, serve
 from zwerm.scenario.tables import Scenario
@@ -43,7 +43,7 @@ EVERY_FAULT: list[dict[str, Any]] = [
 ]
 EVERY_MODEL: list[dict[str, Any]] = [
     {"kind": "path_loss", "tx_power_dbm": -45.0},
-    {"kind": "bursts", "loss_fraction": 0.1, "burst_packets": 3.0},
+    {"kind": "gilbert_elliott", "loss_fraction": 0.1, "burst_packets": 3.0},
     {"kind": "delay", "jitter_s": 0.2, "distribution": "exponential"},
     {"kind": "duplication", "fraction": 0.2},
     {"kind": "corruption", "bit_error_rate": 0.0005},
@@ -101,7 +101,7 @@ def state_of(pid: int) -> str:
     return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
 
 
-def test_a_process_that_somebody_else_stops_ends_the_run_with_its_name(nothing_left: None) -> None:
+def test_a_process_that_is_stopped_from_outside_ends_the_run_with_its_name(nothing_left: None) -> None:
     chosen = scenario(time={"straggler_s": 0.5, "duration_s": 60.0})
     with LocalSwarm(new_run_id(), node_specs(chosen, 1)) as swarm:
         world = assemble(chosen, 1)
@@ -114,7 +114,7 @@ def test_a_process_that_somebody_else_stops_ends_the_run_with_its_name(nothing_l
 def test_a_late_joiner_has_no_process_before_its_time(nothing_left: None) -> None:
     chosen = scenario(faults=[{"kind": "join", "nodes": [3], "at_s": 1.0}])
     world = assemble(chosen, 1)
-    with LocalSwarm(new_run_id(), node_specs(chosen, 1), unborn=world.schedule.unborn) as swarm:
+    with LocalSwarm(new_run_id(), node_specs(chosen, 1), late_joiners=world.schedule.late_joiners) as swarm:
         assert len(robots_of_this_process()) == 3
         result = drive(world, swarm.link, 1, "processes", programs=swarm)
         assert len(robots_of_this_process()) == 4
@@ -139,7 +139,9 @@ def test_a_stale_incarnation_is_refused_and_counted(nothing_left: None) -> None:
         assert swarm.link.refused["incarnation"] == 1
 
 
-def test_what_a_killed_robot_had_still_said_in_real_time_is_refused_and_its_successor_lives(nothing_left: None) -> None:
+def test_late_commands_of_a_killed_robot_are_refused_in_real_time_and_its_next_incarnation_runs(
+    nothing_left: None,
+) -> None:
     faults = [
         {"kind": "restart", "nodes": [1], "at_s": 0.5},
         {"kind": "pause", "nodes": [2], "at_s": 0.5, "for_s": 0.3},
@@ -149,7 +151,7 @@ def test_what_a_killed_robot_had_still_said_in_real_time_is_refused_and_its_succ
     assert (result.crashed, result.restarted) == ([1], [1])
 
 
-def test_robots_elsewhere_cannot_be_killed(tmp_path: Path) -> None:
+def test_a_crash_of_robots_that_run_elsewhere_is_refused(tmp_path: Path) -> None:
     chosen = scenario(faults=[{"kind": "crash", "nodes": [1], "at_s": 0.5}])
     with pytest.raises(ScenarioError, match=r"^small.toml: faults: robots that run elsewhere cannot be killed"):
         serve(chosen, 1, ["tcp/127.0.0.1:0"], tmp_path / "robots.key")

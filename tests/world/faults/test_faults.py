@@ -1,4 +1,4 @@
-"""Faults come and go as the schedule says, do exactly what they say, and a mistake in one is a line that names it."""
+"""Faults begin and end by their schedule, have exactly their effects, and a mistake in one is a line that names it."""
 
 import io
 from typing import Any
@@ -19,11 +19,9 @@ from zwerm.run.runner import run
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Observation, decode_observation
 from zwerm.world.drivers.lockstep import LockStep
-from zwerm.world.faults.generator import draw
-from zwerm.world.faults.nodes import CrashTable
-from zwerm.world.faults.schedule import KINDS as SCHEDULE_KINDS
-from zwerm.world.faults.sensing import KINDS as SENSING_KINDS
-from zwerm.world.faults.sensing import SensorNoise, SensorNoiseTable
+from zwerm.world.faults.generator import random_faults
+from zwerm.world.faults.programs.crash import Crash, CrashTable
+from zwerm.world.faults.sensing.sensor_noise import SensorNoise, SensorNoiseTable
 from zwerm.world.tick.node_status import ProcessAction
 from zwerm.world.world import Send
 
@@ -51,7 +49,9 @@ class Life:
         self.orders: list[list[ProcessAction]] = []
         nodes = {node: Node(*spec).answer for node, spec in node_specs(chosen, seed).items()}
         link = MemoryLink(
-            nodes, lambda node, life: Node(*restart_spec(chosen, seed, node, life)).answer, self.world.schedule.unborn
+            nodes,
+            lambda node, life: Node(*restart_spec(chosen, seed, node, life)).answer,
+            self.world.schedule.late_joiners,
         )
         self._spy()
         self.outcome = LockStep(self.world, link, programs=link).run()
@@ -98,12 +98,12 @@ class Life:
 ALL = list(range(20))
 
 
-def test_a_fault_that_never_came_is_counted_and_told() -> None:
-    never = [
+def test_a_fault_that_never_began_is_counted_and_named_in_the_result() -> None:
+    never: list[dict[str, Any]] = [
         {"kind": "crash", "nodes": [0], "at_s": 9.0},
         {"kind": "blackout", "when": {"metric": "cell_coverage_fraction", "at_least": 1.0}},
     ]
-    came = [
+    came: list[dict[str, Any]] = [
         {"kind": "pause", "nodes": [1], "at_s": 0.0, "for_s": 1.0},
         {"kind": "restart", "nodes": [2], "at_s": 0.1},
         {"kind": "heal", "at_s": 0.1},
@@ -147,13 +147,13 @@ def test_a_cut_link_is_one_way_unless_it_says_both() -> None:
 
 
 @pytest.mark.parametrize("region", [{"center_m": [1.7, 0.3], "radius_m": 0.5}, {"rectangle_m": [1.0, 0.0, 2.0, 1.0]}])
-def test_a_jammer_deafens_who_is_in_its_region_and_nobody_else(region: dict[str, Any]) -> None:
+def test_a_jammer_blocks_receivers_in_its_region_only(region: dict[str, Any]) -> None:
     life = Life(faulty({"kind": "jam", "at_s": 1.0, **region}))
     assert life.heard(1, 0) == ALL[:10]
     assert life.heard(0, 1) == ALL[:-1]
 
 
-def test_a_blackout_silences_its_channel_only() -> None:
+def test_a_blackout_blocks_its_channel_only() -> None:
     life = Life(
         faulty(
             {"kind": "blackout", "channel": "uplink", "at_s": 0.0, "until_s": 1.0},
@@ -165,7 +165,7 @@ def test_a_blackout_silences_its_channel_only() -> None:
     assert life.heard(0, 1) == ALL[:-1]
 
 
-def test_healing_ends_every_fault_in_force_but_death() -> None:
+def test_a_heal_ends_every_active_fault_except_a_crash() -> None:
     life = Life(
         faulty(
             {"kind": "blackout", "at_s": 0.2},
@@ -183,7 +183,7 @@ def test_healing_ends_every_fault_in_force_but_death() -> None:
     assert life.heard(1, 0) == [0, 9, *range(10, 15)], "what began after the healing is not healed"
 
 
-def test_faults_that_overlap_are_all_in_force_and_end_one_by_one() -> None:
+def test_overlapping_faults_are_all_active_and_end_one_by_one() -> None:
     life = Life(
         faulty(
             {"kind": "cut", "senders": [0], "receivers": [1], "at_s": 0.2, "until_s": 1.0},
@@ -197,7 +197,7 @@ def test_faults_that_overlap_are_all_in_force_and_end_one_by_one() -> None:
 # --- conditions -----------------------------------------------------------------------------------------------------
 
 
-def test_a_fault_waits_for_a_robot_to_be_deployed() -> None:
+def test_a_fault_begins_when_a_robot_is_deployed() -> None:
     robots = {"inflow": {"every_s": 0.4, "entry_m": [0.5, 0.5, 1.5, 1.5]}, "placement": {}}
     life = Life(faulty({"kind": "blackout", "when": {"robot_deployed": 2}, "for_s": 0.3}, robots=robots))
     entered = life.awake(2)[0]
@@ -205,7 +205,7 @@ def test_a_fault_waits_for_a_robot_to_be_deployed() -> None:
     assert life.heard(1, 0) == [*range(4, 8), *range(11, 19)]
 
 
-def test_a_fault_waits_for_coverage() -> None:
+def test_a_fault_begins_when_a_coverage_is_reached() -> None:
     for metric, metrics in (
         ("cell_coverage_fraction", {"cells": [2, 2]}),
         ("area_coverage_fraction", {"coverage_radius_m": 0.7}),
@@ -221,7 +221,7 @@ def test_a_fault_waits_for_coverage() -> None:
 # --- nodes ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_crashed_robot_is_neither_observed_nor_heard_and_returns_without_memory_as_somebody_new() -> None:
+def test_a_crashed_robot_is_not_observed_and_returns_without_memory_as_a_new_incarnation() -> None:
     life = Life(faulty({"kind": "crash", "nodes": [1], "at_s": 0.5, "for_s": 0.5}))
     assert life.awake(1) == [*range(5), *range(10, 20)]
     assert life.heard(0, 1) == [*range(5), *range(10, 19)]
@@ -235,14 +235,14 @@ def test_a_crashed_robot_is_neither_observed_nor_heard_and_returns_without_memor
     assert life.world.lives.ever == {"crashed": [1], "restarted": [1]}
 
 
-def test_what_is_sent_to_the_dead_is_dropped_with_its_cause() -> None:
+def test_packets_to_a_crashed_robot_are_dropped_with_their_cause() -> None:
     chosen = faulty({"kind": "crash", "nodes": [1], "at_s": 0.5}, radio={"models": [{"kind": "delay", "delay_s": 0.3}]})
     dropped = Life(chosen).world.medium.summary()["dropped"]
     # In the air at tick 5 were the packets of ticks 2 to 4, of three senders each; later ones found it down.
     assert dropped == {"receiver-crashed": 3 * 3, "receiver-down": 3 * 15}
 
 
-def test_a_restarted_robots_old_packets_are_refused() -> None:
+def test_undelivered_packets_of_a_restarted_robot_are_dropped() -> None:
     delayed = {"models": [{"kind": "delay", "delay_s": 0.5}]}
     life = Life(faulty({"kind": "restart", "nodes": [1], "at_s": 1.0}, radio=delayed))
     # Sent at ticks 5 to 9, due at 10 and later.
@@ -252,9 +252,7 @@ def test_a_restarted_robots_old_packets_are_refused() -> None:
     assert life.orders[10] == [ProcessAction("kill", 1), ProcessAction("start", 1)]
 
 
-def test_a_paused_robot_deadlocks_nothing_keeps_its_mail_and_memory_and_its_motors_stop_after_the_deadman_time() -> (
-    None
-):
+def test_a_paused_robot_keeps_its_packets_and_memory_and_its_motors_stop_after_the_deadman_time() -> None:
     life = Life(faulty({"kind": "pause", "nodes": [1], "at_s": 0.5, "for_s": 1.0}, time={"deadman_s": 0.3}))
     assert life.awake(1) == [*range(5), *range(15, 20)]
     assert life.heard(0, 1) == [*range(5), *range(15, 19)]
@@ -264,7 +262,7 @@ def test_a_paused_robot_deadlocks_nothing_keeps_its_mail_and_memory_and_its_moto
     assert life.world.scene.position[1, 0] == pytest.approx(1.7 + 0.001 * (5 + 3 + 5), abs=1e-6)
 
 
-def test_a_slow_robot_is_observed_every_so_often_and_what_it_says_comes_that_late() -> None:
+def test_a_slow_robot_is_observed_once_in_every_ticks_and_its_packets_are_that_late() -> None:
     life = Life(faulty({"kind": "slow", "nodes": [1], "every_ticks": 4, "at_s": 0.4, "for_s": 1.2}))
     assert life.awake(1) == [0, 1, 2, 3, 4, 8, 12, 16, 17, 18, 19]
     # Observed at 4, 8 and 12, it answers at 7, 11 and 15.
@@ -272,7 +270,7 @@ def test_a_slow_robot_is_observed_every_so_often_and_what_it_says_comes_that_lat
     assert life.world.lives.ever == {"slow": [1]}
 
 
-def test_a_robot_that_joins_late_is_not_observed_before_and_its_body_is_there() -> None:
+def test_a_late_joiner_is_not_observed_before_its_time_and_its_body_is_in_the_arena() -> None:
     life = Life(faulty({"kind": "join", "nodes": [1], "at_s": 1.0}))
     assert life.awake(1) == list(range(10, 20))
     assert life.world.medium.summary()["dropped"] == {"receiver-down": 3 * 10}
@@ -281,7 +279,7 @@ def test_a_robot_that_joins_late_is_not_observed_before_and_its_body_is_there() 
     assert life.orders[10] == [ProcessAction("start", 1)]
 
 
-def test_the_coordinator_can_die_and_return() -> None:
+def test_the_coordinator_can_crash_and_return() -> None:
     crash = {"kind": "crash", "nodes": ["coordinator"], "at_s": 0.5, "for_s": 0.5}
     life = Life(faulty(crash, coordinator={"controller": "radioed:Counts"}))
     assert life.awake(4) == [*range(5), *range(10, 20)]
@@ -296,7 +294,7 @@ def test_a_robot_that_crashed_by_itself_can_be_started_again() -> None:
     assert life.awake(1) == [0, 1, 2, 15, 16, 17]
 
 
-def test_the_run_is_complete_without_those_who_never_return_but_not_before_those_who_will() -> None:
+def test_a_run_ends_without_robots_that_never_return_and_waits_for_robots_that_will() -> None:
     robots = {"controller": "troubled:Finishes", "count": 4, "body": {"kind": "differential"}}
     gone = Life(faulty({"kind": "crash", "nodes": [3], "at_s": 0.0}, robots=robots))
     assert (gone.outcome, gone.world.tick) == ("completed", 3)
@@ -307,14 +305,14 @@ def test_the_run_is_complete_without_those_who_never_return_but_not_before_those
     assert everyone.world.tick == 4
 
 
-def test_a_world_whose_programs_run_elsewhere_says_so() -> None:
+def test_a_crash_of_a_program_that_runs_elsewhere_is_an_error() -> None:
     world = assemble(faulty({"kind": "crash", "nodes": [1], "at_s": 0.0}), 1)
     link = MemoryLink({})
     with pytest.raises(LinkError, match=r"^node 1: a fault would kill its program, which runs elsewhere$"):
         LockStep(world, link).run()
 
 
-def test_what_is_in_no_fault_draws_what_it_drew_without_any() -> None:
+def test_a_fault_changes_no_random_numbers_of_other_links_and_robots() -> None:
     lossy = {"models": [{"kind": "loss", "fraction": 0.5}, {"kind": "delay", "jitter_s": 0.3}]}
     without = Life(faulty(radio=lossy))
     cut = {"kind": "cut", "senders": [0], "receivers": [3], "at_s": 0.3, "until_s": 0.9}
@@ -328,16 +326,16 @@ def test_what_is_in_no_fault_draws_what_it_drew_without_any() -> None:
     assert without.heard(3, 0) != with_cut.heard(3, 0)
 
 
-# --- who and when is drawn ---------------------------------------------------------------------------------------------
+# --- random robots and times ----------------------------------------------------------------------------------------
 
 
 def struck(seed: int, *more: dict[str, Any]) -> list[tuple[int, list[int]]]:
-    """Return when the fault that was drawn began, and whom it killed."""
+    """Return for each fault the tick at which it began and the nodes that it struck."""
     world = Life(faulty({"kind": "crash", "fraction": 0.5, "between_s": [0.5, 1.5]}, *more), seed).world
-    return [(fault.begins or 0, fault.nodes) for fault in world.schedule.faults]
+    return [(each.begins or 0, getattr(each.fault, "nodes", [])) for each in world.schedule.faults]
 
 
-def test_a_crash_can_strike_a_fraction_of_those_who_live_at_a_time_that_the_seed_draws() -> None:
+def test_a_crash_can_strike_a_random_fraction_of_the_running_robots_at_a_random_time() -> None:
     found = [struck(seed)[0] for seed in range(12)]
     assert len({tick for tick, _ in found}) > 4, "ticks differ from seed to seed"
     assert all(5 <= tick <= 15 and len(nodes) == 2 for tick, nodes in found)
@@ -345,7 +343,7 @@ def test_a_crash_can_strike_a_fraction_of_those_who_live_at_a_time_that_the_seed
     assert struck(1) == struck(1)
 
 
-def test_who_is_drawn_is_not_dead_yet_and_no_other_fault_changes_the_draw() -> None:
+def test_a_random_crash_strikes_running_robots_only_and_no_other_fault_changes_its_choice() -> None:
     pause = {"kind": "pause", "nodes": [0], "at_s": 0.0}
     assert struck(1, pause)[0] == struck(1)[0]
     for seed in range(12):
@@ -356,7 +354,7 @@ def test_who_is_drawn_is_not_dead_yet_and_no_other_fault_changes_the_draw() -> N
 
 
 @pytest.mark.parametrize(("fraction", "most"), [(1.0, 40), (0.001, 1)])
-def test_no_base_station_is_drawn_and_one_at_least_of_those_who_are_out(fraction: float, most: int) -> None:
+def test_a_random_crash_strikes_one_robot_at_least_and_no_base_station(fraction: float, most: int) -> None:
     fault = f"faults=[{{kind='crash', fraction={fraction}, between_s=[40.0, 60.0]}}]"
     nodes = run("sensor-coverage", 1, "inline", [*HALL, fault, "time.duration_s=70"]).as_json()["nodes"]["crashed"]
     assert 1 <= len(nodes) <= most
@@ -365,7 +363,9 @@ def test_no_base_station_is_drawn_and_one_at_least_of_those_who_are_out(fraction
 
 
 @pytest.mark.parametrize("wider", [False, True])
-def test_a_new_optional_key_of_a_kind_of_fault_changes_no_draw(monkeypatch: pytest.MonkeyPatch, wider: bool) -> None:
+def test_a_new_optional_key_of_a_kind_of_fault_changes_no_random_number(
+    monkeypatch: pytest.MonkeyPatch, wider: bool
+) -> None:
     noise = {"kind": "sensor_noise", "sensor": "bearings", "sd": 0.1, "at_s": 0.0}
     seeing = {"sensors": [{"kind": "bearings"}]}
 
@@ -380,22 +380,21 @@ def test_a_new_optional_key_of_a_kind_of_fault_changes_no_draw(monkeypatch: pyte
     class WiderNoise(SensorNoiseTable):
         depth_m: float = 3.0 if wider else 2.0
 
-    monkeypatch.setitem(SCHEDULE_KINDS, "crash", WiderCrash)
-    monkeypatch.setitem(SCHEDULE_KINDS, "sensor_noise", WiderNoise)
-    monkeypatch.setitem(SENSING_KINDS, WiderNoise, SensorNoise)
+    monkeypatch.setattr(Crash, "Parameters", WiderCrash)
+    monkeypatch.setattr(SensorNoise, "Parameters", WiderNoise)
     assert drawn_now() == before
     # What a scenario writes does key the draws: the same value, given, is another fault.
     assert drawn_now(depth_m=WiderNoise.model_fields["depth_m"].default)[1] != before[1]
 
 
-def test_the_order_of_keys_and_an_integer_for_a_number_change_no_draw_and_the_kind_does() -> None:
+def test_the_kind_of_a_fault_keys_its_random_numbers_and_the_order_of_its_keys_does_not() -> None:
     noise = {"kind": "sensor_noise", "sensor": "bearings", "sd": 1.0, "at_s": 0.0}
     seeing = {"sensors": [{"kind": "bearings"}]}
     turned = dict(reversed(noise.items())) | {"sd": 1, "at_s": 0}
     traces = [Life(faulty(each, robots=seeing)).world.trace.hex() for each in (noise, turned)]
     assert traces[0] == traces[1]
     out = [{"kind": kind, "robots": [0], "at_s": 0.0} for kind in ("dead_beacon", "camera_blackout")]
-    purposes = [fault.purpose for fault in assemble(faulty(*out, robots=seeing), 1).schedule.faults]
+    purposes = [each.purpose for each in assemble(faulty(*out, robots=seeing), 1).schedule.faults]
     assert len(set(purposes)) == 2
     assert all(purpose.startswith("faults/1/") for purpose in purposes), "each is the first of its kind"
 
@@ -420,7 +419,7 @@ def test_a_random_schedule_has_its_rates_is_sorted_and_can_be_run_as_written() -
     # 10 kinds x 4000 / h x 2 s: 22 expected a seed, Poisson.
     chosen = faulty(random_faults=RATES, robots=SENSES)
     arena = assemble(chosen, 1).arena
-    schedules = [draw(chosen, seed, arena) for seed in range(300)]
+    schedules = [random_faults(chosen, seed, arena) for seed in range(300)]
     assert len({fault.kind for schedule in schedules for fault in schedule}) == 10
     counts = [len(schedule) for schedule in schedules]
     assert abs(np.mean(counts) - 22.2) < 2.576 * np.sqrt(22.2 / 300)
@@ -442,14 +441,14 @@ def test_random_stuck_switches_are_drawn_among_those_that_the_sensor_has(touch: 
     robots = {"sensors": [{"kind": "touch", **touch}]}
     chosen = faulty(random_faults={"stuck_touch_per_h": 4_000.0}, robots=robots)
     arena = assemble(faulty(robots=robots), 1).arena
-    tables = [table for seed in range(100) for table in draw(chosen, seed, arena)]
+    tables = [table for seed in range(100) for table in random_faults(chosen, seed, arena)]
     # About 220 faults: the chance that one switch of 12 is never drawn is below 1e-7.
     assert {table.parameters["switch"] for table in tables} == set(range(touch.get("switches", 8)))
     for seed in range(10):
         assemble(chosen, seed)
 
 
-def test_random_faults_that_cannot_be_are_mistakes() -> None:
+def test_a_rate_of_random_faults_that_cannot_occur_is_a_mistake() -> None:
     chosen = scenario(random_faults={"jam_per_h": 1.0, "stuck_touch_per_h": 2.0})
     with pytest.raises(ScenarioError) as caught:
         assemble(chosen, 1)
@@ -465,8 +464,9 @@ def test_random_faults_that_cannot_be_are_mistakes() -> None:
 @pytest.mark.parametrize(
     ("fault", "line"),
     [
-        ({"kind": "explode", "at_s": 0}, "faults.0.kind: expected one of partition, jam, blackout, cut, heal, crash, restart, "
-         "pause, slow, join, sensor_noise, stuck_touch, dead_beacon, camera_blackout, got 'explode'"),
+        ({"kind": "explode", "at_s": 0}, "faults.0.kind: expected a built-in fault (crash, restart, pause, slow, join, "
+         "partition, jam, blackout, cut, camera_blackout, dead_beacon, stuck_touch, sensor_noise, heal) or module:Class, "
+         "got 'explode'"),
         ({"kind": "crash", "nodes": [9], "at_s": 0}, "faults.0.nodes.0: no such robot: ids are 0 to 3, got 9"),
         ({"kind": "crash", "nodes": [-1], "at_s": 0}, "faults.0.nodes.0: no such robot: ids are 0 to 3, got -1"),
         ({"kind": "crash", "nodes": ["coordinator"], "at_s": 0}, "faults.0.nodes.0: the scenario has no coordinator"),
@@ -532,7 +532,7 @@ def test_a_radio_fault_without_a_radio_is_a_mistake() -> None:
     assert caught.value.mistakes == ["small.toml: faults.0: the scenario has no radio to disturb"]
 
 
-def test_the_result_names_who_crashed_and_who_returned() -> None:
+def test_the_result_names_the_robots_that_crashed_and_returned() -> None:
     crashes = [
         {"kind": "crash", "nodes": [2], "at_s": 0.5},
         {"kind": "restart", "nodes": [1], "at_s": 0.5},

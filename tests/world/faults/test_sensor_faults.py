@@ -1,4 +1,4 @@
-"""What faults do to readings, and to nobody else's."""
+"""Faults of sensors change the readings of their robots and sensors, and no others."""
 
 import math
 from typing import Any
@@ -41,7 +41,7 @@ def seen(observation: Observation) -> list[int]:
     return [bearing.node for bearing in observation.bearings or ()]
 
 
-def test_a_dead_beacon_is_seen_by_nobody_sees_all_and_is_still_bumped_into() -> None:
+def test_a_dead_beacon_is_not_seen_but_sees_others_and_is_still_touched() -> None:
     world = assemble(faulty({"kind": "dead_beacon", "robots": [1, 3], "at_s": 0.1, "for_s": 0.1}), 1)
     before, during, after = look(world), look(world), look(world)
     assert seen(before[0]) == seen(after[0]) == [1, 2, 3]
@@ -55,7 +55,7 @@ def test_a_dead_beacon_is_seen_by_nobody_sees_all_and_is_still_bumped_into() -> 
     assert look(both)[3].line_of_sight is True
 
 
-def test_a_camera_that_is_out_sees_nothing_and_the_rest_of_the_robot_feels_on() -> None:
+def test_a_camera_blackout_darkens_cameras_and_leaves_other_sensors_unchanged() -> None:
     world = assemble(faulty({"kind": "camera_blackout", "robots": [0], "at_s": 0.1}), 1)
     before, during = look(world), look(world)
     assert (during[0].bearings, during[0].neighbours, during[0].landmarks) == ((), (), ())
@@ -65,7 +65,7 @@ def test_a_camera_that_is_out_sees_nothing_and_the_rest_of_the_robot_feels_on() 
     assert during[1].bearings == before[1].bearings
 
 
-def test_a_stuck_switch_is_always_closed_or_never_and_the_others_work() -> None:
+def test_a_stuck_switch_is_always_closed_or_always_open_and_the_others_work() -> None:
     world = assemble(
         faulty(
             {"kind": "stuck_touch", "robots": [0], "switch": 2, "closed": True, "at_s": 0.1, "for_s": 0.1},
@@ -77,7 +77,7 @@ def test_a_stuck_switch_is_always_closed_or_never_and_the_others_work() -> None:
     assert felt == [[180], [90, 180], []]
 
 
-def test_noise_has_its_bias_and_deviation_and_does_not_touch_ids() -> None:
+def test_noise_has_its_bias_and_deviation_and_does_not_change_ids() -> None:
     noise = {"kind": "sensor_noise", "sensor": "bearings", "sd": 0.1, "bias": 0.3, "robots": [0], "at_s": 0.1}
     world = assemble(faulty(noise), 1)
     clear = look(world)
@@ -92,13 +92,13 @@ def test_noise_has_its_bias_and_deviation_and_does_not_touch_ids() -> None:
     assert abs(np.std(errors) - 0.1) < 2.576 * 0.1 / math.sqrt(2 * 900)
 
 
-def test_items_are_missed_and_imagined_at_their_rates() -> None:
+def test_items_are_missing_and_added_at_their_rates() -> None:
     noise = {"kind": "sensor_noise", "missed_fraction": 0.25, "false_fraction": 0.5, "at_s": 0.0}
     sensors = ("bearings", "neighbours", "landmarks", "touch", "line_of_sight")
     world = assemble(faulty(*[noise | {"sensor": sensor} for sensor in sensors]), 1)
     looks = [look(world) for _ in range(200)]
 
-    def rate(value: float, expected: float, count: int) -> None:
+    def rate(value: np.floating[Any], expected: float, count: int) -> None:
         assert abs(value - expected) < 2.576 * math.sqrt(expected * (1 - expected) / count), (value, expected)
 
     # Robot 0 sees all others: what it misses is missed, unless it is imagined again.
@@ -127,7 +127,7 @@ def test_every_sensor_with_numbers_takes_the_same_noise() -> None:
     assert (after.landmarks or ())[1].landmark == 1
 
 
-def test_a_fault_of_one_robot_or_of_another_sensor_changes_no_other_draws() -> None:
+def test_a_fault_of_another_sensor_changes_no_random_numbers() -> None:
     one = {"kind": "sensor_noise", "sensor": "bearings", "sd": 0.1, "at_s": 0.0}
     other = {"kind": "sensor_noise", "sensor": "pose", "sd": 0.2, "at_s": 0.0}
 

@@ -2,7 +2,6 @@
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +12,7 @@ from zwerm.run.runner import run
 from zwerm.scenario.tables import ArenaTable
 from zwerm.view.sensor_coverage import snapshots
 from zwerm.world.arena.arena import Arena
-from zwerm.world.metrics.measures import deployment_cycles
 from zwerm.world.metrics.sight import SeenArea, hexagonal_packing_robots, holes, obstacles, reachable
-from zwerm.world.tick.telemetry import TelemetryRecord
 
 
 def arena(**table: object) -> Arena:
@@ -97,10 +94,10 @@ def test_holes_are_those_of_the_complex_and_obstacles_those_of_the_arena() -> No
 def test_the_complex_of_a_run_can_be_drawn_at_any_cycle(tmp_path: Path) -> None:
     settings = ["arena.size_m=[2.2,1.6]", "base.pose=[0.2,0.8,0.0]", "robots.count=14"]
     result = run("sensor-coverage", runner="inline", overrides=settings)
-    told = snapshots(result.told)
-    assert [each.cycle for each in told] == list(range(1, int(result.metrics["deployment_cycles"]) + 1))
-    assert len(told[1].frontier)
-    assert not len(told[-1].frontier)
+    reported = snapshots(result.snapshots)
+    assert [each.cycle for each in reported] == list(range(1, int(result.metrics["deployment_cycles"]) + 1))
+    assert len(reported[1].frontier)
+    assert not len(reported[-1].frontier)
     assert result.picture(tmp_path / "complex.png", cycle=2).stat().st_size > 5_000
 
 
@@ -141,28 +138,11 @@ def test_holes_are_what_another_library_finds_in_the_true_complex(deployed: RunR
 
 def test_cycles_are_those_told_of_and_ticks_and_messages_are_shared_out_among_them(deployed: RunResult) -> None:
     found = deployed.metrics
-    assert found["deployment_cycles"] == snapshots(deployed.told)[-1].cycle
+    assert found["deployment_cycles"] == snapshots(deployed.snapshots)[-1].cycle
     assert found["ticks_per_cycle_mean"] == deployed.ticks / found["deployment_cycles"]
     sent = sum(sum(channel["messages"]) for channel in deployed.radio["channels"].values())
     assert found["messages_per_cycle_mean"] == sent / found["deployment_cycles"]
     assert 0.0 <= found["redundant_robots"] < found["robots_deployed"]
-
-
-def test_cycles_are_counted_over_all_lives_of_who_tells_of_them() -> None:
-    def cycles(*told: dict[str, Any]) -> float:
-        nowhere, nobody = np.zeros((0, 2)), np.zeros(0, dtype=np.bool_)
-        return deployment_cycles([TelemetryRecord(0, 0.0, 3, each, nowhere, nobody) for each in told])[
-            "deployment_cycles"
-        ]
-
-    def complexes(*numbers: int) -> list[dict[str, Any]]:
-        return [{"complex": {"cycle": number}} for number in numbers]
-
-    assert cycles(*complexes(1, 2, 3), {"deployment_cycles": 3}) == 3.0
-    assert cycles(*complexes(1, 2, 3, 1, 2), {"deployment_cycles": 2}) == 3.0 + 2.0
-    assert cycles(*complexes(1, 1, 1, 2)) == 1.0 + 1.0 + 2.0
-    assert cycles(*({"deployment_cycles": number} for number in (1, 2, 2, 5, 1, 4))) == 5.0 + 4.0
-    assert deployment_cycles([]) == {}
 
 
 def test_a_share_of_the_arena_is_in_sight_when_it_is_said_to_be(deployed: RunResult) -> None:

@@ -6,7 +6,7 @@ import pytest
 from air import Radio, ring
 from support import ROOT, script
 
-from zwerm.world.radio.registry import BUILT_IN
+from zwerm.catalogue import RADIO_MODELS
 
 
 @pytest.fixture(scope="module")
@@ -14,13 +14,13 @@ def fidelity() -> ModuleType:
     return script(ROOT / "benchmarks" / "bench_fidelity.py")
 
 
-def test_every_model_keeps_its_promise_over_thirty_thousand_packets(fidelity: ModuleType) -> None:
+def test_every_model_is_within_its_confidence_interval_over_thirty_thousand_packets(fidelity: ModuleType) -> None:
     rows = list(fidelity.measure(30_000, seed=1))
     assert [row for row in rows if not fidelity.is_inside(row)] == []
-    assert {row[0] for row in rows} == set(BUILT_IN)
+    assert {row[0] for row in rows} == set(RADIO_MODELS)
 
 
-def test_a_model_that_is_off_by_a_tenth_is_found_out(fidelity: ModuleType) -> None:
+def test_a_loss_that_is_wrong_by_a_tenth_is_outside_its_confidence_interval(fidelity: ModuleType) -> None:
     found = Radio(ring(40), [{"kind": "loss", "fraction": 0.33}], check=False).all_broadcast(20)
     assert not fidelity.is_inside(
         fidelity.row("loss", "", 0.3, found["dropped"]["loss"] / found["sent"], 0.46, found["sent"])

@@ -13,19 +13,19 @@ from hypothesis import strategies as st
 from rich.console import Console
 from support import scenario
 
-from zwerm.cli.radio_table import print_books
+from zwerm.catalogue import RADIO_MODELS
+from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.run.runner import run
 from zwerm.wire.messages import Transmission
 from zwerm.world.radio.links import Links
-from zwerm.world.radio.registry import BUILT_IN
 
 MODELS: dict[str, dict[str, Any]] = {
     "range": {"range_m": 1.2},
     "line_of_sight": {},
     "path_loss": {"tx_power_dbm": -50.0},
-    "walls": {"material": "glass", "margin_db": 1.0},
+    "wall_attenuation": {"material": "glass", "margin_db": 1.0},
     "loss": {"fraction": 0.3},
-    "bursts": {"loss_fraction": 0.4, "burst_packets": 3.0},
+    "gilbert_elliott": {"loss_fraction": 0.4, "burst_packets": 3.0},
     "delay": {"delay_s": 0.05, "jitter_s": 0.2, "distribution": "exponential"},
     "duplication": {"fraction": 0.5, "copies": 2},
     "corruption": {"bit_error_rate": 0.02},
@@ -39,12 +39,12 @@ def table(kind: str, **more: Any) -> dict[str, Any]:
     return {"kind": kind, **MODELS[kind], **more}
 
 
-def test_every_model_that_exists_is_tried_here() -> None:
-    assert sorted(MODELS) == sorted(BUILT_IN)
+def test_these_tests_try_every_radio_model_of_the_catalogue() -> None:
+    assert sorted(MODELS) == sorted(RADIO_MODELS)
 
 
 @pytest.mark.parametrize(("first", "second"), list(product(MODELS, MODELS)))
-def test_the_books_balance_under_every_two_models(first: str, second: str) -> None:
+def test_the_ledger_balances_under_every_pair_of_models(first: str, second: str) -> None:
     radio = Radio(ring(4), [table(first), table(second, senders=[0, 1, 2])], walls=[WALL])
     outbox = (Transmission("robots", b"broadcast"), Transmission("robots", b"one", to=3))
     for _ in range(12):  # the medium audits itself at every tick
@@ -71,7 +71,7 @@ def test_the_books_balance_under_every_two_models(first: str, second: str) -> No
     dies=st.tuples(st.integers(0, 4), st.integers(0, 12), st.integers(0, 12)),
     seed=st.integers(0, 2**32),
 )
-def test_the_books_balance_whatever_is_sent_and_whoever_sleeps_or_dies(
+def test_the_ledger_balances_under_any_traffic_with_sleeping_and_crashing_nodes(
     kinds: list[str], traffic: list[Any], asleep: set[int], dies: tuple[int, int, int], seed: int
 ) -> None:
     radio = Radio(ring(5), [table(kind) for kind in kinds], seed, walls=[WALL])
@@ -98,17 +98,17 @@ def test_the_books_balance_whatever_is_sent_and_whoever_sleeps_or_dies(
 def test_an_audit_finds_a_packet_that_vanishes() -> None:
     radio = Radio(ring(3))
     radio.step({0: (Transmission("robots", b"x"),)})
-    radio.medium.channels["robots"].mail.remove_from(0)  # behind the books' back
+    radio.medium.channels["robots"].queue.remove_from(0)  # the ledger does not count this
     with pytest.raises(
-        AssertionError, match=r"^channel robots: link 0 to 1: the books have 1 packets in flight, the air has 0"
+        AssertionError, match=r"^channel robots: link 0 to 1: the ledger has 1 packets in flight, the queue has 0"
     ):
         radio.medium.audit()
 
 
-def test_the_books_by_link_are_sorted_and_add_up_to_the_summary() -> None:
+def test_the_counts_by_link_are_sorted_and_add_up_to_the_summary() -> None:
     radio = Radio(ring(4), [table("loss"), table("duplication")])
     summary = radio.all_broadcast(50)
-    books = radio.medium.channels["robots"].accounts.by_link()
+    books = radio.medium.channels["robots"].ledger.by_link()
     assert list(zip(books["sender"], books["receiver"], strict=True)) == [
         (a, b) for a in range(4) for b in range(4) if a != b
     ]
@@ -120,7 +120,7 @@ def test_the_books_by_link_are_sorted_and_add_up_to_the_summary() -> None:
     assert books["delivered"] == [heard[pair] for pair in pairs]
 
 
-def test_the_books_are_a_table_of_every_cause_with_the_links_that_lost_most() -> None:
+def test_the_radio_table_has_every_cause_and_the_links_that_lost_most() -> None:
     one_way = {"kind": "loss", "fraction": 1.0, "senders": [0], "receivers": [1]}
     walled = scenario(
         robots={"count": 3, "controller": "beacon", "sensors": []},
@@ -134,7 +134,7 @@ def test_the_books_are_a_table_of_every_cause_with_the_links_that_lost_most() ->
     assert ages[1, 0] == pytest.approx(0.1)
     assert ages[2, 0] > 0.3
     console = Console(record=True, width=120, file=io.StringIO())
-    print_books(console, books, 2)
+    print_radio_ledger(console, books, 2)
     text = [" ".join(line.split()) for line in console.export_text().splitlines()]
     assert text[1] == "from to sent delivered loss cut in flight delivered % age mean s age max s"
     assert text[2].startswith(f"all all 120 {120 - 20 - 10 - 4} 20 10 4 ")
@@ -145,13 +145,13 @@ def test_the_books_are_a_table_of_every_cause_with_the_links_that_lost_most() ->
 def test_messages_and_bytes_are_counted_once_for_each_sender() -> None:
     radio = Radio(ring(3))
     radio.step({0: (Transmission("robots", b"12345"), Transmission("robots", b"1", to=2)), 2: ()})
-    books = radio.medium.channels["robots"].accounts
+    books = radio.medium.channels["robots"].ledger
     assert books.node_messages.tolist() == [2, 0, 0]
     assert books.node_bytes.tolist() == [6, 0, 0]
     assert radio.medium.summary()["bytes"] == 6
 
 
-def test_who_is_out_of_reach_loses_nothing() -> None:
+def test_a_packet_to_a_receiver_out_of_reach_is_no_loss() -> None:
     count = 12  # along a line, so that each has two neighbours at most
     line = [[0.5 + index, 0.5, 0.0] for index in range(count)]
     robots = {
@@ -187,20 +187,20 @@ def test_who_is_out_of_reach_loses_nothing() -> None:
     links = books["channels"]["robots"]["links"]
     assert sum(links["out_of_reach"]) == books["channels"]["robots"]["out_of_reach"] == books["out_of_reach"]
     console = Console(record=True, width=160, file=io.StringIO())
-    print_books(console, books, 1)
+    print_radio_ledger(console, books, 1)
     rows = [line.split() for line in console.export_text().splitlines()]
     assert rows[2][-3] == f"{100.0 * result.metrics['delivered_fraction']:.1f}"
     assert rows[3][:4] == ["1", "0", str(ticks), "0"], "the link that lost most, and not one out of reach"
 
 
-def test_without_anybody_in_reach_there_is_no_fraction_delivered() -> None:
+def test_without_a_receiver_in_reach_there_is_no_delivered_fraction() -> None:
     far = {"range_m": 0.001}
     metrics = run(scenario(robots={"controller": "beacon", "sensors": []}, radio=far), 1, "inline").metrics
     assert metrics["out_of_reach_fraction"] == 1.0
     assert "delivered_fraction" not in metrics
 
 
-def test_a_model_of_ones_own_says_whether_it_finds_receivers_out_of_reach() -> None:
+def test_a_model_of_a_user_states_whether_its_receivers_are_out_of_reach() -> None:
     far = {"senders": [0], "receivers": [1]}
     for own, lost in (("own_models:Shadowed", 0), ("own_models:Lossy", 10)):
         radio = Radio(ring(3), [{"kind": own, **far}])
@@ -209,7 +209,7 @@ def test_a_model_of_ones_own_says_whether_it_finds_receivers_out_of_reach() -> N
         assert summary["out_of_reach"] == 10 - lost
 
 
-def test_the_age_of_information_is_what_watching_every_tick_gives() -> None:
+def test_the_age_of_information_equals_a_count_at_every_tick() -> None:
     radio = Radio(ring(3), [table("loss"), table("delay")], seed=5)
     broadcast = Transmission("robots", b"x")
     newest: dict[tuple[int, int], int] = {}
@@ -229,14 +229,14 @@ def test_the_age_of_information_is_what_watching_every_tick_gives() -> None:
                 newest[link] = max(newest.get(link, -1), sent_tick[packet.sender, node, packet.payload])
         for link, sent in newest.items():
             ages.setdefault(link, []).append(tick - sent)
-    found = radio.medium.channels["robots"].accounts.ages_s(200)
+    found = radio.medium.channels["robots"].ledger.ages_s(200)
     assert found is not None
     assert found[0] == pytest.approx(DT_S * np.mean([np.mean(each) for each in ages.values()]))
     # Looked at just before the next packet came, one tick later than at the tick before.
     assert found[1] == pytest.approx(DT_S * (max(map(max, ages.values())) + 1))
 
 
-def test_links_are_found_in_a_dense_table_and_in_a_sorted_one_alike() -> None:
+def test_the_dense_and_the_sorted_table_find_the_same_links() -> None:
     random = np.random.Generator(np.random.Philox(7))
     dense, by_key = Links(50), Links(50, dense_nodes_max=0)
     for _ in range(30):

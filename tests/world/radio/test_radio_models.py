@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from air import DT_S, Radio, ring
 
+from zwerm.catalogue import RADIO_MODELS, RENAMED_RADIO_MODELS
 from zwerm.errors import ProtocolError, ScenarioError
 from zwerm.wire.checksum import seal, unseal
 from zwerm.wire.messages import Transmission
+from zwerm.world.radio import RadioModel, RadioModelTable, registry
 
 Z99 = 2.576
 
@@ -19,7 +21,7 @@ def within(found: float, expected: float, sd: float, count: float) -> None:
     assert abs(found - expected) <= Z99 * sd / math.sqrt(count), (found, expected)
 
 
-def lost_by_link(radio: Radio, ticks: int) -> np.ndarray:  # type: ignore[type-arg]
+def lost_by_link(radio: Radio, ticks: int) -> np.ndarray:
     """Return (links, ticks) which packets were lost while everyone broadcast at every tick, by sender and receiver."""
     count = len(radio.position)
     lost = np.ones((count, count, ticks), dtype=np.bool_)
@@ -33,7 +35,7 @@ def lost_by_link(radio: Radio, ticks: int) -> np.ndarray:  # type: ignore[type-a
     return lost[~np.eye(count, dtype=np.bool_)]
 
 
-def runs(flags: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def runs(flags: np.ndarray) -> np.ndarray:
     """Return the lengths of the runs of true in every row of (k, ticks), those that the ends cut short aside."""
     lengths = []
     for row in flags:
@@ -60,7 +62,7 @@ def test_independent_loss_has_no_memory() -> None:
 
 @pytest.mark.parametrize(("loss", "burst"), [(0.1, 4.0), (0.5, 10.0), (0.3, 1.0)])
 def test_burst_loss_has_the_loss_and_the_burst_length_it_is_given(loss: float, burst: float) -> None:
-    model = {"kind": "bursts", "loss_fraction": loss, "burst_packets": burst}
+    model = {"kind": "gilbert_elliott", "loss_fraction": loss, "burst_packets": burst}
     lost = lost_by_link(Radio(ring(8), [model]), 400)
     # A two-state chain with correlation r from packet to packet has (1 + r) / (1 - r) times the variance of a mean.
     r = 1 - 1 / burst - loss / (1 - loss) / burst
@@ -72,7 +74,7 @@ def test_burst_loss_has_the_loss_and_the_burst_length_it_is_given(loss: float, b
 
 
 def test_a_bad_state_that_passes_some_packets_lowers_the_loss_of_a_burst_but_not_of_the_link() -> None:
-    model = {"kind": "bursts", "loss_fraction": 0.2, "burst_packets": 8.0, "bad_loss_fraction": 0.5}
+    model = {"kind": "gilbert_elliott", "loss_fraction": 0.2, "burst_packets": 8.0, "bad_loss_fraction": 0.5}
     summary = Radio(ring(12), [model]).all_broadcast(400)
     sent = 12 * 11 * 400
     bad, r = 0.4, 1 - 1 / 8 - 0.4 / 0.6 / 8
@@ -81,7 +83,7 @@ def test_a_bad_state_that_passes_some_packets_lowers_the_loss_of_a_burst_but_not
 
 
 def test_packets_of_one_tick_step_the_chain_one_after_the_other() -> None:
-    model = {"kind": "bursts", "loss_fraction": 0.5, "burst_packets": 1_000_000.0}
+    model = {"kind": "gilbert_elliott", "loss_fraction": 0.5, "burst_packets": 1_000_000.0}
     fates = []
     for seed in range(200):
         radio = Radio(ring(2), [model], seed)
@@ -125,7 +127,7 @@ def test_jitter_reorders_and_an_inbox_is_in_the_order_of_arrival() -> None:
     assert order != sorted(order)
 
 
-def test_copies_have_their_rate_and_are_judged_by_themselves() -> None:
+def test_copies_have_their_rate_and_random_numbers_of_their_own() -> None:
     models = [{"kind": "duplication", "fraction": 0.25, "copies": 2}, {"kind": "loss", "fraction": 0.5}]
     summary = Radio(ring(10), models).all_broadcast(200)
     within(summary["copies"] / 18_000, 0.5, 2 * math.sqrt(0.25 * 0.75), 18_000)
@@ -191,7 +193,7 @@ def test_collisions_follow_pure_aloha() -> None:
     assert found == pytest.approx(survives, abs=Z99 * math.sqrt(survives * (1 - survives) / (400 * count / 2)))
 
 
-def test_only_who_is_in_range_of_both_loses_and_who_sends_hears_nothing_meanwhile() -> None:
+def test_a_collision_needs_both_senders_in_range_and_a_sender_receives_nothing_meanwhile() -> None:
     # 0 and 2 are hidden from each other; 1 hears both, 3 hears only 2.
     model = {"kind": "collision", "airtime_s": 0.1, "range_m": 1.5}
     radio = Radio([(10, 10), (11, 10), (12, 10), (13, 10)], [{"kind": "range", "range_m": 1.5}, model])
@@ -208,7 +210,7 @@ def test_only_who_is_in_range_of_both_loses_and_who_sends_hears_nothing_meanwhil
 # --- space ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_packet_carries_its_range_and_no_further() -> None:
+def test_a_packet_reaches_its_range_and_no_further() -> None:
     radio = Radio([(10, 10), (12, 10), (12.001, 10)], range_m=2.0)
     radio.step({0: (Transmission("robots", b"x"),)})
     radio.step({})
@@ -216,7 +218,7 @@ def test_a_packet_carries_its_range_and_no_further() -> None:
     assert radio.medium.summary()["dropped"] == {"out-of-range": 1}
 
 
-def test_line_of_sight_is_looked_along_again_when_a_robot_has_moved() -> None:
+def test_line_of_sight_is_computed_again_after_a_robot_moved() -> None:
     radio = Radio([(10, 10), (12, 10)], walls=[[[11, 9], [11, 11]]], line_of_sight=True)
     radio.one_link(2)
     radio.position[1] = 10, 12
@@ -226,11 +228,11 @@ def test_line_of_sight_is_looked_along_again_when_a_robot_has_moved() -> None:
     assert (summary["delivered"], summary["dropped"]) == (2, {"no-line-of-sight": 3})
 
 
-def test_walls_take_their_decibels_by_material_and_region() -> None:
+def test_walls_attenuate_by_material_and_region() -> None:
     walls = [[[11, 0], [11, 20]], [[12, 0], [12, 20]], [[13, 0], [13, 20]]]
 
     def delivered(margin_db: float, **more: Any) -> int:
-        model = {"kind": "walls", "material": "brick", "margin_db": margin_db, **more}
+        model = {"kind": "wall_attenuation", "material": "brick", "margin_db": margin_db, **more}
         return int(Radio([(10, 10), (14, 10)], [model], walls=walls).one_link(1)["delivered"])
 
     assert (delivered(24.0), delivered(23.9)) == (1, 0)
@@ -239,8 +241,8 @@ def test_walls_take_their_decibels_by_material_and_region() -> None:
     assert (delivered(3.0, loss_db=1.0), delivered(2.9, loss_db=1.0)) == (1, 0)
 
 
-def test_a_line_through_a_corner_meets_one_of_its_two_walls() -> None:
-    model = {"kind": "walls", "loss_db": 1.0, "margin_db": 1.5}
+def test_a_line_through_a_corner_crosses_one_of_its_two_walls() -> None:
+    model = {"kind": "wall_attenuation", "loss_db": 1.0, "margin_db": 1.5}
     radio = Radio(
         [(10, 10), (12, 10)], [model], walls=[[[11, 9], [11, 10], [11, 11]], [[11, 9.5], [11, 10], [11.5, 11]]]
     )
@@ -264,11 +266,11 @@ def test_path_loss_follows_its_curve_over_the_distance() -> None:
         within(1.0 - lost[apart].mean(), expected, math.sqrt(expected * (1 - expected)) or 1e-9, lost[apart].size)
 
 
-def test_walls_before_a_path_loss_weaken_what_it_receives() -> None:
+def test_wall_attenuation_before_a_path_loss_reduces_the_received_power() -> None:
     weak = {"kind": "path_loss", "shadowing_sd_db": 0.0, "width_db": 0.1, "sensitivity_dbm": -75.0}
     walls = [[[15, 0], [15, 20]]]
     assert Radio([(10, 10), (20, 10)], [weak], walls=walls).one_link(10)["delivered"] == 10
-    models = [{"kind": "walls", "material": "brick"}, weak]
+    models: list[dict[str, Any]] = [{"kind": "wall_attenuation", "material": "brick"}, weak]
     assert Radio([(10, 10), (20, 10)], models, walls=walls).one_link(10)["dropped"] == {"weak-signal": 10}
 
 
@@ -277,7 +279,7 @@ def test_shadowing_is_log_normal_lasting_and_the_same_in_both_directions() -> No
     radio = Radio(ring(40, 5.0), [model])
     radio.position[:] = np.array([[50.0, 50.0 + 10.0 * (node % 2)] for node in range(40)])
     summary = radio.all_broadcast(5)
-    books = radio.medium.channels["robots"].accounts.by_link()
+    books = radio.medium.channels["robots"].ledger.by_link()
     fate = dict(zip(zip(books["sender"], books["receiver"], strict=True), books["delivered"], strict=True))
     assert set(fate.values()) == {0, 5}, "a link's shadowing lasts"
     assert all(fate[a, b] == fate[b, a] for a, b in fate)
@@ -286,14 +288,14 @@ def test_shadowing_is_log_normal_lasting_and_the_same_in_both_directions() -> No
     assert summary["dropped"]["weak-signal"] > 0
 
 
-# --- who ------------------------------------------------------------------------------------------------------------
+# --- senders and receivers --------------------------------------------------------------------------------------------
 
 
 def test_a_one_way_link_stays_one_way() -> None:
     model = {"kind": "loss", "fraction": 1.0, "senders": [0], "receivers": [1]}
     radio = Radio(ring(3), [model])
     radio.all_broadcast(20)
-    books = radio.medium.channels["robots"].accounts.by_link()
+    books = radio.medium.channels["robots"].ledger.by_link()
     fate = dict(zip(zip(books["sender"], books["receiver"], strict=True), books["delivered"], strict=True))
     assert fate == {(0, 1): 0, (0, 2): 20, (1, 0): 20, (1, 2): 20, (2, 0): 20, (2, 1): 20}
 
@@ -312,20 +314,20 @@ def heard(radio: Radio, ticks: int, nodes: int) -> list[list[tuple[int, int | No
 ALL_RANDOM = [
     {"kind": "path_loss", "tx_power_dbm": -25.0, "fading_sd_db": 2.0},
     {"kind": "loss", "fraction": 0.2},
-    {"kind": "bursts", "loss_fraction": 0.2, "burst_packets": 3.0},
+    {"kind": "gilbert_elliott", "loss_fraction": 0.2, "burst_packets": 3.0},
     {"kind": "delay", "jitter_s": 0.2},
     {"kind": "duplication", "fraction": 0.2},
     {"kind": "corruption", "bit_error_rate": 0.01},
 ]
 
 
-def test_adding_a_robot_changes_nobody_elses_draws() -> None:
+def test_another_robot_changes_no_random_numbers_of_other_links() -> None:
     four = heard(Radio(ring(4), ALL_RANDOM), 60, 4)
     assert four == heard(Radio([*ring(4), (52.0, 50.0)], ALL_RANDOM), 60, 4)
     assert four != heard(Radio(ring(4), ALL_RANDOM, seed=2), 60, 4)
 
 
-def test_adding_a_model_of_another_kind_changes_no_other_models_draws() -> None:
+def test_another_model_changes_no_random_numbers_of_other_models() -> None:
     idle = {"kind": "rate_limit", "rate_bytes_s": 1e12, "queue_bytes": 1e12}
     four = heard(Radio(ring(4), ALL_RANDOM), 60, 4)
     assert four == heard(Radio(ring(4), [idle, *ALL_RANDOM]), 60, 4)
@@ -334,7 +336,7 @@ def test_adding_a_model_of_another_kind_changes_no_other_models_draws() -> None:
     assert heard(Radio(ring(4), named), 60, 4) == heard(Radio(ring(4), [another, *named]), 60, 4)
 
 
-def test_what_one_robot_sends_changes_nobody_elses_draws() -> None:
+def test_the_packets_of_one_robot_change_no_random_numbers_of_other_links() -> None:
     def run(silent: bool) -> list[Any]:
         radio = Radio(ring(4), ALL_RANDOM)
         for tick in range(60):
@@ -348,14 +350,77 @@ def test_what_one_robot_sends_changes_nobody_elses_draws() -> None:
     assert run(silent=False) == run(silent=True)
 
 
+# --- plug-ins -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", RADIO_MODELS)
+def test_the_catalogue_finds_a_documented_model_class_in_a_file_of_its_own(kind: str) -> None:
+    found = registry.find(kind)
+    assert issubclass(found, RadioModel)
+    assert issubclass(found.Parameters, RadioModelTable)
+    assert RADIO_MODELS[kind] == f"{found.__module__}:{found.__name__}"
+    assert found.__module__.rpartition(".")[2] == kind
+    assert found.__doc__
+    assert [other for other in RADIO_MODELS if RADIO_MODELS[other] == RADIO_MODELS[kind]] == [kind]
+
+
+def test_a_model_of_a_user_has_random_numbers_of_its_own_and_its_cause_in_the_ledger() -> None:
+    rain = {"kind": "own_models:Rain", "mm_per_h": 30.0}
+    summary = Radio(ring(10), [rain]).all_broadcast(100)
+    within(summary["dropped"]["rain"] / 9_000, 0.3, math.sqrt(0.3 * 0.7), 9_000)
+    assert summary["out_of_reach"] == 0
+    four = heard(Radio(ring(4), ALL_RANDOM), 60, 4)
+    assert four == heard(Radio(ring(4), [rain | {"mm_per_h": 0.0}, *ALL_RANDOM]), 60, 4)
+
+
+def test_a_model_states_its_range_and_others_have_no_bound() -> None:
+    radio = Radio(ring(2), [{"kind": "path_loss"}, {"kind": "own_models:Lossy"}], range_m=2.5)
+    models: list[Any] = radio.medium.channels["robots"].models
+    assert [model.range_max_m for model in models] == [2.5, math.inf, math.inf]
+
+
+FORMER: dict[str, dict[str, Any]] = {
+    "bursts": {"loss_fraction": 0.3, "burst_packets": 4.0},
+    "walls": {"loss_db": 1.0, "margin_db": 0.5},
+}
+
+
+@pytest.mark.parametrize("former", FORMER)
+def test_a_former_name_of_a_model_works_with_one_warning_and_the_same_random_numbers(
+    former: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry, "_warned", {})
+    walls = [[[50.0, 40.0], [50.0, 60.0]]]
+
+    def summary(kind: str) -> dict[str, Any]:
+        return Radio(ring(6), [{"kind": kind, **FORMER[former]}], walls=walls).all_broadcast(50)
+
+    current = summary(RENAMED_RADIO_MODELS[former])
+    assert capsys.readouterr().err == ""
+    assert summary(former) == summary(former) == current
+    assert current["dropped"]
+    warning = f"radio.models.0.kind: '{former}' is deprecated, use '{RENAMED_RADIO_MODELS[former]}'"
+    assert capsys.readouterr().err == f"zwerm: warning: small.toml: {warning}\n"
+
+
+def test_these_tests_try_every_former_name() -> None:
+    assert set(FORMER) == set(RENAMED_RADIO_MODELS)
+
+
 # --- mistakes -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("model", "line"),
     [
-        ({"kind": "los"}, "radio.models.0.kind: expected a built-in model (range, line_of_sight, path_loss, walls, loss, "
-         "bursts, delay, duplication, corruption, rate_limit, collision) or module:Class, got 'los'"),
+        ({"kind": "los"}, "radio.models.0.kind: expected a built-in model (range, line_of_sight, path_loss, "
+         "wall_attenuation, loss, gilbert_elliott, delay, duplication, corruption, rate_limit, collision) or module:Class, "
+         "got 'los'"),
+        ({"kind": "own_models:Missing"}, "radio.models.0.kind: module 'own_models' has no class 'Missing'"),
+        ({"kind": "own_models:WithoutJudge"}, "radio.models.0.kind: own_models:WithoutJudge is no radio model: it has no "
+         "method judge(sent, packets)"),
+        ({"kind": "own_models:WithoutContext"}, "radio.models.0.kind: own_models:WithoutContext is no radio model: its "
+         "constructor must take (parameters, context)"),
         ({"kind": "loss"}, "radio.models.0.fraction: required, and missing"),
         ({"kind": "loss", "fraction": 1.5}, "radio.models.0.fraction: expected <= 1, got 1.5"),
         ({"kind": "loss", "fraction": "half"}, 'radio.models.0.fraction: expected a number, got "half"'),
@@ -364,9 +429,9 @@ def test_what_one_robot_sends_changes_nobody_elses_draws() -> None:
          "radio.models.0.senders.1: no such robot: ids are 0 to 1, got 7"),
         ({"kind": "loss", "fraction": 0.1, "receivers": ["coordinator"]},
          "radio.models.0.receivers.0: the scenario has no coordinator"),
-        ({"kind": "bursts", "loss_fraction": 0.9, "burst_packets": 2.0},
+        ({"kind": "gilbert_elliott", "loss_fraction": 0.9, "burst_packets": 2.0},
          "radio.models.0: burst_packets: expected >= 9 for that loss_fraction, got 2"),
-        ({"kind": "bursts", "loss_fraction": 0.5, "burst_packets": 2.0, "bad_loss_fraction": 0.5},
+        ({"kind": "gilbert_elliott", "loss_fraction": 0.5, "burst_packets": 2.0, "bad_loss_fraction": 0.5},
          "radio.models.0: loss_fraction: expected < bad_loss_fraction 0.5, got 0.5"),
         ({"kind": "collision"}, "radio.models.0: expected either airtime_s or rate_bytes_s"),
         ({"kind": "delay", "distribution": "normal"},
@@ -379,7 +444,7 @@ def test_a_mistake_in_a_model_is_one_line(model: dict[str, Any], line: str) -> N
     assert caught.value.mistakes == [line]
 
 
-def test_the_pairs_of_a_channel_are_all_there_and_those_that_are_stopped_are_told() -> None:
+def test_a_channel_lists_all_its_pairs_and_the_blocked_ones() -> None:
     radio = Radio([(50.0 + node, 50.0) for node in range(20)], [{"kind": "range", "range_m": 17.5}])
     pairs = radio.medium.channels["robots"].pairs()
     assert sorted(pairs) == [(a, b) for a in range(20) for b in range(20) if a != b]

@@ -47,7 +47,7 @@ class Mailbox(Hygrometer):
 
 
 class Untyped(Hygrometer):
-    Parameters = dict
+    Parameters = dict  # type: ignore[assignment]
 
 
 class Lonely(Hygrometer):

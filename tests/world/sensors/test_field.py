@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,7 +51,7 @@ def test_each_kind_has_the_value_its_formula_gives():
 @settings(max_examples=60, deadline=None)
 @pytest.mark.parametrize("kind", ["constant", "linear", "gaussians", "bitmap"])
 def test_the_gradient_is_how_the_value_changes(picture, kind, at):
-    parameters = {
+    parameters: Any = {
         "constant": {"value": 2.0},
         "linear": {"gradient_per_m": [2.0, -1.0]},
         "gaussians": {"amplitudes": [3.0, -1.0], "centers_m": [[0.5, 0.5], [2.0, 1.0]], "sd_m": [0.4, 0.8]},

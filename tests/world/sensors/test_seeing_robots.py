@@ -91,13 +91,13 @@ def numbers(sensor, scene):
 
 
 def test_bearing_noise_is_gaussian_with_the_given_spread_and_bias(make_scene, sensor_for, crowd):
-    errors = []
+    found = []
     for tick in range(40):
         scene = make_scene(crowd, tick=tick)
         exact = numbers(sensor_for(scene, "bearings"), scene)
         noisy = numbers(sensor_for(scene, "bearings", sd_rad=0.1, bias_rad=0.05), scene)
-        errors.append(np.remainder(noisy[:, 2] - exact[:, 2] + np.pi, 2.0 * np.pi) - np.pi)
-    errors = np.array(errors)
+        found.append(np.remainder(noisy[:, 2] - exact[:, 2] + np.pi, 2.0 * np.pi) - np.pi)
+    errors = np.array(found)
     assert errors.mean() == pytest.approx(0.05, abs=4 * 0.1 / math.sqrt(errors.size))
     assert errors.std() == pytest.approx(0.1, rel=0.03)
     assert (np.abs(errors - 0.05) < 0.1).mean() == pytest.approx(0.6827, abs=0.02)
@@ -109,12 +109,12 @@ def test_bearing_noise_is_gaussian_with_the_given_spread_and_bias(make_scene, se
 
 
 def test_neighbour_noise_is_gaussian_and_independent_in_both_axes(make_scene, sensor_for, crowd):
-    errors = []
+    found = []
     for tick in range(40):
         scene = make_scene(crowd, tick=tick)
         exact, noisy = (numbers(sensor_for(scene, "neighbours", sd_m=sd), scene) for sd in (0.0, 0.02))
-        errors.append(noisy[:, 2:] - exact[:, 2:])
-    errors = np.concatenate(errors)
+        found.append(noisy[:, 2:] - exact[:, 2:])
+    errors = np.concatenate(found)
     assert errors.mean(axis=0) == pytest.approx([0.0, 0.0], abs=4 * 0.02 / math.sqrt(len(errors)))
     assert errors.std(axis=0) == pytest.approx([0.02, 0.02], rel=0.03)
     assert abs(np.corrcoef(errors.T)[0, 1]) < 0.03

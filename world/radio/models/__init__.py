@@ -1,1 +1,1 @@
-"""The models of the radio, one file each; `zwerm.world.radio.registry` names them."""
+"""Radio models, one file each. The catalogue names them."""

@@ -1,7 +1,7 @@
 """Bit corruption: every bit of a payload is flipped with the same probability, independently (binary symmetric channel).
 
-A damaged packet is delivered: the receiver's decoder has to refuse it. Where the first error falls is geometric, and so is
-every gap to the next; only packets with an error are looked at twice.
+A damaged packet is delivered: the decoder of the receiver has to refuse it. The position of the first error is geometric,
+and so is every gap to the next.
 """
 
 import math
@@ -12,46 +12,43 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from zwerm.maths.keyed_random import splitmix64, unit
-from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
+from zwerm.world.radio import ModelContext, Packets, RadioModel, RadioModelTable, Transmissions, Verdict
 
 
-class CorruptionTable(LinkTable):
+class CorruptionTable(RadioModelTable):
     """The probability that a bit is flipped."""
 
     bit_error_rate: Annotated[float, Field(ge=0, lt=1)]
 
 
-class Corruption:
+class Corruption(RadioModel):
     """Flips bits of payloads; drops nothing."""
 
-    kind: ClassVar[str] = "corruption"
-    cause: ClassVar[str] = "corruption"
-    needs_positions: ClassVar[bool] = False
-    Parameters: ClassVar[type[LinkTable]] = CorruptionTable
+    Parameters: ClassVar[type[RadioModelTable]] = CorruptionTable
 
-    def __init__(self, parameters: CorruptionTable, place: ModelPlace) -> None:
+    def __init__(self, parameters: CorruptionTable, context: ModelContext) -> None:
         self._rate = parameters.bit_error_rate
-        self._draws = place.link_draws()
+        self._random = context.link_random()
 
-    def judge(self, air: Air, packets: Packets) -> Verdict:
-        """Draw where the first error of every packet falls, and damage those in which it does."""
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Choose the position of the first error of every packet, and damage packets that are longer than that."""
         if not self._rate:
             return Verdict()
-        bits = 8 * air.sizes()[packets.payload]
-        words = self._draws.words(packets.link, packets.key)
+        bits = 8 * sent.sizes()[packets.payload]
+        words = self._random.words(packets.link, packets.key)
         # P(no error in m bits) = (1 - rate)^m
         damaged = np.flatnonzero(unit(words) < -np.expm1(bits * math.log1p(-self._rate)))
         if not len(damaged):
             return Verdict()
         payload = packets.payload.copy()
         for row in damaged.tolist():
-            sent = air.payloads[payload[row]]
-            payload[row] = len(air.payloads)
-            air.payloads.append(self._damage(sent, words[row : row + 1]))
+            clean = sent.payloads[payload[row]]
+            payload[row] = len(sent.payloads)
+            sent.payloads.append(self._damage(clean, words[row : row + 1]))
         return Verdict(payload=payload)
 
     def _damage(self, payload: bytes, word: NDArray[np.uint64]) -> bytes:
-        """Return `payload` with at least the bit flipped that `word` chooses."""
+        """Return `payload` with flipped bits, at least the one that `word` chooses."""
         flipped = bytearray(payload)
         bit = -1
         while (bit := bit + 1 + self._gap(word)) < 8 * len(payload):
@@ -60,5 +57,10 @@ class Corruption:
         return bytes(flipped)
 
     def _gap(self, word: NDArray[np.uint64]) -> int:
-        """Return how many bits stay whole before the next error."""
+        """Return the number of correct bits before the next error."""
         return int(min(math.log1p(-float(unit(word)[0])) / math.log1p(-self._rate), 2.0**40))
+
+    @classmethod
+    def network_rule(cls, parameters: CorruptionTable) -> None:
+        """Raise ValueError: no damaged packet passes a kernel."""
+        raise ValueError("the kernel drops packets with a wrong checksum")

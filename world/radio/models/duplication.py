@@ -1,6 +1,6 @@
 """Duplication: some packets arrive more than once, as behind a link layer whose acknowledgements get lost.
 
-A copy is judged by the models that follow with draws of its own. It counts as sent, and as a copy.
+The models that follow judge a copy with random numbers of its own. It counts as sent, and as a copy.
 """
 
 from typing import Annotated, ClassVar
@@ -9,30 +9,32 @@ import numpy as np
 from pydantic import Field
 
 from zwerm.scenario.types import Fraction
-from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
+from zwerm.world.radio import ModelContext, Packets, RadioModel, RadioModelTable, Transmissions, Verdict
 
 
-class DuplicationTable(LinkTable):
-    """The fraction of packets that are copied, and how many copies arrive besides the packet."""
+class DuplicationTable(RadioModelTable):
+    """The fraction of packets that are copied, and the number of copies that arrive besides the packet."""
 
     fraction: Fraction
     copies: Annotated[int, Field(ge=1, le=15)] = 1
 
 
-class Duplication:
+class Duplication(RadioModel):
     """Copies each packet with probability `fraction`; drops nothing."""
 
-    kind: ClassVar[str] = "duplication"
-    cause: ClassVar[str] = "duplication"
-    needs_positions: ClassVar[bool] = False
-    Parameters: ClassVar[type[LinkTable]] = DuplicationTable
+    Parameters: ClassVar[type[RadioModelTable]] = DuplicationTable
 
-    def __init__(self, parameters: DuplicationTable, place: ModelPlace) -> None:
+    def __init__(self, parameters: DuplicationTable, context: ModelContext) -> None:
         self._fraction = parameters.fraction
         self._copies = parameters.copies
-        self._draws = place.link_draws()
+        self._random = context.link_random()
 
-    def judge(self, air: Air, packets: Packets) -> Verdict:
-        """Draw once for every packet."""
-        copied = self._draws.uniform(packets.link, packets.key) < self._fraction
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Compare one random number of each packet with the fraction."""
+        copied = self._random.uniform(packets.link, packets.key) < self._fraction
         return Verdict(copies=copied.astype(np.int64) * self._copies)
+
+    @classmethod
+    def network_rule(cls, parameters: DuplicationTable) -> None:
+        """Raise ValueError: no duplicate passes Zenoh."""
+        raise ValueError("Zenoh drops duplicates by their sequence number")

@@ -1,30 +1,34 @@
-"""Line of sight: a wall between two robots stops a packet, as it stops light.
+"""Line of sight: a wall between two robots stops a packet.
 
-What was found for a link is kept while neither end moves. Bodies do not block.
+The result for a link is kept while neither of its nodes moves. Bodies do not block.
 """
 
 from typing import ClassVar
 
 import numpy as np
 
-from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
+from zwerm.world.radio import ModelContext, Packets, RadioModel, RadioModelTable, Transmissions, Verdict
+from zwerm.world.radio.network_rules import BlockedPairs
 from zwerm.world.radio.static_links import StaticLinkValues
 
 
-class LineOfSightModel:
-    """Drops what a wall stands in the way of, at the time of sending."""
+class LineOfSightModel(RadioModel):
+    """Drops packets whose line from sender to receiver crosses a wall at the time of sending."""
 
-    kind: ClassVar[str] = "line_of_sight"
     cause: ClassVar[str] = "no-line-of-sight"
     needs_positions: ClassVar[bool] = True
     out_of_reach: ClassVar[bool] = True
-    Parameters: ClassVar[type[LinkTable]] = LinkTable
 
-    def __init__(self, parameters: LinkTable, place: ModelPlace) -> None:
+    def __init__(self, parameters: RadioModelTable, context: ModelContext) -> None:
         self._blocked = StaticLinkValues(
-            place.links, lambda start, end: place.arena.blocked(start, end).astype(np.float64)
+            context.links, lambda start, end: context.arena.blocked(start, end).astype(np.float64)
         )
 
-    def judge(self, air: Air, packets: Packets) -> Verdict:
-        """Test the segment between the two positions against every wall."""
-        return Verdict(self._blocked.between(air.scene, packets) > 0.0)
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Test the segment between both positions against every wall."""
+        return Verdict(self._blocked.between(sent.scene, packets) > 0.0)
+
+    @classmethod
+    def network_rule(cls, parameters: RadioModelTable) -> BlockedPairs:
+        """Return that the world computes the blocked pairs."""
+        return BlockedPairs()

@@ -1,29 +1,33 @@
-"""Independent loss: every packet is lost with the same probability, whatever became of those before it (Bernoulli)."""
+"""Independent loss: each packet is lost with the same probability, independently of all others (Bernoulli)."""
 
 from typing import ClassVar
 
 from zwerm.scenario.types import Fraction
-from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
+from zwerm.world.radio import ModelContext, Packets, RadioModel, RadioModelTable, Transmissions, Verdict
+from zwerm.world.radio.network_rules import RandomLoss
 
 
-class LossTable(LinkTable):
+class LossTable(RadioModelTable):
     """The fraction of packets lost."""
 
     fraction: Fraction
 
 
-class Loss:
-    """Drops each packet with probability `fraction`, drawn by link and packet."""
+class Loss(RadioModel):
+    """Drops each packet with probability `fraction`."""
 
-    kind: ClassVar[str] = "loss"
     cause: ClassVar[str] = "loss"
-    needs_positions: ClassVar[bool] = False
-    Parameters: ClassVar[type[LinkTable]] = LossTable
+    Parameters: ClassVar[type[RadioModelTable]] = LossTable
 
-    def __init__(self, parameters: LossTable, place: ModelPlace) -> None:
+    def __init__(self, parameters: LossTable, context: ModelContext) -> None:
         self._fraction = parameters.fraction
-        self._draws = place.link_draws()
+        self._random = context.link_random()
 
-    def judge(self, air: Air, packets: Packets) -> Verdict:
-        """Draw once for every packet."""
-        return Verdict(self._draws.uniform(packets.link, packets.key) < self._fraction)
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Compare one random number of each packet with the fraction."""
+        return Verdict(self._random.uniform(packets.link, packets.key) < self._fraction)
+
+    @classmethod
+    def network_rule(cls, parameters: LossTable) -> RandomLoss:
+        """Return loss without memory."""
+        return RandomLoss(parameters.fraction)

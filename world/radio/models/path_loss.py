@@ -3,9 +3,10 @@
     P_r = tx_power_dbm - reference_loss_db - 10 exponent log10(d / reference_m) - X - walls,    X ~ N(0, shadowing_sd_db)
 
 Rappaport: Wireless Communications, 2nd ed. 2002, eq. 4.69. X belongs to a pair of robots, the same in both directions and
-for the whole run; `fading_sd_db` adds a draw of its own to every packet. "walls" is what a `walls` model before this one has
-found. The chance to get through is logistic in P_r: one half at `sensitivity_dbm`, from 12 % to 88 % over 4 `width_db`, the
-transitional region of Zuniga, Krishnamachari: Analyzing the transitional region in low power wireless links. SECON 2004.
+for the whole run; `fading_sd_db` adds a random number of its own to every packet. "walls" is the attenuation by an earlier
+`wall_attenuation`. The probability of reception is logistic in P_r: one half at `sensitivity_dbm`, from 12 % to 88 % over 4
+`width_db`, the transitional region of Zuniga, Krishnamachari: Analyzing the transitional region in low power wireless
+links. SECON 2004.
 
 The defaults are those of an IEEE 802.15.4 radio (0 dBm, -94 dBm) indoors.
 """
@@ -15,11 +16,11 @@ from typing import ClassVar
 import numpy as np
 
 from zwerm.scenario.types import Finite, NonNegative, Positive
-from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
+from zwerm.world.radio import ModelContext, Packets, RadioModel, RadioModelTable, Transmissions, Verdict
 from zwerm.world.scene import Floats
 
 
-class PathLossTable(LinkTable):
+class PathLossTable(RadioModelTable):
     """Powers [dBm], losses and deviations [dB], distances [m]."""
 
     tx_power_dbm: Finite = 0.0
@@ -32,34 +33,33 @@ class PathLossTable(LinkTable):
     width_db: Positive = 1.0
 
 
-class PathLoss:
-    """Drops what is received too weakly, by chance."""
+class PathLoss(RadioModel):
+    """Drops packets with a probability that depends on the received power."""
 
-    kind: ClassVar[str] = "path_loss"
     cause: ClassVar[str] = "weak-signal"
     needs_positions: ClassVar[bool] = True
-    Parameters: ClassVar[type[LinkTable]] = PathLossTable
+    Parameters: ClassVar[type[RadioModelTable]] = PathLossTable
 
-    def __init__(self, parameters: PathLossTable, place: ModelPlace) -> None:
+    def __init__(self, parameters: PathLossTable, context: ModelContext) -> None:
         self._table = parameters
-        self._place = place
-        self._draws = place.link_draws()
-        self._fading = place.link_draws("/fading")
-        self._shadow_db = place.links.numbers(np.nan)
+        self._context = context
+        self._random = context.link_random()
+        self._fading = context.link_random("/fading")
+        self._shadow_db = context.links.numbers(np.nan)
 
-    def judge(self, air: Air, packets: Packets) -> Verdict:
-        """Draw against the delivery curve."""
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Compare one random number of each packet with its probability of reception."""
         with np.errstate(over="ignore"):
             chance = 1.0 / (
-                1.0 + np.exp((self._table.sensitivity_dbm - self.power_dbm(air, packets)) / self._table.width_db)
+                1.0 + np.exp((self._table.sensitivity_dbm - self.power_dbm(sent, packets)) / self._table.width_db)
             )
-        return Verdict(self._draws.uniform(packets.link, packets.key) >= chance)
+        return Verdict(self._random.uniform(packets.link, packets.key) >= chance)
 
-    def power_dbm(self, air: Air, packets: Packets) -> Floats:
-        """Return (k,) the power with which each packet is received [dBm]."""
-        table, position = self._table, air.scene.position
+    def power_dbm(self, sent: Transmissions, packets: Packets) -> Floats:
+        """Return (k,) the received power of each packet [dBm]."""
+        table, position = self._table, sent.scene.position
         offset = position[packets.sender] - position[packets.receiver]
-        # Nearer than the reference distance the model does not hold, and the power grows no further.
+        # The model does not apply below the reference distance: the power is constant there.
         distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]) / table.reference_m, 1.0)
         power: Floats = table.tx_power_dbm - table.reference_loss_db - 10.0 * table.exponent * np.log10(distance)
         if table.shadowing_sd_db:
@@ -69,14 +69,19 @@ class PathLoss:
         return power if packets.attenuation_db is None else power - packets.attenuation_db
 
     def _shadowing_db(self, packets: Packets) -> Floats:
-        """Return (k,) the shadowing of each packet's pair of robots [dB], drawn once."""
+        """Return (k,) the shadowing of the pair of robots of each packet [dB], constant over a run."""
         shadow = self._shadow_db.values
         new = np.isnan(shadow[packets.link])
         if new.any():
             link, sender, receiver = packets.link[new], packets.sender[new], packets.receiver[new]
-            draw = self._place.draws.normal(
-                self._place.purpose + "/shadowing", np.minimum(sender, receiver), np.maximum(sender, receiver)
+            draw = self._context.draws.normal(
+                self._context.purpose + "/shadowing", np.minimum(sender, receiver), np.maximum(sender, receiver)
             )
             shadow[link] = self._table.shadowing_sd_db * draw
         drawn: Floats = shadow[packets.link]
         return drawn
+
+    @classmethod
+    def network_rule(cls, parameters: PathLossTable) -> None:
+        """Raise ValueError: the probability of loss depends on the distance."""
+        raise ValueError("its chance changes with every distance; say range and loss")

@@ -1,4 +1,4 @@
-"""Disc range: a packet carries `range_m` and not a step further, the unit disc model of the literature.
+"""Disc range: a packet reaches all nodes within `range_m` and no others, the unit disc model.
 
 Clark, Colbourn, Johnson: Unit disk graphs. Discrete Mathematics 86 (1990).
 """
@@ -8,28 +8,33 @@ from typing import ClassVar
 import numpy as np
 
 from zwerm.scenario.types import Positive
-from zwerm.world.radio import Air, LinkTable, ModelPlace, Packets, Verdict
+from zwerm.world.radio import ModelContext, Packets, RadioModel, RadioModelTable, Transmissions, Verdict
+from zwerm.world.radio.network_rules import BlockedPairs
 
 
-class RangeTable(LinkTable):
-    """How far a packet carries [m]."""
+class RangeTable(RadioModelTable):
+    """The greatest distance that a packet travels [m]."""
 
     range_m: Positive
 
 
-class DiscRange:
-    """Drops what is sent further than `range_m`, by the two positions at the time of sending."""
+class DiscRange(RadioModel):
+    """Drops packets over more than `range_m`, by the positions of both nodes at the time of sending."""
 
-    kind: ClassVar[str] = "range"
     cause: ClassVar[str] = "out-of-range"
     needs_positions: ClassVar[bool] = True
     out_of_reach: ClassVar[bool] = True
-    Parameters: ClassVar[type[LinkTable]] = RangeTable
+    Parameters: ClassVar[type[RadioModelTable]] = RangeTable
 
-    def __init__(self, parameters: RangeTable, place: ModelPlace) -> None:
-        self._range_m = parameters.range_m
+    def __init__(self, parameters: RangeTable, context: ModelContext) -> None:
+        self.range_max_m = parameters.range_m
 
-    def judge(self, air: Air, packets: Packets) -> Verdict:
-        """Compare distances."""
-        offset = air.scene.position[packets.sender] - air.scene.position[packets.receiver]
-        return Verdict(np.asarray(np.hypot(offset[:, 0], offset[:, 1]) > self._range_m))
+    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
+        """Compare the distance of each packet with the range."""
+        offset = sent.scene.position[packets.sender] - sent.scene.position[packets.receiver]
+        return Verdict(np.asarray(np.hypot(offset[:, 0], offset[:, 1]) > self.range_max_m))
+
+    @classmethod
+    def network_rule(cls, parameters: RangeTable) -> BlockedPairs:
+        """Return that the world computes the blocked pairs."""
+        return BlockedPairs()

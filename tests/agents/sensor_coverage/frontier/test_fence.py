@@ -23,17 +23,17 @@ SIXTY = math.pi / 3.0
 
 
 def swarm(
-    places: dict[int, tuple[float, float]], turned: dict[int, float] | None = None, range_m: float = 1.0, blind=()
+    slots: dict[int, tuple[float, float]], turned: dict[int, float] | None = None, range_m: float = 1.0, blind=()
 ) -> tuple[Views, FlagComplex]:
     """What robots at these places see of each other, each in a frame of its own."""
     turned = turned or {}
     views: Views = {
         i: {
             j: math.remainder(math.atan2(there[1] - here[1], there[0] - here[0]) - turned.get(i, 0.0), math.tau)
-            for j, there in places.items()
+            for j, there in slots.items()
             if j != i and math.dist(here, there) <= range_m and (i, j) not in blind
         }
-        for i, here in places.items()
+        for i, here in slots.items()
     }
     return views, FlagComplex(views)
 
@@ -66,11 +66,11 @@ def test_an_edge_between_two_triangles_is_covered_on_both_sides_and_one_below_bo
     assert uncovered(views, complex_, 1, 2) == (-1,)
 
 
-def test_the_fence_of_a_hexagon_is_its_rim_and_a_new_robot_goes_at_60_degrees() -> None:
+def test_the_fence_of_a_hexagon_is_its_boundary_and_a_new_robot_is_placed_at_60_degrees() -> None:
     views, complex_ = swarm(hexagon())
     found = fence(views, complex_, 0.0)
-    rim = [(1, 2), (1, 6), (2, 3), (3, 4), (4, 5), (5, 6)]
-    assert [side.edge for side in found.sides] == rim
+    boundary_edges = [(1, 2), (1, 6), (2, 3), (3, 4), (4, 5), (5, 6)]
+    assert [side.edge for side in found.sides] == boundary_edges
     assert found.corners == ()
     assert all(side.angle_i_rad == pytest.approx(SIXTY) for side in found.sides)
     assert {side.edge: side.sign for side in found.sides}[1, 2] == -1
@@ -78,34 +78,34 @@ def test_the_fence_of_a_hexagon_is_its_rim_and_a_new_robot_goes_at_60_degrees() 
 
 def test_an_edge_inside_other_triangles_of_a_common_neighbour_is_an_exception() -> None:
     """Figure 6(a): from k, the chain i, 3, 4, j passes beyond the edge {i, j}."""
-    places = {0: (0.0, 0.0), 1: (0.7, -0.4), 2: (0.7, 0.4), 3: (0.9, -0.2), 4: (0.9, 0.2)}
-    views, complex_ = swarm(places)
+    slots = {0: (0.0, 0.0), 1: (0.7, -0.4), 2: (0.7, 0.4), 3: (0.9, -0.2), 4: (0.9, 0.2)}
+    views, complex_ = swarm(slots)
     assert is_exception(views, complex_, 1, 2)
 
 
 def test_a_chain_on_this_side_of_the_edge_is_no_exception() -> None:
     """The trap: with a robot within triangle kij the printed rule would fire, though nothing covers what is beyond."""
-    places = {0: (0.0, 0.0), 1: (0.7, -0.4), 2: (0.7, 0.4), 3: (0.3, 0.0)}
-    views, complex_ = swarm(places)
+    slots = {0: (0.0, 0.0), 1: (0.7, -0.4), 2: (0.7, 0.4), 3: (0.3, 0.0)}
+    views, complex_ = swarm(slots)
     assert not is_exception(views, complex_, 1, 2)
     assert (1, 2) in [side.edge for side in fence(views, complex_, 0.0).sides]
 
 
-def test_robots_that_stand_exactly_in_line_along_a_wall_are_no_exception_to_anything() -> None:
+def test_robots_exactly_in_line_along_a_wall_make_no_exception_edge() -> None:
     views, complex_ = swarm({1: (0.0, 0.0), 2: (0.4, 0.0), 3: (0.9, 0.0), 4: (0.4, 0.5)})
     assert relative(views[3], 1, 2) == 0.0
     assert not is_exception(views, complex_, 1, 2)
 
 
-def test_robots_that_stand_at_one_place_are_no_exception_to_anything() -> None:
+def test_robots_at_the_same_point_make_no_exception_edge() -> None:
     views, complex_ = swarm({1: (0.0, 0.0), 2: (0.9, 0.0), 3: (0.9, 0.0), 4: (0.45, 0.3)})
     assert not is_exception(views, complex_, 2, 3)
 
 
 def test_a_gap_below_120_degrees_is_bisected() -> None:
     """Figure 8(b): min(60 degrees, half the angle to the next neighbour)."""
-    places = {1: (0.0, 0.0), 2: (0.95, 0.0), 3: (0.95 * math.cos(1.7), 0.95 * math.sin(1.7))}
-    views, complex_ = swarm(places)
+    slots = {1: (0.0, 0.0), 2: (0.95, 0.0), 3: (0.95 * math.cos(1.7), 0.95 * math.sin(1.7))}
+    views, complex_ = swarm(slots)
     sides = {(side.i, side.j, side.sign): side for side in fence(views, complex_, 0.0).sides}
     assert sides[1, 2, 1].angle_i_rad == pytest.approx(0.85)
     assert sides[1, 2, 1].angle_j_rad == pytest.approx(SIXTY)
@@ -113,26 +113,26 @@ def test_a_gap_below_120_degrees_is_bisected() -> None:
     assert nearest_on_side(views, complex_, 1, 2, 1) == 3
 
 
-def test_a_corner_below_60_degrees_is_an_obstacles() -> None:
+def test_a_corner_below_60_degrees_makes_obstacle_edges() -> None:
     """Figure 6(c): j and k do not see each other though they are near, so something stands between them."""
-    places = {1: (0.0, 0.0), 2: (0.9, 0.0), 3: (0.9 * math.cos(0.9), 0.9 * math.sin(0.9))}
-    views, complex_ = swarm(places, blind=((2, 3), (3, 2)))
+    slots = {1: (0.0, 0.0), 2: (0.9, 0.0), 3: (0.9 * math.cos(0.9), 0.9 * math.sin(0.9))}
+    views, complex_ = swarm(slots, blind=((2, 3), (3, 2)))
     found = fence(views, complex_, 0.0)
     assert found.corners == ((1, 2), (1, 3))
     assert Side(1, 2, 1) not in found.sides
 
 
-def test_one_sided_sight_makes_no_edge() -> None:
+def test_a_bearing_from_one_end_only_makes_no_edge() -> None:
     views, complex_ = swarm(hexagon(), blind=((1, 2),))
     assert (1, 2) not in complex_
     assert (1, 2) not in [side.edge for side in fence(views, complex_, 0.15).sides]
 
 
-def test_turning_any_robots_frame_changes_nothing() -> None:
+def test_turning_any_robots_frame_does_not_change_the_fence() -> None:
     random = np.random.default_rng(5)
-    places = {n: (float(x), float(y)) for n, (x, y) in enumerate(random.uniform(0.0, 2.5, (25, 2)))}
-    straight, complex_ = swarm(places)
-    turned, _ = swarm(places, {n: float(random.uniform(-3.0, 3.0)) for n in places})
+    slots = {n: (float(x), float(y)) for n, (x, y) in enumerate(random.uniform(0.0, 2.5, (25, 2)))}
+    straight, complex_ = swarm(slots)
+    turned, _ = swarm(slots, {n: float(random.uniform(-3.0, 3.0)) for n in slots})
     expected, found = fence(straight, complex_, 0.15), fence(turned, complex_, 0.15)
     assert found.corners == expected.corners
     assert [side[:3] for side in found.sides] == [side[:3] for side in expected.sides]
@@ -146,8 +146,8 @@ def test_wedges_close_the_fence_where_the_sign_rule_leaves_it_open() -> None:
     views, complex_ = swarm({1: (0.0, 0.0), 2: (0.95, 0.0)})
     assert [(i, a, b) for i, a, b, _ in wedges(views, complex_)] == [(1, 2, 2), (2, 1, 1)]
     views, complex_ = swarm(hexagon())
-    rim = {frozenset((i, each)) for i, a, b, _ in wedges(views, complex_) for each in (a, b)}
-    assert rim == {frozenset((n, n % 6 + 1)) for n in range(1, 7)}
+    boundary_edges = {frozenset((i, each)) for i, a, b, _ in wedges(views, complex_) for each in (a, b)}
+    assert boundary_edges == {frozenset((n, n % 6 + 1)) for n in range(1, 7)}
 
 
 def test_a_path_avoids_obstacle_edges_where_the_way_round_is_cheaper() -> None:
@@ -158,7 +158,7 @@ def test_a_path_avoids_obstacle_edges_where_the_way_round_is_cheaper() -> None:
     assert reach(complex_, {12: 0.0}, ((11, 12), (2, 11)), 3.0).path(2) == (12, 10, 6, 2)
 
 
-def test_of_several_sources_the_nearest_pushes() -> None:
+def test_the_path_begins_at_the_nearest_of_several_sources() -> None:
     complex_ = FlagComplex({n: [m for m in (n - 1, n + 1) if 0 <= m <= 6] for n in range(7)})
     ways = reach(complex_, {0: 0.0, 6: 0.0}, (), 3.0)
     assert ways.path(2) == (0, 1, 2)

@@ -10,11 +10,10 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.assignment import CheapestFirst
+from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
-from zwerm.agents.sensor_coverage.frontier.planner import Planner, PlannerParameters
-from zwerm.agents.sensor_coverage.frontier.relative_homology import RelativeHomology
-from zwerm.agents.sensor_coverage.frontier.services import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import (
     Answer,
@@ -24,16 +23,18 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Deploy,
     Emerged,
     Move,
-    Order,
     Release,
     Request,
     Response,
+    RobotCommand,
     Sighting,
-    read_dispatch,
+    read_request,
     write,
 )
+from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox
 from zwerm.coordinator.sensor_coverage.push_execution import PushExecution
+from zwerm.coordinator.sensor_coverage.relative_homology import RelativeHomology
 from zwerm.coordinator.sensor_coverage.sources import Sources
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.wire.messages import Packet
@@ -56,50 +57,50 @@ class Swarm:
         self.position = dict(position)
         random = np.random.default_rng(turned_seed)
         self.turned = {robot: float(random.uniform(-3.0, 3.0)) for robot in position}
-        self.places = Slots()
+        self.slots = Slots()
         for robot in self.position:
-            self.places.found(robot)
+            self.slots.add(robot)
         for robot, here in self.position.items():
             seen = [
                 Sighting(other, math.remainder(direction(here, there) - self.turned[robot], math.tau))
                 for other, there in self.position.items()
                 if other != robot and math.dist(here, there) <= range_m
             ]
-            self.places.take(robot, seen)
-        self.places.learn_headings(self.position)
-        views = self.places.views()
-        self.places.learn_references(views)
-        self.place = self.places.place_of()
-        bases = () if base is None else (self.place[base],)
-        self.picture = ScanResult(views, FlagComplex(views), bases)
-        self.planner = Planner(PlannerParameters(), self.places)
+            self.slots.take(robot, seen)
+        self.slots.learn_headings(self.position)
+        views = self.slots.views()
+        self.slots.learn_references(views)
+        self.slot = self.slots.slot_of()
+        bases = () if base is None else (self.slot[base],)
+        self.scan = ScanResult(views, FlagComplex(views), bases)
+        self.planner = Planner(PlannerParameters(), self.slots)
 
-    def look(self) -> "Swarm":
-        self.planner.look(self.picture)
+    def update(self) -> "Swarm":
+        self.planner.update(self.scan)
         return self
 
     def touch(self, robot: int, *towards_deg: float) -> None:
         """Let a robot touch walls in these directions of the truth."""
-        self.places.walls[self.place[robot]] = [math.radians(each) + self.off(robot) for each in towards_deg]
+        self.slots.walls[self.slot[robot]] = [math.radians(each) + self.off(robot) for each in towards_deg]
 
     def off(self, robot: int) -> float:
-        return self.places.heading[robot] - self.turned[robot]
+        return self.slots.heading[robot] - self.turned[robot]
 
     def robots(self, edges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-        occupant = self.places.occupant
+        occupant = self.slots.occupant
         return sorted((min(occupant[i], occupant[j]), max(occupant[i], occupant[j])) for i, j in edges)
 
     def goal(self, plan: Plan) -> Point:
         """Where a plan leads, in truth."""
-        robot = self.places.occupant[plan.mover]
+        robot = self.slots.occupant[plan.mover]
         return at(math.degrees(plan.direction - self.off(robot)), plan.hop_m, self.position[robot])
 
     def plans(self, *pair: int) -> list[Plan]:
         first = next(iter(self.planner.plans()))
-        return [each for each in first if self.robots([each.key[:2]])[0] == pair]
+        return [each for each in first if self.robots([(each.key[0], each.key[1])])[0] == pair]
 
-    def ways(self, complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
-        return Dijkstra(3.0).ways(complex_, sources, self.planner.obstacle)
+    def routes(self, complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
+        return Dijkstra(3.0).routes(complex_, sources, self.planner.obstacle)
 
 
 def direction(here: Point, there: Point) -> float:
@@ -112,19 +113,19 @@ def direction(here: Point, there: Point) -> float:
 def figure_5() -> Swarm:
     """Nine robots in a hexagonal packing, and robot 10 among them."""
     ring = {n + 1: at(60.0 * n) for n in range(6)}
-    return Swarm({**ring, 7: (0.0, 0.0), 8: at(30.0, 1.645), 9: at(90.0, 1.645), 10: (0.25, 0.1)}).look()
+    return Swarm({**ring, 7: (0.0, 0.0), 8: at(30.0, 1.645), 9: at(90.0, 1.645), 10: (0.25, 0.1)}).update()
 
 
 def test_figure_5_robot_10_is_redundant_and_no_other() -> None:
     swarm = figure_5()
-    found = RelativeHomology().redundant(swarm.picture, swarm.planner.rim())
-    assert [swarm.places.occupant[place] for place in found] == [10]
+    add = RelativeHomology().redundant(swarm.scan, swarm.planner.boundary_edges())
+    assert [swarm.slots.occupant[slot] for slot in add] == [10]
 
 
-def test_figure_5_without_robot_10_nobody_is_redundant() -> None:
+def test_figure_5_without_robot_10_no_robot_is_redundant() -> None:
     position = figure_5().position
-    swarm = Swarm({robot: there for robot, there in position.items() if robot != 10}).look()
-    assert RelativeHomology().redundant(swarm.picture, swarm.planner.rim()) == ()
+    swarm = Swarm({robot: there for robot, there in position.items() if robot != 10}).update()
+    assert RelativeHomology().redundant(swarm.scan, swarm.planner.boundary_edges()) == ()
 
 
 # --- figure 6 -------------------------------------------------------------------------------------------------------
@@ -134,10 +135,10 @@ _I, _J, _K = 1, 2, 3
 
 def test_figure_6a_an_edge_within_other_triangles_of_k_is_an_exception() -> None:
     k1, k2 = 4, 5
-    swarm = Swarm({_I: (0.7, -0.4), _J: (0.7, 0.4), _K: (0.0, 0.0), k1: (0.9, -0.2), k2: (0.9, 0.2)}).look()
+    swarm = Swarm({_I: (0.7, -0.4), _J: (0.7, 0.4), _K: (0.0, 0.0), k1: (0.9, -0.2), k2: (0.9, 0.2)}).update()
     assert (_I, _J) not in swarm.robots(side.edge for side in swarm.planner.fence.sides)
     assert (_I, _J) not in swarm.robots([*swarm.planner.frontier, *swarm.planner.obstacle])
-    alone = Swarm({_I: (0.7, -0.4), _J: (0.7, 0.4), _K: (0.0, 0.0)}).look()
+    alone = Swarm({_I: (0.7, -0.4), _J: (0.7, 0.4), _K: (0.0, 0.0)}).update()
     assert (_I, _J) in alone.robots(alone.planner.frontier)
 
 
@@ -146,34 +147,34 @@ def triangle() -> Swarm:
     return Swarm({_I: (0.0, 0.0), _J: (HOP_M, 0.0), _K: at(-60.0)})
 
 
-def test_figure_6b_an_edge_whose_ends_touch_a_wall_ahead_is_an_obstacles() -> None:
+def test_figure_6b_an_edge_is_an_obstacle_edge_if_both_ends_touch_a_wall_ahead() -> None:
     swarm = triangle()
     swarm.touch(_I, 80.0)
     swarm.touch(_J, 100.0)
-    swarm.look()
+    swarm.update()
     assert (_I, _J) in swarm.robots(swarm.planner.obstacle)
     assert (_I, _J) not in swarm.robots(swarm.planner.frontier)
     assert swarm.plans(_I, _J) == []
 
 
 @pytest.mark.parametrize(("wall_deg", "movers"), [(80.0, [_J]), (-60.0, [_I, _J]), (180.0, [_I, _J])])
-def test_figure_6b_where_one_end_touches_a_wall_the_other_goes_and_a_wall_elsewhere_is_none(
+def test_figure_6b_if_one_end_touches_a_wall_ahead_the_other_end_is_the_mover(
     wall_deg: float, movers: list[int]
 ) -> None:
     swarm = triangle()
     swarm.touch(_I, wall_deg)
-    swarm.look()
-    assert sorted(swarm.places.occupant[plan.mover] for plan in swarm.plans(_I, _J)) == movers
+    swarm.update()
+    assert sorted(swarm.slots.occupant[plan.mover] for plan in swarm.plans(_I, _J)) == movers
     assert (_I, _J) in swarm.robots(swarm.planner.frontier)
 
 
-def test_figure_6c_a_convex_corner_makes_both_of_its_edges_an_obstacles() -> None:
+def test_figure_6c_a_convex_corner_makes_both_of_its_edges_obstacle_edges() -> None:
     """They are 0.9 apart as they stand, and a pillar keeps them from seeing each other."""
     swarm = Swarm({_I: (0.0, 0.0), _J: (0.95, 0.0), _K: at(56.0)})
-    views = {place: dict(view) for place, view in swarm.picture.views.items()}
-    del views[swarm.place[_J]][swarm.place[_K]], views[swarm.place[_K]][swarm.place[_J]]
-    swarm.picture = ScanResult(views, FlagComplex(views), ())
-    swarm.look()
+    views = {slot: dict(view) for slot, view in swarm.scan.views.items()}
+    del views[swarm.slot[_J]][swarm.slot[_K]], views[swarm.slot[_K]][swarm.slot[_J]]
+    swarm.scan = ScanResult(views, FlagComplex(views), ())
+    swarm.update()
     assert swarm.robots(swarm.planner.fence.corners) == [(_I, _J), (_I, _K)]
     goals = [swarm.goal(plan) for plan in (*swarm.plans(_I, _J), *swarm.plans(_I, _K))]
     assert goals, "what is not in the corner is frontier"
@@ -185,27 +186,27 @@ def test_figure_6c_a_convex_corner_makes_both_of_its_edges_an_obstacles() -> Non
 
 @pytest.mark.parametrize(("k2", "sides"), [((0.6, 0.65), [-1]), ((0.5, -0.6), [])])
 def test_figure_7_an_edge_is_fence_where_all_its_triangles_are_on_one_side(k2: Point, sides: list[int]) -> None:
-    swarm = Swarm({_I: (0.0, 0.0), _J: (0.95, 0.0), 11: (0.4, 0.6), 12: k2}).look()
-    found = [side for side in swarm.planner.fence.sides if swarm.robots([side.edge]) == [(_I, _J)]]
-    assert [side.sign for side in found] == sides
+    swarm = Swarm({_I: (0.0, 0.0), _J: (0.95, 0.0), 11: (0.4, 0.6), 12: k2}).update()
+    add = [side for side in swarm.planner.fence.sides if swarm.robots([side.edge]) == [(_I, _J)]]
+    assert [side.sign for side in add] == sides
 
 
 @pytest.mark.parametrize("turned_seed", [1, 2, 3])
-def test_figure_8a_both_ends_send_the_new_robot_to_the_same_place_60_degrees_off_on_the_free_side(
+def test_figure_8a_both_ends_send_the_new_robot_to_the_same_point_at_60_degrees_on_the_free_side(
     turned_seed: int,
 ) -> None:
     """The sign conventions, end to end: left of the way from i to j is right of the way from j to i."""
     position = {_I: (0.2, 0.1), _J: at(20.0, of=(0.2, 0.1)), _K: at(-40.0, of=(0.2, 0.1))}
-    swarm = Swarm(position, turned_seed=turned_seed).look()
+    swarm = Swarm(position, turned_seed=turned_seed).update()
     plans = swarm.plans(_I, _J)
-    assert sorted(swarm.places.occupant[plan.mover] for plan in plans) == [_I, _J]
+    assert sorted(swarm.slots.occupant[plan.mover] for plan in plans) == [_I, _J]
     for plan in plans:
         assert swarm.goal(plan) == pytest.approx(at(80.0, of=(0.2, 0.1)))
-        assert {swarm.places.occupant[each] for each in plan.anchors} == {_I, _J}
+        assert {swarm.slots.occupant[each] for each in plan.anchors} == {_I, _J}
 
 
 def test_figure_8b_a_gap_of_100_degrees_is_bisected_from_either_end() -> None:
-    swarm = Swarm({_I: (0.0, 0.0), _J: at(0.0), _K: at(100.0)}).look()
+    swarm = Swarm({_I: (0.0, 0.0), _J: at(0.0), _K: at(100.0)}).update()
     for pair in ((_I, _J), (_I, _K)):
         inward = [plan for plan in swarm.plans(*pair) if swarm.goal(plan)[0] > 0 and swarm.goal(plan)[1] > 0]
         assert len(inward) == 2
@@ -229,8 +230,8 @@ def figure_9() -> Swarm:
 
 
 def assigned(swarm: Swarm) -> Plan:
-    sources = dict.fromkeys(swarm.picture.bases, 0.0)
-    (plan,) = CheapestFirst(swarm.places, 9).assign(swarm.planner.plans(), swarm.picture, sources, swarm.ways)
+    sources = dict.fromkeys(swarm.scan.bases, 0.0)
+    (plan,) = CheapestFirst(swarm.slots, 9).assign(swarm.planner.plans(), swarm.scan, sources, swarm.routes)
     return plan
 
 
@@ -239,54 +240,51 @@ def test_figure_9a_the_path_from_the_source_to_a_frontier_robot_is_12_10_6_2() -
     swarm = figure_9()
     for robot in (12, 11, 8, 9, 10, 7, 5, 4, 6, 3, 1):
         swarm.touch(robot, *range(0, 360, 30))
-    swarm.look()
+    swarm.update()
     plan = assigned(swarm)
-    assert [swarm.places.occupant[place] for place in plan.path] == [12, 10, 6, 2]
+    assert [swarm.slots.occupant[slot] for slot in plan.path] == [12, 10, 6, 2]
     assert swarm.goal(plan)[1] > swarm.position[2][1] - 1e-9
     edges = {frozenset(each) for each in swarm.robots(swarm.planner.obstacle)}
     assert {frozenset((12, 11)), frozenset((11, 8)), frozenset((8, 9))} <= edges
 
 
-def pushed(swarm: Swarm, plan: Plan, loose: bool = False) -> list[tuple[int, Order]]:
-    """Tell a push to its end with robots that do as they are told, robot 13 waiting in the depot; return all orders.
-
-    `loose`: odometry had to say how far to go.
-    """
-    post = CommandMailbox(0.1)
-    base = swarm.picture.bases[0]
-    station = swarm.places.occupant[base]
-    sources = Sources((), swarm.places, post)
+def pushed(swarm: Swarm, plan: Plan, used_odometry: bool = False) -> list[tuple[int, RobotCommand]]:
+    """Run a push to its end with obedient robots, robot 13 waiting in the depot; return all commands."""
+    mailbox = CommandMailbox(0.1)
+    base = swarm.scan.bases[0]
+    station = swarm.slots.occupant[base]
+    sources = Sources((), swarm.slots, mailbox)
     sources.stations[base] = station
-    pushing = PushExecution(PlannerParameters(), swarm.places, post, sources, swarm.planner)
-    pushing.picture = swarm.picture
-    said: list[tuple[int, Order]] = []
-    story = pushing.push(plan)
-    done = Arrived(0, True, loose, False, 0.95, ())
+    pushing = PushExecution(PlannerParameters(), swarm.slots, mailbox, sources, swarm.planner)
+    pushing.scan = swarm.scan
+    said: list[tuple[int, RobotCommand]] = []
+    routine = pushing.push(plan)
+    done = Arrived(0, True, used_odometry, False, 0.95, ())
     for tick in range(50):
         try:
-            next(story)
+            next(routine)
         except StopIteration:
             return said
         answers: list[tuple[int, Response]] = []
-        for sent in post.sent():
-            dispatch = read_dispatch(sent.payload)
-            assert dispatch is not None
+        for sent in mailbox.outgoing():
+            request = read_request(sent.payload)
+            assert request is not None
             assert sent.to is not None
-            order = dispatch.order
-            said.append((sent.to, order))
-            if isinstance(order, Release):
+            command = request.command
+            said.append((sent.to, command))
+            if isinstance(command, Release):
                 emerged = Emerged(sightings_of(swarm, station, turned=0.4))
                 answers.append((13, Response(1, 0, 0, 0, 0, emerged)))
-            elif isinstance(order, Deploy):
-                answers += [(sent.to, reply(dispatch, each)) for each in (Cleared(0), done)]
-            elif isinstance(order, Move | Correct):
-                answers.append((sent.to, reply(dispatch, done)))
-        post.take(0.1 * tick, [Packet("uplink", write(each), sender) for sender, each in answers])
+            elif isinstance(command, Deploy):
+                answers += [(sent.to, reply(request, each)) for each in (Cleared(0), done)]
+            elif isinstance(command, Move | Correct):
+                answers.append((sent.to, reply(request, done)))
+        mailbox.receive(0.1 * tick, [Packet("uplink", write(each), sender) for sender, each in answers])
     raise AssertionError("the push never ends")
 
 
 def reply(to: Request, answer: Answer) -> Response:
-    return Response(1, to.life, to.number, to.attempt, 1, answer)
+    return Response(1, to.incarnation, to.number, to.attempt, 1, answer)
 
 
 def sightings_of(swarm: Swarm, robot: int, turned: float) -> tuple[Sighting, ...]:
@@ -298,58 +296,56 @@ def sightings_of(swarm: Swarm, robot: int, turned: float) -> tuple[Sighting, ...
     )
 
 
-def push_of_figure_9(loose: bool = False) -> tuple[Swarm, list[tuple[int, Order]]]:
+def push_of_figure_9(used_odometry: bool = False) -> tuple[Swarm, list[tuple[int, RobotCommand]]]:
     swarm = figure_9()
-    place = swarm.place
+    slot = swarm.slot
     upwards = math.pi / 2.0 + swarm.off(2)
-    plan = Plan(
-        (place[2], place[1], 1), place[2], upwards, HOP_M, 0.8, (place[2],), tuple(place[n] for n in (12, 10, 6, 2))
-    )
-    return swarm, pushed(swarm.look(), plan, loose)
+    plan = Plan((slot[2], slot[1], 1), slot[2], upwards, HOP_M, 0.8, (slot[2],), tuple(slot[n] for n in (12, 10, 6, 2)))
+    return swarm, pushed(swarm.update(), plan, used_odometry)
 
 
-def test_figure_9b_robots_take_each_others_places_and_robot_13_appears_beside_the_source() -> None:
+def test_figure_9b_robots_take_the_slots_ahead_and_robot_13_appears_beside_the_source() -> None:
     swarm, _ = push_of_figure_9()
-    now = {swarm.places.occupant[swarm.place[n]]: n for n in swarm.position}
+    now = {swarm.slots.occupant[swarm.slot[n]]: n for n in swarm.position}
     assert {robot: now[robot] for robot in (12, 13, 10, 6)} == {12: 12, 13: 10, 10: 6, 6: 2}
-    assert [swarm.places.occupant[max(swarm.places.occupant)]] == [2], "robot 2 has a new place"
+    assert [swarm.slots.occupant[max(swarm.slots.occupant)]] == [2], "robot 2 has a new place"
     assert all(now[robot] == robot for robot in (1, 3, 4, 5, 7, 8, 9, 11))
 
 
-def test_figure_9b_every_landmark_is_the_robot_that_will_be_there_seen_from_the_place_to_go_to() -> None:
+def test_figure_9b_landmarks_are_the_future_occupants_as_seen_from_the_goal() -> None:
     swarm, said = push_of_figure_9()
-    moves = {robot: order for robot, order in said if isinstance(order, Move)}
+    moves = {robot: command for robot, command in said if isinstance(command, Move)}
     assert sorted(moves) == [6, 10, 13]
     at_place = {13: 10, 10: 6, 6: 2}  # robot: the place where it goes, by the id of who was there
     turned = {**swarm.turned, 13: 0.4}
-    for robot, order in moves.items():
+    for robot, command in moves.items():
         goal = swarm.position[at_place[robot]]
-        assert {each.node for each in order.landmarks} & {2} == set(), "nobody refers to who goes into the unknown"
-        for each in order.landmarks:
+        assert {each.node for each in command.landmarks} & {2} == set(), "nobody refers to who goes into the unknown"
+        for each in command.landmarks:
             there = swarm.position[at_place.get(each.node, each.node)]
             assert each.bearing_rad == pytest.approx(math.remainder(direction(goal, there) - turned[robot], math.tau))
             assert each.still == (each.node not in at_place)
 
 
-def test_figure_9b_the_new_robot_corrects_its_distance_to_who_then_stands_at_the_anchor() -> None:
+def test_figure_9b_the_new_robot_corrects_its_distance_to_the_future_occupant_of_the_anchor() -> None:
     _, said = push_of_figure_9()
-    ((robot, order),) = [(robot, order) for robot, order in said if isinstance(order, Correct)]
+    ((robot, command),) = [(robot, command) for robot, command in said if isinstance(command, Correct)]
     assert robot == 2
-    assert isinstance(order, Correct)
-    assert [each.node for each in order.anchors] == [6]
+    assert isinstance(command, Correct)
+    assert [each.node for each in command.anchors] == [6]
 
 
-def test_who_went_by_odometry_corrects_its_distance_to_who_is_behind_and_is_told_where_that_is() -> None:
+def test_a_robot_that_used_odometry_corrects_its_distance_to_the_robot_behind_by_a_given_bearing() -> None:
     """It may have gone so far that it sees nobody behind it."""
-    swarm, said = push_of_figure_9(loose=True)
-    orders = [(robot, order) for robot, order in said if isinstance(order, Correct)]
-    assert [(robot, order.anchors[0].node) for robot, order in orders] == [(13, 12), (10, 13), (6, 10), (2, 6)]
+    swarm, said = push_of_figure_9(used_odometry=True)
+    commands = [(robot, command) for robot, command in said if isinstance(command, Correct)]
+    assert [(robot, command.anchors[0].node) for robot, command in commands] == [(13, 12), (10, 13), (6, 10), (2, 6)]
     turned = {**swarm.turned, 13: 0.4}
     behind = {13: (10, 12), 10: (6, 10), 6: (2, 6)}  # robot: its place and the one behind, by who was there
-    for robot, order in orders[:-1]:
-        place, rear = (swarm.position[each] for each in behind[robot])
-        there = math.remainder(direction(place, rear) - turned[robot], math.tau)
-        assert order.anchors[0].bearing_rad == pytest.approx(there)
+    for robot, command in commands[:-1]:
+        slot, rear = (swarm.position[each] for each in behind[robot])
+        there = math.remainder(direction(slot, rear) - turned[robot], math.tau)
+        assert command.anchors[0].bearing_rad == pytest.approx(there)
 
 
 # --- one-sided sight, and frames ------------------------------------------------------------------------------------
@@ -358,12 +354,12 @@ def test_who_went_by_odometry_corrects_its_distance_to_who_is_behind_and_is_told
 def test_the_fence_opens_where_two_robots_do_not_both_see_each_other() -> None:
     """Four around a hub, 90 degrees apart and near enough to see each other: where one is blind to the next, a side is open."""
     swarm = Swarm({n: at(90.0 * n, 0.65) for n in range(1, 5)} | {9: (0.0, 0.0)})
-    rim = [(1, 2), (1, 4), (2, 3), (3, 4)]
-    assert swarm.look().robots(side.edge for side in swarm.planner.fence.sides) == rim
-    views = {place: dict(view) for place, view in swarm.picture.views.items()}
-    del views[swarm.place[1]][swarm.place[2]]
-    swarm.picture = ScanResult(views, FlagComplex(views), ())
-    sides = swarm.look().robots(side.edge for side in swarm.planner.fence.sides)
+    boundary_edges = [(1, 2), (1, 4), (2, 3), (3, 4)]
+    assert swarm.update().robots(side.edge for side in swarm.planner.fence.sides) == boundary_edges
+    views = {slot: dict(view) for slot, view in swarm.scan.views.items()}
+    del views[swarm.slot[1]][swarm.slot[2]]
+    swarm.scan = ScanResult(views, FlagComplex(views), ())
+    sides = swarm.update().robots(side.edge for side in swarm.planner.fence.sides)
     assert sides == [(1, 4), (1, 9), (2, 3), (2, 9), (3, 4)]
     inward = [swarm.goal(plan) for plan in (*swarm.plans(1, 9), *swarm.plans(2, 9))]
     assert all(math.dist(each, at(135.0, 0.65)) < 0.5 for each in inward), "the open sides are those of the gap"
@@ -372,7 +368,7 @@ def test_the_fence_opens_where_two_robots_do_not_both_see_each_other() -> None:
 def test_turning_any_robots_frame_changes_no_plan() -> None:
     random = np.random.default_rng(3)
     position = {n: (float(x), float(y)) for n, (x, y) in enumerate(random.uniform(0.0, 2.2, (22, 2)))}
-    one, other = (Swarm(position, base=0, turned_seed=seed).look() for seed in (1, 2))
+    one, other = (Swarm(position, base=0, turned_seed=seed).update() for seed in (1, 2))
     for mine, theirs in zip(one.planner.plans(), other.planner.plans(), strict=True):
         assert [(each.key, each.mover, each.anchors) for each in mine] == [
             (each.key, each.mover, each.anchors) for each in theirs

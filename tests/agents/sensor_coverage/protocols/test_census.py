@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from zwerm.agents.runtime.contract import Setup
-from zwerm.agents.sensor_coverage.protocols.census import Census, CensusTally, CensusWave, Message
+from zwerm.agents.sensor_coverage.messages.waves import CensusMessage, CensusTally, CensusWave
+from zwerm.agents.sensor_coverage.protocols.census import Census
 from zwerm.agents.sensor_coverage.protocols.completion import CompletionProtocol
 
 POLL_S = 1.0
@@ -25,30 +26,30 @@ class Swarm:
         self.busy = dict.fromkeys(graph, False)
         self.random = np.random.Generator(np.random.Philox(seed))
         self.loss, self.delay_ticks, self.copies = loss, delay_ticks, copies
-        self.robots = {node: self.born(node) for node in graph}
-        self.under_way: list[tuple[int, int, int, Message]] = []
+        self.robots = {node: self.made(node) for node in graph}
+        self.under_way: list[tuple[int, int, int, CensusMessage]] = []
         self.ticks = 0
         self.sent = 0
 
-    def born(self, node: int) -> Census:
+    def made(self, node: int) -> Census:
         return Census(node, POLL_S, EVERY_S, int(self.random.integers(2**62)), base=node == 0)
 
     @property
     def now_s(self) -> float:
         return 0.5 * self.ticks
 
-    def tick(self) -> None:
+    def step(self) -> None:
         arrived = [each for each in self.under_way if each[0] <= self.ticks]
         self.under_way = [each for each in self.under_way if each[0] > self.ticks]
         for node, robot in self.robots.items():
-            robot.note(self.graph[node], self.claims[node], self.busy[node])
+            robot.update(self.graph[node], self.claims[node], self.busy[node])
         for _, sender, receiver, message in arrived:
-            self.send(receiver, self.robots[receiver].hear(sender, message, self.now_s))
+            self.send(receiver, self.robots[receiver].receive(sender, message, self.now_s))
         for node, robot in self.robots.items():
-            self.send(node, robot.tick(self.now_s))
+            self.send(node, robot.poll(self.now_s))
         self.ticks += 1
 
-    def send(self, sender: int, outbox: list) -> None:  # type: ignore[type-arg]
+    def send(self, sender: int, outbox: list) -> None:
         for to, message in outbox:
             self.sent += 1
             for receiver in self.graph[sender] if to is None else (to,):
@@ -60,7 +61,7 @@ class Swarm:
     def until_concluded(self, ticks_max: int) -> bool:
         """Go on until the base concludes, or for so long, and tell which."""
         for _ in range(ticks_max):
-            self.tick()
+            self.step()
             if self.robots[0].concluded:
                 return True
         return False
@@ -103,7 +104,7 @@ seeds = st.integers(0, 2**32)
 
 
 @pytest.mark.parametrize("graph", [{0: []}, chain(2), chain(9), lattice(5)])
-def test_a_quiet_swarm_is_concluded_upon_after_two_waves_and_everyone_is_counted_once(graph: Graph) -> None:
+def test_the_base_concludes_after_two_waves_of_a_quiet_swarm_and_counts_each_robot_once(graph: Graph) -> None:
     swarm = Swarm(graph, seed=1)
     assert swarm.until_concluded(ticks_max=4 * int(EVERY_S))
     last = swarm.robots[0].last
@@ -112,16 +113,16 @@ def test_a_quiet_swarm_is_concluded_upon_after_two_waves_and_everyone_is_counted
     assert EVERY_S <= swarm.now_s <= EVERY_S + len(graph)
 
 
-def test_a_wave_takes_two_messages_a_robot_where_nobody_has_to_ask_again() -> None:
+def test_a_census_wave_takes_two_messages_per_robot_without_losses() -> None:
     swarm = Swarm(lattice(5), seed=1)
     swarm.robots = {node: Census(node, 100.0, EVERY_S, node, base=node == 0) for node in swarm.graph}
     for _ in range(int(2.0 * EVERY_S)):
-        swarm.tick()
+        swarm.step()
     assert swarm.robots[0].last is not None
     assert swarm.sent == 2 * len(swarm.graph) - 1
 
 
-def test_claims_are_counted() -> None:
+def test_the_census_counts_frontier_claims() -> None:
     swarm = Swarm(lattice(3), seed=1)
     swarm.claims.update({3: 2, 8: 1})
     assert not swarm.until_concluded(ticks_max=40)
@@ -130,11 +131,11 @@ def test_claims_are_counted() -> None:
     assert (last.robots, last.claims) == (9, 3)
 
 
-def test_what_stirs_after_a_conclusion_at_the_base_takes_it_back() -> None:
+def test_a_claim_at_the_base_revokes_the_conclusion_of_the_census() -> None:
     swarm = Swarm(chain(2), seed=1)
     assert swarm.until_concluded(ticks_max=60)
     swarm.claims[0] = 1
-    swarm.tick()
+    swarm.step()
     assert not swarm.robots[0].concluded
 
 
@@ -143,7 +144,7 @@ def test_what_stirs_after_a_conclusion_at_the_base_takes_it_back() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(connected(), faults, seeds, st.data())
-def test_while_a_robot_in_reach_claims_a_frontier_the_base_never_concludes(
+def test_the_base_never_concludes_while_a_reachable_robot_claims_a_frontier(
     graph: Graph, faults: dict[str, float], seed: int, data: st.DataObject
 ) -> None:
     swarm = Swarm(graph, seed, **faults)  # type: ignore[arg-type]
@@ -153,7 +154,9 @@ def test_while_a_robot_in_reach_claims_a_frontier_the_base_never_concludes(
 
 @settings(max_examples=60, deadline=None)
 @given(connected(), faults, seeds)
-def test_when_all_is_quiet_the_base_concludes_in_the_end(graph: Graph, faults: dict[str, float], seed: int) -> None:
+def test_the_base_concludes_from_the_census_once_all_robots_are_quiet(
+    graph: Graph, faults: dict[str, float], seed: int
+) -> None:
     swarm = Swarm(graph, seed, **faults)  # type: ignore[arg-type]
     swarm.claims[1] = 1
     assert not swarm.until_concluded(ticks_max=40)
@@ -164,8 +167,8 @@ def test_when_all_is_quiet_the_base_concludes_in_the_end(graph: Graph, faults: d
 class Hurried(Census):
     """Does not ask who was stirred between two waves: a control."""
 
-    def note(self, neighbours: list[int], claims: int, busy: bool) -> None:  # type: ignore[override]
-        super().note(neighbours, 0, False)
+    def update(self, neighbours: list[int], claims: int, busy: bool) -> None:  # type: ignore[override]
+        super().update(neighbours, 0, False)
         self._claims = claims
 
 
@@ -176,7 +179,7 @@ def handed_around(kind: type[Census], seed: int, loss: float) -> bool:
     holder = 8
     for _ in range(600):
         swarm.claims = dict.fromkeys(swarm.graph, 0) | {holder: 1}
-        swarm.tick()
+        swarm.step()
         if swarm.robots[0].concluded:
             return True
         if swarm.random.random() < 0.5:
@@ -185,11 +188,11 @@ def handed_around(kind: type[Census], seed: int, loss: float) -> bool:
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.4])
-def test_a_claim_that_is_handed_from_robot_to_robot_is_never_missed(loss: float) -> None:
+def test_the_census_never_misses_a_claim_that_moves_from_robot_to_robot(loss: float) -> None:
     assert not any(handed_around(Census, seed, loss) for seed in range(10))
 
 
-def test_without_asking_who_was_stirred_it_is_missed() -> None:
+def test_a_census_that_ignores_disturbed_robots_misses_a_moving_claim() -> None:
     assert any(handed_around(Hurried, seed, 0.0) for seed in range(10))
 
 
@@ -203,8 +206,8 @@ def broken_links(seed: int, faults: dict[str, float], amnesia: float) -> bool:
             swarm.graph = {0: [1, 2], 1: [0, 2, *[3] * (1 in by)], 2: [0, 1, *[3] * (2 in by)], 3: by}
         if swarm.random.random() < amnesia:
             node = int(swarm.random.integers(0, 4))
-            swarm.robots[node] = swarm.born(node)
-        swarm.tick()
+            swarm.robots[node] = swarm.made(node)
+        swarm.step()
         if swarm.robots[0].concluded:
             return True
     return False
@@ -212,43 +215,43 @@ def broken_links(seed: int, faults: dict[str, float], amnesia: float) -> bool:
 
 @settings(max_examples=40, deadline=None)
 @given(faults, seeds)
-def test_nor_is_it_missed_when_links_break(faults: dict[str, float], seed: int) -> None:
+def test_the_census_misses_no_claim_when_links_break(faults: dict[str, float], seed: int) -> None:
     assert not broken_links(seed, faults, amnesia=0.0)
 
 
-def test_robots_that_lose_their_memory_again_and_again_hardly_ever_make_the_base_conclude_wrongly() -> None:
+def test_robots_that_lose_their_memory_repeatedly_rarely_cause_a_wrong_conclusion() -> None:
     """About 1 in 1,500 such lives did when it was measured: late messages of former lives were believed."""
     assert not any(broken_links(seed, {"loss": 0.2, "delay_ticks": 20}, amnesia=0.02) for seed in range(30))
 
 
-def test_a_robot_that_lost_its_memory_does_not_join_by_its_own_child() -> None:
+def test_a_robot_that_lost_its_memory_does_not_join_a_wave_by_its_own_child() -> None:
     child_says = CensusWave(5, parent=1, missing=(1,), again=True)
     reborn = Census(1, POLL_S, EVERY_S, 0)
-    reborn.note([0, 2], 0, False)
-    assert reborn.hear(2, child_says, 0.0) == []
-    assert reborn.hear(0, CensusWave(5, None, (1,), True), 0.0) != []
+    reborn.update([0, 2], 0, False)
+    assert reborn.receive(2, child_says, 0.0) == []
+    assert reborn.receive(0, CensusWave(5, None, (1,), True), 0.0) != []
 
 
-def test_what_a_robot_that_lost_its_memory_did_since_the_last_wave_is_not_taken_for_nothing() -> None:
+def test_the_census_needs_another_wave_after_a_robot_lost_its_memory() -> None:
     swarm = Swarm(chain(2), seed=1)
     for _ in range(6):
-        swarm.tick()
-    swarm.robots[1] = swarm.born(1)
+        swarm.step()
+    swarm.robots[1] = swarm.made(1)
     assert swarm.until_concluded(ticks_max=100)
     assert swarm.now_s > 2.0 * EVERY_S  # the third wave, not the second
 
 
-def test_a_robot_joins_by_nobody_who_does_not_wait_for_it() -> None:
+def test_a_robot_joins_a_wave_only_by_a_neighbour_that_waits_for_it() -> None:
     """It may hear robots that do not see it: they would not count it."""
     robot = Census(1, POLL_S, EVERY_S, 0)
-    robot.note([2], 0, False)
-    assert robot.hear(0, CensusWave(5, None, (7,), False), 0.0) == []
+    robot.update([2], 0, False)
+    assert robot.receive(0, CensusWave(5, None, (7,), False), 0.0) == []
 
 
-def test_a_robot_that_went_while_it_was_waited_for_does_not_stop_the_wave_but_nothing_is_concluded_from_it() -> None:
+def test_a_wave_completes_without_a_robot_that_left_but_the_base_does_not_conclude_from_it() -> None:
     swarm = Swarm(chain(3), seed=1)
     for _ in range(3):
-        swarm.tick()
+        swarm.step()
     swarm.graph = {0: [1], 1: [0], 2: []}
     assert swarm.until_concluded(ticks_max=200)
     last = swarm.robots[0].last
@@ -260,19 +263,22 @@ def test_a_robot_that_went_while_it_was_waited_for_does_not_stop_the_wave_but_no
 @pytest.mark.parametrize(
     "message", [CensusWave(3, None, (1, 2), False), CensusWave(3, 4, (), True), CensusTally(3, 4, 5, 6, 7)]
 )
-def test_every_message_survives_the_wire(message: Message) -> None:
-    assert msgspec.msgpack.decode(msgspec.msgpack.encode(message), type=Message) == message
+def test_every_message_survives_the_wire(message: CensusMessage) -> None:
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(message), type=CensusMessage) == message
 
 
-def test_a_claim_that_has_come_to_an_end_is_not_counted() -> None:
+def test_the_census_does_not_count_an_ended_claim() -> None:
     setup = Setup(node=0, role="base", dt_s=0.1, sensors=(), stream_key=bytes(16))
-    base = CompletionProtocol(setup, np.random.Generator(np.random.Philox(1)), base=True)
-    for tick, claims in enumerate((2, 2, 0)):
-        base.note(tick, (), claims, busy=False)
-        base.letters(asks=tick in (0, 2))
+    asks = True
+    base = CompletionProtocol(setup, np.random.Generator(np.random.Philox(1)), base=True, asks=lambda: asks)
+    for step, claims in enumerate((2, 2, 0)):
+        base.update(step, (), claims, busy=False)
+        asks = step in (0, 2)
+        base.poll(step)
         assert base.last is not None
         assert base.last.claims == 2
-    base.note(200, (), 0, busy=False)
-    base.letters()
+    asks = True
+    base.update(200, (), 0, busy=False)
+    base.poll(200)
     assert base.last is not None
     assert base.last.claims == 0

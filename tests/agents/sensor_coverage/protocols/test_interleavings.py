@@ -11,7 +11,9 @@ import networkx
 import pytest
 from interleavings import Budget, Explorer, Graph, Violation
 
-from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock, LockMessage, LockRequest, Message
+from zwerm.agents.sensor_coverage.messages.locks import LockGrant, LockProtocolMessage, LockRequest
+from zwerm.agents.sensor_coverage.protocols.component import Outgoing
+from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock
 
 
 def connected_graphs(largest: int, smallest: int = 2) -> list[Graph]:
@@ -53,30 +55,32 @@ def test_of_five_robots_no_two_neighbours_leave_together_and_no_departure_change
     assert departures > 500
 
 
-def test_nor_do_they_when_locks_and_wishes_run_out() -> None:
+def test_no_departure_is_unsafe_when_locks_and_requests_expire() -> None:
     _, departures = explore(connected_graphs(3), ticks=2)
     assert departures > 100
 
 
-def test_nor_when_robots_lose_their_memory() -> None:
+def test_no_departure_is_unsafe_when_robots_lose_their_memory() -> None:
     _, departures = explore(connected_graphs(3), ticks=2, amnesias=1)
     assert departures > 500
 
 
-def places(robots: int) -> list[tuple[int, tuple[int, ...]]]:
+def slots(robots: int) -> list[tuple[int, tuple[int, ...]]]:
     """Return where one of the robots may be moved to: all that it can see there."""
     others = range(robots - 1)
     return [(robots - 1, each) for size in range(robots) for each in combinations(others, size)]
 
 
-@pytest.mark.parametrize("place", places(3))
+@pytest.mark.parametrize("slot", slots(3))
 @pytest.mark.parametrize("comes", [False, True])
-def test_nor_when_one_robot_comes_or_is_moved_meanwhile(place: tuple[int, tuple[int, ...]], comes: bool) -> None:
-    _, departures = explore(connected_graphs(3, 3), ticks=1, moving=place, comes=comes)
+def test_no_departure_is_unsafe_when_one_robot_comes_or_is_moved(
+    slot: tuple[int, tuple[int, ...]], comes: bool
+) -> None:
+    _, departures = explore(connected_graphs(3, 3), ticks=1, moving=slot, comes=comes)
     assert departures > 20
 
 
-def test_nor_when_one_of_four_robots_is_moved() -> None:
+def test_no_departure_is_unsafe_when_one_of_four_robots_is_moved() -> None:
     _, departures = explore(connected_graphs(4, 4), moving=(3, (0, 1)))
     assert departures > 100
 
@@ -89,19 +93,19 @@ class Advised(LeaveLock):
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
-        self._verdict: tuple[tuple[int, int], ...] = ()
+        self._versions: tuple[tuple[int, int], ...] = ()
 
-    def hear(self, sender: int, message: Message, now_s: float) -> list[LockMessage]:
-        sent = super().hear(sender, message, now_s)
+    def receive(self, sender: int, message: LockProtocolMessage, now_s: float) -> list[Outgoing]:
+        sent = super().receive(sender, message, now_s)
         if self.redundant():
-            self._verdict = tuple((node, self._lists[node].version) for node in self._listed)
+            self._versions = tuple((node, self._lists[node].version) for node in self._listed)
         return sent
 
-    def ask(self, now_s: float, versions: tuple[tuple[int, int], ...] | None = None) -> list[LockMessage]:
-        return super().ask(now_s, self._verdict)
+    def request(self, now_s: float, versions: tuple[tuple[int, int], ...] | None = None) -> list[Outgoing]:
+        return super().request(now_s, self._versions)
 
 
-def test_nor_when_they_rely_on_what_they_were_told_of_lists_that_were_true_once() -> None:
+def test_no_departure_is_unsafe_when_robots_rely_on_advice_from_old_lists() -> None:
     _, departures = explore(connected_graphs(4), Advised)
     assert departures > 100
     _, moved = explore(connected_graphs(3, 3), Advised, ticks=1, moving=(2, (0,)))
@@ -111,11 +115,11 @@ def test_nor_when_they_rely_on_what_they_were_told_of_lists_that_were_true_once(
 class Credulous(Advised):
     """Grants a lock whatever list it is asked upon."""
 
-    def _answer(self, asker: int, ask: LockRequest, now_s: float) -> list[LockMessage]:
-        return super()._answer(asker, LockRequest(ask.number, ((self._me, self._version),)), now_s)
+    def _answer(self, requester: int, request: LockRequest, now_s: float) -> list[Outgoing]:
+        return super()._answer(requester, LockRequest(request.number, ((self._me, self._version),)), now_s)
 
 
-def test_nor_would_it_be_so_if_neighbours_did_not_look_at_the_versions_of_their_lists() -> None:
+def test_advice_from_old_lists_is_unsafe_if_neighbours_do_not_check_list_versions() -> None:
     with pytest.raises(Violation):
         explore(connected_graphs(4, 4), Credulous, moving=(3, (0, 2)))
 
@@ -134,31 +138,31 @@ class Impatient(LeaveLock):
     """Does not wait for the last grant."""
 
     def may_leave(self, now_s: float) -> bool:
-        wish = self._wish
-        return wish is not None and not self.locked(now_s) and len(wish.granted) >= len(self._listed) - 1
+        request = self._request
+        return request is not None and not self.locked(now_s) and len(request.granted) >= len(self._listed) - 1
 
 
 class AnyVersion(LeaveLock):
     """Grants a lock whatever list it is asked upon."""
 
-    def _answer(self, asker: int, ask: LockRequest, now_s: float) -> list[LockMessage]:
-        return super()._answer(asker, LockRequest(ask.number, ((self._me, self._version),)), now_s)
+    def _answer(self, requester: int, request: LockRequest, now_s: float) -> list[Outgoing]:
+        return super()._answer(requester, LockRequest(request.number, ((self._me, self._version),)), now_s)
 
 
 class Late(LeaveLock):
     """Leaves as long as it likes after it asked."""
 
-    def _may_still_act(self, wish: Any, now_s: float) -> bool:
-        return wish.version == self._version
+    def _may_still_act(self, request: Any, now_s: float) -> bool:
+        return request.version == self._version
 
 
 class Generous(LeaveLock):
     """Grants locks while it wants to leave itself, and leaves nevertheless."""
 
-    def _answer(self, asker: int, ask: LockRequest, now_s: float) -> list[LockMessage]:
-        wish, self._wish = self._wish, None
-        answer = super()._answer(asker, ask, now_s)
-        self._wish = wish
+    def _answer(self, requester: int, request: LockRequest, now_s: float) -> list[Outgoing]:
+        own, self._request = self._request, None
+        answer = super()._answer(requester, request, now_s)
+        self._request = own
         return answer
 
     def _free_to_act(self, now_s: float) -> bool:
@@ -168,10 +172,10 @@ class Generous(LeaveLock):
 class Fickle(LeaveLock):
     """Takes a grant for any number it ever asked under."""
 
-    def hear(self, sender: int, message: Message, now_s: float) -> list[LockMessage]:
-        if self._wish is not None and type(message).__name__ == "Grant":
-            return super().hear(sender, type(message)(self._wish.ask.number), now_s)
-        return super().hear(sender, message, now_s)
+    def receive(self, sender: int, message: LockProtocolMessage, now_s: float) -> list[Outgoing]:
+        if self._request is not None and isinstance(message, LockGrant):
+            return super().receive(sender, LockGrant(self._request.message.number), now_s)
+        return super().receive(sender, message, now_s)
 
 
 class Rash(LeaveLock):
@@ -185,9 +189,9 @@ class Rash(LeaveLock):
 class Ghost(LeaveLock):
     """Grants locks when it has left."""
 
-    def _answer(self, asker: int, ask: LockRequest, now_s: float) -> list[LockMessage]:
+    def _answer(self, requester: int, request: LockRequest, now_s: float) -> list[Outgoing]:
         stands, self._stands = self._stands, True
-        answer = super()._answer(asker, ask, now_s)
+        answer = super()._answer(requester, request, now_s)
         self._stands = stands
         return answer
 
@@ -196,8 +200,8 @@ class Blind(LeaveLock):
     """Leaves although it sees others than when it asked."""
 
     def may_leave(self, now_s: float) -> bool:
-        wish = self._wish
-        return wish is not None and not self.locked(now_s) and len(wish.granted) == len(wish.ask.versions)
+        request = self._request
+        return request is not None and not self.locked(now_s) and len(request.granted) == len(request.message.versions)
 
 
 @pytest.mark.parametrize(
@@ -214,6 +218,8 @@ class Blind(LeaveLock):
         (Blind, 3, {"moving": (2, (0,)), "comes": True}),
     ],
 )
-def test_without_it_the_search_finds_a_violation(kind: type[LeaveLock], robots: int, budget: dict[str, Any]) -> None:
+def test_the_search_finds_a_violation_without_each_part_of_the_protocol(
+    kind: type[LeaveLock], robots: int, budget: dict[str, Any]
+) -> None:
     with pytest.raises(Violation):
         explore(connected_graphs(robots, robots), kind, **budget)

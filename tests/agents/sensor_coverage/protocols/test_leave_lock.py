@@ -13,16 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import ROOT
 
-from zwerm.agents.sensor_coverage.protocols.leave_lock import (
-    LeaveLock,
+from zwerm.agents.sensor_coverage.messages.locks import (
     LockDenial,
     LockGrant,
-    LockMessage,
+    LockProtocolMessage,
     LockRelease,
     LockRequest,
-    Message,
     NeighbourList,
 )
+from zwerm.agents.sensor_coverage.protocols.component import Outgoing
+from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock
 
 LEASE_S = 10.0
 START_S = 100.0
@@ -34,10 +34,10 @@ def swarm(graph: Graph) -> dict[int, LeaveLock]:
     """Return robots that stand there, and know each other's lists."""
     robots = {node: LeaveLock(node, LEASE_S, START_S - LEASE_S) for node in graph}
     for node, robot in robots.items():
-        robot.see(graph[node], START_S)
+        robot.update(graph[node], START_S)
     for node, robot in robots.items():
         for other in graph[node]:
-            robot.hear(other, robots[other].tell(), START_S)
+            robot.receive(other, robots[other].neighbour_list(), START_S)
     return robots
 
 
@@ -45,7 +45,7 @@ def everyone(count: int) -> Graph:
     return {node: [other for other in range(count) if other != node] for node in range(count)}
 
 
-def only(sent: list[LockMessage]) -> Message:
+def only(sent: list[Outgoing]) -> LockProtocolMessage:
     (each,) = sent
     return each.message
 
@@ -67,8 +67,8 @@ def gudhi_betti(graph: Graph) -> list[int]:
 
 def discs(seed: int, count: int) -> Graph:
     """Robots at random that see each other within a range."""
-    place = np.random.Generator(np.random.Philox(seed)).random((count, 2))
-    apart = np.hypot(*(place[:, None] - place[None, :]).transpose(2, 0, 1))
+    slot = np.random.Generator(np.random.Philox(seed)).random((count, 2))
+    apart = np.hypot(*(slot[:, None] - slot[None, :]).transpose(2, 0, 1))
     return {node: [int(each) for each in np.flatnonzero(row < 0.4) if each != node] for node, row in enumerate(apart)}
 
 
@@ -82,7 +82,7 @@ def graphs(draw: st.DrawFn) -> Graph:
 
 @settings(max_examples=150, deadline=None)
 @given(st.one_of(graphs(), st.builds(discs, st.integers(0, 2**32), st.integers(4, 25))))
-def test_who_leaves_by_the_criterion_leaves_the_betti_numbers_as_they_were(graph: Graph) -> None:
+def test_a_departure_by_the_link_criterion_changes_no_betti_number(graph: Graph) -> None:
     before = gudhi_betti(graph)
     for node, robot in swarm(graph).items():
         if robot.redundant():
@@ -103,150 +103,153 @@ def test_who_leaves_by_the_criterion_leaves_the_betti_numbers_as_they_were(graph
         (everyone(4), [0, 1, 2, 3]),
     ],
 )
-def test_who_is_redundant_in_small_swarms(graph: Graph, redundant: list[int]) -> None:
+def test_the_link_criterion_finds_the_redundant_robots_of_small_swarms(graph: Graph, redundant: list[int]) -> None:
     assert [node for node, robot in swarm(graph).items() if robot.redundant()] == redundant
 
 
-def test_a_neighbour_whose_list_is_not_known_or_does_not_name_the_robot_makes_it_stay() -> None:
+def test_a_robot_stays_if_a_neighbours_list_is_unknown_or_does_not_name_it() -> None:
     robot = LeaveLock(0, LEASE_S, START_S - LEASE_S)
-    robot.see([1, 2], START_S)
-    robot.hear(1, NeighbourList(1, (0, 2)), START_S)
+    robot.update([1, 2], START_S)
+    robot.receive(1, NeighbourList(1, (0, 2)), START_S)
     assert not robot.redundant()
-    robot.hear(2, NeighbourList(1, (1,)), START_S)
+    robot.receive(2, NeighbourList(1, (1,)), START_S)
     assert not robot.redundant()
-    robot.hear(2, NeighbourList(2, (0, 1)), START_S)
+    robot.receive(2, NeighbourList(2, (0, 1)), START_S)
     assert robot.redundant()
 
 
-def test_an_older_list_that_comes_late_says_nothing() -> None:
+def test_a_late_older_neighbour_list_is_ignored() -> None:
     robot = LeaveLock(0, LEASE_S, START_S - LEASE_S)
-    robot.see([1], START_S)
-    robot.hear(1, NeighbourList(5, ()), START_S)
-    robot.hear(1, NeighbourList(4, (0,)), START_S)
+    robot.update([1], START_S)
+    robot.receive(1, NeighbourList(5, ()), START_S)
+    robot.receive(1, NeighbourList(4, (0,)), START_S)
     assert not robot.redundant()
 
 
 # --- locks ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_robot_leaves_once_all_have_granted() -> None:
+def test_a_robot_leaves_once_all_neighbours_have_granted_its_lock() -> None:
     robots = swarm(everyone(3))
-    ask = only(robots[0].ask(START_S))
+    request = only(robots[0].request(START_S))
     for other in (1, 2):
         assert not robots[0].leave(START_S)
-        (grant,) = robots[other].hear(0, ask, START_S)
-        assert grant == LockMessage(0, LockGrant(ask.number))
+        (grant,) = robots[other].receive(0, request, START_S)
+        assert grant == Outgoing(0, LockGrant(request.number))
         assert robots[other].locked(START_S)
-        robots[0].hear(other, grant.message, START_S)
-    assert robots[0].leave(START_S) == [LockMessage(None, LockRelease(ask.number))]
+        robots[0].receive(other, grant.message, START_S)
+    assert robots[0].leave(START_S) == [Outgoing(None, LockRelease(request.number))]
     assert not robots[0].wants
-    robots[1].hear(0, LockRelease(ask.number), START_S)
+    robots[1].receive(0, LockRelease(request.number), START_S)
     assert not robots[1].locked(START_S)
 
 
-def test_a_copy_of_an_ask_is_granted_again_and_holds_no_longer() -> None:
+def test_a_repeated_lock_request_is_granted_again_without_a_longer_lease() -> None:
     robots = swarm(everyone(2))
-    ask = only(robots[0].ask(START_S))
+    request = only(robots[0].request(START_S))
     for late_s in (0.0, 5.0):
-        assert only(robots[1].hear(0, ask, START_S + late_s)) == LockGrant(ask.number)
+        assert only(robots[1].receive(0, request, START_S + late_s)) == LockGrant(request.number)
     assert not robots[1].locked(START_S + LEASE_S)
 
 
-def test_an_ask_that_arrives_after_it_is_over_locks_nobody() -> None:
+def test_a_lock_request_that_arrives_after_its_release_locks_no_robot() -> None:
     robots = swarm(everyone(2))
-    ask = only(robots[0].ask(START_S))
+    request = only(robots[0].request(START_S))
     (over,) = robots[0].give_up()
-    robots[1].hear(0, over.message, START_S)
-    assert robots[1].hear(0, ask, START_S) == []
+    robots[1].receive(0, over.message, START_S)
+    assert robots[1].receive(0, request, START_S) == []
     assert not robots[1].locked(START_S)
 
 
-def test_who_asks_again_asks_those_that_have_not_granted() -> None:
+def test_a_repeated_lock_request_names_the_neighbours_that_have_not_granted() -> None:
     robots = swarm(everyone(3))
-    ask = only(robots[0].ask(START_S))
-    robots[0].hear(2, only(robots[2].hear(0, ask, START_S)), START_S)
-    again = only(robots[0].ask(START_S + 1.0))
-    assert again == LockRequest(ask.number, tuple(each for each in ask.versions if each[0] == 1))
-    robots[0].hear(1, only(robots[1].hear(0, again, START_S + 1.0)), START_S + 1.0)
+    request = only(robots[0].request(START_S))
+    robots[0].receive(2, only(robots[2].receive(0, request, START_S)), START_S)
+    again = only(robots[0].request(START_S + 1.0))
+    assert again == LockRequest(request.number, tuple(each for each in request.versions if each[0] == 1))
+    robots[0].receive(1, only(robots[1].receive(0, again, START_S + 1.0)), START_S + 1.0)
     assert robots[0].may_leave(START_S + 1.0)
-    assert robots[0].ask(START_S + 1.0) == []
+    assert robots[0].request(START_S + 1.0) == []
 
 
-def test_a_list_tells_that_a_wish_is_over_where_that_was_lost() -> None:
+def test_a_neighbour_list_replaces_a_lost_lock_release() -> None:
     robots = swarm(everyone(2))
-    robots[1].hear(0, only(robots[0].ask(START_S)), START_S)
-    robots[1].hear(0, robots[0].tell(), START_S)
+    robots[1].receive(0, only(robots[0].request(START_S)), START_S)
+    robots[1].receive(0, robots[0].neighbour_list(), START_S)
     assert robots[1].locked(START_S)
     robots[0].give_up()
-    robots[1].hear(0, robots[0].tell(), START_S)
+    robots[1].receive(0, robots[0].neighbour_list(), START_S)
     assert not robots[1].locked(START_S)
 
 
-def test_a_lock_is_granted_to_nobody_else_until_it_ends() -> None:
+def test_a_robot_grants_no_second_lock_before_the_first_ends() -> None:
     robots = swarm({0: [1], 1: [0, 2], 2: [1]})
-    first, second = only(robots[0].ask(START_S)), only(robots[2].ask(START_S))
-    robots[1].hear(0, first, START_S)
-    assert only(robots[1].hear(2, second, START_S + LEASE_S - 1e-6)) == LockDenial(second.number)
-    assert only(robots[1].hear(2, second, START_S + LEASE_S)) == LockGrant(second.number)
+    first, second = only(robots[0].request(START_S)), only(robots[2].request(START_S))
+    robots[1].receive(0, first, START_S)
+    assert only(robots[1].receive(2, second, START_S + LEASE_S - 1e-6)) == LockDenial(second.number)
+    assert only(robots[1].receive(2, second, START_S + LEASE_S)) == LockGrant(second.number)
 
 
-def test_a_wish_ends_long_before_the_locks_and_is_given_up() -> None:
+def test_a_lock_request_expires_before_its_locks_and_is_withdrawn() -> None:
     robots = swarm(everyone(2))
-    ask = only(robots[0].ask(START_S))
-    robots[0].hear(1, only(robots[1].hear(0, ask, START_S)), START_S)
+    request = only(robots[0].request(START_S))
+    robots[0].receive(1, only(robots[1].receive(0, request, START_S)), START_S)
     assert robots[0].may_leave(START_S + LEASE_S / 2.0 - 1e-6)
     assert not robots[0].may_leave(START_S + LEASE_S / 2.0)
-    assert only(robots[0].ask(START_S + LEASE_S / 2.0)) == LockRelease(ask.number)
-    assert only(robots[0].ask(START_S + LEASE_S / 2.0)).number > ask.number
+    assert only(robots[0].request(START_S + LEASE_S / 2.0)) == LockRelease(request.number)
+    assert only(robots[0].request(START_S + LEASE_S / 2.0)).number > request.number
 
 
-def test_of_two_neighbours_that_ask_at_once_the_larger_id_yields() -> None:
+def test_of_two_neighbours_that_request_locks_together_the_larger_id_yields() -> None:
     robots = swarm(everyone(2))
-    asks = [only(robots[node].ask(START_S)) for node in (0, 1)]
-    assert robots[1].hear(0, asks[0], START_S) == [
-        LockMessage(None, LockRelease(asks[1].number)),
-        LockMessage(0, LockGrant(asks[0].number)),
+    asks = [only(robots[node].request(START_S)) for node in (0, 1)]
+    assert robots[1].receive(0, asks[0], START_S) == [
+        Outgoing(None, LockRelease(asks[1].number)),
+        Outgoing(0, LockGrant(asks[0].number)),
     ]
-    assert only(robots[0].hear(1, asks[1], START_S)) == LockDenial(asks[1].number)
+    assert only(robots[0].receive(1, asks[1], START_S)) == LockDenial(asks[1].number)
     assert robots[0].wants
     assert not robots[1].wants
 
 
-def test_an_ask_upon_an_old_list_is_denied_and_the_new_one_told() -> None:
+def test_a_lock_request_with_an_old_list_version_is_denied_with_the_new_list() -> None:
     robots = swarm(everyone(2))
-    ask = only(robots[0].ask(START_S))
-    robots[1].see([0, 7], START_S)
-    assert robots[1].hear(0, ask, START_S) == [LockMessage(0, LockDenial(ask.number)), LockMessage(0, robots[1].tell())]
-    robots[0].hear(1, LockDenial(ask.number), START_S)
+    request = only(robots[0].request(START_S))
+    robots[1].update([0, 7], START_S)
+    assert robots[1].receive(0, request, START_S) == [
+        Outgoing(0, LockDenial(request.number)),
+        Outgoing(0, robots[1].neighbour_list()),
+    ]
+    robots[0].receive(1, LockDenial(request.number), START_S)
     assert not robots[0].wants
 
 
-def test_who_sees_somebody_come_or_go_does_not_leave_upon_the_grants_it_has() -> None:
+def test_a_robot_whose_view_changed_does_not_leave_by_earlier_grants() -> None:
     for seen in ([1, 7], []):
         robots = swarm(everyone(2))
-        ask = only(robots[0].ask(START_S))
-        robots[0].hear(1, only(robots[1].hear(0, ask, START_S)), START_S)
-        robots[0].see(seen, START_S)
+        request = only(robots[0].request(START_S))
+        robots[0].receive(1, only(robots[1].receive(0, request, START_S)), START_S)
+        robots[0].update(seen, START_S)
         assert not robots[0].leave(START_S)
-        assert only(robots[0].ask(START_S)) == LockRelease(ask.number)
+        assert only(robots[0].request(START_S)) == LockRelease(request.number)
 
 
-def test_who_has_left_or_moves_grants_nothing_until_it_stands_again() -> None:
+def test_a_robot_that_left_or_moves_grants_no_lock_until_it_stands_again() -> None:
     robots = swarm(everyone(2))
     robots[1].depart()
-    ask = only(robots[0].ask(START_S))
-    assert only(robots[1].hear(0, ask, START_S)) == LockDenial(ask.number)
+    request = only(robots[0].request(START_S))
+    assert only(robots[1].receive(0, request, START_S)) == LockDenial(request.number)
     robots[1].settle()
-    assert only(robots[1].hear(0, ask, START_S)) == LockGrant(ask.number)
+    assert only(robots[1].receive(0, request, START_S)) == LockGrant(request.number)
 
 
-def test_a_robot_that_lost_its_memory_stands_still_and_grants_nothing_for_a_lease() -> None:
+def test_a_robot_that_lost_its_memory_stands_still_and_grants_no_lock_for_one_lease() -> None:
     robots = swarm(everyone(2))
-    ask = only(robots[0].ask(START_S))
+    request = only(robots[0].request(START_S))
     reborn = LeaveLock(1, LEASE_S, START_S)
-    reborn.see([0], START_S)
+    reborn.update([0], START_S)
     assert reborn.locked(START_S + LEASE_S - 1e-6)
-    assert only(reborn.hear(0, ask, START_S + LEASE_S - 1e-6)) == LockDenial(ask.number)
+    assert only(reborn.receive(0, request, START_S + LEASE_S - 1e-6)) == LockDenial(request.number)
     assert not reborn.locked(START_S + LEASE_S)
     assert not LeaveLock(1, LEASE_S, START_S, quiet_s=0.0).locked(START_S)
 
@@ -255,9 +258,9 @@ def test_a_robot_that_lost_its_memory_repeats_no_version_and_no_number() -> None
     before, after = LeaveLock(0, LEASE_S, 0.0), LeaveLock(0, LEASE_S, START_S)
     for now_s, robot in ((1.0, before), (START_S, after)):
         for seen in ([1], [2], [1]):
-            robot.see(seen, now_s)
-    assert after.tell().listed == before.tell().listed
-    assert after.tell().version > before.tell().version
+            robot.update(seen, now_s)
+    assert after.neighbour_list().listed == before.neighbour_list().listed
+    assert after.neighbour_list().version > before.neighbour_list().version
 
 
 @pytest.mark.parametrize(
@@ -271,8 +274,8 @@ def test_a_robot_that_lost_its_memory_repeats_no_version_and_no_number() -> None
         LockRelease(7),
     ],
 )
-def test_every_message_survives_the_wire(message: Message) -> None:
-    assert msgspec.msgpack.decode(msgspec.msgpack.encode(message), type=Message) == message
+def test_every_message_survives_the_wire(message: LockProtocolMessage) -> None:
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(message), type=LockProtocolMessage) == message
 
 
 # --- with everything going wrong ------------------------------------------------------------------------------------

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from zwerm.agents.sensor_coverage.frontier.paths import reach
-from zwerm.agents.sensor_coverage.messages.peers import PathVector, Route, read, write
+from zwerm.agents.sensor_coverage.messages.beacons import PathVector, Route
+from zwerm.agents.sensor_coverage.messages.peers import read, write
 from zwerm.agents.sensor_coverage.protocols.path_vector import RENEW_TICKS, PathVectorProtocol
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
@@ -24,40 +25,40 @@ class Network:
         self, count: int, weights: dict[Edge, float], kind: type[PathVectorProtocol] = PathVectorProtocol
     ) -> None:
         self.weights = dict(weights)
-        self.robots = {place: kind() for place in range(1, count + 1)}
+        self.robots = {slot: kind() for slot in range(1, count + 1)}
         self.told = dict.fromkeys(self.robots, 0)
         self.roots: dict[int, None] = {}
         self.under_way: list[tuple[int, int, PathVector]] = []
         self.tick = 0
 
-    def beside(self, place: int) -> dict[int, float]:
-        return {other: self.weights[edge(place, other)] for other in self.robots if edge(place, other) in self.weights}
+    def beside(self, slot: int) -> dict[int, float]:
+        return {other: self.weights[edge(slot, other)] for other in self.robots if edge(slot, other) in self.weights}
 
-    def tell(self, place: int) -> None:
-        robot = self.robots[place]
+    def tell(self, slot: int) -> None:
+        robot = self.robots[slot]
         self.tick += 1
-        robot.choose(place, 0.0 if place in self.roots else None, self.beside(place), self.tick)
-        self.told[place] += 1
-        way = PathVector(self.told[place], place, robot.route, robot.ended)
-        self.under_way += [(place, other, way) for other in self.beside(place)]
+        robot.choose(slot, 0.0 if slot in self.roots else None, self.beside(slot), self.tick)
+        self.told[slot] += 1
+        way = PathVector(self.told[slot], slot, robot.route, robot.ended)
+        self.under_way += [(slot, other, way) for other in self.beside(slot)]
 
     def deliver(self, sender: int, receiver: int, way: PathVector) -> None:
         if edge(sender, receiver) in self.weights:
-            self.robots[receiver].hear(sender, way)
+            self.robots[receiver].receive(sender, way)
 
-    def round(self, places: Iterable[int]) -> None:
+    def round(self, slots: Iterable[int]) -> None:
         """Let everyone tell its way, and all hear it: nothing is lost."""
-        for place in places:
-            self.tell(place)
+        for slot in slots:
+            self.tell(slot)
         arrived, self.under_way = self.under_way, []
         for each in arrived:
             self.deliver(*each)
 
     def costs(self) -> dict[int, float]:
-        return {place: robot.route.cost for place, robot in self.robots.items() if robot.route is not None}
+        return {slot: robot.route.cost for slot, robot in self.robots.items() if robot.route is not None}
 
     def true_costs(self) -> dict[int, float]:
-        lists = {place: list(self.beside(place)) for place in self.robots}
+        lists = {slot: list(self.beside(slot)) for slot in self.robots}
         obstacle = [each for each, weight in self.weights.items() if weight > 1.0]
         return reach(FlagComplex(lists), dict.fromkeys(self.roots, 0.0), obstacle, OBSTACLE_COST).cost
 
@@ -111,11 +112,11 @@ class Lossy(RuleBasedStateMachine):
 
     @rule(data=st.data())
     def toggle_a_root(self, data: st.DataObject) -> None:
-        place, roots = self.a_place(data), self.network.roots
-        if place in roots:
-            del roots[place]
+        slot, roots = self.a_place(data), self.network.roots
+        if slot in roots:
+            del roots[slot]
         else:
-            roots[place] = None
+            roots[slot] = None
 
     @rule(data=st.data(), weight=st.sampled_from((0.0, 1.0, OBSTACLE_COST)))
     def change_an_edge(self, data: st.DataObject, weight: float) -> None:
@@ -131,11 +132,11 @@ class Lossy(RuleBasedStateMachine):
 
     @invariant()
     def no_way_comes_by_a_place_twice_so_nobody_counts_further_than_there_are_places(self) -> None:
-        for place, robot in self.network.robots.items():
+        for slot, robot in self.network.robots.items():
             if robot.route is not None:
-                assert robot.route.places[0] == place
-                assert len(set(robot.route.places)) == len(robot.route.places) <= len(self.network.robots)
-                assert robot.route.cost <= OBSTACLE_COST * (len(robot.route.places) - 1)
+                assert robot.route.slots[0] == slot
+                assert len(set(robot.route.slots)) == len(robot.route.slots) <= len(self.network.robots)
+                assert robot.route.cost <= OBSTACLE_COST * (len(robot.route.slots) - 1)
 
     def teardown(self) -> None:
         """Once nothing is lost any more, ways become the shortest of the graph, and stay so."""
@@ -147,9 +148,9 @@ class Lossy(RuleBasedStateMachine):
             assert network.costs() == network.true_costs()
             for robot in network.robots.values():
                 if robot.route is not None:
-                    hops = zip(robot.route.places, robot.route.places[1:], strict=False)
+                    hops = zip(robot.route.slots, robot.route.slots[1:], strict=False)
                     assert robot.route.cost == sum(network.weights[edge(*hop)] for hop in hops)
-                    assert robot.route.places[-1] in network.roots
+                    assert robot.route.slots[-1] in network.roots
 
 
 Lossy.TestCase.settings = settings(
@@ -164,12 +165,12 @@ TestAnyFiniteSequenceOfFaults = Lossy.TestCase
 class Gullible(PathVectorProtocol):
     """Believes in ways through its own place, up to a length: plain distance vector, as a control."""
 
-    def choose(self, place: int, cost: float | None, weights: dict[int, float], tick: int) -> None:  # type: ignore[override]
-        best = None if cost is None else Route(cost, (place,))
+    def choose(self, slot: int, cost: float | None, weights: dict[int, float], tick: int) -> None:  # type: ignore[override]
+        best = None if cost is None else Route(cost, (slot,))
         for beside, weight in weights.items():
-            way = self._ways.get(beside)
+            way = self._routes.get(beside)
             if way is not None and way.cost < 99.0 and (best is None or way.cost + weight < best.cost):
-                best = Route(way.cost + weight, (place, *way.places))
+                best = Route(way.cost + weight, (slot, *way.slots))
         self.route = best
 
 
@@ -184,14 +185,14 @@ def after_the_cut(kind: type[PathVectorProtocol], loss: float, delay: int, seed:
     told: list[float] = []
     queue: list[tuple[int, tuple[int, int, PathVector]]] = []
     for now in range(rounds):
-        for place in random.permutation(range(2, 17)).tolist():
-            network.tell(place)
+        for slot in random.permutation(range(2, 17)).tolist():
+            network.tell(slot)
         queue += [(now + int(random.integers(0, delay + 1)), e) for e in network.under_way if random.random() >= loss]
         network.under_way = []
         for _, each in [each for each in queue if each[0] <= now]:
             network.deliver(*each)
         queue = [each for each in queue if each[0] > now]
-        costs = [cost for place, cost in network.costs().items() if place != 1]
+        costs = [cost for slot, cost in network.costs().items() if slot != 1]
         if not costs:
             return told
         told += costs
@@ -199,21 +200,19 @@ def after_the_cut(kind: type[PathVectorProtocol], loss: float, delay: int, seed:
 
 
 @pytest.mark.parametrize(("loss", "delay"), [(0.0, 0), (0.3, 2), (0.6, 3), (0.9, 0)])
-def test_after_its_root_is_cut_off_a_gradient_ends_and_counts_no_further_than_there_are_places(
-    loss: float, delay: int
-) -> None:
+def test_after_the_frontier_is_cut_off_routes_end_and_costs_stay_bounded_by_the_slots(loss: float, delay: int) -> None:
     for seed in range(3):
         told = after_the_cut(PathVectorProtocol, loss, delay, seed)
         assert len(told) < 400 * 15, "it ends"
         assert max(told, default=0.0) <= 15 * OBSTACLE_COST
 
 
-def test_a_gradient_that_believes_in_ways_through_itself_counts_on() -> None:
+def test_a_distance_vector_without_slots_counts_to_infinity() -> None:
     assert max(after_the_cut(Gullible, 0.0, 0, seed=1, rounds=100)) > 15 * OBSTACLE_COST
 
 
 @pytest.mark.parametrize("weights", [line(3), {(1, 2): 1.0, (1, 3): 1.0, (2, 3): 1.0}])
-def test_two_robots_do_not_point_at_each_other_when_their_root_goes(weights: dict[Edge, float]) -> None:
+def test_two_robots_do_not_route_through_each_other_when_the_frontier_goes(weights: dict[Edge, float]) -> None:
     network = Network(3, weights)
     network.roots[1] = None
     settled(network, 4)
@@ -225,29 +224,29 @@ def test_two_robots_do_not_point_at_each_other_when_their_root_goes(weights: dic
 # --- what is believed -----------------------------------------------------------------------------------------------
 
 
-def test_a_way_along_an_obstacle_costs_more() -> None:
+def test_a_route_along_an_obstacle_edge_costs_more() -> None:
     network = Network(4, {(1, 2): 1.0, (2, 3): 1.0, (1, 4): 1.0, (3, 4): OBSTACLE_COST})
     network.roots[1] = None
     settled(network, 4)
     assert network.robots[3].route == Route(2.0, (3, 2, 1), since=1)
 
 
-def test_of_equal_ways_that_to_the_smallest_place_at_the_frontier_wins_and_then_that_by_the_smallest() -> None:
+def test_of_equal_routes_the_one_to_the_smallest_slot_wins_and_then_the_one_through_the_smallest() -> None:
     robot = PathVectorProtocol()
-    for place, root in ((5, 4), (3, 4), (2, 7), (1, 8)):
-        robot.hear(place, PathVector(1, place, Route(1.0, (place, root), 5)))
+    for slot, root in ((5, 4), (3, 4), (2, 7), (1, 8)):
+        robot.receive(slot, PathVector(1, slot, Route(1.0, (slot, root), 5)))
     robot.choose(9, None, dict.fromkeys((5, 3, 2, 1), 1.0), 9)
     assert robot.route == Route(2.0, (9, 3, 4), 5)
 
 
-def test_the_base_is_where_ways_begin_and_none_leads_through_it() -> None:
+def test_no_route_leads_through_the_base() -> None:
     robot = PathVectorProtocol()
-    robot.hear(0, PathVector(1, 0, Route(1.0, (0, 7), 5)))
+    robot.receive(0, PathVector(1, 0, Route(1.0, (0, 7), 5)))
     robot.choose(9, None, {0: 1.0}, 9)
     assert robot.route is None
 
 
-def test_the_nearest_of_two_roots_is_told_and_who_stops_being_one_tells_the_other() -> None:
+def test_routes_lead_to_the_nearest_frontier_robot_and_to_the_other_once_it_ends_its_claim() -> None:
     network = Network(5, line(5))
     network.roots.update({1: None, 5: None})
     settled(network, 5)
@@ -257,44 +256,44 @@ def test_the_nearest_of_two_roots_is_told_and_who_stops_being_one_tells_the_othe
     assert network.costs() == {1: 0.0, 2: 1.0, 3: 2.0, 4: 3.0, 5: 4.0}
 
 
-def test_an_older_word_that_comes_late_and_a_copy_change_nothing() -> None:
+def test_a_late_older_path_vector_and_a_copy_change_nothing() -> None:
     robot = PathVectorProtocol()
-    robot.hear(4, PathVector(7, 1, Route(0.0, (1,), 5)))
+    robot.receive(4, PathVector(7, 1, Route(0.0, (1,), 5)))
     version = robot.version
-    robot.hear(4, PathVector(6, 1, None))
-    robot.hear(4, PathVector(7, 1, None))
+    robot.receive(4, PathVector(6, 1, None))
+    robot.receive(4, PathVector(7, 1, None))
     robot.choose(2, None, {1: 1.0}, 9)
     assert robot.route == Route(1.0, (2, 1), 5)
     assert robot.version == version
 
 
-def test_a_way_belongs_to_a_place_and_outlives_who_told_it() -> None:
+def test_a_route_belongs_to_a_slot_and_outlives_its_occupant() -> None:
     robot = PathVectorProtocol()
-    robot.hear(4, PathVector(7, 1, Route(1.0, (1, 5), 5)))
-    robot.hear(4, PathVector(8, 6, None))  # it has gone on, and tells of another place
+    robot.receive(4, PathVector(7, 1, Route(1.0, (1, 5), 5)))
+    robot.receive(4, PathVector(8, 6, None))  # it has gone on, and tells of another place
     robot.choose(2, None, {1: 1.0, 6: 1.0}, 9)
     assert robot.route == Route(2.0, (2, 1, 5), 5)
     robot.take_over(1, None)
     assert robot.route == Route(1.0, (1, 5), 5)
-    robot.hear(9, PathVector(1, 1, None))  # whoever stands there now
+    robot.receive(9, PathVector(1, 1, None))  # whoever stands there now
     robot.choose(2, None, {1: 1.0, 6: 1.0}, 9)
     assert robot.route is None
 
 
-def test_all_ways_to_a_place_end_with_the_word_that_it_is_not_at_the_frontier_any_more() -> None:
+def test_all_routes_to_a_slot_end_when_it_is_announced_as_ended() -> None:
     robot = PathVectorProtocol()
-    robot.hear(4, PathVector(1, 4, Route(1.0, (4, 7), 5)))
-    robot.hear(3, PathVector(1, 3, Route(2.0, (3, 5, 7), 5)))
-    robot.hear(4, PathVector(2, 4, None, ended=((7, 8),)))
+    robot.receive(4, PathVector(1, 4, Route(1.0, (4, 7), 5)))
+    robot.receive(3, PathVector(1, 3, Route(2.0, (3, 5, 7), 5)))
+    robot.receive(4, PathVector(2, 4, None, ended=((7, 8),)))
     robot.choose(2, None, {3: 1.0, 4: 1.0}, 9)
     assert robot.route is None
     assert robot.ended == ((7, 8),)
-    robot.hear(3, PathVector(2, 3, Route(2.0, (3, 5, 7), 10)))  # it is again
+    robot.receive(3, PathVector(2, 3, Route(2.0, (3, 5, 7), 10)))  # it is again
     robot.choose(2, None, {3: 1.0, 4: 1.0}, 11)
     assert robot.route == Route(3.0, (2, 3, 5, 7), 10)
 
 
-def test_who_claims_something_else_ends_what_it_claimed_before() -> None:
+def test_a_new_frontier_claim_of_a_robot_ends_its_earlier_claim() -> None:
     robot = PathVectorProtocol()
     robot.choose(2, 0.0, {}, 5)
     robot.choose(2, 0.0, {}, 6)
@@ -305,18 +304,18 @@ def test_who_claims_something_else_ends_what_it_claimed_before() -> None:
     assert (robot.route, robot.ended) == (None, ((2, 8),))
 
 
-def test_who_took_a_place_over_and_missed_the_end_of_its_way_is_believed_after_a_while() -> None:
+def test_a_robot_that_took_over_a_slot_and_missed_the_end_of_its_route_renews_its_claim() -> None:
     follower, other = PathVectorProtocol(), PathVectorProtocol()
-    follower.hear(4, PathVector(1, 2, Route(0.0, (2,), 5)))
-    other.hear(4, PathVector(2, 2, None, ended=((2, 8),)))  # the follower has not heard that
+    follower.receive(4, PathVector(1, 2, Route(0.0, (2,), 5)))
+    other.receive(4, PathVector(2, 2, None, ended=((2, 8),)))  # the follower has not heard that
     follower.take_over(2, None)
     for number, tick in ((1, 9), (2, 9 + RENEW_TICKS)):
         follower.choose(2, 0.0, {}, tick)
-        other.hear(6, PathVector(number, 2, follower.route))
+        other.receive(6, PathVector(number, 2, follower.route))
         other.choose(3, None, {2: 1.0}, tick)
         assert (other.route is not None) == (number == 2)
 
 
-def test_a_way_survives_the_wire() -> None:
+def test_a_path_vector_survives_the_wire() -> None:
     for way in (PathVector(1, 2, Route(4.5, (2, 3), 7), ((4, 5),)), PathVector(1, 2, None)):
         assert read(write(way)) == way

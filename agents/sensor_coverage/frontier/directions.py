@@ -1,0 +1,66 @@
+"""Estimates of directions: a robot's heading, the direction between two slots, and the directions of walls.
+
+The central coordinator and the decentralised robots use the same three estimators. All angles are in radians, positive
+to the left.
+"""
+
+import cmath
+import math
+from collections.abc import Iterable
+
+# Weight of a new reading in the reference direction between two slots, once several readings are averaged.
+REFERENCE_WEIGHT = 0.1
+# A reference direction that differs from a new reading by more than this [rad] is replaced: a robot was displaced.
+REFERENCE_OFF_RAD = 0.35
+# Readings of a heading after which its weight no longer falls.
+HEADING_READINGS_MAX = 20
+# Contacts within this angle [rad] belong to the same wall.
+SAME_WALL_RAD = 0.2
+
+# Unit vector of a reference direction as a complex number, and the number of readings averaged so far.
+Reference = tuple[complex, int]
+
+
+def angle_between(a_rad: float, b_rad: float) -> float:
+    """Return the absolute angle [rad] between two directions, in [0, pi]."""
+    return abs(math.remainder(a_rad - b_rad, math.tau))
+
+
+def wrapped(angle_rad: float) -> float:
+    """Return the same angle in [-pi, pi]."""
+    return math.remainder(angle_rad, math.tau)
+
+
+def refined_heading(heading_rad: float, readings: int, pairs: Iterable[tuple[float, float]]) -> float | None:
+    """Return a robot's heading refined by reciprocal bearings, or None if there are no pairs.
+
+    Each pair has the direction from a neighbour back to the robot, in the common frame, and the robot's own bearing to
+    that neighbour. The two directions are opposite: heading = back + pi - bearing. `readings` counts earlier
+    refinements.
+    """
+    error = 0j
+    for back_rad, bearing_rad in pairs:
+        error += cmath.exp(1j * (back_rad + math.pi - heading_rad - bearing_rad))
+    return heading_rad + cmath.phase(error) / min(readings + 1, HEADING_READINGS_MAX) if error else None
+
+
+def refined_reference(known: Reference | None, there_rad: float, back_rad: float) -> Reference:
+    """Return the reference direction from one slot to another after one more reading from both ends.
+
+    The low weight of one reading prevents a random walk of the reference, which the paper's "current bearings" cause.
+    """
+    now = cmath.exp(1j * there_rad) + cmath.exp(1j * (back_rad + math.pi))
+    now /= abs(now) or 1.0
+    mean, count = (now, 0) if known is None else known
+    if abs(cmath.phase(now / mean)) > REFERENCE_OFF_RAD:
+        mean, count = now, 0
+    mean += max(1.0 / (count + 1), REFERENCE_WEIGHT) * (now - mean)
+    return mean / (abs(mean) or 1.0), count + 1
+
+
+def add_wall(known: list[float], direction_rad: float) -> bool:
+    """Add the direction of a wall unless a similar one is known; return whether it was added."""
+    if any(angle_between(each, direction_rad) <= SAME_WALL_RAD for each in known):
+        return False
+    known.append(direction_rad)
+    return True

@@ -1,0 +1,33 @@
+"""One scan of the swarm, and one planned deployment."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from zwerm.maths.simplicial import FlagComplex
+
+
+class ScanResult(NamedTuple):
+    """The views of all slots, their Rips complex (algorithm 2), and the slots of the base stations.
+
+    `views` has the bearing [rad] of each visible slot, by the slot that sees it.
+    """
+
+    views: Mapping[int, Mapping[int, float]]
+    complex_: FlagComplex
+    bases: tuple[int, ...]
+
+
+class Plan(NamedTuple):
+    """One deployment: the robot at `mover` drives along `direction` [rad], and the robots on the path follow.
+
+    `key` names what is expanded: one side of an edge, or a gap around one slot. The new robot measures its distance to
+    the robots at the `anchors`. `path` leads from a source to the mover, once a path is assigned.
+    """
+
+    key: tuple[int, ...]
+    mover: int
+    direction: float
+    hop_m: float
+    clear_m: float
+    anchors: tuple[int, ...]
+    path: tuple[int, ...] = ()

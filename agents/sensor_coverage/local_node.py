@@ -1,0 +1,86 @@
+"""What a decentralised robot and its base station have in common: the situation, the census, and the loop over components."""
+
+from typing import Final
+
+from zwerm.agents.runtime.contract import Controller, Setup
+from zwerm.agents.sensor_coverage.frontier.planner import Planner
+from zwerm.agents.sensor_coverage.messages import advice, peers
+from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS
+from zwerm.agents.sensor_coverage.motion.parameters import RobotParameters
+from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
+from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
+from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
+from zwerm.agents.sensor_coverage.protocols.advice_client import AdviceClient
+from zwerm.agents.sensor_coverage.protocols.completion import CompletionProtocol
+from zwerm.agents.sensor_coverage.protocols.component_loop import Codec, ComponentLoop
+from zwerm.wire.messages import Command, Observation, Wake
+
+CODECS: Final = {
+    peers.CHANNEL: Codec(peers.read, peers.write, needs_sender=True),
+    advice.CHANNEL: Codec(advice.read, advice.write),
+}
+
+
+class LocalNode(Controller):
+    """A node without a coordinator. A subclass sets `components`, in the order in which they are polled and send."""
+
+    sensors = ("bearings", "touch", "odometry")
+    Parameters = RobotParameters
+    components: ComponentLoop
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        self.random.integers(1, INCARNATIONS)  # not used; keeps the later draws as they were in earlier versions
+        self.situation = Situation(setup, self.parameters, self.random, Planner)
+        self.beaconing = Beaconing(self.situation.local_map, lambda: self.situation.waiting)
+        base = setup.role == "base"
+        self.completion = CompletionProtocol(setup, self.random, base, lambda: self._takes_census)
+        self.advice_client: AdviceClient | None = None
+        if setup.services.get("redundancy") == "coordinator":
+            self.advice_client = AdviceClient(setup.dt_s)
+        self._claimed = False
+
+    @property
+    def node(self) -> int:
+        """The node's id."""
+        return self.setup.node
+
+    @property
+    def local_map(self) -> LocalMap:
+        """The node's map of its neighbourhood."""
+        return self.situation.local_map
+
+    def step(self, observation: Observation) -> Command:
+        """Observe, receive messages, go on with the activity, poll the components, and send their messages."""
+        situation = self.situation
+        situation.observe(observation)
+        self.completion.update(situation.tick, situation.bearings, situation.claims, self._occupied)
+        self.components.deliver(observation.inbox, situation.tick)
+        velocity = situation.advance()
+        self.components.poll(situation.tick)
+        if bool(situation.claims) != self._claimed:
+            self._claimed = bool(situation.claims)
+            situation.telemetry["claims_frontier"] = self._claimed
+        telemetry, situation.telemetry = situation.telemetry, {}
+        snapshot, situation.snapshot = situation.snapshot, b""
+        outbox = self.components.outbox()
+        return Command(drive=velocity, outbox=outbox, wake=self._wake(), telemetry=telemetry, snapshot=snapshot)
+
+    @property
+    def _takes_census(self) -> bool:
+        """Whether the node asks in the census again where answers are missing."""
+        return True
+
+    @property
+    def _occupied(self) -> bool:
+        """Whether the node is busy, as the census counts it: a message in flight keeps its sender busy."""
+        situation = self.situation
+        here = situation.in_push or situation.active or situation.local_map.moving
+        return here or not situation.calm or not situation.mailbox.empty
+
+    def _wake(self) -> Wake | None:
+        """Return the next wake-up: the next tick during an activity, else the earliest of the components'."""
+        due = self.components.next_wake()
+        if self.situation.active or due is None:
+            return None
+        return Wake(at_s=max(self.situation.tick + 1, due) * self.setup.dt_s, on_packet=True)

@@ -1,0 +1,97 @@
+"""Broadcast messages between neighbours: the state of a robot, and its route to the frontier.
+
+A robot broadcasts a `StateBeacon` when its state changes, and periodically. Directions are in the frame of the base,
+which each robot knows by its heading. No message contains a position.
+"""
+
+from typing import Final
+
+from msgspec import Struct
+
+# Slot of a robot that occupies none.
+NOWHERE: Final = -1
+# Number of hops to the base that stands for unknown.
+FAR: Final = 1000
+
+
+class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A part of a message."""
+
+
+class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A whole message, which begins with its tag."""
+
+
+class SeenRobot(_Part, frozen=True):
+    """A visible robot: the number of its latest drive, the slot that it holds, and its direction [rad]."""
+
+    node: int
+    epoch: int
+    slot: int
+    direction_rad: float
+
+
+class Attempt(_Part, frozen=True):
+    """The sender's attempts at one side of the edge between its slot and the slot `other`."""
+
+    other: int
+    sign: int
+    attempts: int
+    failed: bool
+    closed: bool
+
+
+class Route(_Part, frozen=True):
+    """The route to the nearest frontier robot: its cost, and its slots, the sender's first.
+
+    The last slot has been at the frontier since the tick `since`.
+    """
+
+    cost: float
+    slots: tuple[int, ...]
+    since: int = 0
+
+
+class PathVector(_Message, frozen=True, tag="w"):
+    """The route from a slot, by the robot at the slot; `number` counts the sender's path vectors.
+
+    `ended` has (slot, tick) of slots that have not been at the frontier since that tick, the newest last. `home` is the
+    number of hops to the base, or FAR if unknown.
+    """
+
+    number: int
+    slot: int
+    route: Route | None
+    ended: tuple[tuple[int, int], ...] = ()
+    home: int = FAR
+
+
+# Stands for the path vector of a robot that has sent none.
+UNSAID: Final = PathVector(0, NOWHERE, None)
+
+
+class StateBeacon(_Message, frozen=True, tag="s"):
+    """The state of a robot, as its neighbours need it.
+
+    `number` counts the sender's states, `epoch` its drives, and `samples` its averages of bearings. `could` has the
+    sides, as (other slot, sign), that it could expand. `waiting`: it stands at the base, ready to go. `redundant`: it
+    has left the complex, and its body still stands at its slot.
+    """
+
+    number: int
+    slot: int
+    epoch: int
+    moving: bool
+    waiting: bool
+    samples: int
+    seen: tuple[SeenRobot, ...]
+    tries: tuple[Attempt, ...]
+    could: tuple[tuple[int, int], ...]
+    path_vector: PathVector
+    redundant: bool = False
+
+
+class StateRequest(_Message, frozen=True, tag="a"):
+    """A request that these robots, or all if there are none, broadcast their states."""
+
+    nodes: tuple[int, ...]

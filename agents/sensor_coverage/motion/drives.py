@@ -1,0 +1,192 @@
+"""The three drives of a push: deploy into unknown space, move to the slot ahead, and correct the scale.
+
+Each drive is a generator that yields one velocity a tick and returns a `DriveResult`. The coordinator's robots and the
+decentralised robots use the same drives.
+"""
+
+import math
+from collections.abc import Callable, Generator, Sequence
+from itertools import count
+from typing import Final, NamedTuple
+
+from zwerm.agents.sensor_coverage.messages.commands import Landmark, Sighting
+from zwerm.agents.sensor_coverage.motion.homing import Vector, slide, unit
+from zwerm.agents.sensor_coverage.motion.landmark_target import TargetPoint, target_point
+from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Locomotion
+from zwerm.wire.messages import BodyVelocity
+
+# A contact within this angle of the heading is ahead.
+AHEAD_RAD: Final = math.pi / 3.0
+# A deployment is stuck after this many ticks with less than this fraction of a full step forward.
+STUCK_TICKS: Final = 5
+STUCK_FRACTION: Final = 0.2
+# A deployment ends this close [m] to its full length.
+HOP_TOLERANCE_M: Final = 1e-3
+# A move with noisy bearings stops this close [m] to the goal and averages.
+NOISY_NEAR_M: Final = 0.06
+# A move drives back after this many ticks without a visible robot.
+LOST_TICKS: Final = 20
+# Fraction of the offset to drive in the second half of a move.
+LATE_GAIN: Final = 0.7
+# Longest way [m] to creep forward until a link breaks, and back until it is restored.
+BREAK_M_MAX: Final = 0.4
+RESTORE_M_MAX: Final = 0.5
+# A second anchor is skipped if less than this fraction of its direction is perpendicular to the first.
+PERPENDICULAR_MIN: Final = 0.3
+
+
+class DriveResult(NamedTuple):
+    """The end of a drive; the fields have the meaning of `Arrived`."""
+
+    ok: bool
+    used_odometry: bool = False
+    used_moving_landmarks: bool = False
+    driven_m: float = 0.0
+    touched: tuple[float, ...] = ()
+
+
+DriveToResult = Generator[BodyVelocity, None, DriveResult]
+
+
+def deploy(
+    motion: Locomotion, bearing_rad: float, hop_m: float, clear_m: float, on_cleared: Callable[[], None]
+) -> DriveToResult:
+    """Drive into unknown space. Algorithm 1, line 8, with the test drive of section III-A, item iv.
+
+    The robot may lose all visual links on its way: its follower drives to its start, and the link is restored then.
+    `on_cleared` is called once the robot has driven `clear_m`.
+    """
+    frame = motion.frame
+    frame.forget()
+    start = motion.position
+    ux, uy = unit(bearing_rad)
+    cleared, stuck = False, 0
+    touched: tuple[float, ...] = ()
+    done = 0.0
+    for _ in range(motion.parameters.drive_ticks_max):
+        now = (frame.x_m - start[0]) * ux + (frame.y_m - start[1]) * uy
+        stuck = stuck + 1 if now < done + STUCK_FRACTION * motion.step_m else 0
+        done = max(done, now)
+        ahead = [each for each in frame.touched if _apart(each, bearing_rad) < AHEAD_RAD]
+        if ahead or stuck > STUCK_TICKS:
+            touched = tuple(ahead)
+            if done < clear_m:
+                yield from motion.drive_to(start)
+                return DriveResult(False, driven_m=done, touched=touched)
+            break
+        if not cleared and done >= clear_m:
+            cleared = True
+            on_cleared()
+        if done >= hop_m - HOP_TOLERANCE_M:
+            break
+        # A wall may have displaced the robot from its line: drive back onto it.
+        aside = (frame.y_m - start[1]) * ux - (frame.x_m - start[0]) * uy
+        left = min(hop_m - done, motion.step_m)
+        yield motion.velocity(ux * left + uy * aside * 0.5, uy * left - ux * aside * 0.5)
+    if not cleared:
+        on_cleared()
+    return DriveResult(True, driven_m=done, touched=touched)
+
+
+def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequence[Landmark]) -> DriveToResult:
+    """Drive to the slot ahead. Section III-B, by the visual homing of section II-D."""
+    p, frame = motion.parameters, motion.frame
+    frame.forget()
+    start = motion.position
+    ux, uy = unit(bearing_rad)
+    goal = start[0] + ux * hop_m, start[1] + uy * hop_m
+    noisy = motion.samples > 1
+    near_m = NOISY_NEAR_M if noisy else p.tolerance_m
+    lost = 0
+    target = TargetPoint(0.0, 0.0)
+    for _ in range(p.drive_ticks_max):
+        target = target_point(landmarks, frame.seen, _offset(motion, goal), motion.hop_m)
+        if target.distance_m < near_m:
+            break
+        lost = 0 if frame.seen else lost + 1
+        if lost > LOST_TICKS:
+            yield from motion.drive_to(start)
+            return DriveResult(False, used_odometry=True)
+        far_m = math.hypot(frame.x_m - start[0], frame.y_m - start[1])
+        gain = 1.0 if far_m < 0.5 * hop_m else LATE_GAIN
+        x, y = slide(gain * target.x, gain * target.y, frame.touched)
+        if math.hypot(x, y) < p.tolerance_m:
+            break  # a wall is in the way
+        yield motion.velocity(x, y)
+    else:
+        if target.distance_m > 0.5 * hop_m > 0.0:
+            return DriveResult(False, target.used_odometry, target.used_moving_landmarks)
+    if noisy and not target.used_moving_landmarks:
+        target = yield from _approach(motion, landmarks, goal)
+    return DriveResult(True, target.used_odometry, target.used_moving_landmarks)
+
+
+def _approach(
+    motion: Locomotion, landmarks: Sequence[Landmark], goal: Vector
+) -> Generator[BodyVelocity, None, TargetPoint]:
+    """Stop, average, step, and repeat.
+
+    The error falls with the square root of the number of all readings, because odometry measures each step.
+    """
+    p, frame = motion.parameters, motion.frame
+    ex = ey = 0.0
+    target = TargetPoint(0.0, 0.0)
+    for stop in count(1):
+        frame.forget()
+        for _ in range(p.stop_samples):
+            yield STOP
+            frame.average()
+        target = target_point(landmarks, frame.averages(), _offset(motion, goal), motion.hop_m)
+        ex, ey = ex + (target.x - ex) / stop, ey + (target.y - ey) / stop
+        sx, sy = slide(ex, ey, frame.touched)
+        wanted = ((motion.bearing_noise_rad or 0.0) * motion.hop_m / p.tolerance_m) ** 2 * target.spread
+        enough = stop * p.stop_samples >= min(wanted, p.still_samples_max)
+        if enough and stop > 1 and math.hypot(sx, sy) < p.tolerance_m:
+            break
+        x, y = motion.position
+        yield from motion.drive_to((x + sx, y + sy), 0.3 * p.tolerance_m)
+        ex, ey = ex - (frame.x_m - x), ey - (frame.y_m - y)
+        if enough and stop > 1:
+            break
+    return target
+
+
+def correct(motion: Locomotion, anchors: Sequence[Sighting]) -> DriveToResult:
+    """Correct the scale. Section III-C.2: the range of sight is the only known distance."""
+    p, frame = motion.parameters, motion.frame
+    first: Vector | None = None
+    for anchor in anchors:
+        ax, ay = unit(frame.seen.get(anchor.node, anchor.bearing_rad))
+        if first is not None:  # stay at the corrected distance to the first anchor
+            along = ax * first[0] + ay * first[1]
+            ax, ay = ax - along * first[0], ay - along * first[1]
+            length = math.hypot(ax, ay)
+            if length < PERPENDICULAR_MIN:
+                break
+            ax, ay = ax / length, ay / length
+        away = math.atan2(-ay, -ax)
+        driven_m = 0.0
+        while anchor.node in frame.seen and driven_m < BREAK_M_MAX:
+            if any(_apart(each, away) < AHEAD_RAD for each in frame.touched):
+                break
+            driven_m += p.creep_m
+            yield motion.velocity(-ax * p.creep_m, -ay * p.creep_m)
+        broken = anchor.node not in frame.seen
+        driven_m = 0.0
+        while anchor.node not in frame.seen and driven_m < RESTORE_M_MAX:
+            driven_m += p.fine_m
+            yield motion.velocity(ax * p.fine_m, ay * p.fine_m)
+        if broken:
+            x, y = frame.x_m + ax * p.margin_m, frame.y_m + ay * p.margin_m
+            yield from motion.drive_to((x, y))
+        if first is None:
+            first = unit(frame.seen.get(anchor.node, anchor.bearing_rad))
+    return DriveResult(True)
+
+
+def _offset(motion: Locomotion, goal: Vector) -> Vector:
+    return goal[0] - motion.frame.x_m, goal[1] - motion.frame.y_m
+
+
+def _apart(a_rad: float, b_rad: float) -> float:
+    return abs(math.remainder(a_rad - b_rad, math.tau))

@@ -1,0 +1,189 @@
+"""One decentralised robot's situation, which its components share: readings, activity, local map, and mailbox."""
+
+import math
+from collections.abc import Callable, Generator, Sequence
+
+import numpy as np
+
+from zwerm.agents.runtime.contract import Setup
+from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.commands import Landmark, Sighting
+from zwerm.agents.sensor_coverage.motion.drives import DriveResult, DriveToResult, correct, deploy, move
+from zwerm.agents.sensor_coverage.motion.homing import Vector
+from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive, Locomotion
+from zwerm.agents.sensor_coverage.motion.parameters import RobotParameters
+from zwerm.agents.sensor_coverage.neighbourhood.failure_detector import FailureDetector
+from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap, MakePlanner
+from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
+from zwerm.agents.sensor_coverage.protocols.transport.mailbox import ReliableMailbox
+from zwerm.wire.messages import BodyVelocity, Observation
+
+
+class Situation:
+    """The state of one robot or base station.
+
+    `driving`: the robot moves in this tick. `in_push`: it is part of a push. `calm`: it stands still, and its view
+    agrees with its neighbours' states. `negotiation` exists if robots may leave the complex. `telemetry` and
+    `snapshot` are reported with the next command.
+    """
+
+    def __init__(
+        self, setup: Setup, parameters: RobotParameters, random: np.random.Generator, make_planner: MakePlanner
+    ) -> None:
+        self.node = setup.node
+        self.tick = 0
+        self.motion = Locomotion(parameters, setup)
+        self.motion.rest = 0.0, 0.0
+        planner_parameters = PlannerParameters(link_m=parameters.link_m, margin_m=parameters.margin_m)
+        self.local_map = LocalMap(setup.node, planner_parameters, make_planner)
+        self.mailbox = ReliableMailbox()
+        self.failure_detector = FailureDetector()
+        self.negotiation: LeaveNegotiation | None = None
+        if setup.services.get("redundancy") in ("link", "coordinator"):
+            self.negotiation = LeaveNegotiation(setup.node, setup.dt_s, random, setup.incarnation == 1)
+        self.driving = self.in_push = self.calm = False
+        self.telemetry: dict[str, float | bool] = {}
+        self.snapshot = b""
+        self.on_cleared: Callable[[], None] = lambda: None
+        self.on_arrived: Callable[[DriveResult], None] = lambda _: self.stand()
+        self._activity: Generator[BodyVelocity, None, DriveResult | None] | None = self._look_around()
+
+    # --- every tick -------------------------------------------------------------------------------------------------
+
+    def observe(self, observation: Observation) -> None:
+        """Take in the readings of a tick."""
+        self.tick = observation.tick
+        self.motion.frame.update(observation)
+        if self.negotiation is not None:
+            self.negotiation.observe(self.tick, self.motion.frame.seen)
+
+    def advance(self) -> BodyVelocity:
+        """Return the next velocity of the activity; report the end of a drive to `on_arrived`."""
+        velocity, result = STOP, None
+        if self._activity is not None:
+            try:
+                velocity = next(self._activity)
+            except StopIteration as end:
+                self._activity, result = None, end.value
+        self.driving = velocity != STOP
+        if isinstance(result, DriveResult):
+            self.motion.settle()
+            self.on_arrived(result)
+        return velocity
+
+    # --- what the robot knows of itself -----------------------------------------------------------------------------
+
+    @property
+    def active(self) -> bool:
+        """Whether the robot drives or averages bearings."""
+        return self._activity is not None
+
+    @property
+    def bearings(self) -> dict[int, float]:
+        """Bearings [rad] of the visible robots that are not declared dead."""
+        dead = self.failure_detector.dead
+        return {node: bearing for node, bearing in self.motion.frame.seen.items() if node not in dead}
+
+    @property
+    def claims(self) -> int:
+        """Number of frontier claims of this robot."""
+        return len(self.local_map.plans) + len(self.local_map.gaps)
+
+    @property
+    def busy(self) -> bool:
+        """Whether the robot drives, averages bearings, or must do so."""
+        return self._activity is not None or self.unsure
+
+    @property
+    def clear(self) -> bool:
+        """Whether the robot stands still, has averaged bearings, and no slot around it changes hands."""
+        return not self.busy and not self.local_map.changing(self.bearings, self.tick)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the robot stands at its slot in the complex, and has nothing else to do."""
+        return not (self.local_map.redundant or self.local_map.moving or self.driving or self.in_push)
+
+    @property
+    def idle(self) -> bool:
+        """Whether the robot is in no push, stands still, and knows its heading."""
+        return not self.in_push and not self.local_map.moving and self.local_map.heading is not None
+
+    @property
+    def locked(self) -> bool:
+        """Whether the robot must stand still for a neighbour that leaves."""
+        return self.negotiation is not None and self.negotiation.locked
+
+    @property
+    def free(self) -> bool:
+        """Whether the robot can take part in a push."""
+        return self.idle and not self.locked
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the robot stands at the base, ready to go."""
+        return self.local_map.slot == NOWHERE and self.idle
+
+    @property
+    def displaced(self) -> bool:
+        """Whether another robot has pushed this robot away from its point of rest."""
+        if self.motion.rest is None:
+            return False
+        away_m = math.hypot(self.motion.frame.x_m - self.motion.rest[0], self.motion.frame.y_m - self.motion.rest[1])
+        return away_m > 2.0 * self.motion.parameters.tolerance_m and not self.locked
+
+    @property
+    def unsure(self) -> bool:
+        """Whether a visible robot is not averaged yet, or an averaged robot is no longer visible."""
+        motion, frame = self.motion, self.motion.frame
+        wanted = 1 if motion.bearing_noise_rad is None else motion.samples
+        gone = any(node not in frame.seen for node in self.local_map.seen)
+        return gone or not self.local_map.samples or any(frame.count(node) < wanted for node in self._standing())
+
+    def _standing(self) -> list[int]:
+        """Return the visible robots that are not known to move."""
+        states = self.local_map.states
+        return [node for node in self.motion.frame.seen if node not in states or not states[node].moving]
+
+    # --- activities -------------------------------------------------------------------------------------------------
+
+    def look_around(self) -> None:
+        """Begin to average the bearings of the visible robots that stand still."""
+        self._activity = self._look_around()
+
+    def recover(self) -> None:
+        """Begin to drive back to the point of rest."""
+        if self.motion.rest is not None:
+            self._activity = self._recover(self.motion.rest)
+
+    def deploy(self, bearing_rad: float, hop_m: float, clear_m: float) -> None:
+        """Begin to drive into unknown space."""
+        self._drive(deploy(self.motion, bearing_rad, hop_m, clear_m, lambda: self.on_cleared()))
+
+    def move(self, bearing_rad: float, hop_m: float, landmarks: Sequence[Landmark]) -> None:
+        """Begin to drive to the slot ahead."""
+        self._drive(move(self.motion, bearing_rad, hop_m, landmarks))
+
+    def correct(self, anchors: Sequence[Sighting]) -> None:
+        """Begin to correct the scale."""
+        self._drive(correct(self.motion, anchors))
+
+    def stand(self) -> None:
+        """End a drive: the robot stands still, for neighbours to average its bearing."""
+        self.local_map.end_drive()
+        self.motion.frame.forget()
+
+    def _drive(self, drive: DriveToResult) -> None:
+        self.local_map.begin_drive()
+        self._activity = drive
+
+    def _look_around(self) -> Drive:
+        motion, frame = self.motion, self.motion.frame
+        yield from motion.average(lambda samples: all(frame.count(node) >= samples for node in self._standing()))
+        standing = frozenset(self._standing())
+        self.local_map.update_bearings({node: each for node, each in frame.averages().items() if node in standing})
+        self.local_map.update_walls(frame.touched)
+
+    def _recover(self, rest: Vector) -> Drive:
+        self.motion.rest = yield from self.motion.return_to_rest(rest)

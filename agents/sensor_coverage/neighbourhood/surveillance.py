@@ -1,0 +1,88 @@
+"""Surveillance of the neighbourhood: a standing robot keeps its local map, its plans and its route up to date."""
+
+from typing import ClassVar, Final
+
+from zwerm.agents.sensor_coverage.messages.beacons import PathVector, StateBeacon
+from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
+from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
+from zwerm.agents.sensor_coverage.protocols.component import Component
+
+# Ticks for which a robot may be unsure whether it is at the frontier before it announces doubt. Most pushes end
+# earlier.
+DOUBT_TICKS: Final = 100
+
+
+class Surveillance(Component):
+    """Averages bearings, makes plans, chooses the route, and has the failure detector ask for missing states."""
+
+    accepts: ClassVar[tuple[type, ...]] = (StateBeacon, PathVector)
+
+    def __init__(self, situation: Situation, beaconing: Beaconing) -> None:
+        self._situation = situation
+        self._beaconing = beaconing
+        self._basis: object = None
+        self._route_basis = 0
+        self._doubt_at: int | None = None
+
+    def receive(self, sender: int, message: StateBeacon | PathVector, tick: int) -> None:
+        """Take in a neighbour's state or route."""
+        situation, local_map = self._situation, self._situation.local_map
+        if isinstance(message, PathVector):
+            local_map.path_vectors.receive(sender, message)
+            return
+        local_map.path_vectors.receive(sender, message.path_vector)
+        if situation.failure_detector.answered(sender):
+            local_map.change()
+        if local_map.missed(sender, message):
+            self._beaconing.missed(tick)
+        if local_map.receive(sender, message, tick):
+            situation.motion.frame.forget((sender,))
+
+    def poll(self, tick: int) -> None:
+        """Update the local map if anything has changed; do nothing during a drive."""
+        situation, local_map = self._situation, self._situation.local_map
+        if local_map.moving:
+            return
+        if not situation.active:
+            if situation.displaced:
+                situation.recover()
+            elif situation.unsure:
+                situation.look_around()
+        basis = local_map.version, tuple(situation.motion.frame.seen), not situation.active
+        if basis != self._basis or tick >= self._next_timer():
+            self._basis = basis
+            self._update(tick)
+        elif local_map.path_vectors.version == self._route_basis:
+            return  # nothing is new
+        self._route_basis = local_map.path_vectors.version
+        if situation.calm:
+            local_map.find_route(tick)
+        elif self._doubt_at is not None and tick >= self._doubt_at:
+            local_map.claim_doubt(tick)
+
+    def next_wake(self) -> int | None:
+        """Return the tick at which a handover or the time without doubt ends."""
+        tick, doubt_at = self._situation.tick, self._doubt_at
+        times = (self._situation.local_map.handovers_until, doubt_at if doubt_at is None or doubt_at > tick else None)
+        return min((each for each in times if each is not None), default=None)
+
+    def _next_timer(self) -> int:
+        situation = self._situation
+        times = situation.failure_detector.due, situation.local_map.handovers_until, self._doubt_at
+        return min([self._beaconing.heartbeat, *(each for each in times if each is not None)])
+
+    def _update(self, tick: int) -> None:
+        """Update headings, references and plans, and ask for missing states.
+
+        While slots around change hands, the frontier and the route stay as they were, because slots outlive occupants.
+        """
+        situation, local_map = self._situation, self._situation.local_map
+        local_map.resolve_duplicate()
+        local_map.find_heading()
+        local_map.learn_references()
+        situation.calm = situation.clear
+        self._doubt_at = None if situation.calm else self._doubt_at or tick + DOUBT_TICKS
+        if situation.calm:
+            local_map.update_plans()
+        motion = situation.motion
+        situation.failure_detector.check(tick, local_map, motion.frame.seen, motion.samples)

@@ -1,0 +1,41 @@
+"""The interface of every protocol between neighbours, and of the protocol with the coordinator.
+
+A component does no input or output, reads no clock and starts no task. A robot delivers messages to its components,
+polls them in order, sends their messages, and sleeps until the earliest of their wake-ups.
+"""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+
+class Outgoing(NamedTuple):
+    """A message to one node, or to all that hear the channel if `to` is None."""
+
+    to: int | None
+    message: Any
+
+
+class Component(Protocol):
+    """One protocol of one robot. All methods do nothing unless a component overrides them.
+
+    `channel` is the radio channel of the outgoing messages. `accepts` are the types of the messages that it receives.
+    """
+
+    channel: ClassVar[str] = ""
+    accepts: ClassVar[tuple[type[Any], ...]] = ()
+
+    def receive(self, sender: int, message: Any, tick: int) -> None:
+        """Take in a message of one of the accepted types."""
+        return
+
+    def poll(self, tick: int) -> None:
+        """Act on the state of this tick, after all messages have been received and the drive has gone on."""
+        return
+
+    def outgoing(self) -> Sequence[Outgoing]:
+        """Return the messages to send in this tick, after all components have been polled; each is returned once."""
+        return ()
+
+    def next_wake(self) -> int | None:
+        """Return the latest tick at which the robot must be awake, or None if only an event matters."""
+        return None

@@ -1,0 +1,257 @@
+"""The base station's schedule of pushes: it starts them one by one, and decides when the deployment ends.
+
+The base starts a push when its route leads to a frontier. The push begins at a robot that waits at the base, or at a
+redundant robot that has offered itself. Without a route for some time the base takes the census, and concludes from it.
+"""
+
+from typing import Any, ClassVar, Final
+
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
+from zwerm.agents.sensor_coverage.messages.pushes import (
+    PushAborted,
+    PushDone,
+    PushToken,
+    RedundantCall,
+    RedundantOffer,
+    RedundantPushEnd,
+)
+from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
+from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
+from zwerm.agents.sensor_coverage.protocols.completion import CompletionProtocol
+from zwerm.agents.sensor_coverage.protocols.component import Component
+
+COVERED: Final = "covered"
+
+# Bounds of the ticks to wait: for a robot to come out, for a push to end, and without a frontier before the census.
+RELEASE_TICKS_MAX: Final = 60
+PUSH_TICKS_MAX: Final = 2000
+QUIET_TICKS: Final = 60
+# Bound of the ticks to wait for a census that concludes.
+CENSUS_TICKS_MAX: Final = 6000
+# Ticks after a push to wait for news of an edge before gaps are expanded.
+GAP_TICKS: Final = 24
+# Bound of the ticks to wait for a robot that stands at the base and is not ready.
+READY_TICKS_MAX: Final = 1500
+# Pause after so many pushes, and its ticks: redundant robots negotiate while all robots stand still.
+PAUSE_EVERY: Final = 10
+PAUSE_TICKS: Final = 80
+
+
+class PushScheduler(Component):
+    """The base station's part in pushes.
+
+    `cycles` counts deployment attempts, `pushes` successful ones, and `released` the robots that came out of the depot.
+    `outcome` says how the deployment ended, and is empty before. `release`: let a robot out in this tick. `idle`: no
+    push is active.
+    """
+
+    accepts: ClassVar[tuple[type, ...]] = (
+        StateBeacon,
+        PushToken,
+        PushAborted,
+        PushDone,
+        RedundantOffer,
+        RedundantPushEnd,
+    )
+
+    def __init__(self, situation: Situation, beaconing: Beaconing, completion: CompletionProtocol) -> None:
+        self.cycles = 0
+        self.pushes = 0
+        self.released = 0
+        self.outcome = ""
+        self.release = False
+        self._situation = situation
+        self._map = situation.local_map
+        self._beaconing = beaconing
+        self._completion = completion
+        self._known: dict[int, None] = {}  # robots that were ever visible
+        self._released_at: int | None = None
+        self._released_before = -1  # robots that had come out when the latest one was released
+        self._active: int | None = None  # the push that is active
+        self._is_first = False
+        self._to_gap = False
+        self._rear: int | None = None  # the robot that the active push takes from the base
+        self._since = self._edges_since = 0
+        self._not_ready_since = 0
+        self._quiet_since: int | None = None
+        self._tokens = 0
+        self._paused_at = 0
+        self._paused_until: int | None = None
+        self._offers: dict[int, tuple[int, ...]] = {}  # slot of a redundant robot: the slots from there to the base
+
+    @property
+    def idle(self) -> bool:
+        """Whether no push is active."""
+        return self._active is None
+
+    @property
+    def takes_census(self) -> bool:
+        """Whether the base may begin waves of the census."""
+        waited = 0 if self._quiet_since is None else self._situation.tick - self._quiet_since
+        return waited > QUIET_TICKS + 4 * self._situation.motion.samples and not self.outcome
+
+    def count_released(self, visible: list[int]) -> None:
+        """Count the robots that have come out of the depot: those that are visible for the first time."""
+        for node in visible:
+            if node not in self._known:
+                self._known[node] = None
+                self.released += 1
+
+    def receive(self, sender: int, message: Any, tick: int) -> None:
+        """Take in a new neighbour's state, or a message of a push."""
+        match message:
+            case StateBeacon(slot=slot):
+                if sender not in self._map.states and slot == NOWHERE:
+                    self._beaconing.repeat(tick)  # the new robot needs the base's view for its heading
+            case PushToken(push):
+                self._situation.mailbox.write(sender, PushAborted(push, False))
+            case RedundantOffer(_, slots):
+                self._offers[slots[0]] = slots
+            case PushAborted(push, tried) if push == self._active:
+                self._end(tried)
+            case PushDone(push) if push == self._active:
+                self._end(True, True)
+            case RedundantPushEnd(push, tried, done) if push == self._active:
+                self._end(tried, done)
+            case _:
+                pass
+
+    def poll(self, tick: int) -> None:
+        """Give up a push whose first message was lost, and start the next push if it is time."""
+        mailbox = self._situation.mailbox
+        for to, body in mailbox.lost:
+            self._map.forget(to)
+            if isinstance(body, PushToken | RedundantCall) and body.push == self._active:
+                self._end(False)
+        mailbox.sent.clear()
+        mailbox.lost.clear()
+        if not self.outcome:
+            if self._active is not None:
+                self._watch_push(tick, self._active)
+            else:
+                self._start_push(tick)
+
+    # --- one push -----------------------------------------------------------------------------------------------------
+
+    def _watch_push(self, tick: int, push: int) -> None:
+        """End a push that takes too long, and release the next robot in time."""
+        self._not_ready_since = tick
+        if tick - self._since > PUSH_TICKS_MAX:
+            self._end(False)
+        elif self._released_at is None and self._rear_has_left() and not self._offers:
+            self._let_out(tick)
+
+    def _start_push(self, tick: int) -> None:
+        """Start the next push, or wait for its conditions."""
+        alone = not any(state.slot not in (0, NOWHERE) for state in self._map.states.values())
+        if not alone and not self._map.has_route:
+            self._watch_quiet(tick)
+            return
+        if not alone and self._map.to_gap and tick - self._edges_since < GAP_TICKS:
+            return  # news of an edge may be on its way
+        self._quiet_since = None
+        if self._pauses(tick):
+            return
+        if not alone and self._offers:
+            self._call(tick)
+            return
+        visible = self._situation.motion.frame.seen
+        waiting = [node for node, state in sorted(self._map.states.items()) if state.waiting and node in visible]
+        if not waiting:
+            if not self._not_ready(tick):
+                self._let_out(tick)
+            return
+        via = NOWHERE if alone else self._map.next_hop()
+        if via is None:
+            return
+        self._released_at = None
+        push = self._begin(tick, first=alone, rear=waiting[0])
+        self._situation.mailbox.write(waiting[0], PushToken(push, push, (), via))
+
+    def _call(self, tick: int) -> None:
+        """Start the next push at a redundant robot."""
+        slots = self._offers.pop(next(iter(self._offers)))
+        node = self._map.at(slots[-1])
+        if node is not None and node in self._situation.motion.frame.seen:
+            push = self._begin(tick, first=False, rear=None)
+            self._situation.mailbox.write(node, RedundantCall(push, slots))
+
+    def _begin(self, tick: int, first: bool, rear: int | None) -> int:
+        """Record that a push begins, and return its number."""
+        self._tokens += 1
+        self._to_gap = self._map.to_gap
+        self._active, self._since, self._is_first, self._rear = self._tokens, tick, first, rear
+        return self._tokens
+
+    def _end(self, tried: bool, done: bool = False) -> None:
+        """Record that the active push has ended."""
+        self._active = None
+        if done or not self._to_gap:  # a failed push into a gap leaves the edges as they were
+            self._edges_since = self._situation.tick
+        self.cycles += tried or done
+        self.pushes += done
+        self._report_numbers()
+        if self._is_first and tried and not done:
+            self.outcome = "source-blocked: no robot gets away from the base"
+
+    # --- conditions ---------------------------------------------------------------------------------------------------
+
+    def _pauses(self, tick: int) -> bool:
+        """Return whether redundant robots have time to negotiate now."""
+        paused = self.pushes // PAUSE_EVERY == self._paused_at // PAUSE_EVERY
+        if self._situation.negotiation is None or paused:
+            return False
+        if self._paused_until is None:
+            self._paused_until = tick + PAUSE_TICKS
+        if tick < self._paused_until:
+            return True
+        self._paused_at, self._paused_until = self.pushes, None
+        return False
+
+    def _not_ready(self, tick: int) -> bool:
+        """Return whether a visible robot has no slot yet, and may be ready soon."""
+        states = self._map.states
+        homeless = [n for n in self._situation.bearings if n not in states or states[n].slot == NOWHERE]
+        if not homeless or self._released_at is not None:
+            self._not_ready_since = tick
+        return tick - self._not_ready_since < READY_TICKS_MAX and bool(homeless) and self._released_at is None
+
+    def _rear_has_left(self) -> bool:
+        """Return whether the robot that the push took from the base has its slot: the next robot has time to average."""
+        states = self._map.states
+        rear = None if self._rear is None else states.get(self._rear)
+        nobody = not any(states[node].slot == NOWHERE for node in self._situation.bearings if node in states)
+        return not self._is_first and rear is not None and rear.slot != NOWHERE and not rear.moving and nobody
+
+    def _let_out(self, tick: int) -> None:
+        """Release a robot, or conclude that the depot is empty if none has come out."""
+        if self._released_at is None:
+            self.release = True
+            self._released_at = tick
+            self._released_before = self.released
+        elif self.released == self._released_before and tick - self._released_at > RELEASE_TICKS_MAX:
+            self.outcome = "depot-dry: the depot is empty"
+            self._report_numbers()
+
+    def _watch_quiet(self, tick: int) -> None:
+        """Conclude from the census, or from a very long time without a route to a frontier."""
+        if not self._situation.clear or self._map.route is not None:
+            self._quiet_since = None
+            return
+        if self._quiet_since is None:
+            self._quiet_since = tick
+        last = self._completion.last
+        if self.takes_census and self._completion.concluded:
+            self.outcome = COVERED
+        elif tick - self._quiet_since > CENSUS_TICKS_MAX:
+            claimed = last is not None and last.claims > 0
+            self.outcome = "cut-off: no way leads to the frontier" if claimed else COVERED
+        if self.outcome:
+            self._report_numbers()
+
+    def _report_numbers(self) -> None:
+        self._situation.telemetry |= {
+            "deployment_cycles": self.cycles,
+            "pushes": self.pushes,
+            "robots_released": self.released,
+        }

@@ -1,0 +1,1 @@
+"""Messages over a lossy radio: request de-duplication, reliable segments, and a limited flood."""

@@ -1,0 +1,162 @@
+"""The metrics of sensor coverage: what its coordinator and base stations report, and what truth says of robots' decisions.
+
+A report counts only from the nodes that may give it: cycles, pushes and numbers of robots from the coordinator and the base
+stations; a claim of a frontier or a change of membership from each robot, of itself. Others are ignored.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Final
+
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, MembershipSnapshot, decode_snapshot
+from zwerm.catalogue import BASE
+from zwerm.maths.simplicial import betti
+from zwerm.scenario.tables import Scenario
+from zwerm.world.geometry.visibility import Visibility
+from zwerm.world.metrics import Metric, MetricContext, Truth
+from zwerm.world.metrics.sight import complex_of
+from zwerm.world.tick.telemetry import TelemetryRecord
+
+# Numbers that the coordinator and the base stations report; the newest of each is the metric.
+NUMBERS: Final = ("pushes", "robots_released", "redundant_robots")
+CYCLES: Final = "deployment_cycles"
+CLAIM: Final = "claims_frontier"
+
+
+class Deployment(Metric):
+    """Cycles, pushes and robots of a deployment, by the reports of the coordinator and the base stations."""
+
+    names: ClassVar[Sequence[str]] = (
+        CYCLES, *NUMBERS, "ticks_per_cycle_mean", "messages_per_cycle_mean", "undecodable_snapshots",
+    )  # fmt: skip
+
+    def __init__(self, parameters: Any, context: MetricContext) -> None:
+        centre = [] if context.coordinator is None else [context.coordinator]
+        self._reporters = dict.fromkeys([*context.stations, *centre])
+        self._newest: dict[str, float] = {}
+        self._cycle: dict[int, float] = {}  # the newest cycle, by node
+        self._before: dict[int, float] = {}  # cycles of earlier incarnations, by node
+        self._undecodable = 0
+        self._truth: Truth | None = None
+
+    def report(self, record: TelemetryRecord) -> None:
+        """Take the numbers and the cycle that a node reports."""
+        snapshot = decode_snapshot(record.snapshot) if record.snapshot else None
+        self._undecodable += bool(record.snapshot) and snapshot is None
+        if record.node not in self._reporters:
+            return
+        for name in NUMBERS:
+            if name in record.numbers:
+                self._newest[name] = record.numbers[name]
+        if isinstance(snapshot, ComplexSnapshot):
+            self._count(record.node, float(snapshot.cycle), snapshot.cycle <= self._cycle.get(record.node, 0.0))
+        elif CYCLES in record.numbers:
+            cycle = record.numbers[CYCLES]
+            self._count(record.node, cycle, cycle < self._cycle.get(record.node, 0.0))
+
+    def sample(self, truth: Truth) -> None:
+        """Take the tick and the number of messages at the end."""
+        self._truth = truth
+
+    def metrics(self) -> dict[str, float]:
+        """Return the newest reports, and ticks and messages by cycle."""
+        found = dict(self._newest)
+        cycles = found.get(CYCLES)
+        if cycles and self._truth is not None:
+            found["ticks_per_cycle_mean"] = self._truth.scene.tick / cycles
+            found["messages_per_cycle_mean"] = self._truth.messages / cycles
+        if self._undecodable:
+            found["undecodable_snapshots"] = float(self._undecodable)
+        return found
+
+    def _count(self, node: int, cycle: float, restarted: bool) -> None:
+        """Count the cycles of a node over all its incarnations.
+
+        A restarted node counts anew: a complex whose cycle is not a later one, or fewer cycles than before, begin a new count.
+        """
+        if restarted:
+            self._before[node] = self._before.get(node, 0.0) + self._cycle.get(node, 0.0)
+        self._cycle[node] = cycle
+        self._newest[CYCLES] = self._before.get(node, 0.0) + cycle
+
+
+class Conclusion(Metric):
+    """`concluded_early`: 1 where the base station has concluded while a living robot claimed a frontier, else 0."""
+
+    names: ClassVar[Sequence[str]] = ("concluded_early",)
+
+    def __init__(self, parameters: Any, context: MetricContext) -> None:
+        variant = context.scenario.variant
+        self._applies = variant is not None and variant.decides == BASE
+        self._claims: dict[int, bool] = {}
+        self._truth: Truth | None = None
+
+    def report(self, record: TelemetryRecord) -> None:
+        """Take a robot's claim that it stands at a frontier, or that it does not any more."""
+        if CLAIM in record.numbers:
+            self._claims[record.node] = bool(record.numbers[CLAIM])
+
+    def sample(self, truth: Truth) -> None:
+        """Take the state at the end."""
+        self._truth = truth
+
+    def metrics(self) -> dict[str, float]:
+        """Return whether the conclusion was wrong; nothing where no base station concludes."""
+        truth = self._truth
+        if not self._applies or truth is None:
+            return {}
+        claimed = any(claims and node not in truth.dead for node, claims in self._claims.items())
+        return {"concluded_early": float(truth.completed and claimed)}
+
+
+class Removals(Metric):
+    """How many robots have left the complex, and how many of these departures changed its b0 or b1 in truth.
+
+    The complex is that of all living robots in the arena that have not left it, by true visibility within
+    `metrics.sight_range_m`; measured only where that is given and robots leave by agreement.
+    """
+
+    names: ClassVar[Sequence[str]] = ("removals", "unsafe_removals")
+
+    def __init__(self, parameters: Any, context: MetricContext) -> None:
+        self._range_m: float | None = context.scenario.metrics.sight_range_m
+        self._applies = self._range_m is not None and robots_leave(context.scenario)
+        self._truth: Truth | None = None
+
+    def sample(self, truth: Truth) -> None:
+        """Take the snapshots at the end."""
+        self._truth = truth
+
+    def metrics(self) -> dict[str, float]:
+        """Return both counts."""
+        if not self._applies or self._truth is None or self._range_m is None:
+            return {}
+        return removals(self._truth, self._range_m)
+
+
+def robots_leave(scenario: Scenario) -> bool:
+    """Tell whether the robots of a scenario leave the complex by agreement among neighbours."""
+    services = {} if scenario.variant is None else dict(scenario.variant.services)
+    return services.get("redundancy") == "link" or services == {"path": "gradient", "redundancy": "coordinator"}
+
+
+def removals(truth: Truth, range_m: float) -> dict[str, float]:
+    """Return how many robots have left the complex, and how many departures changed b0 or b1; sight within `range_m`."""
+    out: dict[int, None] = {}
+    dead = dict.fromkeys(truth.dead)
+    count = unsafe = 0
+    sight = Visibility()
+    for record in truth.telemetry.snapshots:
+        change = decode_snapshot(record.snapshot)
+        if not isinstance(change, MembershipSnapshot):
+            continue
+        if change.member:
+            out.pop(record.node, None)
+            continue
+        scene = replace(truth.scene, tick=record.tick, position=record.position, present=record.present)
+        members = [node for node in scene.present_ids().tolist() if node not in out and node not in dead]
+        whole = complex_of(sight.pairs(scene, range_m), members)
+        count += 1
+        unsafe += betti(whole) != betti(whole.without([record.node]))
+        out[record.node] = None
+    return {"removals": float(count), "unsafe_removals": float(unsafe)}

@@ -1,0 +1,155 @@
+"""Ledger: counts of sent, delivered and dropped packets, by link of a channel and by cause.
+
+At every tick and for every link: sent = delivered + dropped, by cause + in flight. Dropped packets are out of reach (their
+receivers were), or losses. A copy that the medium made counts as sent, and as a copy; a damaged packet that arrives counts as
+delivered, and as damaged. The age of information of a link is the time since its newest delivered packet was sent, from its
+first delivery on.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwerm.world.radio.links import Column, Links
+from zwerm.world.scene import Floats, Ints
+
+
+class Ledger:
+    """The ledger of one channel, among `nodes` nodes."""
+
+    def __init__(self, links: Links, nodes: int, dt_s: float) -> None:
+        self.copies = 0
+        self.damaged = 0
+        self.delay_ticks = 0  # from sending to delivery, over all delivered packets
+        self.node_messages: Ints = np.zeros(nodes, dtype=np.int64)  # transmissions, by sender
+        self.node_bytes: Ints = np.zeros(nodes, dtype=np.int64)  # payload of these
+        self._links = links
+        self._dt_s = dt_s
+        self._sent = links.integers()
+        self._delivered = links.integers()
+        self._lost: dict[str, Column] = {}  # by cause
+        self._out_of_reach: dict[str, Column] = {}
+        # Age of information [ticks]: sending of the newest packet, its delivery, the sum of ages, the largest age.
+        self._newest = links.integers(-1)
+        self._since = links.integers()
+        self._age_sum = links.numbers()
+        self._age_peak = links.numbers()
+        self._age_ticks = links.integers()
+
+    def send(self, link: Ints) -> None:
+        """Count packets sent on `link` (k,)."""
+        np.add.at(self._sent.values, link, 1)
+
+    def drop(self, link: Ints, cause: str, out_of_reach: bool = False) -> None:
+        """Count packets dropped on `link` (k,), with receivers in reach or out of it."""
+        if len(link):
+            columns = self._out_of_reach if out_of_reach else self._lost
+            column = columns.get(cause)
+            if column is None:
+                column = columns[cause] = self._links.integers()
+            np.add.at(column.values, link, 1)
+
+    def deliver(self, link: Ints, sent_tick: Ints, tick: int) -> None:
+        """Count packets received at `tick` on `link` (k,) that were sent at `sent_tick` (k,)."""
+        np.add.at(self._delivered.values, link, 1)
+        self.delay_ticks += tick * len(link) - int(sent_tick.sum())
+        newest = self._newest.values
+        before = newest[link]
+        np.maximum.at(newest, link, sent_tick)
+        fresher = newest[link] > before
+        if not fresher.all():
+            link, before = link[fresher], before[fresher]
+        since = self._since.values[link]
+        # The age grew by one a tick from `since` to now. Two rows of the same link write the same value.
+        ticks = np.where(before < 0, 0, tick - since)
+        self._age_sum.values[link] += ticks * (0.5 * (since + tick - 1) - before)
+        self._age_ticks.values[link] += ticks
+        peak = np.where(before < 0, 0, tick - before)
+        self._age_peak.values[link] = np.maximum(self._age_peak.values[link], peak)
+        self._since.values[link] = tick
+
+    # --- totals -----------------------------------------------------------------------------------------------------
+
+    def sent(self) -> Ints:
+        """Return the packets sent, by link."""
+        return self._of(self._sent)
+
+    def delivered(self) -> Ints:
+        """Return the packets delivered, by link."""
+        return self._of(self._delivered)
+
+    def dropped(self) -> dict[str, Ints]:
+        """Return the packets dropped, by cause and link; causes are sorted."""
+        found: dict[str, Ints] = {}
+        for cause, column in sorted([*self._lost.items(), *self._out_of_reach.items()], key=lambda item: item[0]):
+            found[cause] = found[cause] + self._of(column) if cause in found else self._of(column)
+        return found
+
+    def out_of_reach(self) -> Ints:
+        """Return the packets dropped because their receivers were out of reach, by link."""
+        found: Ints = np.zeros(self._links.count, dtype=np.int64)
+        for column in self._out_of_reach.values():
+            found = found + self._of(column)
+        return found
+
+    def in_flight(self) -> Ints:
+        """Return the packets sent and neither delivered nor dropped yet, by link."""
+        left: Ints = self.sent() - self.delivered()
+        for dropped in self.dropped().values():
+            left = left - dropped
+        return left
+
+    def imbalance(self, in_flight: Ints) -> list[str]:
+        """Return a line for every link whose ledger differs from the counted packets in flight (links,)."""
+        wrong = np.flatnonzero(self.in_flight() != in_flight)
+        return [
+            f"link {self._links.sender[row]} to {self._links.receiver[row]}: the ledger has {self.in_flight()[row]} packets"
+            f" in flight, the queue has {in_flight[row]}"
+            for row in wrong.tolist()
+        ]
+
+    def ages_s(self, tick: int) -> tuple[float, float] | None:
+        """Return the mean over links of the mean age of information up to `tick`, and the largest age [s].
+
+        None before the first delivery.
+        """
+        mean_s, peak_s = self.link_ages_s(tick)
+        counted = ~np.isnan(mean_s)
+        return (float(mean_s[counted].mean()), float(peak_s[counted].max())) if counted.any() else None
+
+    def link_ages_s(self, tick: int) -> tuple[Floats, Floats]:
+        """Return by link the mean and the largest age of information up to `tick` [s]; nan before the first delivery."""
+        newest, since = self._of(self._newest), self._of(self._since)
+        heard = newest >= 0
+        left = np.where(heard, tick - since, 0)
+        ticks = self._of(self._age_ticks) + left
+        total = self._of(self._age_sum) + left * (0.5 * (since + tick - 1) - newest)
+        counted = heard & (ticks > 0)
+        peak = np.maximum(self._of(self._age_peak), tick - newest)
+        mean = np.divide(total, ticks, out=np.full(len(ticks), np.nan), where=counted)
+        return mean * self._dt_s, np.where(counted, peak, np.nan) * self._dt_s
+
+    def order(self) -> Ints:
+        """Return the rows of the links, sorted by sender and receiver."""
+        return np.lexsort((self._of_links(self._links.receiver), self._of_links(self._links.sender)))
+
+    def by_link(self) -> dict[str, Any]:
+        """Return the counts of all links as columns, sorted by sender and receiver, for a JSON encoder."""
+        sender, receiver = self._of_links(self._links.sender), self._of_links(self._links.receiver)
+        order = self.order()
+        return {
+            "sender": sender[order].tolist(),
+            "receiver": receiver[order].tolist(),
+            "sent": self.sent()[order].tolist(),
+            "delivered": self.delivered()[order].tolist(),
+            "dropped": {cause: column[order].tolist() for cause, column in self.dropped().items()},
+            "out_of_reach": self.out_of_reach()[order].tolist(),
+            "in_flight": self.in_flight()[order].tolist(),
+        }
+
+    def _of(self, column: Column) -> NDArray[Any]:
+        return self._of_links(column.values)
+
+    def _of_links(self, values: NDArray[Any]) -> NDArray[Any]:
+        return values[: self._links.count]

@@ -1,0 +1,76 @@
+"""`zwerm list`: the catalogue of algorithms with their scenarios and studies, and of plug-ins."""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from zwerm.catalogue import ALGORITHMS, plugins, row_of
+from zwerm.cli.terminal import errors_as_lines, out, print_json
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+def list_catalogue(
+    text: Annotated[str, typer.Argument(help="Show only what has this text in its name or summary.")] = "",
+    kinds: Annotated[bool, typer.Option("--plugins", help="List the plug-ins of each kind instead.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """List the algorithms that ship with Zwerm, with their scenarios and studies.
+
+    Examples: [bold]zwerm list[/bold], [bold]zwerm list loss[/bold], [bold]zwerm list --plugins[/bold]
+    """
+    with errors_as_lines():
+        algorithms = [] if kinds else _algorithms(text)
+    if as_json:
+        print_json({kind: dict(rows) for kind, rows in plugins().items()} if kinds else {"algorithms": algorithms})
+    elif kinds:
+        for kind, rows in plugins().items():
+            out.print(f"[bold]{kind}[/bold]: {', '.join(name for name in rows if text in name)}", highlight=False)
+    else:
+        _print_algorithms(algorithms, whole=bool(text))
+
+
+def _algorithms(text: str) -> "list[dict[str, Any]]":
+    """Return the rows with their scenarios and studies that contain `text`; rows without any are left out."""
+    from zwerm.scenario.load import built_in, load
+    from zwerm.study.study_tables import built_in as built_in_studies
+    from zwerm.study.study_tables import load_study
+
+    entries: list[dict[str, Any]] = []
+    for name in built_in():
+        scenario = load(name)
+        size = f"{scenario.robots.count} robots, {scenario.time.duration_s:g} s"
+        entries.append({"kind": "scenario", "name": name, "size": size, "summary": scenario.summary})
+    for name in built_in_studies():
+        study = load_study(name)
+        size = f"{study.trials} trials"
+        entries.append({"kind": "study", "name": name, "size": size, "summary": study.table.summary})
+    chosen = [each for each in entries if text in each["name"] or text.lower() in each["summary"].lower()]
+    rows = []
+    for row in (*ALGORITHMS, None):
+        own = [each for each in chosen if row_of(each["name"]) is row]
+        if own:
+            title, paper = ("Others", "") if row is None else (row.title, row.paper)
+            rows.append({"name": row.name if row else "", "title": title, "paper": paper, "entries": own})
+    return rows
+
+
+def _print_algorithms(rows: "Sequence[dict[str, Any]]", whole: bool) -> None:
+    """Print the rows: the `whole` of each entry, or one line an entry, so that the catalogue fits on a screen or two."""
+    from rich.table import Table
+
+    for row in rows:
+        table = Table(
+            box=None, padding=(0, 2, 0, 0), title_justify="left", show_header=False, title_style="bold", expand=True
+        )
+        table.title = row["title"] + (f" ({row['paper']})" if row["paper"] else "")
+        table.add_column(style="cyan", no_wrap=True)
+        table.add_column(style="dim", no_wrap=True)
+        table.add_column(ratio=1, no_wrap=not whole, overflow="fold" if whole else "ellipsis")
+        for each in row["entries"]:
+            table.add_row(each["name"], each["size"] if whole else each["kind"], each["summary"])
+        out.print(table)
+        out.print()
+    if not rows:
+        out.print("nothing in the catalogue has this text", highlight=False)

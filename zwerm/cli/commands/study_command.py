@@ -1,0 +1,53 @@
+"""`zwerm study`: run a study, print its table and draw it."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from zwerm.cli.options import Json, Sets
+from zwerm.cli.terminal import err, errors_as_lines, out, print_json
+from zwerm.cli.trials import Jobs, Out, Retry, Seeds, exit_with, print_trial_counts, study_extra
+
+
+def study(
+    study: Annotated[str, typer.Argument(metavar="STUDY", help="A built-in study (see `zwerm list`) or a TOML file.")],
+    seeds: Seeds = None,
+    jobs: Jobs = None,
+    output: Out = None,
+    sets: Sets = None,
+    retry: Retry = False,
+    as_json: Json = False,
+) -> None:
+    """Run a study: scenarios over a grid of settings and many seeds, compared with a paper's numbers.
+
+    Trials run inline, many at a time. Each row is stored when its trial ends: after Ctrl-C the same command continues
+    where it stopped. Writes a Parquet file, one row a trial, and a picture of the same name.
+
+    Examples:
+
+    [bold]zwerm study computation-free-comparison --seeds 20[/bold]
+
+    [bold]zwerm study my-study.toml --seeds 501-1000 --out second-half.parquet[/bold]
+    """
+    with errors_as_lines():
+        with study_extra():
+            from zwerm.study.export import study_json
+            from zwerm.study.study_figure import draw_study
+            from zwerm.study.study_report import StudyProgress, print_results
+            from zwerm.study.study_runner import run_study
+            from zwerm.study.study_tables import load_study, parse_seeds
+        loaded = load_study(study)
+        chosen = None if seeds is None else parse_seeds(seeds)
+        path = output or Path("runs") / f"{loaded.name}.parquet"
+        with StudyProgress(err, loaded.name, quiet=as_json) as progress:
+            result = run_study(
+                loaded, path, seeds=chosen, jobs=jobs, sets=tuple(sets or ()), retry=retry, listener=progress
+            )
+        drawn = [draw_study(path.with_suffix(".png"), result.results)] if result.done else []
+        if as_json:
+            print_json(study_json(result, drawn))
+        elif result.done:
+            print_results(out, result.results)
+            print_trial_counts(result, drawn)
+    exit_with(result)

@@ -1,0 +1,96 @@
+"""The output of `zwerm run` and `zwerm world`: pictures, an animation, and the result as a table or as JSON."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NoReturn
+
+import typer
+
+from zwerm.cli.console import RunProgress, print_result
+from zwerm.cli.radio_table import print_radio_ledger
+from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, out, print_json
+from zwerm.errors import PictureError, ScenarioError
+from zwerm.run.result import RunResult
+
+_MOMENT: Final = re.compile(r"(?P<cycle>\d+)|(?P<at_s>\d+(\.\d+)?)s")
+
+
+@dataclass(frozen=True)
+class RunOutput:
+    """The output options of a command. Raises ScenarioError for a moment that is neither a cycle nor a time.
+
+    `radio_table` is the number of links to print, or None for no table.
+    """
+
+    picture: Path | None
+    moments: tuple[str, ...]
+    animation: Path | None
+    radio_table: int | None
+    as_json: bool
+
+    def __post_init__(self) -> None:
+        diagnostics = [
+            f"--picture-at: expected a cycle such as 40 or a time such as 120s, got {each!r}"
+            for each in self.moments
+            if not _MOMENT.fullmatch(each)
+        ]
+        if diagnostics:
+            raise ScenarioError(diagnostics)
+
+    def report(self, result: RunResult) -> NoReturn:
+        """Draw and print the result, and exit with the status of its outcome."""
+        drawn, errors = self._draw_stills(result)
+        if result.scenario.random_faults is not None and not self.as_json:
+            drawn.append(_write_faults(result))
+        if self.animation is not None:
+            with RunProgress(err, "animation", quiet=self.as_json) as progress:
+                drawn.append(result.animate(self.animation, progress.ticked))
+        for node, traceback in sorted(result.tracebacks.items()):
+            err.print(f"node {node} raised:\n{traceback}", markup=False, highlight=False, soft_wrap=True)
+        if self.as_json:
+            print_json(result.as_json())
+        else:
+            print_result(out, result, drawn)
+            if self.radio_table is not None:
+                print_radio_ledger(out, result.radio, self.radio_table)
+        if errors:
+            raise PictureError("\n".join(errors))
+        if result.reason:
+            err.print(f"zwerm: {result.reason}", style="red", markup=False, highlight=False, soft_wrap=True)
+        if result.outcome == "interrupted":
+            raise typer.Exit(EXIT_INTERRUPTED)
+        raise typer.Exit(0 if result.ok else EXIT_FAILED)
+
+    def _draw_stills(self, result: RunResult) -> tuple[list[Path], list[str]]:
+        """Return the pictures drawn, and the errors of moments that the run does not have; the result is still printed."""
+        drawn: list[Path] = []
+        errors: list[str] = []
+        path = self.picture or Path("runs") / f"{result.scenario.name}-seed{result.seed}.png"
+        if self.picture is not None or not self.as_json:
+            drawn.append(result.picture(path))
+        for moment in self.moments:
+            try:
+                drawn.append(_draw_moment(result, path, moment))
+            except PictureError as error:
+                errors.append(str(error))
+        return drawn, errors
+
+
+def _draw_moment(result: RunResult, final: Path, moment: str) -> Path:
+    """Draw the run at a moment; the file name is that of the final picture with the moment appended."""
+    found = _MOMENT.fullmatch(moment)
+    assert found is not None
+    if found["cycle"] is not None:
+        return result.picture(final.with_stem(f"{final.stem}-cycle{moment}"), cycle=int(moment))
+    return result.picture(final.with_stem(f"{final.stem}-{moment}"), at_s=float(found["at_s"]))
+
+
+def _write_faults(result: RunResult) -> Path:
+    """Write the random faults of the run as a scenario's fault tables."""
+    from zwerm.scenario.toml import write_toml
+
+    path = Path("runs") / f"{result.scenario.name}-seed{result.seed}-faults.toml"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(write_toml({"faults": result.faults}), encoding="utf-8")
+    return path

@@ -1,0 +1,214 @@
+"""The world's end of a Zenoh link: a session that is also the router, so each message takes one hop.
+
+Only expected and welcomed nodes are received, one incarnation of each at a time. Messages of a node arrive in the order sent,
+and the end of its process after its last message. `refused` counts refused messages by reason. The access control in the
+router's settings decides which node may connect and use which key.
+
+Zenoh's thread receives messages, and wakes the world only when as many have arrived as the world waits for. A thread switch
+for each message would cost more than the work on the message.
+"""
+
+import contextlib
+import threading
+from collections import Counter, deque
+from collections.abc import Callable, Collection, Mapping
+from typing import Any, Final
+
+import msgspec
+import zenoh
+from msgspec import Struct
+from zenoh.handlers import Callback
+
+from zwerm.errors import LinkError
+from zwerm.link import Arrival, arrival
+from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threads
+from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
+from zwerm.wire.messages import REFUSABLE, Goodbye, Welcome, decode_hello, encode, refusal
+
+# Largest number of waiting arrivals. Lock-step needs fewer: one for each node. At this number Zenoh's thread blocks, and then
+# the senders do.
+CAPACITY: Final = 16_384
+
+
+class ExpectedNode(Struct, frozen=True):
+    """A node that may join: its incarnation, its controller's name, its encoded Setup, and whether time is real."""
+
+    incarnation: int
+    controller: str
+    setup: bytes
+    paced: bool = False
+
+
+class ZenohWorldLink:
+    """The world's end of the link to the nodes `members` of the run `run`; `settings` are the router's."""
+
+    def __init__(self, run: str, members: Mapping[int, ExpectedNode], settings: Mapping[str, Any]) -> None:
+        """Open the router's session, without waiting for nodes. Raises LinkError if it cannot listen."""
+        self.refused: Counter[str] = Counter()
+        self._run = run
+        self._members = dict(members)
+        self._joined: dict[int, int] = {}
+        self._source_of: dict[str, int] = {}
+        self._changed = threading.Condition()
+        self._dismissed = False
+        self._arrivals: deque[Arrival] = deque()
+        self._wanted = CAPACITY  # number of arrivals at which Zenoh's thread wakes the receiver
+        self._losses = 0  # lost nodes among the arrivals
+        self._closed = False
+        set_threads(TWO_THREADS)
+        self._session = open_session({"mode": "router", **settings}, "the world cannot listen")
+        try:
+            self._put = {node: self._publisher(observation_key(run, node)).put for node in self._members}
+            self._session.declare_subscriber(command_key(run, EVERY), Callback(self._on_command, indirect=False))
+            self._session.liveliness().declare_subscriber(alive_key(run, EVERY), self._on_liveliness)
+            self._session.declare_queryable(hello_key(run, EVERY), self._on_hello)
+        except BaseException:
+            self._session.close()  # type: ignore[no-untyped-call]
+            raise
+
+    @property
+    def joined(self) -> frozenset[int]:
+        """Nodes that have been welcomed and are not lost."""
+        return frozenset(self._joined)
+
+    def wait_joined(self, enough: Callable[[Collection[int]], bool], timeout_s: float) -> bool:
+        """Wait until `enough(joined nodes)` is true; return whether it is within `timeout_s` seconds."""
+        with self._changed:
+            return self._changed.wait_for(lambda: enough(self._joined.keys()), timeout_s)
+
+    def expect(self, node: int, member: ExpectedNode) -> None:
+        """Allow a lost or new node to join as `member`. Raises LinkError if it is still joined."""
+        with self._changed:
+            if node in self._joined:
+                raise LinkError(f"node {node} is still joined as incarnation {self._joined[node]}")
+            self._members[node] = member
+            if node not in self._put:
+                self._put[node] = self._publisher(observation_key(self._run, node)).put
+
+    def send(self, node: int, payload: bytes) -> None:
+        """Send one message to a node that has joined."""
+        self._put[node](payload)
+
+    def receive(self, timeout_s: float) -> Arrival | None:
+        """Return the next arrival, or None after `timeout_s` seconds without one. Raises LinkError once closed."""
+        self._wait(1, timeout_s)
+        if not self._arrivals:
+            return None
+        return self._take(1)[0]
+
+    def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
+        """Return all arrivals once there are `count`, or a node is lost, or `timeout_s` seconds have passed.
+
+        Raises LinkError once closed.
+        """
+        self._wait(count, timeout_s)
+        return self._take(len(self._arrivals))
+
+    def dismiss(self, reason: str) -> None:
+        """Tell every joined node to exit; their end is not reported as a loss."""
+        self._dismissed = True
+        if self._session.is_closed():
+            return
+        farewell = encode(Goodbye(reason))
+        for node in sorted(self._joined):
+            self._put[node](farewell)
+
+    def close(self) -> None:
+        """Release all resources of the link; idempotent."""
+        self._dismissed = True
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        self._session.close()  # type: ignore[no-untyped-call]
+
+    def _wait(self, count: int, timeout_s: float) -> None:
+        if self._closed:
+            raise LinkError("the world's link is closed")
+        if len(self._arrivals) >= count or timeout_s <= 0:
+            return
+        with self._changed:
+            self._wanted = min(count, CAPACITY)
+            self._changed.wait_for(
+                lambda: len(self._arrivals) >= self._wanted or self._losses or self._closed, timeout_s
+            )
+            self._wanted = CAPACITY
+
+    def _take(self, count: int) -> list[Arrival]:
+        full = len(self._arrivals) >= CAPACITY
+        pop = self._arrivals.popleft
+        arrivals = [pop() for _ in range(count)]
+        if full or self._losses:
+            with self._changed:
+                self._losses -= sum(arrival.payload is None for arrival in arrivals)
+                self._changed.notify_all()
+        return arrivals
+
+    def _publisher(self, key: str) -> zenoh.Publisher:
+        return self._session.declare_publisher(
+            key,
+            express=True,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
+
+    def _on_command(self, sample: zenoh.Sample) -> None:
+        """Receive a message; access control limits its sender to the key's node. Runs in Zenoh's thread."""
+        keep_thread()
+        node = self._source_of.get(str(sample.key_expr))
+        if node is None:
+            with self._changed:
+                self.refused["not-joined"] += 1
+            return
+        self._arrivals.append(arrival((node, sample.payload.to_bytes())))
+        if len(self._arrivals) >= self._wanted:
+            with self._changed:
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: len(self._arrivals) < CAPACITY or self._closed)
+
+    def _on_liveliness(self, sample: zenoh.Sample) -> None:
+        """Handle a liveliness token; it vanishes after the node's last message. Runs in a thread of its own."""
+        if sample.kind == zenoh.SampleKind.PUT:
+            return
+        node = node_of(str(sample.key_expr))
+        with self._changed:
+            self._source_of.pop(command_key(self._run, node), None)
+            if self._joined.pop(node, None) is not None and not self._dismissed:
+                self._arrivals.append(Arrival(node, None))
+                self._losses += 1
+            self._changed.notify_all()
+
+    def _on_hello(self, query: zenoh.Query) -> None:
+        """Answer a node's hello or goodbye. Runs in a thread of its own."""
+        with query, contextlib.suppress(zenoh.ZError):  # the link was closed
+            key = str(query.key_expr)
+            try:
+                welcome = self._welcome(node_of(key), query.payload.to_bytes() if query.payload else b"")
+            except ValueError:
+                welcome = Welcome(refused="identity")
+            if welcome.refused:
+                with self._changed:
+                    self.refused[welcome.refused] += 1
+            query.reply(key, encode(welcome))
+
+    def _welcome(self, node: int, payload: bytes) -> Welcome:
+        """Admit the node and return its controller and Setup, or return the reason for refusing it."""
+        try:
+            hello = decode_hello(payload)
+        except REFUSABLE as error:
+            return Welcome(refused=refusal(error).reason)
+        with self._changed:
+            if isinstance(hello, Goodbye):
+                return Welcome(refused="" if node in self._joined else "not-joined")
+            member = self._members.get(node)
+            if hello.node != node:
+                return Welcome(refused="identity")
+            if member is None:
+                return Welcome(refused="unknown")
+            if hello.incarnation != member.incarnation:
+                return Welcome(refused="incarnation")
+            if node in self._joined:
+                return Welcome(refused="joined")
+            self._joined[node] = member.incarnation
+            self._source_of[command_key(self._run, node)] = node
+            self._changed.notify_all()
+        return Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced)
