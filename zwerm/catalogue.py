@@ -151,6 +151,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         paper="Latimer, Srinivasa, Lee-Shue, Sonne, Choset, Hurst 2002",
         page="papers/robot-teams.md",
         controllers={ROBOT: {"robot-teams": "zwerm.agents.robot_teams:TeamRobot"}},
+        metrics=("zwerm.world.metrics.robot_teams:TeamCoverage",),
         layers=("zwerm.view.robot_teams:CellsLayer",),
         scenarios=("robot-teams*",),
     ),

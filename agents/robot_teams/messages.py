@@ -81,5 +81,29 @@ class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     voids: tuple[Void, ...] = ()
 
 
+class FoundSnapshot(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """What one robot found, for metrics and pictures: no node receives it.
+
+    `slices` are x, bottom and top of swept segments [m], `critical_points` are x and y [m]; `team` is the lead's id.
+    """
+
+    team: int
+    slices: tuple[tuple[float, float, float], ...]
+    critical_points: tuple[tuple[float, float], ...]
+
+
+encode_snapshot: Final = msgspec.msgpack.Encoder().encode
+_decode_snapshot: Final = msgspec.msgpack.Decoder(FoundSnapshot).decode
+
+
+def decode_snapshot(payload: bytes) -> FoundSnapshot | None:
+    """Return the snapshot in `payload`, or None where it holds none."""
+    try:
+        found: FoundSnapshot = _decode_snapshot(payload)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return None
+    return found
+
+
 encode_beacon: Final = msgspec.msgpack.Encoder().encode
 decode_beacon: Final = msgspec.msgpack.Decoder(Beacon).decode

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Generator
-from typing import Annotated, Any, ClassVar, Final
+from typing import Annotated, ClassVar, Final
 
 import msgspec
 from msgspec import Meta, Struct
@@ -11,7 +11,17 @@ from zwerm.agents.robot_teams.fact_exchange import FactExchange
 from zwerm.agents.robot_teams.facts import BOTTOM, PASSES, TOP, Arc, End, Segment, Void
 from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre, mm
 from zwerm.agents.robot_teams.membership import Membership
-from zwerm.agents.robot_teams.messages import HUNTS, READY, Beacon, Plan, Status, decode_beacon, encode_beacon
+from zwerm.agents.robot_teams.messages import (
+    HUNTS,
+    READY,
+    Beacon,
+    FoundSnapshot,
+    Plan,
+    Status,
+    decode_beacon,
+    encode_beacon,
+    encode_snapshot,
+)
 from zwerm.agents.robot_teams.pilot import FAILED, IDLE, RUNNING, Pilot
 from zwerm.agents.robot_teams.planning import (
     FAR,
@@ -174,7 +184,8 @@ class TeamRobot(Controller):
         outbox = self._say(observation, senses)
         sensing = self._sensing
         drive = BodyVelocity(sensing.cos * vx + sensing.sin * vy, sensing.cos * vy - sensing.sin * vx, 0.0)
-        return Command(drive=drive, outbox=outbox, done=self._done, told=self._telemetry(tick))
+        telemetry, snapshot = self._telemetry(), self._snapshot()
+        return Command(drive=drive, outbox=outbox, done=self._done, telemetry=telemetry, snapshot=snapshot)
 
     # --- moving -------------------------------------------------------------------------------------------------------
 
@@ -391,33 +402,34 @@ class TeamRobot(Controller):
         frame = seal(encode_beacon(beacon))
         return tuple([Transmission(channel, frame) for channel in self.setup.channels])
 
-    def _telemetry(self, tick: int) -> dict[str, Any]:
-        """Return what those who watch the run may see: the certificate, the team and what was found, when the map grows.
-
-        A fact is reported by the robot that found it.
-        """
+    def _telemetry(self) -> dict[str, float | bool]:
+        """Return the certificate and what the team came to, whenever the map has grown."""
         facts = self.map.facts
         if len(facts) == self._told_count:
             return {}
         self._told_count = len(facts)
         certificate, membership = self.map.certificate, self.membership
-        told: dict[str, Any] = {
-            "complete": certificate.complete,
+        return {
+            "certificate_satisfied": certificate.complete,
             "ends": certificate.ends,
             "ends_without_mate": len(certificate.ends_without_mate),
             "open_ports": len(certificate.open_ports),
-            "critical_point_count": len({arc.ports for arc in facts.arcs if arc.kind != PASSES}),
+            "critical_points": len({arc.ports for arc in facts.arcs if arc.kind != PASSES}),
             "divisions": membership.divisions,
             "merges": membership.merges,
-            "team": membership.view.lead,
         }
+
+    def _snapshot(self) -> bytes:
+        """Return what this robot has found since the last tick, encoded; empty where it found nothing."""
         found, self.work.found_facts = self.work.found_facts, []
-        if found:
-            told["slices"] = [
-                [self._grid.x_m(fact.slice), fact.bottom_mm / 1000.0, fact.top_mm / 1000.0]
-                for fact in found
-                if isinstance(fact, Segment)
-            ]
-            arcs = [fact for fact in found if isinstance(fact, Arc) and fact.kind != PASSES]
-            told["critical_points"] = [[arc.x_mm / 1000.0, arc.y_mm / 1000.0] for arc in arcs]
-        return told
+        if not found:
+            return b""
+        slices = [fact for fact in found if isinstance(fact, Segment)]
+        points = [fact for fact in found if isinstance(fact, Arc) and fact.kind != PASSES]
+        return encode_snapshot(
+            FoundSnapshot(
+                self.membership.view.lead,
+                tuple([(self._grid.x_m(s.slice), s.bottom_mm / 1000.0, s.top_mm / 1000.0) for s in slices]),
+                tuple([(arc.x_mm / 1000.0, arc.y_mm / 1000.0) for arc in points]),
+            )
+        )

@@ -5,8 +5,9 @@ body's radius. Their footprints can sweep the free space within the footprint's 
 sides inside it; the same in both areas.
 """
 
+import math
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 import shapely
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
-from zwerm.world.arena.arena import Arena
-from zwerm.world.scene import Scene
+from zwerm.world.metrics import Metric, MetricContext, Truth
+from zwerm.world.tick.telemetry import TelemetryRecord
 
 Floats = NDArray[np.float64]
 
@@ -76,29 +77,45 @@ def coverage(
     }
 
 
-class TeamCoverageObserver:
-    """Notes the path of every robot, tick by tick, and measures what their footprints swept."""
+class TeamCoverage(Metric):
+    """Coverage by the footprints of all robots, from their paths, and what the robots report of their map."""
 
-    every_s = 0.05
+    names: ClassVar[Sequence[str]] = (
+        *("coverage_fraction", "repeat_coverage_fraction", "path_length_m", "sweepable_area_m2", "completion_time_s"),
+        *("certificate_satisfied", "critical_points", "divisions", "merges"),
+    )
+    every_s: ClassVar[float | None] = 0.05
 
-    def __init__(self, arena: Arena, radius_m: float, footprint_m: float) -> None:
-        self._free = arena.free
-        self._radius_m, self._footprint_m = radius_m, footprint_m
+    def __init__(self, parameters: Any, context: MetricContext) -> None:
+        robots = context.scenario.robots
+        self._free = context.arena.free
+        self._radius_m = robots.body.radius_m
+        self._footprint_m = float(robots.parameters.get("footprint_m", 0.5))
         self._paths: list[Floats] = []
+        self._numbers: dict[int, dict[str, float]] = {}
+        self._truth: Truth | None = None
 
-    def look(self, scene: Scene, dead: Sequence[int]) -> None:
+    def report(self, record: TelemetryRecord) -> None:
+        """Keep the newest numbers of every robot."""
+        self._numbers.setdefault(record.node, {}).update(record.numbers)
+
+    def sample(self, truth: Truth) -> None:
         """Note where the robots are."""
-        self._paths.append(scene.position.copy())
+        self._paths.append(truth.scene.position.copy())
+        self._truth = truth
 
     def metrics(self) -> dict[str, float]:
-        """Return `coverage_fraction`, `repeat_coverage_fraction` and the length of all paths together."""
-        if not self._paths:
+        """Return the coverage by exact polygons, and the reports of the robots that live."""
+        if self._truth is None:
             return {}
         paths = np.array(self._paths)
-        return coverage(
-            self._free, [paths[:, robot] for robot in range(paths.shape[1])], self._radius_m, self._footprint_m
-        )
-
-    def series(self) -> dict[str, list[float]]:
-        """Return nothing: exact polygons at every look would take longer than the run."""
-        return {}
+        tracks = [paths[:, robot] for robot in range(paths.shape[1])]
+        living = [numbers for node, numbers in self._numbers.items() if node not in self._truth.dead]
+        return {
+            **coverage(self._free, tracks, self._radius_m, self._footprint_m),
+            "completion_time_s": self._truth.time_s if self._truth.completed else math.nan,
+            "certificate_satisfied": float(bool(living) and all(n.get("certificate_satisfied") for n in living)),
+            "critical_points": max([numbers.get("critical_points", 0.0) for numbers in living], default=0.0),
+            "divisions": sum([numbers.get("divisions", 0.0) for numbers in self._numbers.values()]),
+            "merges": sum([numbers.get("merges", 0.0) for numbers in self._numbers.values()]),
+        }

@@ -13,6 +13,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from zwerm.agents.robot_teams.messages import decode_snapshot
 from zwerm.record.history import Tracks
 from zwerm.view.canvas import Sheet
 from zwerm.view.layer import Layer
@@ -31,10 +32,10 @@ class CellsLayer(Layer):
     animation_s: ClassVar[float | None] = 20.0
 
     def __init__(self, sheet: Sheet, view: RunView, names: bool = False) -> None:
-        found = [(each.time_s, each.told["slices"], each.told["team"]) for each in view.told if "slices" in each.told]
-        self._slices = [(time_s, line, team) for time_s, lines, team in found for line in lines]
-        told = [(each.time_s, each.told["critical_points"]) for each in view.told if "critical_points" in each.told]
-        self._points = [(time_s, point) for time_s, points in told for point in points]
+        found = [(each.time_s, decode_snapshot(each.snapshot)) for each in view.snapshots]
+        known = [(time_s, snapshot) for time_s, snapshot in found if snapshot is not None]
+        self._slices = [(time_s, line, each.team) for time_s, each in known for line in each.slices]
+        self._points = [(time_s, point) for time_s, each in known for point in each.critical_points]
         self._lines = LineCollection([], linewidths=2.2, capstyle="round", alpha=0.75, zorder=1.4)
         sheet.axes.add_collection(self._lines, autolim=False)
         self._dots: Any = sheet.axes.scatter([], [], s=28.0, marker="D", color=CRITICAL, zorder=3.4)
@@ -42,7 +43,7 @@ class CellsLayer(Layer):
     @classmethod
     def applies(cls, view: RunView) -> bool:
         """Tell whether any robot reported a slice."""
-        return any("slices" in each.told for each in view.told)
+        return any(decode_snapshot(each.snapshot) is not None for each in view.snapshots)
 
     @property
     def artists(self) -> Sequence[Artist]:

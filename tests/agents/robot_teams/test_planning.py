@@ -1,5 +1,7 @@
 """The lead's decisions: the barrier, room in a corridor, reservations and division."""
 
+import msgspec
+
 from zwerm.agents.robot_teams.facts import RIGHT, TOP, Arc, End, Segment
 from zwerm.agents.robot_teams.messages import HUNTS, READY, Plan, Status, View
 from zwerm.agents.robot_teams.planning import (
@@ -45,7 +47,7 @@ def test_the_barrier_is_passed_by_robots_that_finished_their_latest_plan() -> No
 
 def test_plans_and_statuses_of_another_view_count_for_nothing() -> None:
     old = status(0, 5)
-    statuses = {0: Status(*[1 if name == "epoch" else getattr(old, name) for name in old.__struct_fields__])}
+    statuses = {0: msgspec.structs.replace(old, epoch=1)}
     assert free_members(VIEW, [plan(5, (0,), epoch=1)], statuses) == []
 
 

@@ -82,7 +82,8 @@ def test_the_order_of_facts_has_no_influence(facts: list[Fact], random: object) 
 
 
 def test_different_sets_have_different_digests() -> None:
-    digests = {known(facts).facts.digest for facts in ([], [Segment(0, 0, 1)], [Segment(0, 0, 2)], [Segment(1, 0, 1)])}
+    sets: list[list[Fact]] = [[], [Segment(0, 0, 1)], [Segment(0, 0, 2)], [Segment(1, 0, 1)]]
+    digests = {known(facts).facts.digest for facts in sets}
     assert len(digests) == 4
 
 
