@@ -201,8 +201,8 @@ class Pilot:
         touched: dict[int, int] = {}
         wx, wy = self._wanted
         for other in senses.robots:
-            if other.gap_m > CONTACT_M:
-                continue
+            if other.gap_m > CONTACT_M or other.dead:
+                continue  # a wreck is a wall
             ticks = touched[other.node] = self._contact_ticks.get(other.node, 0) + 1
             if wx * other.nx + wy * other.ny > 0.2:
                 if self._goes_first(other, ticks):
@@ -222,7 +222,7 @@ class Pilot:
         return self._node < other.node and ticks * self._dt_s < MOVING_WAIT_S
 
     def _into(self, senses: Senses, way: Vector) -> bool:
-        return any(r.gap_m <= CONTACT_M and way[0] * r.nx + way[1] * r.ny > 0.2 for r in senses.robots)
+        return any(r.gap_m <= CONTACT_M and not r.dead and way[0] * r.nx + way[1] * r.ny > 0.2 for r in senses.robots)
 
     def _limited(self, senses: Senses, way: Vector) -> Vector:
         """Return the velocity along `way`, less what would close more than half of a gap in one tick."""

@@ -34,7 +34,7 @@ from zwerm.agents.robot_teams.planning import (
     latest_plans,
     without_busy,
 )
-from zwerm.agents.robot_teams.senses import DEAD_M, Senses, Sensing
+from zwerm.agents.robot_teams.senses import Senses, Sensing
 from zwerm.agents.robot_teams.slice_map import SliceMap
 from zwerm.agents.robot_teams.work import Lost, NoWay, Work
 from zwerm.agents.runtime.contract import Controller, Setup
@@ -162,7 +162,7 @@ class TeamRobot(Controller):
         tick = observation.tick
         senses = self._senses = self._sensing.read(observation, self._is_dead)
         for other in senses.robots:
-            if other.gap_m < DEAD_M and other.stands and other.node not in self._wrecks and self._is_dead(other.node):
+            if other.dead and other.node not in self._wrecks:
                 self._wrecks[other.node] = tick
                 self._note_wreck(other.x_m, other.y_m)
         if observation.inbox:

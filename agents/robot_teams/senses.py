@@ -13,7 +13,7 @@ GAP_M: Final = 0.04
 STANDS_M: Final = 0.004
 
 # A wreck nearer than this, beyond the gap that is kept, is a wall [m].
-DEAD_M: Final = 0.01
+DEAD_M: Final = 0.04
 
 Vector = tuple[float, float]
 
@@ -29,6 +29,7 @@ class Beside(NamedTuple):
     gap_m: float
     dx_m: float
     dy_m: float
+    dead: bool = False
 
     @property
     def stands(self) -> bool:
@@ -74,9 +75,10 @@ class Sensing:
             was = self._last.get(each.node, (x, y))
             places[each.node] = x, y
             gap = apart - 2.0 * self._radius_m - GAP_M
-            if gap < DEAD_M and x == was[0] and y == was[1] and dead(each.node):
+            wreck = gap < DEAD_M and abs(x - was[0]) + abs(y - was[1]) < STANDS_M and dead(each.node)
+            if wreck:
                 wrecks.append((dx / apart, dy / apart))
-            robots.append(Beside(each.node, x, y, dx / apart, dy / apart, gap, x - was[0], y - was[1]))
+            robots.append(Beside(each.node, x, y, dx / apart, dy / apart, gap, x - was[0], y - was[1], wreck))
         self._last = places
         walls = (*[self._vector(contact.bearing_rad) for contact in touch or ()], *wrecks)
         return Senses(observation.tick, pose.x_m, pose.y_m, walls, tuple(robots))
