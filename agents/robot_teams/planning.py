@@ -160,7 +160,8 @@ def assign(
     if number == 0 and len(free) > 1 and _apart(slice_map, places):
         return [Plan(view.epoch, 1, End(0, LINK, 0), RIGHT, False, tuple(free))]
     distances = {node: slice_map.distances(at) for node, at in places.items() if at is not None}
-    swept = {status.sweeping for status in statuses.values() if status.phase != READY}
+    members = [statuses[node] for node in view.members if node in statuses]
+    swept = {status.sweeping for status in members if status.phase != READY}
     tasks = [task for task in open_tasks(slice_map) if task not in skip]
     tasks = [task for task in tasks if not (task.own_slice and task.end.slice in swept)]
     made: list[Plan] = []

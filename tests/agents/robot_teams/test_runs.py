@@ -89,7 +89,9 @@ def test_random_arenas_are_covered(count: int, seed: int) -> None:
 
 
 def test_two_robots_are_faster_than_one_and_repeat_more() -> None:
-    one, two = cover(team(1)), cover(team(2))
+    wide = {"polygon": [[0.0, 0.0], [14.0, 0.0], [14.0, 5.0], [0.0, 5.0]], "obstacles": []}
+    poses = [[0.6, 4.0, 0.0], [1.55, 4.0, 0.0]]
+    one, two = cover(team(1, wide, poses[:1])), cover(team(2, wide, poses))
     assert two.time_s < 0.9 * one.time_s
     assert two.coverage["repeat_coverage_fraction"] > one.coverage["repeat_coverage_fraction"]
 
