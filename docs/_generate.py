@@ -7,8 +7,8 @@ that every name is known, used and up to date.
 import inspect
 import re
 import sys
-from importlib import import_module
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
