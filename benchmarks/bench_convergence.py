@@ -14,7 +14,7 @@ from csv_rows import add_csv_option, write_csv
 from zwerm.run.assembly import assemble
 from zwerm.scenario.load import load
 from zwerm.world.fields.registry import make_field
-from zwerm.world.metrics.voronoi_coverage import VoronoiCells
+from zwerm.world.geometry.voronoi_cells import VoronoiCells
 from zwerm.world.scene import Floats
 
 GAIN_PER_S = 5.0
@@ -64,8 +64,8 @@ def main() -> None:
         for seed in range(1, arguments.seeds + 1):
             world = assemble(scenario, seed)
             assert scenario.field is not None
-            field = make_field(scenario.field, world.arena.bounds, scenario.folder, scenario.place)
-            coverage = VoronoiCells(world.arena, field)
+            field = make_field(scenario.field, world.scene.arena.bounds, scenario.folder, scenario.place)
+            coverage = VoronoiCells(world.scene.arena, field)
             position, errors = converge(coverage, world.scene.position, arguments.error_m, arguments.longest_s)
             tail = next(step for step, error in enumerate(errors) if error < 100.0 * errors[-1])
             measured = math.log(errors[tail] / errors[-1]) / ((len(errors) - 1 - tail) * STEP_S)

@@ -27,7 +27,7 @@ def emulator_rate(scenario: Scenario, seed: int) -> float:
 
 def physics_rate(scenario: Scenario, seed: int) -> float:
     """Return robot-ticks per second of pymunk alone, with the wheel speeds of robots that see no other robot."""
-    physics = assemble(scenario, seed)._physics
+    physics = assemble(scenario, seed).bodies.physics
     count = scenario.robots.count
     forward, turn = np.full(count, 0.0725), np.full(count, -0.77)
     ticks = round(scenario.time.duration_s / scenario.time.dt_s)

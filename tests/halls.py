@@ -27,6 +27,6 @@ def drive(
     answers: dict[int, Link] = {n: Node(*each).answer for n, each in node_specs(scenario, 1).items()}
     if around is not None:
         answers = {n: around(n, each) for n, each in answers.items()}
-    driver = LockStep(world, MemoryLink(answers), on_tick)
+    driver = LockStep(world, MemoryLink(answers), [] if on_tick is None else [on_tick])
     outcome = driver.run()
     return outcome, world

@@ -1,4 +1,4 @@
-"""What is true at one tick: the snapshot that sensors, the radio medium and metrics look at."""
+"""The scene: the true state of all robots at one tick, which sensors, the radio and metrics read."""
 
 from dataclasses import dataclass
 
@@ -15,9 +15,9 @@ Bools = NDArray[np.bool_]
 
 @dataclass(slots=True)
 class Scene:
-    """The truth at tick `tick`. Arrays have one row per robot id, whether or not the robot is in the arena.
+    """The true state at tick `tick`. Arrays have one row per robot id, also for robots outside the arena.
 
-    `present` marks the robots that are bodies in the arena; `moved` those whose pose differs from the previous scene's.
+    `present` marks the robots with a body in the arena, `moved` those whose pose differs from the previous scene's.
     """
 
     tick: int

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
         StragglerError,
         ZwermError,
     )
-    from zwerm.run.result import Positions, RunResult
+    from zwerm.run.positions import Positions
+    from zwerm.run.result import RunResult
     from zwerm.run.runner import run
     from zwerm.scenario.load import load
     from zwerm.scenario.tables import Scenario
@@ -55,7 +56,8 @@ if TYPE_CHECKING:
 
 # The public names, by the module that defines them.
 _NAMES: Final = {
-    "zwerm.run.result": ("Positions", "RunResult"),
+    "zwerm.run.positions": ("Positions",),
+    "zwerm.run.result": ("RunResult",),
     "zwerm.scenario.load": ("load",),
     "zwerm.scenario.tables": ("Scenario",),
     "zwerm.scenario.types": ("Table",),

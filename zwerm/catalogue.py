@@ -226,8 +226,8 @@ RENAMED_RADIO_MODELS: Final = {"bursts": "gilbert_elliott", "walls": "wall_atten
 
 # Metrics by the key of `[metrics]` that switches them on; the value of the key is validated by the class's `Parameters`.
 METRICS: Final = {
-    "cells": "zwerm.world.metrics.coverage:CellCoverage",
-    "coverage_radius_m": "zwerm.world.metrics.coverage:AreaCoverage",
+    "cells": "zwerm.world.metrics.position_coverage:CellCoverage",
+    "coverage_radius_m": "zwerm.world.metrics.position_coverage:AreaCoverage",
     "voronoi": "zwerm.world.metrics.voronoi_coverage:VoronoiMetrics",
     "sight_range_m": "zwerm.world.metrics.sight_coverage:SightCoverage",
 }
@@ -235,7 +235,7 @@ METRICS: Final = {
 
 def plugins() -> dict[str, Mapping[str, str]]:
     """Return the rows of every kind of plug-in."""
-    return {"sensor": SENSORS, "field": FIELDS, "radio model": RADIO_MODELS, "command": COMMANDS}
+    return {"sensor": SENSORS, "field": FIELDS, "radio model": RADIO_MODELS, "metric": METRICS, "command": COMMANDS}
 
 
 def row_of(file_name: str) -> Algorithm | None:

@@ -28,10 +28,10 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     read_request,
     write,
 )
-from zwerm.agents.sensor_coverage.motion.drives import DriveToResult, correct, deploy, move
 from zwerm.agents.sensor_coverage.motion.homing import Vector
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive, Locomotion
-from zwerm.agents.sensor_coverage.motion.parameters import RobotParameters
+from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
+from zwerm.agents.sensor_coverage.motion.push_drives import DriveToResult, correct, deploy, move
 from zwerm.agents.sensor_coverage.protocols.component import Component
 from zwerm.agents.sensor_coverage.protocols.component_loop import Codec, ComponentLoop
 from zwerm.agents.sensor_coverage.protocols.transport.deduplication import RequestDeduplicator

@@ -6,12 +6,12 @@ from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.messages import advice, peers
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS
-from zwerm.agents.sensor_coverage.motion.parameters import RobotParameters
+from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.advice_client import AdviceClient
-from zwerm.agents.sensor_coverage.protocols.completion import CompletionProtocol
+from zwerm.agents.sensor_coverage.protocols.completion_census import CompletionProtocol
 from zwerm.agents.sensor_coverage.protocols.component_loop import Codec, ComponentLoop
 from zwerm.wire.messages import Command, Observation, Wake
 

@@ -21,7 +21,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     SlotVacated,
     TakeSlot,
 )
-from zwerm.agents.sensor_coverage.motion.drives import DriveResult
+from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.neighbourhood.surveillance import Surveillance

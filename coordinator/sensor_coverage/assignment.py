@@ -2,9 +2,9 @@
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
+from zwerm.agents.sensor_coverage.frontier.decisions import FindRoutes
 from zwerm.agents.sensor_coverage.frontier.paths import Reach
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
-from zwerm.agents.sensor_coverage.frontier.services import FindRoutes
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.maths.simplicial import FlagComplex
 

@@ -1,7 +1,7 @@
 """The coordinator of sensor coverage: Algorithm 1 of Ramaithitima et al. 2015.
 
 It knows only the robots' reports over the uplink. Each decision stands behind an interface
-(`zwerm.agents.sensor_coverage.frontier.services`). `SensorCoverageCoordinator._algorithm_1` is the algorithm as the
+(`zwerm.agents.sensor_coverage.frontier.decisions`). `SensorCoverageCoordinator._algorithm_1` is the algorithm as the
 paper prints it.
 """
 
@@ -10,12 +10,12 @@ from typing import Any, Final, Protocol
 
 import msgspec
 
+from zwerm.agents.sensor_coverage.frontier.decisions import Services
 from zwerm.agents.sensor_coverage.frontier.directions import add_wall
-from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
-from zwerm.agents.sensor_coverage.frontier.services import Services
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS, Emerged, Report, RollCall, ScanRequest
 from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_snapshot

@@ -6,10 +6,10 @@ Several pushes may run concurrently if no slot of one path is a landmark in anot
 import math
 from collections.abc import Collection, Mapping, Sequence
 
+from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
-from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
-from zwerm.agents.sensor_coverage.frontier.services import FrontierService
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import Arrived, Cleared, Correct, Deploy, Move, Sighting
 from zwerm.agents.sensor_coverage.motion.push_geometry import (

@@ -12,8 +12,8 @@ that have not reported. So an advisor that starts again needs no memory.
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, Protocol
 
-from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.messages.advice import (
     CHANNEL,
     AdviceMessage,

@@ -9,8 +9,8 @@ from zwerm.compare.comparison import make_comparison
 from zwerm.compare.comparison_figure import check_figure
 from zwerm.compare.variants import parse_sweep, parse_variant
 from zwerm.errors import PictureError, ScenarioError
-from zwerm.study.plan import make_points
 from zwerm.study.study_tables import load_study
+from zwerm.study.trial_plan import make_points
 
 
 def test_a_variant_argument_is_a_name_and_its_settings() -> None:

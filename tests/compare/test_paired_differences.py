@@ -14,10 +14,10 @@ from zwerm.compare.comparison_report import shown
 from zwerm.compare.variants import parse_sweep, parse_variant
 from zwerm.maths.statistics import Sample
 from zwerm.run.runner import run
-from zwerm.study.plan import make_points
 from zwerm.study.study_runner import run_study
 from zwerm.study.study_tables import Study
 from zwerm.study.summary import Results
+from zwerm.study.trial_plan import make_points
 
 
 def test_variants_with_one_seed_have_the_same_random_faults_and_positions(gossip: Path) -> None:

@@ -94,7 +94,7 @@ def test_the_toml_of_the_readme_is_a_valid_arena(desk: Path) -> None:
     (desk / "arena.toml").write_text(table)
     tables = read(ROOT / "scenarios/computation-free.toml") | read(desk / "arena.toml") | {"name": "warehouse"}
     world = assemble(validate(tables, "warehouse.toml", desk), 1)
-    assert world.arena.area_m2 == pytest.approx(20.0)
+    assert world.scene.arena.area_m2 == pytest.approx(20.0)
 
 
 def test_every_link_of_the_readme_leads_somewhere() -> None:

@@ -107,6 +107,17 @@ def test_closing_a_link_twice_is_allowed(open_link: Open) -> None:
     link.close()
 
 
+def test_a_node_in_memory_answers_when_its_answer_is_collected_and_not_when_it_is_sent_something() -> None:
+    answered: list[bytes] = []
+    link = MemoryLink({0: lambda payload: answered.append(payload) or payload, 1: bytes})
+    link.send(0, b"a")
+    link.send(1, b"b")
+    assert answered == []
+    link.kill(1)
+    assert link.receive_many(2, 0.0) == [Arrival(1, None), Arrival(0, b"a")]
+    assert answered == [b"a"]
+
+
 # --- between processes ----------------------------------------------------------------------------------------------
 
 

@@ -50,16 +50,18 @@ def test_a_frontier_that_no_path_leads_to_is_cut_off() -> None:
 
     def strike(world: World) -> None:
         position = world.scene.position
-        alive = [robot for robot in world.scene.present_ids().tolist() if robot not in world.crashed]
-        if world.crashed or position[alive, 0].max() > 3.4:
+        alive = [robot for robot in world.scene.present_ids().tolist() if robot not in world.status.crashed]
+        if world.status.crashed or position[alive, 0].max() > 3.4:
             for robot in alive:
                 if 1.6 < position[robot, 0] < 2.6 and world.tick % 40 == 0:
                     world.crash(robot, "struck by lightning")
 
     outcome, world = drive(load("sensor-coverage", corridor), strike)
     assert outcome == "failed"
-    assert world.telemetry.gave_up.startswith("node 160 gave up: cut-off: no path leads to the frontier; ")
-    assert len(world.crashed) > 2
+    ending = world.ending()
+    assert ending is not None
+    assert ending.reason.startswith("node 160 gave up: cut-off: no path leads to the frontier; ")
+    assert len(world.status.crashed) > 2
 
 
 def test_a_failed_deployment_exits_with_1_and_one_clear_line(tmp_path: Path) -> None:

@@ -96,8 +96,8 @@ def test_every_built_in_scenario_is_without_mistake_and_says_what_it_is(name: st
         ("summary=5", "summary: expected a string, got 5"),
         ("name=a b", "name: expected letters, digits, '.', '_' and '-', and no sign first, got \"a b\""),
         (
-            "robots.inflow={every_s = 1, entry_m = [1, 0, 0, 1]}",
-            "robots.inflow.entry_m: expected [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax, "
+            "robots.entrance={every_s = 1, entry_m = [1, 0, 0, 1]}",
+            "robots.entrance.entry_m: expected [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax, "
             "got [1, 0, 0, 1]",
         ),
         (f"robots.controller={list(range(99))}", None),

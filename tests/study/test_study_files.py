@@ -7,8 +7,8 @@ import pytest
 from study_files import GRID, TINY
 
 from zwerm.errors import ScenarioError
-from zwerm.study.plan import make_points, make_trials
 from zwerm.study.study_tables import Study, built_in, load_study, parse_seeds
+from zwerm.study.trial_plan import make_points, make_trials
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ from study_files import GRID, TINY, run_here
 
 from zwerm.errors import ScenarioError
 from zwerm.run.runner import run
-from zwerm.study.plan import make_points
 from zwerm.study.rows import Rows, read_rows
 from zwerm.study.study_runner import run_study
 from zwerm.study.study_tables import Study
+from zwerm.study.trial_plan import make_points
 
 
 def test_a_row_equals_the_result_of_a_run_with_its_seed(write: Callable[..., Study], tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ def test_counts_of_robots_are_sampled_over_time(write: Callable[..., Study], tmp
     study = write(
         TINY.replace("seeds = 3", "seeds = 1")
         + "series = ['robots_in_arena', 'robots_entered']\n"
-        + "set = ['robots.count=5', 'robots.inflow.every_s=0.5', 'robots.inflow.entry_m=[0, 0, 1, 1]']\n"
+        + "set = ['robots.count=5', 'robots.entrance.every_s=0.5', 'robots.entrance.entry_m=[0, 0, 1, 1]']\n"
     )
     (row,) = read_rows(run_here(study, tmp_path / "out.parquet").path)
     assert len(row["series_time_s"]) == 121

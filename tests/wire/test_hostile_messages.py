@@ -64,7 +64,7 @@ def test_a_hostile_message_is_refused_for_its_reason(payload: bytes, reason: str
     with pytest.raises(ProtocolError) as refused:
         world.accept(0, payload)
     assert refused.value.reason == reason
-    assert world.refused == {reason: 1}
+    assert world.intake.refused == {reason: 1}
     assert world.awaited() == [0, 1, 2, 3], "the node is still awaited"
     world.accept(0, encode(GOOD))
     assert world.awaited() == [1, 2, 3]
@@ -77,7 +77,7 @@ def test_a_second_answer_and_one_from_a_node_that_does_not_exist_are_refused() -
     for node, reason in ((0, "duplicate"), (4, "unasked"), (-1, "unasked")):
         with pytest.raises(ProtocolError, match=f"^{reason}:"):
             world.accept(node, encode(GOOD))
-    assert world.refused == {"duplicate": 1, "unasked": 2}
+    assert world.intake.refused == {"duplicate": 1, "unasked": 2}
 
 
 @pytest.fixture(scope="module")
@@ -101,15 +101,15 @@ mutations = st.one_of(
 @example(encode(GOOD))
 def test_no_bytes_at_all_do_more_than_be_refused_or_be_a_valid_command(waiting_world: World, payload: bytes) -> None:
     world = waiting_world
-    before = world.refused.total()
+    before = world.intake.refused.total()
     try:
         world.accept(1, payload)
     except ProtocolError:
         refused = 1
     else:
         refused = 0
-        world.answers.ask(range(4), 0)  # so that the next example is not refused as a duplicate
-    assert world.refused.total() == before + refused
+        world.intake.begin_tick(0, range(4), [b""] * 4)  # so that the next example is not refused as a duplicate
+    assert world.intake.refused.total() == before + refused
     assert 1 in world.awaited()
 
 

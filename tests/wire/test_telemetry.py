@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from zwerm.errors import ProtocolError
 from zwerm.wire.messages import Command, encode, encode_command, open_answer, traced_bytes
-from zwerm.wire.telemetry import NAMES_MAX, is_telemetry_name, plain_numbers, telemetry_error
+from zwerm.wire.telemetry_rules import NAMES_MAX, is_telemetry_name, plain_numbers, telemetry_error
 
 LONG = "a" * 65
 

@@ -19,7 +19,7 @@ from zwerm.wire.messages import (
     decode_observation,
     encode,
 )
-from zwerm.world.metrics.coverage import area_coverage_fraction, cell_counts, cell_coverage_fraction
+from zwerm.world.metrics.position_coverage import area_coverage_fraction, cell_counts, cell_coverage_fraction
 from zwerm.world.world import World
 
 
@@ -126,7 +126,7 @@ def test_a_sleeper_is_observed_again_when_its_time_comes_and_its_drive_persists_
     seen += [list(tick(world)) for _ in range(6)]
     assert seen == [[0, 1], [1], [1], [1], [1], [0, 1], [0, 1]]
     assert world.scene.position[0, 0] == pytest.approx(1.0 + 0.1 * 0.7)
-    assert world.robot_ticks == 10
+    assert world.intake.observed_count == 10
 
 
 def test_a_sleeper_with_no_event_sleeps_until_the_run_ends() -> None:
@@ -225,54 +225,54 @@ def test_a_crashed_robot_stops_is_never_awaited_again_and_its_packets_are_droppe
     halted = world.scene.position[1].copy()
     assert list(tick(world)) == [0]
     assert (world.scene.position[1] == halted).all()
-    assert world.crashed == {1: "Oops"}
+    assert world.status.crashed == {1: "Oops"}
 
 
-def trace_of(*, foreseeing: bool, latency_ticks: int) -> str:
-    """Return the trace of robots that come and go, drive, sleep and crash, in a world that `foresees` or does not."""
-    inflow = {"every_s": 0.3, "entry_m": [0.0, 0.0, 1.0, 4.0], "exit_m": [1.5, 0.0, 4.0, 4.0]}
+def trace_of(*, precomputing: bool, latency_ticks: int) -> str:
+    """Return the trace of robots that come and go, drive, sleep and crash, in a world that precomputes or does not."""
+    entrance = {"every_s": 0.3, "entry_m": [0.0, 0.0, 1.0, 4.0], "exit_m": [1.5, 0.0, 4.0, 4.0]}
     body = {"kind": "holonomic", "radius_m": 0.1, "max_speed_m_s": 2.0, "latency_ticks": latency_ticks}
     sensors = [
         {"kind": "odometry", "distance_sd_fraction": 0.1},
         {"kind": "bearings", "sd_rad": 0.1},
         {"kind": "line_of_sight"},
     ]
-    robots = {"count": 12, "inflow": inflow, "body": body, "sensors": sensors, "on_crash": "continue"}
+    robots = {"count": 12, "entrance": entrance, "body": body, "sensors": sensors, "on_crash": "continue"}
     noise = {"kind": "sensor_noise", "sensor": "bearings", "at_s": 0.8, "for_s": 0.4, "sd": 0.1}
     world = world_at(robots=robots, faults=[noise])
     answer = {7: Command(drive=BodyVelocity(1.8)), 16: Command(wake=Wake(at_s=2.0))}
     while world.tick < 40:
         world.begin()
         nodes, _ = world.observe()
-        if foreseeing:
-            world.foresee()
+        if precomputing:
+            world.precompute()
         for node in nodes:
             said: Command | Failure = answer.get(world.tick + node, Command(drive=BodyVelocity(1.9, 0.0, 0.05 * node)))
             failed = world.tick == 30 and node == nodes[0]
             said = Failure(world.tick, "Oops", "") if failed else msgspec.structs.replace(said, tick=world.tick)
             world.accept(node, encode(said))
         world.advance()
-    assert world.exited
-    assert world.crashed
+    assert world.bodies.exited
+    assert world.status.crashed
     return world.trace.hex()
 
 
-def test_foresight_changes_nothing_whoever_comes_goes_sleeps_or_is_blinded() -> None:
-    traces = [trace_of(foreseeing=True, latency_ticks=latency) for latency in (0, 1, 3)]
-    assert traces == [trace_of(foreseeing=False, latency_ticks=latency) for latency in (0, 1, 3)]
+def test_precomputing_changes_no_trace_when_robots_enter_leave_sleep_or_lose_their_camera() -> None:
+    traces = [trace_of(precomputing=True, latency_ticks=latency) for latency in (0, 1, 3)]
+    assert traces == [trace_of(precomputing=False, latency_ticks=latency) for latency in (0, 1, 3)]
     assert len(set(traces)) == 3
 
 
-def test_what_was_foreseen_is_not_sensed_again() -> None:
+def test_precomputed_readings_are_not_sensed_again() -> None:
     body = {"kind": "holonomic", "latency_ticks": 1}
     world = world_at((1.0, 1.0, 0.0), (2.0, 1.0, 0.0), robots={"sensors": [{"kind": "bearings"}], "body": body})
-    (sensor,) = world._sensors.values()
+    (sensor,) = world._sensing.sensors.values()
     asked = []
     read = sensor.read
     sensor.read = lambda scene, robots: (asked.append(scene.tick), read(scene, robots))[1]  # type: ignore[method-assign]
     for _ in range(3):
         nodes, _ = world.observe()
-        world.foresee()
+        world.precompute()
         for node in nodes:
             world.accept(node, encode(Command(tick=world.tick)))
         world.advance()
@@ -280,8 +280,8 @@ def test_what_was_foreseen_is_not_sensed_again() -> None:
 
 
 def test_robots_flow_in_through_the_entry_and_out_through_the_exit() -> None:
-    inflow = {"every_s": 0.5, "entry_m": [0.0, 0.0, 1.0, 4.0], "exit_m": [3.0, 0.0, 4.0, 4.0]}
-    robots = {"count": 3, "inflow": inflow, "body": {"kind": "holonomic", "radius_m": 0.1, "max_speed_m_s": 2.0}}
+    entrance = {"every_s": 0.5, "entry_m": [0.0, 0.0, 1.0, 4.0], "exit_m": [3.0, 0.0, 4.0, 4.0]}
+    robots = {"count": 3, "entrance": entrance, "body": {"kind": "holonomic", "radius_m": 0.1, "max_speed_m_s": 2.0}}
     world = world_at((0.5, 0.5, 0.0), robots=robots | {"placement": {}})
     there = []
     for _ in range(60):
@@ -293,7 +293,7 @@ def test_robots_flow_in_through_the_entry_and_out_through_the_exit() -> None:
     assert there[0] == [0]
     assert there[5] == [0, 1]
     assert there[10] == [0, 1, 2]
-    assert sorted(world.exited) == [0, 1, 2]
+    assert sorted(world.bodies.exited) == [0, 1, 2]
     assert not world.scene.present.any()
     assert world.completed
 
@@ -330,12 +330,12 @@ def test_the_coordinator_hears_everyone_over_the_uplink_and_senses_nothing() -> 
 
 def test_coverage_metrics_agree_with_counting_and_with_the_area_of_discs() -> None:
     world = world_at((0.5, 0.5, 0.0), (0.8, 0.8, 0.0), (3.5, 3.5, 0.0))
-    counts = cell_counts(world.scene.position, world.arena.bounds, (4, 2))
+    counts = cell_counts(world.scene.position, world.scene.arena.bounds, (4, 2))
     assert counts.tolist() == [[2, 0, 0, 0], [0, 0, 0, 1]]
     assert cell_coverage_fraction(counts) == 0.25
-    quarter = area_coverage_fraction(np.array([[0.0, 0.0]]), 1.0, world.arena)
+    quarter = area_coverage_fraction(np.array([[0.0, 0.0]]), 1.0, world.scene.arena)
     assert quarter == pytest.approx(math.pi / 4 / 16, rel=1e-3)
-    twice = area_coverage_fraction(np.array([[2.0, 2.0], [2.0, 2.0]]), 1.0, world.arena)
+    twice = area_coverage_fraction(np.array([[2.0, 2.0], [2.0, 2.0]]), 1.0, world.scene.arena)
     assert twice == pytest.approx(math.pi / 16, rel=1e-3)
 
 

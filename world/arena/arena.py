@@ -1,9 +1,8 @@
-"""The arena: where robots can be, what stops them, and what stops their sight and their radio.
+"""The arena: free space, and the walls that stop robots, sight and radio.
 
-Free space is a polygon (its holes are obstacles) plus walls without thickness. Questions are asked for many points or
-lines at once; the answers are exact to rounding, and no line of sight slips through a corner at which two walls meet.
-Small arenas are answered by comparing everything with everything, large ones through a spatial index. An arena never
-changes. It knows nothing of robots: bodies do not block here. How an arena is read from files stands in `shapes`.
+Free space is a polygon (its holes are obstacles) plus walls without thickness. Queries take many points or lines at once. The
+answers are exact to rounding, and no line of sight passes the corner at which two walls meet. Small arenas compare all pairs,
+large ones use a spatial index. An arena never changes, and it holds no robots. `shapes` reads arenas from files.
 """
 
 from collections.abc import Sequence
@@ -23,13 +22,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# Up to this many pairs, comparing all with all is quicker than asking an index (measured).
+# Up to this many pairs, comparing all pairs is faster than a query of the index (measured).
 _DENSE_LINES = 5_000
-# Up to so many walls, every line is compared with every wall in blocks of that size: the index is slower.
+# Up to this many walls, blocks of lines are compared with every wall: the index is slower.
 _FEW_SEGMENTS = 64
 _DENSE_POINTS = 20_000
-_DENSE_WALLS = 8  # so many in all, however many points are asked about
-_ON_WALL_M = 1e-9  # so much farther than the tree's own distance a nearest wall is looked for
+_DENSE_WALLS = 8  # up to this many walls, for any number of points
+_ON_WALL_M = 1e-9  # added to the distance of the tree, so that rounding hides no nearest wall
 
 
 class WallContacts(NamedTuple):
@@ -46,7 +45,7 @@ class Arena:
 
     `free` is the shapely polygon of free space, `walls` the walls without thickness, `segments` (m, 4) every wall as
     straight pieces x0, y0, x1, y1 [m], collinear neighbours merged; `bounds` is xmin, ymin, xmax, ymax [m]. `is_convex`
-    means that nothing inside can hide anything.
+    means that every two points see each other.
     """
 
     def __init__(self, free: Polygon | MultiPolygon, walls: Sequence[LineString] = ()) -> None:
@@ -77,7 +76,7 @@ class Arena:
         return cls(*read_shape(table, folder))
 
     def blocked(self, start: Floats, end: Floats) -> Bools:
-        """Return for each line from start (k, 2) to end (k, 2) whether a wall crosses or touches it, its ends aside."""
+        """Return (k,) whether a wall crosses or touches each line from start (k, 2) to end (k, 2), its ends excluded."""
         count = len(start)
         if self.is_convex or count == 0:
             return np.zeros(count, dtype=np.bool_)
@@ -98,7 +97,7 @@ class Arena:
         return blocked
 
     def nearest_wall_points(self, points: Floats) -> Floats:
-        """Return (k, 2) the place on a wall nearest to each of points (k, 2) [m]; of equals, the first segment's."""
+        """Return (k, 2) the point on a wall nearest to each of points (k, 2) [m]; of equally near ones, the first segment's."""
         count = len(points)
         if count * len(self.segments) <= _DENSE_POINTS:
             x, y = points.T[:, :, None]
@@ -106,7 +105,7 @@ class Arena:
             best = np.argmin((nx - x) ** 2 + (ny - y) ** 2, axis=1)
             rows = np.arange(count)
             return np.column_stack([nx[rows, best], ny[rows, best]])
-        # The tree's own distances only tell how far to look: what is nearest is then found by the same sums as above.
+        # The tree's distances only bound the search; the same sums as above then find the nearest wall.
         _, distance = self._tree.query_nearest(shapely.points(points), all_matches=False, return_distance=True)
         point, wall = self._near(points, distance + _ON_WALL_M)
         x, y = points[point].T
@@ -147,7 +146,7 @@ class Arena:
 
     def _nearest(self, x: Floats, y: Floats, wall: Ints | slice) -> tuple[Floats, Floats]:
         px, py, ex, ey = self._px[wall], self._py[wall], self._ex[wall], self._ey[wall]
-        # What np.clip does, without its detours.
+        # As np.clip, which is slower.
         along = np.minimum(np.maximum(((x - px) * ex + (y - py) * ey) / self._length2[wall], 0.0), 1.0)
         return px + along * ex, py + along * ey
 
@@ -196,7 +195,7 @@ def _crosses(
 ) -> NDArray[np.bool_]:
     """Return whether wall pq meets line ab between a and b, elementwise.
 
-    Signs are taken of each wall end by itself, so that two walls with a common end agree about it and leave no gap.
+    Each sign depends on one wall end only, so that two walls with a common end agree about it and leave no gap.
     """
     dx, dy = bx - ax, by - ay
     apx, apy, aqx, aqy = px - ax, py - ay, qx - ax, qy - ay
@@ -205,7 +204,7 @@ def _crosses(
     bpx, bpy, bqx, bqy = px - bx, py - by, qx - bx, qy - by
     side_b = bpx * bqy - bpy * bqx
     hit: Bools = (side_a * side_b < 0.0) & (side_p * side_q <= 0.0)
-    along = (side_p == 0.0) & (side_q == 0.0)  # on one line: they meet where the wall's span and ab's overlap
+    along = (side_p == 0.0) & (side_q == 0.0)  # on one line: they meet where their spans overlap
     if along.any():
         length2 = dx * dx + dy * dy
         at_p, at_q = dx * apx + dy * apy, dx * aqx + dy * aqy

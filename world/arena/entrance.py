@@ -1,8 +1,8 @@
-"""Depots, which let robots into the arena one by one, and an exit that takes them out.
+"""Entrances of the arena: a timed entry schedule with an exit, and the depots of base stations.
 
-From a timed inflow robots enter in id order, every `every_s` seconds, at a random free place of the entry rectangle. While
-there is none, the next robot waits at the door; the interval counts from the last entry. From a base station's depot they
-enter when it releases them, where it stands.
+An entry schedule lets robots enter in id order, every `every_s` seconds, at a random free place of the entry rectangle. While
+no place is free, the next robot waits; the interval counts from the last entry. A base station's depot lets a robot enter at
+the station when the station releases it.
 """
 
 from collections import deque
@@ -11,16 +11,16 @@ import numpy as np
 
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
-from zwerm.scenario.tables import BaseTable, InflowTable, PlacementTable
+from zwerm.scenario.tables import BaseTable, EntranceTable, PlacementTable
 from zwerm.world.arena.arena import Arena
 from zwerm.world.arena.placement import free_spot, place, placed
 from zwerm.world.scene import Floats, Ints, Scene
 
 
 class EntrySchedule:
-    """The door of a depot of `count` robots, and the way out."""
+    """Lets `count` robots enter one by one, and removes those that reach the exit."""
 
-    def __init__(self, table: InflowTable, count: int) -> None:
+    def __init__(self, table: EntranceTable, count: int) -> None:
         self._table = table
         self._count = count
         self._next_robot = 0
@@ -52,10 +52,13 @@ class EntrySchedule:
 
 
 class Depots:
-    """The base stations, robots 0 to n - 1, and the others, who wait in their depots: dealt out in turn, each in id order."""
+    """The base stations, robots 0 to n - 1, and the depots in which the other robots wait.
+
+    The robots are dealt to the depots in turn, and leave each in id order.
+    """
 
     def __init__(self, table: BaseTable, count: int, arena: Arena, radius_m: float, draws: Draws) -> None:
-        """Take the place of every base station. Raises ScenarioError where one cannot be, or no robot is left to wait."""
+        """Place every base station. Raises ScenarioError where one has no room, or where no robot is left to wait."""
         stations = table.stations
         if stations >= count:
             raise ScenarioError([f"robots.count: expected more than the {stations} base stations, got {count}"])
@@ -72,7 +75,7 @@ class Depots:
         self.refused_releases = 0
 
     def release(self, station: int) -> None:
-        """Let a station's next robot out; a release from an empty depot is refused and counted."""
+        """Release a station's next robot; a release from an empty depot is refused and counted."""
         if self._waiting[station]:
             self._entering.append((station, self._waiting[station].popleft()))
         else:
@@ -81,7 +84,7 @@ class Depots:
     def entering(self, scene: Scene) -> tuple[int, Floats, float] | None:
         """Return (robot, position (2,) [m], heading [rad]) of a robot that enters now, at its base, or None.
 
-        One robot enters a tick; of those released at once the others follow.
+        One robot enters a tick; others released at the same tick follow.
         """
         if not self._entering:
             return None
@@ -89,5 +92,5 @@ class Depots:
         return robot, self.position[station].copy(), float(self.heading[station])
 
     def leaving(self, scene: Scene) -> Ints:
-        """Return nobody: what a base station released stays out."""
+        """Return no robots: a released robot stays in the arena."""
         return np.zeros(0, dtype=np.int64)

@@ -1,8 +1,8 @@
-"""Maps drawn as images: ROS map_server maps (YAML beside PGM or PNG, ROS 1 and 2) and plain bitmaps, as free cells.
+"""Maps drawn as images: ROS map_server maps (YAML with a PGM or PNG, ROS 1 and 2) and plain bitmaps, read as free cells.
 
-Of a ROS map, cells are free where map_server finds them less occupied than `free_thresh`; unknown cells are not free.
-Of a bitmap, what is brighter than mid-grey on a white ground is free; its lower left corner is the origin. How cells
-become a polygon stands in `raster`. Every mistake is one line that names the file.
+A cell of a ROS map is free where its occupancy is below `free_thresh`; unknown cells are not free. A pixel of a bitmap is
+free where it is brighter than mid-grey on a white ground; the lower left corner is the origin. `raster` turns cells into a
+polygon. Every mistake is one line that names the file.
 """
 
 import math
@@ -32,7 +32,7 @@ _SIXTEEN_BIT = ("I", "I;16", "I;16B", "I;16L", "I;16N")
 
 
 class RosMap(BaseModel):
-    """A map_server YAML. Keys besides these are other programs' and ignored, as map_server does."""
+    """A map_server YAML. Other keys are ignored, as in map_server."""
 
     image: str
     resolution: Positive
@@ -44,7 +44,7 @@ class RosMap(BaseModel):
 
 
 class Grid(NamedTuple):
-    """Free cells, and where they lie: cell [0, 0] has its lower left corner at `origin_m`, and rows run upward."""
+    """Free cells and their position: cell [0, 0] has its lower left corner at `origin_m`, and rows run upward."""
 
     free: Bools  # (h, w)
     cell_m: tuple[float, float]  # width and height of a cell
@@ -122,7 +122,7 @@ def _ros_free(image: Path, described: RosMap) -> Bools:
         percent = np.round(255.0 * shade)
         return (percent <= 100.0) & (percent < 100.0 * described.free_thresh)
     if described.mode == "trinary" and opacity is not None:
-        shade = (3.0 * shade + opacity) / 4.0  # map_server takes opacity for one more channel of brightness
+        shade = (3.0 * shade + opacity) / 4.0  # map_server counts opacity as one more channel of brightness
     occupancy = shade if described.negate else 1.0 - shade
     free: Bools = occupancy < described.free_thresh
     return free & (opacity == 1.0) if described.mode == "scale" and opacity is not None else free
@@ -145,7 +145,7 @@ def _bitmap(path: Path, table: ArenaTable) -> Grid:
 
 
 def _shades(path: Path) -> tuple[Floats, Floats | None]:
-    """Return the mean of the colours in [0, 1] (h, w), and likewise the opacity where the image has any."""
+    """Return the mean of the colour channels in [0, 1] (h, w), and the opacity (h, w) or None."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)

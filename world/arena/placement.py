@@ -1,9 +1,9 @@
-"""Where robots start: drawn one after the other, each tried again until clear of walls and of those before it.
+"""Start positions: robots are drawn one after the other, each until it is clear of walls and of the robots before it.
 
-Robot i's tries are keyed by its id and the number of the try, so that a robot more moves nobody with a lower id, and
-nobody at all whom it does not get in the way of. Robots are put only where they can roam: of each polygon of free
-space, in the largest part that a disc of their radius can move about in, and not in a pocket behind a gap too narrow
-for them. (Given poses may be anywhere free; walls without thickness are taken for intended, and close off nothing.)
+The tries of robot i are keyed by its id and the number of the try. So one robot more moves no robot with a lower id, and none
+whose place it does not take. Robots start only where they can move: in the largest part of each polygon of free space that a
+disc of their radius can reach, and not in a pocket behind a narrow gap. Given poses may be anywhere in free space. Walls
+without thickness close off nothing here.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,9 +25,9 @@ Spread = Callable[[Floats], Floats]  # draws (..., 2) in [0, 1) to places (..., 
 
 TRIES = 10_000
 _FIRST_TRIES = 8  # drawn for all robots at once
-_INFLOW_TRIES = 8
+_ENTRY_TRIES = 8
 
-_KEYS = {  # of each kind: the keys it needs, and those it may have
+_KEYS = {  # by kind: the required keys, and the optional ones
     "uniform": ((), ()),
     "disc": (("radius_m",), ("center_m",)),
     "cell": (("grid", "radius_m"), ("cell",)),
@@ -40,9 +40,9 @@ def place(
 ) -> tuple[Floats, Floats]:
     """Return positions (count, 2) [m] and headings (count,) [rad], in [-pi, pi) where they are drawn.
 
-    Centres are at least radius_m from every wall and twice that from each other. `entry` stands in for the arena's
-    bounds: what is uniform, a random disc or a grid then lies in that rectangle. Raises ScenarioError for a table
-    that contradicts itself, and where no room is found in TRIES tries.
+    Centres are at least radius_m from every wall and twice that from each other. The rectangle `entry` replaces the bounds
+    of the arena for uniform placement, random discs and grids. Raises ScenarioError for a contradictory table, and where a
+    robot finds no room in TRIES tries.
     """
     _check_keys(table)
     if table.kind == "poses":
@@ -80,15 +80,15 @@ def free_spot(
 ) -> Floats | None:
     """Return a place (2,) [m] in the rectangle, clear of walls and of robots at occupied (n, 2), or None.
 
-    The few tries are keyed by (purpose, ids, try), so that the caller may ask again with another id.
+    The tries are keyed by (purpose, ids, try), so that a caller can try again with another id.
     """
-    draw = draws.uniform(purpose, *ids, np.arange(_INFLOW_TRIES)[:, None], np.arange(2))
+    draw = draws.uniform(purpose, *ids, np.arange(_ENTRY_TRIES)[:, None], np.arange(2))
     spots = _in_rectangle(rectangle)(draw)
     return _first_clear(spots[arena.contains(spots, radius_m)], occupied, radius_m)
 
 
 class _Ground:
-    """Where a body of this radius may be put."""
+    """The places at which a body of a radius may start."""
 
     def __init__(self, arena: Arena, radius_m: float) -> None:
         self._arena, self._radius_m = arena, radius_m
@@ -99,11 +99,11 @@ class _Ground:
             shapely.prepare(self._roaming)
 
     def admits(self, points: Floats) -> Bools:
-        """Return (k,) whether a body may be centred at each of points (k, 2)."""
+        """Return (k,) whether a body may start with its centre at each of points (k, 2)."""
         if self._roaming is None:
             return self._arena.contains(points, self._radius_m)
         admitted: Bools = shapely.contains_xy(self._roaming, points[:, 0], points[:, 1])
-        # Rounded corners of the eroded polygon are drawn with chords, and thin walls are not in it.
+        # The eroded polygon approximates round corners by chords and ignores thin walls, so test these too.
         admitted[admitted] = self._arena.contains(points[admitted], self._radius_m)
         return admitted
 
@@ -157,7 +157,7 @@ def _in_disc(center: Floats, radius_m: float) -> Spread:
 
 
 def _random_center(radius_m: float, ground: _Ground, bounds: Rectangle, draws: Draws) -> Floats:
-    """Return a centre (2,) whose disc lies within the bounds and at which itself a robot may be."""
+    """Return a centre (2,) that a robot may take and whose disc lies within the bounds."""
     xmin, ymin, xmax, ymax = bounds
     widest = min(xmax - xmin, ymax - ymin) / 2.0
     if radius_m > widest:
@@ -174,7 +174,7 @@ def _random_center(radius_m: float, ground: _Ground, bounds: Rectangle, draws: D
 def _cell_center(
     grid: tuple[int, int], cell: tuple[int, int] | None, ground: _Ground, bounds: Rectangle, draws: Draws
 ) -> Floats:
-    """Return the centre (2,) of the cell (column, row), or of a random one at whose centre a robot may be."""
+    """Return the centre (2,) of the cell (column, row), or of a random cell whose centre a robot may take."""
     xmin, ymin, xmax, ymax = bounds
     size = np.array([xmax - xmin, ymax - ymin]) / grid
     if cell is not None:
@@ -199,7 +199,7 @@ def _first_admitted(points: Callable[[Ints], Floats], ground: _Ground, what: str
 
 
 def _tries(draws: Draws, robots: ArrayLike, start: int, end: int) -> Floats:
-    """Return the draws (..., end - start, 2) of tries number start to end, of each robot."""
+    """Return the draws (..., end - start, 2) of each robot for the tries from start to end."""
     robot = np.asarray(robots)[..., None, None]
     return draws.uniform("placement", robot, np.arange(start, end)[:, None], np.arange(2))
 
@@ -229,7 +229,7 @@ def placed(
 ) -> tuple[Floats, Floats]:
     """Return positions (n, 2) [m] and headings (n,) [rad] of n given poses.
 
-    Raises ScenarioError, by the poses' keys, for those in a wall or in each other's way.
+    Raises ScenarioError, with the keys of the poses, for poses in a wall or too near to each other.
     """
     poses = np.array(given)
     position = poses[:, :2]

@@ -1,10 +1,9 @@
-"""Free cells of an image as one exact polygon: what is traced are the cracks between free cells and all others.
+"""Free cells of an image as one exact polygon: it follows the cracks between free cells and all others.
 
-Free cells hang together by their sides, walls by sides and corners: a wall drawn one pixel thin on a diagonal lets
-nothing through. Staircases become straight lines; the outline moves by less than one pixel, and neither opens a wall
-nor closes a way. Of the components of free cells one is kept, the one that holds a given cell or else the largest;
-the others (specks within walls, rooms without doors) become wall. The image's edge is a wall. Nothing here knows
-files or units.
+Free cells are connected by sides, walls by sides and corners: a diagonal wall one pixel thin has no gap. Staircases become
+straight lines. The outline moves by less than one pixel, and this neither opens a wall nor closes a passage. One component of
+free cells is kept: the one with a given cell, or else the largest. The others (specks in walls, closed rooms) become wall.
+The edge of the image is a wall. This module has no files and no units.
 """
 
 import numpy as np
@@ -17,16 +16,15 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# Cutting corners moves the outline by at most sqrt(1/8) px, straightening by at most this: less than one pixel
-# together.
+# Cutting corners moves the outline by at most sqrt(1/8) px, straightening by at most this: together less than 1 px.
 _STRAIGHTEN_PX = 0.6
 _STEPS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])  # the four directions of a crack; adding one turns left
 
 
 def component(free: Bools, cell: tuple[int, int] | None = None) -> Bools:
-    """Return the cells of `free` (h, w) that hang together with `cell` (row, column), or else the most that do.
+    """Return the component of `free` (h, w) that contains `cell` (row, column), or else the largest.
 
-    Raises ValueError where there is no free cell, or `cell` is not one.
+    Raises ValueError where no cell is free, or `cell` is not.
     """
     label, count = ndimage.label(free)
     if count == 0:
@@ -49,14 +47,14 @@ def outline(free: Bools) -> Polygon:
         wrong = _entangled(straight) & (tolerance > 0.0)
         if not wrong.any():
             break
-        tolerance[wrong] = 0.0  # the untouched outlines keep clear of each other, so this ends
+        tolerance[wrong] = 0.0  # outlines that are not straightened never cross, so this ends
     areas = [_signed_area(ring) for ring in straight]
-    shell = int(np.argmax(areas))  # free space lies to the left, so that the shell alone runs counter-clockwise
+    shell = int(np.argmax(areas))  # free space is on the left, so only the shell runs counter-clockwise
     return Polygon(straight[shell], [ring for index, ring in enumerate(straight) if index != shell])
 
 
 def _trace(free: Bools) -> list[tuple[Ints, Bools]]:
-    """Return every ring of cracks, free space to its left: corners (n, 2), and whether two lines meet there (n,)."""
+    """Return every ring of cracks with free space on its left: corners (n, 2), and whether two rings meet there (n,)."""
     padded = np.pad(free, 1)
     height, width = free.shape[0] + 1, free.shape[1] + 1
     below, above = padded[:-1, 1:], padded[1:, 1:]  # of the crack that leaves each grid point eastward
@@ -71,7 +69,7 @@ def _trace(free: Bools) -> list[tuple[Ints, Bools]]:
     y, x = np.divmod(point, width)
     x_end, y_end = x + _STEPS[direction, 0], y + _STEPS[direction, 1]
     turn_left, turn_right = (direction + 1) % 4, (direction + 3) % 4
-    # Where two lines meet in a point, turning left stays at the same free cell, and so keeps the walls together.
+    # Where two rings meet in a point, a left turn stays at the same free cell, and keeps the walls connected.
     onward = np.where(leaving[direction, y_end, x_end], direction, turn_right)
     onward = np.where(leaving[turn_left, y_end, x_end], turn_left, onward)
     following = np.searchsorted(crack, (onward * height + y_end) * width + x_end).tolist()
@@ -95,9 +93,9 @@ def _trace(free: Bools) -> list[tuple[Ints, Bools]]:
 
 
 def _cut_corners(corners: Ints, shared: Bools) -> Floats:
-    """Return a ring's points (n, 2) with the corners of staircases, and those where two lines meet, cut off.
+    """Return the points (n, 2) of a ring without the corners of staircases and those where two rings meet.
 
-    The cut begins half a pixel before. Corners between runs of two pixels or more stay, and so do all of a rectangle.
+    A cut begins half a pixel before the corner. Corners between runs of two or more pixels stay, and all of a rectangle.
     """
     run_before = corners - np.roll(corners, 1, axis=0)
     run_after = np.roll(run_before, -1, axis=0)
@@ -115,7 +113,7 @@ def _cut_corners(corners: Ints, shared: Bools) -> Floats:
 def _straighten(rings: list[Floats], tolerance_px: Floats) -> list[Floats]:
     """Return the rings without points closer than their tolerance to the line without them (Douglas, Peucker 1973).
 
-    A ring is halved between two points far apart, which stay; one that would fall into a line is left as it is.
+    A ring is split at two distant points, which stay; a ring that would collapse into a line is not changed.
     """
     halves = []
     for ring in rings:
@@ -134,7 +132,7 @@ def _straighten(rings: list[Floats], tolerance_px: Floats) -> list[Floats]:
 
 
 def _entangled(rings: list[Floats]) -> Bools:
-    """Return for each ring whether it meets itself or another."""
+    """Return (n,) whether each ring meets itself or another."""
     owner = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
     lines = shapely.linearrings(np.vstack(rings), indices=owner)
     wrong: Bools = ~shapely.is_simple(lines)

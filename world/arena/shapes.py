@@ -1,7 +1,7 @@
-"""An arena's shape from a scenario's table: a rectangle, polygon, WKT, GeoJSON or map, less obstacles and walls.
+"""The shape of an arena from a scenario's table: a rectangle, polygon, WKT, GeoJSON or map, less obstacles and walls.
 
-A rectangle has its lower left corner at the origin; everything else keeps its coordinates, in metres (GeoJSON's too:
-there are no degrees here). `scale` multiplies them all. Every mistake of the table is reported, each in one line.
+A rectangle has its lower left corner at the origin. All other shapes keep their coordinates, in metres (GeoJSON's too, not
+degrees). `scale` multiplies all coordinates. Every mistake of the table is one line.
 """
 
 import json
@@ -22,9 +22,9 @@ from zwerm.world.arena.maps import read_map
 Space: TypeAlias = Polygon | MultiPolygon
 T = TypeVar("T")
 
-# A gap that is exactly as wide as it must be is open.
+# Keeps a gap open that is exactly as wide as required.
 _NARROWER = 1.0 - 1e-6
-# Right-angled corners stay as they are; sharper ones lose their tips.
+# The mitre limit: right-angled corners stay, sharper ones lose their tips.
 _CORNER = 1.5
 
 _SOURCES = ("size_m", "polygon", "wkt", "geojson", "map")
@@ -68,7 +68,7 @@ def read_shape(table: ArenaTable, folder: Path) -> tuple[Space, list[LineString]
 
 
 def _passable(free: Space, passage_m: float, start: shapely.Point | None) -> Polygon:
-    """Return the part of free space that a disc of a diameter can get about in, with the corners that it does not fill."""
+    """Return the part of free space that a disc of diameter `passage_m` reaches, with the corners that it does not fill."""
     inner = shapely.buffer(free, -_NARROWER * passage_m / 2.0)
     if inner.is_empty:
         raise ScenarioError([f"arena.passage_m: expected some place that is wider, got {passage_m:g}"])
@@ -160,7 +160,7 @@ def _geojson_parts(value: Any, place: str) -> list[Space]:
 
 
 def _checked(shape: Space, place: str) -> Space:
-    """Return the shape without heights; raise ScenarioError unless it encloses an area and nowhere meets itself."""
+    """Return the shape in 2D. Raises ScenarioError unless it has an area and does not meet itself."""
     shape = shapely.force_2d(shape)
     if not shape.is_valid:
         what, _, where = shapely.is_valid_reason(shape).rstrip("]").partition("[")

@@ -1,1 +1,1 @@
-"""Bodies and drives of robots."""
+"""Bodies of robots: placement at the start, drives, physics, entering and leaving."""

@@ -1,7 +1,7 @@
-"""Drives: from what robots command to the velocity their bodies try to have.
+"""Drives: from the commands of robots to the velocities that their bodies track.
 
-A commanded drive persists until the next one. It takes effect a fixed number of ticks after the observation it answers
-(the body's actuation latency), is disturbed by noise, drawn anew every tick, and is then clamped to what the motors can do.
+A commanded drive persists until the next one. It acts a fixed number of ticks after the observation it answers (the body's
+actuation latency). Noise, drawn anew for every tick, disturbs it; then it is clamped to the limits of the motors.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from zwerm.scenario.tables import BodyTable
 from zwerm.wire.messages import BodyVelocity, WheelSpeeds
 from zwerm.world.scene import Floats
 
-# Ticks of noise drawn at once: draws are keyed by tick, so a block costs less and changes nothing.
+# Ticks of noise drawn at once. Draws are keyed by tick, so the size of a block changes only the cost.
 _BLOCK_TICKS: Final = 64
 
 _KINDS: Final[dict[str, type[BodyVelocity] | type[WheelSpeeds]]] = {
@@ -26,9 +26,9 @@ _KINDS: Final[dict[str, type[BodyVelocity] | type[WheelSpeeds]]] = {
 
 
 class Drives:
-    """The drives of a swarm of `count` robots; `kind` is what such a body takes.
+    """The drives of `count` robots; `kind` is the type of drive that their body takes.
 
-    They are `lagging` where a command does not act before the next tick.
+    `lagging` means that a command acts at the next tick or later.
     """
 
     def __init__(self, body: BodyTable, count: int, draws: Draws) -> None:
@@ -47,20 +47,19 @@ class Drives:
             self._limit = np.array([body.max_speed_m_s, body.max_speed_m_s, body.max_turn_rad_s])
 
     def command(self, drives: Mapping[int, BodyVelocity | WheelSpeeds]) -> None:
-        """Take the new drives of some robots, all of this body's `kind`."""
+        """Set the new drives of some robots, all of type `kind`."""
         axes, numbers = self._axes, chain.from_iterable(map(msgspec.structs.astuple, drives.values()))
         self._commanded[list(drives)] = np.fromiter(numbers, np.float64, axes * len(drives)).reshape(-1, axes)
 
     def stop(self, robot: int) -> None:
-        """Cut a robot's motors, whatever is still on its way to them, from the next step on."""
+        """Stop a robot's motors from the next step on, and drop its commands that have not acted yet."""
         for pending in (self._commanded, *self._pending):
             pending[robot] = 0.0
 
     def velocities(self, tick: int) -> tuple[Floats, Floats | None, Floats]:
         """Return (forward [m/s], left [m/s] or None, turn [rad/s]), each (n,), for the step from `tick` to the next.
 
-        To be asked for once a tick: where drives are `lagging`, before those that answer the tick's observations are commanded,
-        and after that where they are not.
+        Call it once a tick: before `command` where drives are `lagging`, after it otherwise.
         """
         if self._pending:
             self._pending.append(self._commanded.copy())

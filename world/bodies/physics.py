@@ -1,9 +1,9 @@
-"""Rigid bodies in the plane: pymunk discs pushed by their drives, between walls.
+"""Rigid bodies in the plane: pymunk discs that track the velocity of their drive, between walls.
 
-A drive is a velocity that the body's motors track: in every substep it is given to the solver as the force that would reach
-it, so that contacts constrain it before it is integrated. (A velocity set before every substep would be integrated first,
-and would discard what the solver made of friction and of contacts.) Contacts are inelastic; without friction they never
-turn a body. Bodies have no other dynamics: no inertia between substeps, no slip.
+In every substep a body receives the force that would give it the velocity of its drive, so that contacts constrain it before
+it is integrated. A velocity set directly before each substep would be integrated first, and would discard what the solver
+computed for friction and contacts. Contacts are inelastic; without friction they never turn a body. Bodies have no other
+dynamics: no inertia between substeps, no slip.
 """
 
 from typing import Final
@@ -15,10 +15,10 @@ from pymunk import batch
 from zwerm.scenario.tables import BodyTable
 from zwerm.world.scene import Bools, Floats, Ints
 
-# Sweeps of the contact solver a substep: discs in the plane seldom touch more than a few others.
+# Iterations of the contact solver in each substep; a disc in the plane seldom touches more than four others.
 _SWEEPS: Final = 4
 
-# Left of an overlap after one substep, and the overlap that is left alone [m].
+# The fraction of an overlap that remains after one substep, and the overlap that the solver ignores [m].
 _OVERLAP_LEFT_FRACTION: Final = 0.1
 _OVERLAP_IGNORED_M: Final = 1e-5
 
@@ -38,7 +38,7 @@ class Physics:
         self._moment = pymunk.moment_for_circle(body.mass_kg, 0.0, body.radius_m)
         self._space = _make_space(self._substep_s, body.friction, segments)
         self._bodies: dict[int, pymunk.Body] = {}
-        # The time in the middle of each substep, and from a change of velocity to the force that makes it.
+        # The middle of each substep [s], and the factor from a change of velocity to the force that causes it.
         self._middle_s: Floats = np.arange(0.5, body.substeps)[:, None] * self._substep_s
         self._inertia: Floats = np.array([body.mass_kg, body.mass_kg, self._moment]) / self._substep_s
         self._poses = batch.Buffer()
@@ -61,18 +61,18 @@ class Physics:
         self._arranged = False
 
     def fix(self, robot: int, position: Floats, heading: float) -> None:
-        """Put a robot into the arena that never moves and that nobody runs into: a base station."""
+        """Put a robot into the arena that never moves and never collides: a base station."""
         self.position[robot] = position
         self.heading[robot] = heading
 
     def remove(self, robot: int) -> None:
-        """Take a robot's body out of the arena; its last pose stays on record."""
+        """Remove a robot's body from the arena; `position` and `heading` keep its last pose."""
         body = self._bodies.pop(robot)
         self._space.remove(body, *body.shapes)
         self._arranged = False
 
     def _arrange(self) -> None:
-        """Lay out the buffers anew: pymunk's batches are in its own order of bodies, the static one included."""
+        """Rebuild the buffers: pymunk's batches follow its own order of bodies, and include the static one."""
         owner = {body.id: robot for robot, body in self._bodies.items()}
         self._poses.clear()
         batch.get_space_bodies(self._space, _POSE, self._poses)
@@ -137,7 +137,7 @@ class Physics:
 
 def _make_space(substep_s: float, friction: float, segments: Floats) -> pymunk.Space:
     space = pymunk.Space()
-    space.damping = 0.0  # no velocity outlives a substep: the force of the drive makes it anew
+    space.damping = 0.0  # velocities last one substep: the force of the drive sets them again
     space.iterations = _SWEEPS
     space.collision_slop = _OVERLAP_IGNORED_M
     space.collision_bias = _OVERLAP_LEFT_FRACTION ** (1.0 / substep_s)
@@ -149,7 +149,7 @@ def _make_space(substep_s: float, friction: float, segments: Floats) -> pymunk.S
 
 
 def _plain(rows: list[int], count: int) -> slice | Ints:
-    """Return what picks these rows: all of `count` in order, as mostly, in place."""
+    """Return an index for these rows: a slice if they are all of `count` in order, which avoids a copy."""
     return slice(count) if rows == list(range(count)) else np.array(rows, dtype=np.int64)
 
 

@@ -1,1 +1,1 @@
-"""Drivers of the world: lock-step and real time."""
+"""Drivers of the world: the order of one tick, lock-step, real time, and control of the nodes' programs."""

@@ -1,84 +1,63 @@
-"""Lock-step: virtual time goes on when every node that is awake has answered, and not before.
+"""Lock-step: virtual time advances when every node that is awake has answered, and not before.
 
-A node that stays silent past a wall-clock deadline ends the run with its name; it never changes the result.
+A node without an answer until a wall-clock deadline ends the run with its name; the deadline never changes a result.
 """
 
+import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Final
 
 from zwerm.errors import ProtocolError, StragglerError
 from zwerm.link import Arrival, NodeProcesses, WorldLink
-from zwerm.world.tick.process_control import ProcessController
+from zwerm.world.drivers.driver import Driver, TickObserver
+from zwerm.world.drivers.process_control import ProcessController
+from zwerm.world.tick.node_status import ProcessAction
 from zwerm.world.world import World
 
-# A part of this many of the answers is waited for after the rest.
+# The last 1 / 8 of the answers is awaited only after the rest has been decoded.
 _LAST: Final = 8
 
-OnTick = Callable[[World], None]
 
-# What a run may end with; "interrupted" is the caller's to say.
-COMPLETED: Final = "completed"
-TIME_LIMIT: Final = "time-limit"
-FAILED: Final = "failed"
-INTERRUPTED: Final = "interrupted"
-
-
-class LockStep:
-    """Drives a world over a link. `lost` counts observations that were never answered by a living node."""
+class LockStep(Driver):
+    """Drives a world in lock-step. `run` raises StragglerError where a node misses the deadline."""
 
     def __init__(
-        self, world: World, link: WorldLink, on_tick: OnTick | None = None, programs: NodeProcesses | None = None
+        self,
+        world: World,
+        link: WorldLink,
+        observers: Sequence[TickObserver] = (),
+        programs: NodeProcesses | None = None,
     ) -> None:
-        self._world = world
-        self._link = link
-        self._undertaker = ProcessController(world, link, programs, self._take)
-        self._on_tick = on_tick
-        self._last_tick = round(world.scenario.time.duration_s / world.scenario.time.dt_s)
-        self.reason = ""
-        self.lost = 0
+        super().__init__(world, link, observers)
+        self._processes = ProcessController(world, link, programs, self._take)
+        self._straggler_s = world.scenario.time.straggler_s
+        self._lost = 0
 
-    def run(self) -> str:
-        """Go on until the run is over, and return its outcome; `reason` then says why it failed.
+    @property
+    def lost(self) -> int:
+        """How many observations living nodes have not answered: at most those of the last tick."""
+        return self._lost
 
-        Raises StragglerError where a node misses the deadline.
-        """
-        world = self._world
-        while world.tick < self._last_tick:
-            self._tick()
-            if world.crashed and world.scenario.robots.on_crash == "fail":
-                return self._fail()
-            if world.telemetry.gave_up:
-                self.reason = world.telemetry.gave_up
-                return FAILED
-            if world.completed:
-                return COMPLETED
-        return TIME_LIMIT
+    def _carry_out(self, actions: Sequence[ProcessAction]) -> None:
+        self._processes.carry_out(actions)
 
-    def _tick(self) -> None:
-        world, link = self._world, self._link
-        self._undertaker.carry_out(world.begin())
-        nodes, _ = world.observe(link.send)
-        world.foresee()
+    def _exchange(self) -> None:
+        nodes, _ = self._world.observe(self._link.send)
+        self._world.precompute()
         self._collect(len(nodes))
-        if world.crashed and world.scenario.robots.on_crash == "fail":
-            return
-        world.advance()
-        if self._on_tick is not None:
-            self._on_tick(world)
 
     def _collect(self, missing: int) -> None:
-        """Receive until nobody is awaited; `missing` bounds the answers that can come in order."""
+        """Receive until no node is awaited; `missing` bounds the number of answers that are still to come."""
         world = self._world
-        straggler_s = world.scenario.time.straggler_s
         deadline: float | None = None
         while missing > 0:
-            patience_s = straggler_s if deadline is None else max(0.0, deadline - time.monotonic())
-            # All but a few: those still come while the others are read.
-            arrivals = self._link.receive_many(missing - missing // _LAST, patience_s)
+            timeout_s = self._straggler_s if deadline is None else max(0.0, deadline - time.monotonic())
+            # All but a few: the last ones arrive while the others are decoded.
+            arrivals = self._link.receive_many(missing - missing // _LAST, timeout_s)
             if not arrivals:
-                self.lost += len(world.awaited())
-                raise StragglerError(world.awaited(), world.tick, straggler_s)
+                self._lost += len(world.awaited())
+                raise StragglerError(world.awaited(), world.tick, self._straggler_s)
             accept = world.accept
             for arrival in arrivals:
                 node, payload = arrival
@@ -89,23 +68,15 @@ class LockStep:
                 try:
                     accept(node, payload)
                     missing -= 1
-                except ProtocolError:  # counted by the world
-                    # Time that a babbling node uses up is not given back to it.
-                    deadline = deadline or time.monotonic() + straggler_s
+                except ProtocolError:  # the world has counted it
+                    # A refused message does not extend the deadline.
+                    deadline = deadline or time.monotonic() + self._straggler_s
 
-    def _take(self, arrival: Arrival) -> bool:
-        """Tell the world what has come; return whether it was an answer to this tick's observation."""
+    def _take(self, arrival: Arrival) -> None:
+        """Give an arrival to the world."""
         node, payload = arrival
         if payload is None:
             self._world.crash(node, "process ended")
-            return False
-        try:
+            return
+        with contextlib.suppress(ProtocolError):  # the world has counted it
             self._world.accept(node, payload)
-        except ProtocolError:
-            return False  # counted by the world
-        return True
-
-    def _fail(self) -> str:
-        node, reason = next(iter(self._world.crashed.items()))
-        self.reason = f"node {node} crashed at tick {self._world.tick}: {reason}"
-        return FAILED

@@ -1,9 +1,9 @@
-"""Real time: ticks are paced by the wall clock, and nobody is waited for.
+"""Real time: the wall clock paces the ticks, and the world waits for no node.
 
-A command that misses its tick is counted and applied when it arrives. A robot that stays silent longer than the deadman
-time is stopped until it speaks again; one that owes many answers is not observed until it has given one, so that what is sent
-to it always fits into the buffers on the way and sending never waits. While a fault has a program killed or started, its
-node is not observed either, and time goes on. Runs in real time are not repeatable, and promise no trace.
+A command that misses its tick is counted and applied when it arrives. A robot without an answer for the deadman time is
+stopped until it answers again. A node with too many unanswered observations is not observed until it answers one, so that all
+messages to it fit into the buffers of the link and sending never blocks. While a fault kills or starts a program, its node is
+not observed either. Runs in real time are not repeatable, and their trace promises nothing.
 """
 
 import contextlib
@@ -14,145 +14,132 @@ from typing import Final
 
 from zwerm.errors import ProtocolError
 from zwerm.link import Arrival, NodeProcesses, WorldLink
-from zwerm.world.drivers.lockstep import COMPLETED, FAILED, TIME_LIMIT, OnTick
+from zwerm.world.drivers.driver import Driver, TickObserver
+from zwerm.world.drivers.process_control import ActionThread
 from zwerm.world.tick.node_status import ProcessAction
-from zwerm.world.tick.process_control import ActionThread
 from zwerm.world.world import World
 
-# So many answers, and observations of so many bytes, a node may owe and still be observed.
-OWED_MAX: Final = 64
-OWED_BYTES_MAX: Final = 131_072
+# The unanswered observations at which a node is no longer observed: their number, and their total size in bytes.
+UNANSWERED_MAX: Final = 64
+UNANSWERED_BYTES_MAX: Final = 131_072
 
 
-class RealTime:
-    """Drives a world over a link at `factor` times the speed of the wall clock."""
+class RealTime(Driver):
+    """Drives a world at `factor` times the speed of the wall clock.
+
+    `deadman_stops` counts robots stopped for their silence, `overruns` ticks that took longer than their time.
+    """
 
     def __init__(
         self,
         world: World,
         link: WorldLink,
         factor: float,
-        on_tick: OnTick | None = None,
+        observers: Sequence[TickObserver] = (),
         programs: NodeProcesses | None = None,
-        on_sense: OnTick | None = None,
+        before_send: TickObserver | None = None,
     ) -> None:
-        """`on_sense` is called between sensing and sending, `on_tick` when a tick is over."""
-        self._world = world
-        self._errands = ActionThread(programs)
-        self._link = link
-        self._dt_s = world.scenario.time.dt_s / factor
-        self._on_tick = on_tick
-        self._on_sense = on_sense
-        self._last_tick = round(world.scenario.time.duration_s / world.scenario.time.dt_s)
-        self._unanswered_since_s: dict[int, float] = {}
-        self._owed: dict[int, deque[int]] = {}  # the sizes of the observations that a node has not answered
-        self._dying: Counter[int] = Counter()  # nodes whose end has been ordered, and not reported yet
+        """`before_send` is called between sensing and sending."""
+        super().__init__(world, link, observers)
+        self._actions = ActionThread(programs)
+        self._tick_s = world.scenario.time.dt_s / factor
+        self._deadman_s = world.scenario.time.deadman_s
+        self._before_send = before_send
+        self._start_s = 0.0  # on the monotonic clock
+        self._unanswered: dict[int, deque[int]] = {}  # the sizes of a node's unanswered observations [bytes]
+        self._silent_since_s: dict[int, float] = {}  # virtual time of the first of them
+        self._dying: Counter[int] = Counter()  # kills that have been requested and not yet reported, by node
         self._starting: Counter[int] = Counter()
         self._stopped: dict[int, None] = {}
         self.deadman_stops = 0
         self.overruns = 0
-        self.reason = ""
-        world.answers.late_allowed = True
 
     @property
     def lost(self) -> int:
-        """Return how many observations living nodes have not answered yet, besides each one's newest."""
-        crashed = self._world.crashed
-        return sum(max(0, len(owed) - 1) for node, owed in self._owed.items() if node not in crashed)
+        """How many observations living nodes have not answered yet, besides the newest of each node."""
+        dead = self._world.dead
+        return sum(max(0, len(sizes) - 1) for node, sizes in self._unanswered.items() if node not in dead)
 
     def run(self) -> str:
-        """Go on until the run is over, and return its outcome. Raises LinkError where a fault cannot be carried out."""
+        """Drive until the run ends, and return its outcome. Raises LinkError where a fault cannot be carried out."""
+        self._start_s = time.monotonic()
         try:
-            return self._run()
+            return super().run()
         finally:
-            self._errands.close()
+            self._actions.close()
 
-    def _run(self) -> str:
-        world = self._world
-        start = time.monotonic()
-        while world.tick < self._last_tick:
-            deadline = start + (world.tick + 1) * self._dt_s
-            self._bring_about(world.begin())
-            nodes, observations = world.observe()
-            if self._on_sense is not None:
-                self._on_sense(world)
-            for node, observation in zip(nodes, observations, strict=True):
-                self._link.send(node, observation)
-                self._owed.setdefault(node, deque()).append(len(observation))
+    def _carry_out(self, actions: Sequence[ProcessAction]) -> None:
+        """Request the actions of this tick; a dead node owes no answers."""
+        for action in actions:
+            kind, node = action
+            if kind == "kill":
+                self._dying[node] += 1
+                for kept in (self._unanswered, self._silent_since_s, self._stopped):
+                    kept.pop(node, None)
+            elif kind == "start":
+                self._starting[node] += 1
+            self._withhold(node)
+            self._actions.request(action)
+        for kind, node in self._actions.finished():
+            if kind == "start":
+                self._starting[node] -= 1
                 self._withhold(node)
-                self._unanswered_since_s.setdefault(node, world.time_s)
-            self._listen(deadline)
-            self._stop_the_silent()
-            world.advance()
-            if self._on_tick is not None:
-                self._on_tick(world)
-            if world.crashed and world.scenario.robots.on_crash == "fail":
-                node, why = next(iter(world.crashed.items()))
-                self.reason = f"node {node} crashed at tick {world.tick}: {why}"
-                return FAILED
-            if world.telemetry.gave_up:
-                self.reason = world.telemetry.gave_up
-                return FAILED
-            if world.completed:
-                return COMPLETED
-        return TIME_LIMIT
 
-    def _listen(self, deadline: float) -> None:
-        """Take what arrives until `deadline` on the monotonic clock; once, without waiting, where that has passed."""
-        if time.monotonic() > deadline:
+    def _exchange(self) -> None:
+        world = self._world
+        time_s = world.scene.time_s
+        deadline_s = self._start_s + (world.tick + 1) * self._tick_s
+        nodes, observations = world.observe()
+        if self._before_send is not None:
+            self._before_send(world)
+        for node, observation in zip(nodes, observations, strict=True):
+            self._link.send(node, observation)
+            self._unanswered.setdefault(node, deque()).append(len(observation))
+            self._withhold(node)
+            self._silent_since_s.setdefault(node, time_s)
+        self._listen(deadline_s)
+        self._stop_the_silent(time_s)
+
+    def _listen(self, deadline_s: float) -> None:
+        """Take what arrives until `deadline_s` on the monotonic clock; once, without waiting, where it has passed."""
+        if time.monotonic() > deadline_s:
             self.overruns += 1
-        while (arrival := self._link.receive(max(0.0, deadline - time.monotonic()))) is not None:
+        while (arrival := self._link.receive(max(0.0, deadline_s - time.monotonic()))) is not None:
             self._take(arrival)
-        # A link in memory answers at once and cannot wait: sleep the rest of the tick away.
-        time.sleep(max(0.0, deadline - time.monotonic()))
+        # A link in memory does not wait: sleep for the rest of the tick.
+        time.sleep(max(0.0, deadline_s - time.monotonic()))
 
     def _take(self, arrival: Arrival) -> None:
-        """Tell the world what has come."""
+        """Give an arrival to the world, unless it is of a program that is being killed."""
         node, payload = arrival
-        if self._dying[node]:  # the last words of a program that is killed, and its end
+        if self._dying[node]:
             if payload is None:
                 self._dying[node] -= 1
             else:
-                self._world.refused["stale-incarnation"] += 1
+                self._world.refuse_stale()
             return
         if payload is None:
             self._world.crash(node, "process ended")
             return
-        if owed := self._owed.get(node):
-            owed.popleft()
+        if sizes := self._unanswered.get(node):
+            sizes.popleft()
             self._withhold(node)
-        self._unanswered_since_s.pop(node, None)
+        self._silent_since_s.pop(node, None)
         self._stopped.pop(node, None)
-        with contextlib.suppress(ProtocolError):  # counted by the world
-            self._world.accept(node, payload)
+        with contextlib.suppress(ProtocolError):  # the world has counted it
+            self._world.accept(node, payload, late_allowed=True)
 
     def _withhold(self, node: int) -> None:
-        """Let a node be observed, or not: its program is being started, or it owes too much."""
-        owed = self._owed.get(node, ())
-        too_much = len(owed) >= OWED_MAX or sum(owed) >= OWED_BYTES_MAX
-        self._world.lives.withheld[node] = bool(self._starting[node]) or too_much
+        """Exclude a node from observation while its program starts or it has too many unanswered observations."""
+        sizes = self._unanswered.get(node, ())
+        too_many = len(sizes) >= UNANSWERED_MAX or sum(sizes) >= UNANSWERED_BYTES_MAX
+        self._world.withhold(node, bool(self._starting[node]) or too_many)
 
-    def _bring_about(self, orders: Sequence[ProcessAction]) -> None:
-        """Have done to programs what faults demand; a dead one owes no answers."""
-        for order in orders:
-            deed, node = order
-            if deed == "kill":
-                self._dying[node] += 1
-                for kept in (self._owed, self._unanswered_since_s, self._stopped):
-                    kept.pop(node, None)
-            elif deed == "start":
-                self._starting[node] += 1
-            self._withhold(node)
-            self._errands.ask(order)
-        for deed, node in self._errands.done():
-            if deed == "start":
-                self._starting[node] -= 1
-                self._withhold(node)
-
-    def _stop_the_silent(self) -> None:
-        limit_s = self._world.time_s - self._world.scenario.time.deadman_s
-        for node, since_s in self._unanswered_since_s.items():
-            if since_s < limit_s and node not in self._stopped and node not in self._world.crashed:
-                self._world.halt(node)
+    def _stop_the_silent(self, time_s: float) -> None:
+        """Stop the motors of robots without an answer for the deadman time."""
+        dead = self._world.dead
+        for node, since_s in self._silent_since_s.items():
+            if since_s < time_s - self._deadman_s and node not in self._stopped and node not in dead:
+                self._world.stop(node)
                 self._stopped[node] = None
                 self.deadman_stops += 1

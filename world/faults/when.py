@@ -2,7 +2,7 @@
 
 from zwerm.scenario.tables import Scenario
 from zwerm.world.faults import WhenTable
-from zwerm.world.metrics.coverage import area_coverage_fraction, cell_counts, cell_coverage_fraction
+from zwerm.world.metrics.position_coverage import area_coverage_fraction, cell_counts, cell_coverage_fraction
 from zwerm.world.scene import Scene
 
 

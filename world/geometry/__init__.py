@@ -1,1 +1,1 @@
-"""Geometry that sensors and metrics share: visibility, Voronoi neighbours, walls by cell, quadrature."""
+"""Geometry for sensors and metrics: visibility, Voronoi neighbours, an index of walls, quadrature."""

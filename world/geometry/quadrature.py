@@ -1,8 +1,8 @@
 """Integrals over convex polygons of fields that are known everywhere: the truth that robots estimate.
 
-Polygons are cut into triangles about a point inside, and every triangle is integrated with Gauss and Legendre's rule on
-Duffy's square: exact for polynomials up to degree 14, and to about 1e-12 for fields as smooth as a cell is wide. Fields
-with edges, such as bitmaps, come out to a percent or so of a pixel's share.
+Polygons are split into triangles around a point inside. Each triangle is integrated by the Gauss-Legendre rule on Duffy's
+square. It is exact for polynomials up to degree 14, and to about 1e-12 for fields that vary on the scale of a cell. For fields
+with edges, such as bitmaps, the error is about a percent of one pixel's share.
 """
 
 import math
@@ -34,7 +34,7 @@ class CellIntegrals(NamedTuple):
     """Integrals of a field over n cells."""
 
     mass: Floats  # (n,) of phi
-    centroid: Floats  # (n, 2) [m] of q phi, over the mass; where that is not positive, the point the cell was cut about
+    centroid: Floats  # (n, 2) [m] of q phi, over the mass; where that is not positive, the point of the cell
     cost: Floats  # (n,) of |q - p|^2 / 2 phi. Schwager 2006, eq. 1 with f(x) = x^2 / 2
 
 

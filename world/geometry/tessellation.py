@@ -1,10 +1,9 @@
-"""Who is a Voronoi neighbour of whom: the Delaunay triangulation of a swarm, kept from scene to scene.
+"""Voronoi neighbours: the Delaunay triangulation of a swarm, kept from scene to scene.
 
-While robots move little their triangulation seldom changes. So the last one is tried first: if its triangles still turn
-counter-clockwise, its rim is still convex and no edge should be flipped, it is the Delaunay triangulation of the new
-positions too (Delaunay's lemma), and that is far quicker to see than to triangulate anew. Where a few edges should be, they
-are (Lawson 1977). Robots that share one place, and swarms on one line, are dealt with as stated; nothing here knows of
-ranges, walls or noise.
+The triangulation of slowly moving robots seldom changes, so the previous one is tested first. It is the Delaunay triangulation
+of the new positions if its triangles still turn counter-clockwise, its rim is still convex, and no edge has to be flipped
+(Delaunay's lemma). This test is much faster than a new triangulation. A few edges are flipped in place (Lawson 1977).
+`Tessellation.pairs` states the result for robots at one place and swarms on one line. Ranges, walls and noise play no part.
 """
 
 from typing import Final, NamedTuple
@@ -18,8 +17,8 @@ from zwerm.world.scene import Floats, Ints
 
 Complexes = NDArray[np.complex128]
 
-# Where more edges are to be flipped at once, or more often than that, it is quicker to triangulate anew.
-_FLIPS_AT_ONCE: Final = 12  # or this share of the points
+# Beyond this many flips at once, or this many rounds, a new triangulation is faster.
+_FLIPS_AT_ONCE: Final = 12  # or _FLIPS_SHARE of the points, if that is more
 _FLIPS_SHARE: Final = 0.06
 _ROUNDS: Final = 8
 
@@ -67,7 +66,7 @@ class Tessellation:
         return self._pairs
 
     def _mended(self, position: Floats) -> bool:
-        """Make the mesh the Delaunay triangulation of these positions by flipping edges, and tell whether it is."""
+        """Make the mesh the Delaunay triangulation of these positions by flipping edges, and return whether it is."""
         assert self._mesh is not None
         for changes in range(_ROUNDS):
             wrong = _wrong_edges(self._mesh, position)
@@ -120,7 +119,7 @@ class Tessellation:
         _, q, r, s, gone = rim[:, at].tolist()
         if (rim[_CORNER] == s).any():
             return False
-        # Its two inner sides, q s and s r, are sides of the rim from now on, with what lies across from them.
+        # Its two inner sides, q s and s r, become sides of the rim, with the triangles across from them.
         rows, sides = [], []
         for p in (q, r):
             (row,) = np.flatnonzero(
@@ -153,7 +152,7 @@ class Tessellation:
             del self._rows[_ends(a, b)]
             self._rows[_ends(c, d)] = row
             edges[:, row] = d, c, a, b, left, right
-            # The four edges around it have another corner across, two of them in the other triangle.
+            # The four edges around it get another opposite corner, two of them in the other triangle.
             for p, q, was, old, now, new in (
                 (b, c, a, left, d, right),
                 (c, a, b, left, d, left),
@@ -179,7 +178,7 @@ def _triangulate(position: Floats) -> tuple[_Mesh | None, Ints]:
         return None, np.column_stack(every_pair(count))
     try:
         found = Delaunay(position)
-    except QhullError:  # all on one line, or at one place
+    except QhullError:  # all points on one line, or at one place
         return None, np.column_stack(every_pair(count))
     triangles = found.simplices.astype(np.int64)
     a, b, c = position.view(np.complex128)[:, 0].take(triangles.T)
@@ -235,7 +234,7 @@ def _with_coincident(pairs: Ints, twins: Ints, count: int) -> Ints:
 
 def _wrong_edges(mesh: _Mesh, position: Floats) -> Ints | None:
     """Return the edges that are to be flipped; None where the triangles do not cover the hull, each place once."""
-    place = position.view(np.complex128)[:, 0]  # so that x and y are looked up at once
+    place = position.view(np.complex128)[:, 0]  # one lookup for x and y
     before, corner, after = place.take(mesh.rim[:_APEX])
     if _turn(corner - before, after - before).min() < 0.0:
         return None
@@ -256,6 +255,6 @@ def _wrong_edges(mesh: _Mesh, position: Floats) -> Ints | None:
 
 def _turn(p: Complexes, q: Complexes) -> Floats:
     """Return the turn from p to q, vectors of one shape: twice the area of the triangles with the origin."""
-    # Not the product of complex numbers, which rounds differently where a processor can multiply and add at once.
+    # Not a product of complex numbers: that rounds differently on processors with fused multiply-add.
     turn: Floats = p.real * q.imag - p.imag * q.real
     return turn

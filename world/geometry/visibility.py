@@ -1,9 +1,8 @@
-"""Who can see whom: the pairs of robots within range whose connecting line is free.
+"""Visibility: the pairs of robots within range whose connecting line is free.
 
-Visibility is mutual and is settled once per unordered pair, for every sensor and for the radio. What was found is kept
-until an end moves: a swarm that stands still asks the arena nothing. Turning on the spot is not moving. With a range
-the work is near-linear in the robots; without one it is quadratic, and with robots that hide each other and no range it
-is cubic. It knows nothing of headings, noise or radio models.
+Visibility is mutual, and is computed once per unordered pair for all sensors and the radio. A result is kept until one end
+moves; turning on the spot is not moving. With a range the cost is near-linear in the number of robots; without one it is
+quadratic, and cubic if robots also occlude each other. Headings, noise and radio models have no part here.
 """
 
 from typing import NamedTuple
@@ -15,15 +14,15 @@ from zwerm.world.arena.arena import Arena
 from zwerm.world.geometry.pairs import every_pair
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 
-# Robots that may hide others are tried against so many lines at a time: it bounds memory and fits the cache.
+# Occluding robots are tested against this many lines at a time: it bounds memory and fits the cache.
 _TRIPLES_AT_ONCE = 1 << 15
 
-# Up to so many robots all pairs are measured: that takes less than to grow a tree and search it.
+# Up to this many robots all pairs are measured: a search tree costs more.
 _FEW_ROBOTS = 128
 
 
 class VisiblePairs(NamedTuple):
-    """Who sees whom, by observer, then by the one seen; robot `robots[r]` has rows `ends[r - 1]` to `ends[r]`."""
+    """Pairs (observer, seen), sorted; robot `robots[r]` is the observer in rows `ends[r - 1]` to `ends[r]`."""
 
     observer: Ints  # (k,) ids
     seen: Ints  # (k,) ids
@@ -31,7 +30,7 @@ class VisiblePairs(NamedTuple):
 
 
 class WallVerdicts:
-    """What the arena answered about lines between two things, by the line's key, until it is told that an end moved."""
+    """Results of wall tests for lines between two items, by the key of the line, kept until an end moves."""
 
     def __init__(self) -> None:
         self._keys: Ints = np.empty(0, dtype=np.int64)
@@ -43,11 +42,11 @@ class WallVerdicts:
         return self._keys
 
     def keep(self, still: Bools) -> None:
-        """Forget every line but those of `keys` where `still`."""
+        """Drop the results of all lines except those of `keys` where `still`."""
         self._keys, self._blocked = self._keys[still], self._blocked[still]
 
     def blocked(self, arena: Arena, keys: Ints, start: Floats, end: Floats) -> Bools:
-        """Return (k,) whether a wall blocks the lines `keys` (k,) from start to end (k, 2); only new ones are tried."""
+        """Return (k,) whether a wall blocks the lines `keys` (k,) from start to end (k, 2); only new lines are tested."""
         if len(self._keys) == 0:
             blocked = arena.blocked(start, end)
             self._learn(keys, blocked)
@@ -94,7 +93,7 @@ class NearPairs:
     def _search(self, scene: Scene, reach_m: float) -> None:
         ids = scene.present_ids()
         position = scene.position[ids]
-        # A little too far, so that one rule, the one above, decides at the very edge.
+        # Slightly too far, so that the comparison in `pairs` alone decides at the edge.
         farther_m = reach_m * (1.0 + 1e-9)
         if len(ids) <= _FEW_ROBOTS:
             first, second = every_pair(len(ids))
@@ -111,7 +110,7 @@ class NearPairs:
 
 
 class Visibility:
-    """The visible pairs of one run, remembered from scene to scene."""
+    """The visible pairs of one run, kept from scene to scene."""
 
     def __init__(self) -> None:
         self._position: Floats = np.empty((0, 2))
@@ -124,7 +123,7 @@ class Visibility:
     def pairs(
         self, scene: Scene, range_m: float | None = None, through_walls: bool = False, robots_occlude: bool = False
     ) -> Ints:
-        """Return (k, 2) ids i < j of the present robots that see each other, ascending; not to be written to.
+        """Return (k, 2) ids i < j of the present robots that see each other, ascending. The array is shared: do not write.
 
         They are at most `range_m` apart, no wall blocks the line between their centres, unless `through_walls`, and no
         third robot's disc touches it, if `robots_occlude`.
@@ -167,7 +166,7 @@ class Visibility:
         return VisiblePairs(observer, seen, np.searchsorted(observer, robots, side="right"))
 
     def _advance(self, scene: Scene) -> None:
-        """Forget what no longer holds. Positions are compared, so it does not matter which scenes were asked about."""
+        """Drop results that no longer hold. Positions are compared, so the sequence of queried scenes does not matter."""
         if len(self._present) != len(scene.present):
             changed = np.ones(len(scene.present), dtype=np.bool_)
             self._verdicts = WallVerdicts()
@@ -214,7 +213,7 @@ def _hidden(scene: Scene, pairs: Ints, near: Ints) -> Bools:
         last = max(first + 1, int(np.searchsorted(work, done + _TRIPLES_AT_ONCE, side="right")))
         i = pairs[first:last, 0]
         row = np.repeat(np.arange(first, last), degree[i])
-        # The k-th candidate of each pair: a running count, less where the pair's candidates begin.
+        # The number of each candidate within its pair: a running count minus the start of the pair.
         k = hider[np.arange(len(row)) + np.repeat(ends[i] - (work[first:last] - done), degree[i])]
         third = k != pairs[row, 1]
         row, k = row[third], k[third]

@@ -1,7 +1,7 @@
-"""Which walls a line may meet: walls are filed under the cells of a square grid, and a line asks those it runs through.
+"""An index of walls: each cell of a square grid lists its walls, and a line queries the cells it crosses.
 
-Answers are candidates, to be compared exactly: every wall that a line meets is among them, others and repetitions may
-be. Unlike a tree of bounding boxes it stays quick for long slanting lines, and it answers for all lines at once.
+Results are candidates for an exact test: they contain every wall that a line meets, and may contain others and repetitions.
+Unlike a tree of bounding boxes it stays fast for long diagonal lines, and it answers for all lines at once.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_SLACK = 1e-6  # of a cell: rounding never puts a line into a cell whose walls it then misses
+_SLACK = 1e-6  # [cells]: rounding cannot put a line into a cell whose walls it then misses
 
 
 class WallIndex:

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from zwerm.errors import ScenarioError
 from zwerm.scenario.plugin_names import object_named
-from zwerm.wire.telemetry import is_telemetry_name
+from zwerm.wire.telemetry_rules import is_telemetry_name
 from zwerm.world.metrics import Metric, MetricContext, Truth
 
 

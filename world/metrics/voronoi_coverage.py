@@ -10,21 +10,13 @@ from collections.abc import Callable, Sequence
 from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
-import shapely
 from pydantic import Field as Limits
 
 from zwerm.errors import ScenarioError
-from zwerm.maths.kept_cell import KeptCell
-from zwerm.maths.polygons import Point as Place
-from zwerm.maths.polygons import Polygon, voronoi_cell
 from zwerm.scenario.types import Count, Point, Positive, Table
-from zwerm.wire.messages import Neighbour
-from zwerm.world.arena.arena import Arena
-from zwerm.world.fields import Field
-from zwerm.world.geometry.quadrature import CellIntegrals, integrate
-from zwerm.world.geometry.tessellation import Tessellation
+from zwerm.world.geometry.voronoi_cells import Rings, VoronoiCells
 from zwerm.world.metrics import Metric, MetricContext, Truth
-from zwerm.world.scene import Floats, Ints
+from zwerm.world.scene import Floats
 
 # The statistics whose fall below the threshold is timed. The paper names the first; the published times lie between those
 # of the next two.
@@ -46,89 +38,6 @@ class VoronoiMetricsTable(Table):
     peak_m: Point | None = None
     rings: Count = 10
     stationary: Annotated[int, Limits(ge=0)] = 0
-
-
-def outline_of(arena: Arena) -> Floats:
-    """Return (m, 2) the corners of a convex arena [m], counter-clockwise."""
-    ring = arena.free.exterior
-    corners = np.asarray(ring.coords)[:-1, :2]
-    return corners if ring.is_ccw else corners[::-1]
-
-
-class VoronoiCells:
-    """The Voronoi cells of a convex arena, and what a field makes of them."""
-
-    def __init__(self, arena: Arena, field: Field) -> None:
-        self._outline, self._field = outline_of(arena), field
-        self._tessellation = Tessellation()
-        self._kept: list[KeptCell] = []
-
-    def cells(self, position: Floats) -> list[Polygon]:
-        """Return for each of position (n, 2) its cell's corners relative to it [m]; empty for one that has none."""
-        return [
-            voronoi_cell(outline, [(other.x_m, other.y_m) for other in others])
-            for outline, others in zip(*self._seen(position), strict=True)
-        ]
-
-    def targets(self, position: Floats) -> Floats:
-        """Return (n, 2) the way of each of position (n, 2) to where an undisturbed robot there would go [m]."""
-        if len(self._kept) != len(position):
-            self._kept = [KeptCell() for _ in position]
-        value, gradient = self._field.value(position).tolist(), self._field.gradient(position).tolist()
-        return np.array(
-            [
-                cell.target(outline, others, phi, gx, gy)
-                for cell, outline, others, phi, (gx, gy) in zip(
-                    self._kept, *self._seen(position), value, gradient, strict=True
-                )
-            ]
-        )
-
-    def _seen(self, position: Floats) -> tuple[list[list[Place]], list[tuple[Neighbour, ...]]]:
-        """Return what is around each of position (n, 2), relative to it: the outline, and the Voronoi neighbours."""
-        pairs = self._tessellation.pairs(position)
-        observer, seen = np.concatenate([pairs, pairs[:, ::-1]]).T
-        order = np.argsort(observer, kind="stable")
-        observer, seen = observer[order], seen[order]
-        x, y = (position[seen] - position[observer]).T.tolist()
-        ends = np.searchsorted(observer, np.arange(len(position)), side="right").tolist()
-        others = list(map(Neighbour, seen.tolist(), x, y))
-        outlines = [list(map(tuple, outline)) for outline in (self._outline - position[:, None, :]).tolist()]
-        return outlines, [tuple(others[start:end]) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
-
-    def errors(self, position: Floats) -> Floats:
-        """Return (n,) the distance of each of position (n, 2) to the estimated centroid of its cell [m]."""
-        x, y = self.targets(position).T
-        errors: Floats = np.hypot(x, y)
-        return errors
-
-    def integrals(self, position: Floats) -> CellIntegrals:
-        """Return the integrals of the true field over the cells of position (n, 2)."""
-        cells = [
-            [(x + px, y + py) for x, y in cell]
-            for cell, (px, py) in zip(self.cells(position), position.tolist(), strict=True)
-        ]
-        return integrate(cells, position, self._field)
-
-
-class Rings:
-    """Rings of equal width about a peak, out to the arena's farthest corner, less what of them lies outside."""
-
-    def __init__(self, arena: Arena, peak_m: tuple[float, float], count: int) -> None:
-        self._peak = np.array(peak_m)
-        self.edges_m: Floats = np.linspace(0.0, np.hypot(*(outline_of(arena) - self._peak).T).max(), count + 1)
-        discs = shapely.buffer(shapely.Point(peak_m), self.edges_m[1:], quad_segs=64)
-        inner = shapely.area(shapely.intersection(discs, arena.free))
-        self._share = np.diff(inner, prepend=0.0) / arena.area_m2
-
-    def density(self, position: Floats) -> dict[str, float]:
-        """Return the density of robots in each ring over that of the whole arena: 1 is uniform. Figures 4 and 7."""
-        distance = np.hypot(*(position - self._peak).T)
-        counts: Ints = np.histogram(distance, self.edges_m)[0]
-        found = {"mean_peak_distance_m": float(distance.mean())}
-        for ring, (count, share) in enumerate(zip(counts.tolist(), self._share.tolist(), strict=True), 1):
-            found[f"density_ring_{ring:02d}"] = count / len(position) / share if share > 0.0 else math.nan
-        return found
 
 
 class VoronoiMetrics(Metric):

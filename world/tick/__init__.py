@@ -1,1 +1,1 @@
-"""The parts of one tick: wake rule, command intake, node status, process control, precomputed readings, telemetry."""
+"""The parts of one tick: node status, wake rule, sensing, precomputed readings, command intake, completion, telemetry."""

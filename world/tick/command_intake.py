@@ -1,61 +1,93 @@
-"""Answers: what nodes say to the observations of one tick, who still owes one, and what no node may say.
+"""Command intake: collects the answers to one tick's observations and refuses what no node may send.
 
-Promises: each node that was asked is heard once a tick, and only with what this world can carry out; whatever else comes is
-refused for a reason, counted, and changes nothing. In real time an answer to an earlier tick is heard too, in order.
+Each observed node is accepted once a tick, and only with a command that this world can carry out. Every other message is
+refused for a reason, counted, and changes nothing. Where the driver allows late answers (real time), an answer to an earlier
+tick is accepted too, in order.
 """
 
 from collections import Counter
 from collections.abc import Collection, Sequence
-from typing import Final
+from typing import Final, NamedTuple, Protocol
 
 from zwerm.errors import ProtocolError
-from zwerm.wire.messages import BodyVelocity, Command, Failure, WheelSpeeds, open_answer, traced_bytes
-from zwerm.world.radio.medium import Medium
+from zwerm.wire.messages import BodyVelocity, Command, Failure, Transmission, WheelSpeeds, open_answer, traced_bytes
 
 NO_ANSWER: Final = b""
 
+NodeAnswer = tuple[int, Command | Failure]
+
+
+class Addressing(Protocol):
+    """The part of the radio that knows which transmissions are possible."""
+
+    def refuses(self, sender: int, message: Transmission) -> str:
+        """Return why a transmission cannot be sent at all, or an empty string."""
+
+
+class Exchange(NamedTuple):
+    """The messages of one tick: parallel sequences by node id, ascending. A node without an answer has b"".
+
+    `traced` is the part of `commands` that the trace covers: all but telemetry and snapshots.
+    """
+
+    tick: int
+    nodes: Sequence[int]
+    observations: Sequence[bytes]
+    commands: Sequence[bytes]
+    traced: Sequence[bytes]
+
 
 class CommandIntake:
-    """The answers to one tick's observations at a time. `late_count` is how many came after their tick."""
+    """Collects the answers of one tick at a time.
+
+    `exchange` holds the messages of the tick that ended last. `observed_count` counts observations, `late_count` answers that
+    came after their tick, `refused` refusals by reason.
+    """
 
     def __init__(
-        self, drive: type[BodyVelocity] | type[WheelSpeeds], body: str, fixed: Collection[int], medium: Medium
+        self,
+        drive: type[BodyVelocity] | type[WheelSpeeds],
+        body: str,
+        fixed: Collection[int],
+        addressing: Addressing,
     ) -> None:
-        """A `body` of that kind takes the drive `drive`; the nodes `fixed` have no body that moves."""
+        """A body of kind `body` takes the drive type `drive`; the nodes in `fixed` have no body that moves."""
+        self.exchange = Exchange(-1, (), (), (), ())
         self.refused: Counter[str] = Counter()
-        self.late_allowed = False
         self.late_count = 0
+        self.observed_count = 0
         self._drive = drive
         self._drives = (drive, type(None))
         self._body = body
         self._fixed = fixed
-        self._medium = medium
+        self._addressing = addressing
         self._tick = -1
         self._nodes: Sequence[int] = ()
-        self._owing: dict[int, None] = {}
-        self._heard: dict[int, tuple[bytes, Command | Failure]] = {}
-        self._traced: dict[int, bytes] = {}  # what the trace covers of commands with telemetry
-        self._late: list[tuple[int, Command | Failure]] = []
+        self._observations: Sequence[bytes] = ()
+        self._pending: dict[int, None] = {}
+        self._accepted: dict[int, tuple[bytes, Command | Failure]] = {}
+        self._traced: dict[int, bytes] = {}  # the traced bytes of the accepted commands with telemetry
+        self._late: list[NodeAnswer] = []
         self._newest: dict[int, int] = {}  # the tick that a node answered last, where answers may be late
 
-    def ask(self, nodes: Sequence[int], tick: int) -> None:
-        """Take note that `nodes`, ascending, have been sent the observations of `tick`."""
-        self._tick, self._nodes = tick, nodes
-        self._owing = dict.fromkeys(nodes)
-        self._heard = {}
+    def begin_tick(self, tick: int, nodes: Sequence[int], observations: Sequence[bytes]) -> None:
+        """Expect an answer from each of `nodes`, ascending, which are sent `observations` at `tick`."""
+        self._tick, self._nodes, self._observations = tick, nodes, observations
+        self._pending = dict.fromkeys(nodes)
+        self._accepted = {}
         self._traced = {}
+        self.observed_count += len(nodes)
 
-    def hear(self, node: int, payload: bytes) -> Command | Failure:
-        """Return what a node says, once it has been taken note of.
+    def accept(self, node: int, payload: bytes, late_allowed: bool = False) -> Command | Failure:
+        """Accept a node's answer and return it decoded; with `late_allowed` also an answer to an earlier tick.
 
-        Raises ProtocolError, and counts its reason, for what is malformed or unasked for; the node still owes its answer
-        then.
+        Raises ProtocolError, and counts its reason, for a malformed or unexpected answer; the node stays pending then.
         """
         try:
             answer = open_answer(payload)
-            late = answer.tick != self._tick or node not in self._owing
+            late = answer.tick != self._tick or node not in self._pending
             if late:
-                self._check_late(node, answer.tick)
+                self._check_late(node, answer.tick, late_allowed)
             if type(answer) is Command and (
                 answer.outbox or type(answer.drive) not in self._drives or node in self._fixed
             ):
@@ -67,40 +99,38 @@ class CommandIntake:
             self._late.append((node, answer))
             self.late_count += 1
         else:
-            self._heard[node] = payload, answer
-            del self._owing[node]
+            self._accepted[node] = payload, answer
+            del self._pending[node]
             if type(answer) is Command and (answer.telemetry or answer.snapshot):
                 self._traced[node] = traced_bytes(answer, payload)
-        if self.late_allowed:
+        if late_allowed:
             self._newest[node] = answer.tick
         return answer
 
-    def owing(self) -> list[int]:
-        """Return the nodes that were asked and have not been heard, ascending."""
-        return list(self._owing)
+    def pending(self) -> list[int]:
+        """Return the observed nodes whose answer has not been accepted, ascending."""
+        return list(self._pending)
 
-    def close(self) -> tuple[list[bytes], list[bytes], list[tuple[int, Command | Failure]]]:
-        """End the tick: return the bytes of each node that was asked, in order; what the trace covers of them; the answers.
-
-        Late answers come first. The second list is the first, less telemetry and snapshots.
-        """
-        heard = self._heard
-        payloads = [heard[node][0] if node in heard else NO_ANSWER for node in self._nodes]
-        traced = payloads
+    def end_tick(self) -> list[NodeAnswer]:
+        """End the tick: set `exchange`, and return all accepted answers, late ones first and then by node id."""
+        accepted, nodes = self._accepted, self._nodes
+        commands = [accepted[node][0] if node in accepted else NO_ANSWER for node in nodes]
+        answers = self._late + [(node, accepted[node][1]) for node in nodes if node in accepted]
+        traced = commands
         if self._traced:
-            traced = [self._traced.get(node, payload) for node, payload in zip(self._nodes, payloads, strict=True)]
-        answers = self._late + [(node, heard[node][1]) for node in self._nodes if node in heard]
+            traced = [self._traced.get(node, command) for node, command in zip(nodes, commands, strict=True)]
+        self.exchange = Exchange(self._tick, nodes, self._observations, commands, traced)
         self._late = []
-        self.ask((), self._tick + 1)
-        return payloads, traced, answers
+        self.begin_tick(self._tick + 1, (), ())
+        return answers
 
-    def _check_late(self, node: int, tick: int) -> None:
-        """Raise ProtocolError, unless late answers are allowed and this one comes in order."""
-        if self.late_allowed and self._newest.get(node, -1) < tick < self._tick:
+    def _check_late(self, node: int, tick: int, allowed: bool) -> None:
+        """Raise ProtocolError, unless late answers are `allowed` and this one comes in order."""
+        if allowed and self._newest.get(node, -1) < tick < self._tick:
             return
         if tick != self._tick:
             raise ProtocolError("out-of-order", f"node {node} answers tick {tick} at tick {self._tick}")
-        if node not in self._heard:
+        if node not in self._accepted:
             raise ProtocolError("unasked", f"node {node} was sent no observation at tick {tick}")
         raise ProtocolError("duplicate", f"node {node} answers tick {tick} again")
 
@@ -111,6 +141,6 @@ class CommandIntake:
         if command.drive is not None and node in self._fixed:
             raise ProtocolError("wrong-drive", f"node {node} has no drive")
         for message in command.outbox:
-            refused = self._medium.refuses(node, message)
+            refused = self._addressing.refuses(node, message)
             if refused:
                 raise ProtocolError("wrong-packet", refused)

@@ -1,8 +1,8 @@
-"""Lives: which nodes' programs run, which of their incarnations it is, and who is stopped or slow.
+"""Status of each node: running, down, paused or slow; crashed; or late to join.
 
-A node that is down is neither observed nor awaited, and its radio hears nothing; one that is paused is not observed either,
-but its mail waits for it. A slow node is observed only once it is done with the observation before, and what it answers is
-held back until then. Whatever changes here is an order for those who run the programs.
+A node that is down is neither observed nor awaited, and receives no packets. A paused node is not observed either, but its
+packets wait. A slow node is observed again once it has finished its last observation; until then its answer is held back.
+A change of status yields the actions that the runner of the nodes' programs has to carry out.
 """
 
 from collections.abc import Sequence
@@ -13,87 +13,101 @@ import numpy as np
 from zwerm.wire.messages import Command, Failure
 from zwerm.world.scene import Bools, Ints
 
-Deed = Literal["kill", "start", "pause", "resume"]
-Held = tuple[int, Command | Failure]
+ActionKind = Literal["kill", "start", "pause", "resume"]
+Event = Literal["crashed", "restarted", "paused", "slow", "late"]
+NodeAnswer = tuple[int, Command | Failure]
 
-ONE: Final = 1
+FULL_SPEED_TICKS: Final = 1
 
 
 class ProcessAction(NamedTuple):
-    """What is to be done to a node's program, before anybody is observed at this tick."""
+    """An action on a node's program, to carry out before any node is observed at this tick."""
 
-    deed: Deed
+    kind: ActionKind
     node: int
 
 
 class NodeStatus:
-    """The lives of `nodes` nodes; `unborn` start later. Nodes that are present in the arena are not its business."""
+    """The status of `nodes` nodes; the nodes in `late_joiners` start later."""
 
-    def __init__(self, nodes: int, unborn: Sequence[int] = ()) -> None:
+    def __init__(self, nodes: int, late_joiners: Sequence[int] = ()) -> None:
         self.down: Bools = np.zeros(nodes, dtype=np.bool_)
-        self.down[list(unborn)] = True
+        self.down[list(late_joiners)] = True
         self.paused: Bools = np.zeros(nodes, dtype=np.bool_)
-        self.every: Ints = np.ones(nodes, dtype=np.int64)  # ticks that a node takes over an answer
-        self.withheld: Bools = np.zeros(nodes, dtype=np.bool_)  # whom the driver does not want observed now
-        self.ever: dict[str, list[int]] = {}  # who was ever crashed, restarted, paused, slow or late, in order
+        self.answer_ticks: Ints = np.full(nodes, FULL_SPEED_TICKS)  # ticks that a node takes over an answer
+        self.withheld: Bools = np.zeros(nodes, dtype=np.bool_)  # nodes that the driver excludes from observation
+        self.crashed: dict[int, str] = {}  # the reason by node, of programs that ended on their own, in order
+        self.failures: dict[int, Failure] = {}  # of controllers that raised
+        self.gone: Sequence[int] = ()  # nodes that a fault keeps down to the end of the run
+        self.history: dict[Event, list[int]] = {}  # the nodes to which each event ever happened, in order
         self._busy_until: Ints = np.zeros(nodes, dtype=np.int64)
-        self._held: dict[int, list[Held]] = {}
-        self._hindered = bool(unborn)
-        for node in unborn:
+        self._held: dict[int, list[NodeAnswer]] = {}  # answers of slow nodes, by the tick at which they act
+        self._hindered = bool(late_joiners)
+        for node in late_joiners:
             self.note("late", node)
 
-    def note(self, what: str, node: int) -> None:
-        """Remember that this happened to a node."""
-        nodes = self.ever.setdefault(what, [])
+    @property
+    def dead(self) -> list[int]:
+        """The nodes that are down and never return, ascending."""
+        return sorted({*self.crashed, *self.gone})
+
+    def ever(self, event: Event) -> list[int]:
+        """Return the nodes to which `event` ever happened, in order."""
+        return self.history.get(event, [])
+
+    def note(self, event: Event, node: int) -> None:
+        """Add a node to the history of an event, once."""
+        nodes = self.history.setdefault(event, [])
         if node not in nodes:
             nodes.append(node)
 
-    def change(self, down: Bools, paused: Bools, every: Ints) -> list[ProcessAction]:
-        """Make (nodes,) who is down, paused and slow as told; return the orders that follow, by node."""
-        orders: list[ProcessAction] = []
+    def change(self, down: Bools, paused: Bools, answer_ticks: Ints) -> list[ProcessAction]:
+        """Set the status arrays (nodes,), and return the actions that follow, by node id."""
+        actions: list[ProcessAction] = []
         for node in np.flatnonzero((down != self.down) | (paused != self.paused)).tolist():
             if down[node] and not self.down[node]:
-                orders.append(ProcessAction("kill", node))
+                actions.append(ProcessAction("kill", node))
                 self.note("crashed", node)
             elif self.down[node] and not down[node]:
-                orders.append(ProcessAction("start", node))
-            # A program that is started is not stopped; one that dies needs no waking.
-            stopped = bool(self.paused[node] and not self.down[node])
-            stop = bool(paused[node] and not down[node])
-            if stop and not stopped:
-                orders.append(ProcessAction("pause", node))
+                actions.append(ProcessAction("start", node))
+            # A started program is not paused; a killed one is not resumed.
+            was_paused = bool(self.paused[node] and not self.down[node])
+            is_paused = bool(paused[node] and not down[node])
+            if is_paused and not was_paused:
+                actions.append(ProcessAction("pause", node))
                 self.note("paused", node)
-            elif stopped and not stop and not down[node]:
-                orders.append(ProcessAction("resume", node))
-        for node in np.flatnonzero(every > self.every).tolist():
+            elif was_paused and not is_paused and not down[node]:
+                actions.append(ProcessAction("resume", node))
+        for node in np.flatnonzero(answer_ticks > self.answer_ticks).tolist():
             self.note("slow", node)
-        self.down, self.paused, self.every = down, paused, every
-        self._hindered = bool(down.any() or paused.any() or (every > ONE).any() or self._held)
-        return orders
+        self.down, self.paused, self.answer_ticks = down, paused, answer_ticks
+        slow = bool((answer_ticks > FULL_SPEED_TICKS).any())
+        self._hindered = bool(down.any() or paused.any() or slow or self._held)
+        return actions
 
-    def able(self, nodes: Ints, tick: int) -> Ints:
-        """Return those of `nodes` that can take an observation at `tick`; the slow among them are busy from now on."""
+    def observable(self, nodes: Ints, tick: int) -> Ints:
+        """Return those of `nodes` that can take an observation at `tick`; slow nodes among them are busy from now on."""
         if not self._hindered and not self.withheld.any():
             return nodes
-        kept_away = self.down[nodes] | self.paused[nodes] | self.withheld[nodes]
-        nodes = nodes[~kept_away & (self._busy_until[nodes] <= tick)]
-        self._busy_until[nodes] = tick + self.every[nodes]
+        excluded = self.down[nodes] | self.paused[nodes] | self.withheld[nodes]
+        nodes = nodes[~excluded & (self._busy_until[nodes] <= tick)]
+        self._busy_until[nodes] = tick + self.answer_ticks[nodes]
         return nodes
 
-    def finished(self, answers: Sequence[Held], tick: int) -> list[Held]:
-        """Take the answers that came at `tick`, and return those that act now: the held ones first."""
+    def due_answers(self, answers: Sequence[NodeAnswer], tick: int) -> list[NodeAnswer]:
+        """Take the answers of `tick`, and return those that act now: first the ones that slow nodes gave earlier."""
         if not self._hindered:
             return list(answers)
-        acting = self._held.pop(tick, [])
+        due = self._held.pop(tick, [])
         for node, answer in answers:
-            if self.every[node] > ONE:
-                self._held.setdefault(tick + int(self.every[node]) - 1, []).append((node, answer))
+            if self.answer_ticks[node] > FULL_SPEED_TICKS:
+                self._held.setdefault(tick + int(self.answer_ticks[node]) - 1, []).append((node, answer))
             else:
-                acting.append((node, answer))
-        return acting
+                due.append((node, answer))
+        return due
 
-    def forget(self, node: int) -> None:
-        """Drop what a node has not finished: its program is dead."""
+    def drop_unfinished(self, node: int) -> None:
+        """Drop the held answers of a node: its program is dead."""
         self._busy_until[node] = 0
         for tick, held in self._held.items():
             self._held[tick] = [(other, answer) for other, answer in held if other != node]

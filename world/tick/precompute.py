@@ -1,4 +1,4 @@
-"""Foresight: what the same robots will sense at the next tick, worked out before it begins."""
+"""Precomputed readings: what the same robots sense at the next tick, computed while nodes still work on this one."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -11,12 +11,12 @@ Readings = Mapping[str, Sequence[Any]]
 
 
 class PrecomputedReadings(NamedTuple):
-    """The `readings` of `robots` (ascending ids) in `scene`, by field: right unless the scene or the robots become others."""
+    """The `readings` of `robots` (ascending ids) in `scene`, by field of the observation."""
 
     scene: Scene
     robots: Ints
     readings: Readings
 
-    def holds(self, scene: Scene, robots: Ints) -> bool:
-        """Tell whether it is `scene` that came about, and `robots` that sense it."""
+    def valid_for(self, scene: Scene, robots: Ints) -> bool:
+        """Tell whether these are the readings of exactly these robots in exactly this scene."""
         return self.scene is scene and np.array_equal(self.robots, robots)

@@ -65,10 +65,9 @@ class TelemetryArrays:
 
 
 class TelemetrySink:
-    """Takes the telemetry of commands. `gave_up` is the reason of the node that ended the task as impossible, or ""."""
+    """Takes the telemetry of commands."""
 
     def __init__(self, dt_s: float = 1.0, numbers_max: int = NUMBERS_MAX, bytes_max: int = SNAPSHOT_BYTES_MAX) -> None:
-        self.gave_up = ""
         self.dropped = 0
         self.newest: dict[int, dict[str, float]] = {}  # by node, then by name
         self.snapshots: list[TelemetryRecord] = []
@@ -81,10 +80,8 @@ class TelemetrySink:
         self._names: dict[str, int] = {}
         self._tick, self._node, self._name, self._value = array("q"), array("i"), array("h"), array("d")
 
-    def accept(self, scene: Scene, node: int, command: Command, decides: bool) -> None:
-        """Take what a command reports. `decides`: the node may end the task as impossible."""
-        if command.gave_up and decides:
-            self.gave_up = f"node {node} gave up: {command.gave_up}"
+    def accept(self, scene: Scene, node: int, command: Command) -> None:
+        """Take the telemetry and the snapshot of a command."""
         if not command.telemetry and not command.snapshot:
             return
         numbers = {name: float(value) for name, value in command.telemetry.items()}

@@ -1,8 +1,8 @@
-"""Who is awake: the wake rule, which makes an idle robot cost nothing and is the same in every runner.
+"""Wake rule: which nodes are observed at a tick. It is the same in every runner, and a sleeping robot costs nothing.
 
-A node that gave no wake is observed at every tick. One that did sleeps until its time comes or one of its events happens:
-a packet waits for it, its closed touch switches differ from those it last saw, or the ids it sees do. Contacts and ids are
-compared whenever any robot moved, came or went.
+A node that gave no wake is observed at every tick. A node with a wake sleeps until its time comes or one of its events
+happens: a packet waits for it, its closed touch switches differ from those it observed last, or the ids it sees do. Contacts
+and ids are compared after every tick at which any robot moved, entered or left.
 """
 
 import math
@@ -25,12 +25,12 @@ def _ids(reading: Sequence[Bearing]) -> Any:
     return tuple(bearing.node for bearing in reading)
 
 
-# What of a sensor's reading is an event when it changes, by the field of the observation.
+# The part of a sensor's reading whose change is an event, by the field of the observation.
 SIGNATURES: Final[dict[str, Callable[[Any], Any]]] = {"touch": _closed, "bearings": _ids}
 
 
 class Wakes:
-    """The wake state of `count` nodes. Nobody is awake before it has been admitted."""
+    """The wake state of `count` nodes. No node is awake before `admit`."""
 
     def __init__(self, count: int, dt_s: float) -> None:
         self._dt_s = dt_s
@@ -38,25 +38,25 @@ class Wakes:
         self._on_packet: Bools = np.zeros(count, dtype=np.bool_)
         self._watching: dict[str, Bools] = {field: np.zeros(count, dtype=np.bool_) for field in SIGNATURES}
         self._newest: dict[str, dict[int, Any]] = {field: {} for field in SIGNATURES}  # readings
-        self._unfiled: dict[str, tuple[Sequence[int], Sequence[Any]]] = {}  # the newest, of those observed together
-        self._seen: dict[str, dict[int, Any]] = {field: {} for field in SIGNATURES}  # signatures, of those who watch
+        self._unmerged: dict[str, tuple[Sequence[int], Sequence[Any]]] = {}  # the newest of all nodes observed together
+        self._seen: dict[str, dict[int, Any]] = {field: {} for field in SIGNATURES}  # signatures of watching nodes
         self._asleep: dict[int, None] = {}
         self._ids: Ints = np.zeros(0, dtype=np.int64)
         self._stale = True
 
     def admit(self, node: int) -> None:
-        """Let a node be observed at every tick, until it says otherwise."""
+        """Observe a node at every tick, until it gives a wake."""
         self._due[node] = -1.0
         self._stale = True
 
     def retire(self, node: int) -> None:
-        """Never wake this node again."""
+        """Observe a node no more."""
         self._rouse(node)
         self._due[node] = NEVER
         self._stale = True
 
     def sleep(self, node: int, wake: Wake, tick: int) -> None:
-        """Put a node to sleep until `wake`; a time that has passed means the next tick."""
+        """Let a node sleep until `wake`; a time in the past means the next tick."""
         self._catch_up()
         due = NEVER if wake.at_s is None else float(np.ceil(wake.at_s / self._dt_s - 1e-9))
         self._due[node] = max(due, tick + 1)
@@ -75,29 +75,29 @@ class Wakes:
                 self._due[node] = tick
 
     def watchers(self, field: str) -> Ints:
-        """Return the sleepers that ask for a change of the sensor `field`."""
+        """Return the sleepers that wake on a change of the sensor `field`."""
         return np.flatnonzero(self._watching[field])
 
     def note_readings(self, field: str, nodes: Ints, readings: Sequence[Any], tick: int) -> None:
-        """Wake those of `nodes` whose reading differs from the one they last observed."""
+        """Wake those of `nodes` whose reading differs from the one they observed last."""
         signature, seen = SIGNATURES[field], self._seen[field]
         for node, reading in zip(nodes.tolist(), readings, strict=True):
             if signature(reading) != seen.get(node):
                 self._due[node] = tick
 
     def remember(self, field: str, nodes: Sequence[int], readings: Sequence[Any]) -> None:
-        """Take note of what `nodes` observe now. As long as the same ones are awake that takes the place of what they had."""
-        if field in self._unfiled and self._unfiled[field][0] != nodes:
+        """Keep the readings that `nodes` observe now. While the same nodes are awake, they replace the ones before."""
+        if field in self._unmerged and self._unmerged[field][0] != nodes:
             self._catch_up()
-        self._unfiled[field] = nodes, readings
+        self._unmerged[field] = nodes, readings
 
     def _catch_up(self) -> None:
-        for field, (nodes, readings) in self._unfiled.items():
+        for field, (nodes, readings) in self._unmerged.items():
             self._newest[field].update(zip(nodes, readings, strict=True))
-        self._unfiled.clear()
+        self._unmerged.clear()
 
     def awake(self, tick: int) -> Ints:
-        """Return the nodes to observe at `tick`, ascending; a sleeper among them is awake from now on."""
+        """Return the nodes to observe at `tick`, ascending; sleepers among them are awake from now on."""
         if self._asleep or self._stale:
             self._ids = np.flatnonzero(self._due <= tick)
             self._stale = False
@@ -115,5 +115,5 @@ class Wakes:
 
     @property
     def sleeping(self) -> bool:
-        """Tell whether anyone is asleep."""
+        """Whether any node sleeps."""
         return bool(self._asleep)

@@ -18,11 +18,11 @@ from zwerm.compare.variants import Sweep
 from zwerm.errors import ScenarioError
 from zwerm.maths.statistics import Sample, condense
 from zwerm.scenario.load import built_in
-from zwerm.study.plan import Point
 from zwerm.study.study_tables import Setting, Study, VariantTable, check_study
 from zwerm.study.summary import Results
 from zwerm.study.trial import Row
-from zwerm.world.drivers.lockstep import FAILED
+from zwerm.study.trial_plan import Point
+from zwerm.world.tick.completion import FAILED
 
 # Default metrics to compare: those of them that a run measured, unless all values are zero.
 METRICS: Final = (

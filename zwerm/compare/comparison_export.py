@@ -6,8 +6,8 @@ from typing import Any
 
 from zwerm.compare.comparison import Comparison, SweepPoint
 from zwerm.study.export import sample_json, study_head
-from zwerm.study.plan import Point
 from zwerm.study.study_runner import StudyResult
+from zwerm.study.trial_plan import Point
 
 
 def comparison_json(result: StudyResult, comparison: Comparison, drawn: Sequence[Path]) -> dict[str, Any]:

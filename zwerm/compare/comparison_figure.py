@@ -15,8 +15,8 @@ import numpy as np
 from zwerm.compare.comparison import COMPLETED, Comparison, SweepPoint
 from zwerm.errors import PictureError
 from zwerm.maths.statistics import Sample
-from zwerm.study.plan import Point
 from zwerm.study.study_tables import Setting
+from zwerm.study.trial_plan import Point
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

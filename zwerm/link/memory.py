@@ -1,4 +1,4 @@
-"""The memory link: nodes run in the world's process and answer each message at once."""
+"""The memory link: nodes live in the world's own process and compute their answers when the world collects them."""
 
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -8,9 +8,10 @@ from zwerm.link import Answer, Arrival, arrival
 
 
 class MemoryLink:
-    """The world's end of the link to inline nodes. A node is a function from one message to its answer.
+    """The world's end of nodes that run inline. A node is a function from one message to one message.
 
-    `make` returns a node from its id and incarnation, when a fault starts it. The nodes `late_joiners` do not run before.
+    `send` only queues a message; a controller runs inside `receive` or `receive_many`. `make`, of a node's id and
+    incarnation number, returns the node that a fault starts. The nodes in `late_joiners` do not run before that.
     """
 
     def __init__(
@@ -22,40 +23,49 @@ class MemoryLink:
         self._nodes = {node: answer for node, answer in nodes.items() if node not in late_joiners}
         self._make = make
         self._incarnation = dict.fromkeys(self._nodes, 1)
-        self._arrivals: deque[Arrival] = deque()
+        self._unanswered: deque[tuple[int, bytes]] = deque()  # messages whose answer has not been collected
+        self._losses: deque[Arrival] = deque()
 
     def send(self, node: int, payload: bytes) -> None:
-        """Hand the message to the node, and queue its answer."""
-        self._arrivals.append(arrival((node, self._nodes[node](payload))))
+        """Queue a message to a node."""
+        self._unanswered.append((node, payload))
 
     def receive(self, timeout_s: float) -> Arrival | None:
-        """Return the next answer, or None at once: answers never come later."""
-        return self._arrivals.popleft() if self._arrivals else None
+        """Return the next loss or answer, or None at once: nothing arrives later in memory."""
+        if self._losses:
+            return self._losses.popleft()
+        if self._unanswered:
+            node, payload = self._unanswered.popleft()
+            return arrival((node, self._nodes[node](payload)))
+        return None
 
     def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
-        """Return all answers at once: answers never come later."""
-        arrivals = list(self._arrivals)
-        self._arrivals.clear()
-        return arrivals
+        """Return all losses and answers, at once: nothing arrives later in memory."""
+        losses, unanswered, nodes = self._losses, self._unanswered, self._nodes
+        self._losses, self._unanswered = deque(), deque()
+        answers = [arrival((node, nodes[node](payload))) for node, payload in unanswered]
+        return [*losses, *answers] if losses else answers
 
     def close(self) -> None:
-        """Discard the answers not yet received."""
-        self._arrivals.clear()
+        """Drop everything that has not been received; idempotent."""
+        self._unanswered.clear()
+        self._losses.clear()
 
     def kill(self, node: int) -> None:
-        """Discard a node and its state, and report it lost."""
+        """Drop a node, its memory and its unanswered messages."""
         del self._nodes[node]
-        self._arrivals.append(Arrival(node, None))
+        self._unanswered = deque(each for each in self._unanswered if each[0] != node)
+        self._losses.append(Arrival(node, None))
 
     def start(self, node: int) -> None:
-        """Make a node, as its next incarnation if it ran before."""
+        """Make a node, as its next incarnation if it ran before. Raises LinkError without `make`."""
         if self._make is None:
             raise LinkError(f"node {node} cannot be started: the link has no function that makes nodes")
         self._incarnation[node] = self._incarnation.get(node, 0) + 1
         self._nodes[node] = self._make(node, self._incarnation[node])
 
     def pause(self, node: int) -> None:
-        """Do nothing: an inline node computes only when it gets a message."""
+        """Do nothing: the world observes no paused node, so its controller does not run."""
 
     def resume(self, node: int) -> None:
-        """Do nothing."""
+        """Do nothing: the world observes the node again."""

@@ -1,9 +1,8 @@
-"""Keyed randomness: a draw is a function of (seed, purpose, ids, sequence number), never of how many were drawn before.
+"""Keyed random numbers: a draw is a function of (seed, purpose, ids), and independent of the number of draws before it.
 
-Adding a robot, a sensor or a fault therefore changes nobody else's draws, and neither does the order in which they are
-made. The counter-based generator is SplitMix64's finaliser (Steele, Lea, Flood 2014) chained over the parts of the key,
-vectorised over arrays of ids; controllers get a numpy Generator over Philox instead, keyed the same way. Not for
-cryptography.
+One robot, sensor or fault more changes no other draw, and neither does the order of draws. The counter-based generator is the
+finaliser of SplitMix64 (Steele, Lea, Flood 2014), chained over the parts of the key and vectorised over arrays of ids.
+Controllers receive a numpy Generator over Philox, keyed in the same way. It is not fit for cryptography.
 """
 
 from hashlib import blake2b
@@ -28,7 +27,7 @@ def splitmix64(state: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def key_part(part: ArrayLike) -> NDArray[np.uint64]:
-    """Return what one part of a key (non-negative integers) is mixed in as."""
+    """Return one part of a key (non-negative integers) as the words that are mixed into the state."""
     return splitmix64(np.atleast_1d(np.asarray(part, dtype=np.uint64)) * _GOLDEN)
 
 
@@ -45,7 +44,7 @@ def gaussian(words: NDArray[np.uint64]) -> NDArray[np.float64]:
 
 
 class Draws:
-    """All the randomness of one run."""
+    """The random numbers of one run."""
 
     def __init__(self, seed: int) -> None:
         self.seed = seed
@@ -56,7 +55,7 @@ class Draws:
         return blake2b(key.encode(), digest_size=16, person=b"zwerm-draws").digest()
 
     def states(self, purpose: str, *ids: ArrayLike) -> NDArray[np.uint64]:
-        """Return the states of the chain after `ids`, at least one-dimensional: where many draws share the head of a key.
+        """Return the states of the chain after `ids`, at least one-dimensional, for many draws with a common head of the key.
 
         `splitmix64(splitmix64(states(purpose, a) ^ key_part(b)))` is `bits(purpose, a, b)`.
         """
@@ -84,14 +83,14 @@ class Draws:
         return draw.reshape(np.broadcast_shapes(*(np.shape(part) for part in ids)))
 
     def stream_key(self, purpose: str, *ids: int) -> bytes:
-        """Return the 16-byte key of a stream of its own, fit to be handed to another process."""
+        """Return the 16-byte key of a separate stream, which another process may use."""
         return self._digest(purpose, *ids)
 
     def generator(self, purpose: str, *ids: int) -> np.random.Generator:
-        """Return a numpy Generator of its own for this purpose and these ids."""
+        """Return a separate numpy Generator for this purpose and these ids."""
         return stream(self.stream_key(purpose, *ids))
 
 
 def stream(key: bytes) -> np.random.Generator:
-    """Return the numpy Generator over Philox that `key` (16 bytes) names."""
+    """Return the numpy Generator over Philox with this key (16 bytes)."""
     return np.random.Generator(np.random.Philox(key=np.frombuffer(key, dtype="<u8")))

@@ -13,16 +13,16 @@ from typing import Final, NamedTuple
 Point = tuple[float, float]
 Polygon = Sequence[Point]
 
-# A cell has six sides on average; before so many cuts, measuring how far it reaches costs more than it saves.
+# A cell has six sides on average; before this many cuts, computing its reach costs more than it saves.
 _CUTS_BEFORE_REACH: Final = 6
 
-# Below this, a quotient of two sums of denormal numbers means nothing.
+# Below this mass, the quotient of two sums of denormal numbers has no correct digit.
 MASS_MIN: Final = 1e-290
 
 # The area of a thinner polygon may be rounding, and its centroid is held to its bounding box [m2].
 _THIN_M2: Final = 1e-12
 
-# Robots nearer than this are taken to be at one place, which leaves no bisector to speak of [m].
+# Robots nearer than this count as being at one place and have no bisector [m].
 COINCIDENT_M: Final = 1e-12
 
 

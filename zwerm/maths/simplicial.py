@@ -38,7 +38,7 @@ class FlagComplex:
         )
 
     def __contains__(self, simplex: Edge) -> bool:
-        """Tell whether the ordered edge is there."""
+        """Whether the complex contains the ordered simplex."""
         return simplex in self._known
 
     def common(self, i: int, j: int) -> tuple[int, ...]:
@@ -46,7 +46,7 @@ class FlagComplex:
         return tuple(k for k in self.neighbours[i] if edge(j, k) in self._known)
 
     def without(self, vertices: Iterable[int]) -> "FlagComplex":
-        """Return the complex with some vertices gone, and all that they are part of."""
+        """Return the complex without some vertices and all simplices that contain them."""
         gone = frozenset(vertices)
         return FlagComplex({v: each for v, each in self.neighbours.items() if v not in gone})
 
@@ -86,7 +86,7 @@ def bits(chain: int) -> Iterator[int]:
 
 
 def reduce_chain(chain: int, pivots: Mapping[int, int]) -> int:
-    """Return `chain` reduced by columns that are keyed by their highest bit: 0 iff it is in their span."""
+    """Return `chain` reduced by columns keyed by their highest bit: 0 if and only if it is in their span."""
     while chain:
         column = pivots.get(chain.bit_length())
         if column is None:
@@ -106,14 +106,14 @@ def rank(columns: Iterable[int]) -> int:
 
 
 def betti(complex_: FlagComplex) -> tuple[int, int]:
-    """Return the Betti numbers (b0, b1): the number of pieces, and the number of holes."""
+    """Return the Betti numbers (b0, b1): the number of connected components, and the number of holes."""
     pieces = len(complex_.components())
     cycles = len(complex_.edges) - len(complex_.vertices) + pieces
     return pieces, cycles - rank(boundaries(complex_))
 
 
 def hole_cycles(complex_: FlagComplex) -> list[tuple[int, ...]]:
-    """Return closed walks around the holes, one a hole: a basis of H1 out of the shortest cycles there are.
+    """Return one closed walk around each hole: a shortest basis of H1.
 
     Erickson and Whittlesey 2005: every cycle of such a basis is, from one of its vertices, two shortest paths and an edge. Of
     two cycles around the same hole, from the same vertex, one is enough.
@@ -149,7 +149,7 @@ def hole_cycles(complex_: FlagComplex) -> list[tuple[int, ...]]:
 
 
 def _ancestors(vertex: int, before: Mapping[int, int]) -> list[int]:
-    """Return a vertex, the one before it, and so on to the root, which is before itself."""
+    """Return the path from a vertex to the root, whose predecessor is itself."""
     found = [vertex]
     while before[found[-1]] != found[-1]:
         found.append(before[found[-1]])
@@ -227,7 +227,7 @@ def _boundary(cycle: int, whole: list[int]) -> int:
     return chain
 
 
-# --- who can be spared ----------------------------------------------------------------------------------------------
+# --- redundant vertices ---------------------------------------------------------------------------------------------
 
 
 def may_leave(vertex: int, neighbours: Mapping[int, Iterable[int]]) -> bool:
@@ -240,7 +240,7 @@ def may_leave(vertex: int, neighbours: Mapping[int, Iterable[int]]) -> bool:
         return False
     seen = {each: frozenset(neighbours[each]) for each in around}
     if any(all(other in seen[each] for other in around if other != each) for each in around):
-        return True  # one of them sees all the others: the link is a cone
+        return True  # one neighbour sees all others: the link is a cone
     return betti(FlagComplex({each: [other for other in around if other in seen[each]] for each in around})) == (1, 0)
 
 

@@ -1,6 +1,6 @@
-"""What many trials say together: means, and how far to trust them.
+"""Statistics over trials: means and their confidence intervals.
 
-Intervals are Student's, over trials that are independent of each other; they say nothing of a bias that all trials share.
+Intervals are Student's, for independent trials; they do not cover a bias that all trials share.
 """
 
 import math
@@ -14,7 +14,7 @@ CONFIDENCE: Final = 0.95
 
 
 class Sample(NamedTuple):
-    """A sample condensed. `sd` and `half_width` are nan where one trial does not tell."""
+    """The summary of a sample. `sd` and `half_width` are nan for fewer than two trials."""
 
     n: int
     mean: float
@@ -37,8 +37,8 @@ def condense(values: Sequence[float]) -> Sample:
 def half_width(sd: float, n: int, n_other: int | None = None) -> float:
     """Return half the 95 % interval of a mean of `n` values, nan for fewer than two.
 
-    With `n_other`, of the difference between it and the mean of that many other values, whose standard deviation is
-    taken to be the same and is not known.
+    With `n_other`, half the interval of the difference to the mean of that many other values; both samples are assumed to have
+    the same unknown standard deviation.
     """
     if n < 2:
         return math.nan

@@ -1,4 +1,4 @@
-"""From a scenario to a world ready to run, with every mistake that the typed tables could not see."""
+"""From a scenario to a world and its observers; reports every mistake that the typed tables cannot detect."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
@@ -24,24 +24,36 @@ T = TypeVar("T")
 
 
 def assemble(scenario: Scenario, seed: int) -> World:
-    """Return the world of `scenario`, its robots placed for `seed`.
+    """Return the world of `scenario`, its robots placed for `seed`. Raises ScenarioError as `assemble_run` does."""
+    return assemble_run(scenario, seed)[0]
 
-    Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the placement.
+
+def assemble_run(scenario: Scenario, seed: int) -> tuple[World, Observers]:
+    """Return the world of `scenario` for `seed`, and the observers that measure its run.
+
+    Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the faults and the placement.
     """
-    prepared = prepare(scenario)
+    arena, sensors, observers = prepare(scenario)
     mistakes: list[str] = []
-    world = _attempt(lambda: World(scenario, seed, *prepared), scenario, mistakes)
+    world = _attempt(lambda: World(scenario, seed, arena, sensors), scenario, mistakes)
     if world is None:
         raise ScenarioError(mistakes)
-    return world
+    return world, observers
 
 
 class Prepared(NamedTuple):
-    """All of a world that does not depend on the seed. Sensors and observers are for one run each."""
+    """The parts of a world and its run that do not depend on the seed. Sensors and observers are for one run each."""
 
     arena: Arena
     sensors: Sequence[Sensor]
     observers: Observers
+
+
+def observers_of(scenario: Scenario, arena: Arena) -> Observers:
+    """Return new observers for a run of `scenario`, as `prepare` makes them."""
+    table = scenario.field
+    field = None if table is None else make_field(table, arena.bounds, scenario.folder, scenario.place)
+    return make_observers(scenario, arena, field)
 
 
 def prepare(scenario: Scenario) -> Prepared:
@@ -57,7 +69,7 @@ def prepare(scenario: Scenario) -> Prepared:
     if arena is not None and table is not None:
         bounds = arena.bounds
         field = _attempt(lambda: make_field(table, bounds, scenario.folder, scenario.place), scenario, mistakes)
-    # What needs the field is not told that there is none where the mistake is in the field's own table.
+    # A mistake in the field's own table must not also be reported as a missing field.
     if arena is not None and (field is not None or table is None):
         sensors = _attempt(lambda: _sensors(scenario, arena, field), scenario, mistakes)
         observers = _attempt(lambda: make_observers(scenario, arena, field), scenario, mistakes)

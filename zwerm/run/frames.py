@@ -1,17 +1,25 @@
 """A run as pandas frames, in long form. pandas comes with the extra `frames`."""
 
-from typing import TYPE_CHECKING, get_args
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from zwerm.errors import MissingExtraError
-from zwerm.run.result import FrameKind, RunResult
+from zwerm.run.positions import Positions
+from zwerm.world.scene import Floats
+from zwerm.world.tick.telemetry import TelemetryArrays
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 
-def frame_of(result: RunResult, kind: FrameKind) -> "DataFrame":
+FrameKind = Literal["positions", "metrics", "telemetry"]
+
+
+def frame_of(
+    kind: FrameKind, positions: Positions, series: Mapping[str, Floats], telemetry: TelemetryArrays
+) -> "DataFrame":
     """Return the frame that `RunResult.to_frame` describes."""
     if kind not in get_args(FrameKind):
         raise ValueError(f"to_frame: expected one of {', '.join(get_args(FrameKind))}, got {kind!r}")
@@ -20,20 +28,18 @@ def frame_of(result: RunResult, kind: FrameKind) -> "DataFrame":
     except ImportError as missing:
         raise MissingExtraError(f"to_frame needs pandas ({missing}): pip install 'zwerm[frames]'") from None
     if kind == "metrics":
-        return DataFrame(result.series or {"time_s": np.zeros(0)})
+        return DataFrame(dict(series) or {"time_s": np.zeros(0)})
     if kind == "telemetry":
-        reported = result.telemetry
         columns = ("tick", "time_s", "node", "name", "value")
-        return DataFrame({name: getattr(reported, name) for name in columns})
-    poses = result.positions
-    samples, robots = poses.present.shape
+        return DataFrame({name: getattr(telemetry, name) for name in columns})
+    samples, robots = positions.present.shape
     return DataFrame(
         {
-            "time_s": np.repeat(poses.time_s, robots),
-            "node": np.tile(poses.node, samples),
-            "x_m": poses.x_m.ravel(),
-            "y_m": poses.y_m.ravel(),
-            "heading_rad": poses.heading_rad.ravel(),
-            "present": poses.present.ravel(),
+            "time_s": np.repeat(positions.time_s, robots),
+            "node": np.tile(positions.node, samples),
+            "x_m": positions.x_m.ravel(),
+            "y_m": positions.y_m.ravel(),
+            "heading_rad": positions.heading_rad.ravel(),
+            "present": positions.present.ravel(),
         }
     )

@@ -3,40 +3,23 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from zwerm.catalogue import layers_of
 from zwerm.record.history import History
+from zwerm.run.frames import FrameKind, frame_of
+from zwerm.run.positions import Positions
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
-from zwerm.world.scene import Bools, Floats, Ints
+from zwerm.world.scene import Floats, Ints
 from zwerm.world.tick.telemetry import TelemetryArrays, TelemetryRecord
 
 if TYPE_CHECKING:  # pictures need matplotlib
     from pandas import DataFrame
 
     from zwerm.view.run_view import RunView
-
-
-FrameKind = Literal["positions", "metrics", "telemetry"]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Positions:
-    """The true poses of n robots at k times. Where a robot is not in the arena its pose is nan.
-
-    A scenario of less than 2,000 ticks has a sample at every tick; a longer one at even intervals of at most a thousandth of
-    its duration, and at the end.
-    """
-
-    time_s: Floats  # (k,) [s]
-    node: Ints  # (n,)
-    x_m: Floats  # (k, n) [m]
-    y_m: Floats  # (k, n) [m]
-    heading_rad: Floats  # (k, n) [rad], not wrapped
-    present: Bools  # (k, n)
 
 
 @dataclass(slots=True)
@@ -97,9 +80,7 @@ class RunResult:
         number.
         Raises MissingExtraError without pandas, and ValueError for another kind.
         """
-        from zwerm.run.frames import frame_of
-
-        return frame_of(self, kind)
+        return frame_of(kind, self.positions, self.series, self.telemetry)
 
     def as_json(self) -> dict[str, Any]:
         """Return the stable summary of the run, ready for a JSON encoder."""

@@ -5,9 +5,9 @@ import secrets
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Final, Literal, Protocol
 
 import numpy as np
 
@@ -17,39 +17,47 @@ from zwerm.errors import ScenarioError, StragglerError
 from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
-from zwerm.run.assembly import assemble
+from zwerm.run.assembly import assemble_run, observers_of
 from zwerm.run.measurement import measure, truth_of
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
-from zwerm.world.drivers.lockstep import FAILED, INTERRUPTED, LockStep
+from zwerm.world.drivers.driver import TickObserver
+from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.drivers.realtime import RealTime
-from zwerm.world.metrics.coverage import cell_counts
+from zwerm.world.metrics.observers import Observers
+from zwerm.world.metrics.position_coverage import cell_counts
 from zwerm.world.radio.report import radio_report
+from zwerm.world.scene import Scene
+from zwerm.world.tick.completion import FAILED, INTERRUPTED
+from zwerm.world.tick.node_status import Event
 from zwerm.world.world import World
 
 Runner = Literal["processes", "inline"]
 
-# How many samples of a run its history takes, for pictures and animations, and how often a watcher is told of ticks.
-HISTORY_SAMPLES = 4_000
-TOLD_TIMES = 1_000
+# The samples of positions that a run's history holds for pictures, and the progress reports of a run, at most about.
+HISTORY_SAMPLES: Final = 4_000
+PROGRESS_REPORTS: Final = 1_000
+
+# The events, besides crashes and restarts, that a result lists nodes for.
+HINDRANCES: Final[tuple[Event, ...]] = ("paused", "slow", "late")
 
 
 class ProgressListener(Protocol):
-    """Somebody to tell how a run is getting on."""
+    """Receives reports on the progress of a run."""
 
     def joined(self, count: int, total: int) -> None:
-        """`count` of `total` robots have joined."""
+        """Take the report that `count` of `total` robots have joined."""
 
     def ticked(self, tick: int, ticks: int) -> None:
-        """`tick` of `ticks` are done."""
+        """Take the report that `tick` of `ticks` are done."""
 
     def covered(self, fraction: float, robots: int) -> None:
-        """This fraction of the arena is in sight of so many robots."""
+        """Take the report that `robots` robots see a `fraction` of the arena."""
 
 
 class NullProgress:
-    """A watcher that does not look."""
+    """Ignores all reports."""
 
     def joined(self, count: int, total: int) -> None:
         """Ignore it."""
@@ -70,7 +78,7 @@ def run(
     watcher: ProgressListener | None = None,
     record: Path | None = None,
 ) -> RunResult:
-    """Run `scenario` (a built-in name, a path, or one already loaded) and return its result.
+    """Run `scenario` (a built-in name, a path, or a loaded scenario) and return its result.
 
     `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock; `record` is a file
     to write an MCAP recording to. Raises ScenarioError for a mistake in the scenario, and LinkError where robots cannot
@@ -85,7 +93,7 @@ def run(
             raise ScenarioError([f"overrides: a scenario that is already loaded takes none, got {list(overrides)}"])
     else:
         scenario = load(str(scenario), tuple(overrides))
-    world = assemble(scenario, seed)
+    world, metrics = assemble_run(scenario, seed)
     members = node_specs(scenario, seed)
     watcher = watcher or NullProgress()
     if runner == "inline":
@@ -96,7 +104,7 @@ def run(
             lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
             world.schedule.late_joiners,
         )
-        return drive(world, link, seed, runner, realtime, watcher, record, link)
+        return drive(world, link, seed, runner, realtime, watcher, record, link, metrics)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
     with LocalSwarm(
@@ -107,7 +115,7 @@ def run(
         late_joiners=world.schedule.late_joiners,
         restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
     ) as swarm:
-        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm)
+        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics)
 
 
 def serve(
@@ -124,7 +132,7 @@ def serve(
 
     Waits `deadline_s` for them to connect to one of the Zenoh endpoints `listen`. Raises ScenarioError and LinkError.
     """
-    world = assemble(scenario, seed)
+    world, metrics = assemble_run(scenario, seed)
     if world.schedule.touches_programs:
         raise ScenarioError(
             [f"{scenario.place}: faults: robots that run elsewhere cannot be killed, started or paused"]
@@ -141,11 +149,11 @@ def serve(
         deadline_s=deadline_s,
         paced=realtime is not None,
     ) as swarm:
-        return drive(world, swarm.link, seed, "remote", realtime, watcher, record)
+        return drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics)
 
 
 def new_run_id() -> str:
-    """Return a name for a run that no other run on the same router has; it influences nothing."""
+    """Return a name for a run, unique among the runs of a router; it has no effect on results."""
     return secrets.token_hex(8)
 
 
@@ -158,71 +166,105 @@ def drive(
     watcher: ProgressListener | None = None,
     record: Path | None = None,
     programs: NodeProcesses | None = None,
+    metrics: Observers | None = None,
 ) -> RunResult:
     """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`.
 
-    `programs` does to nodes what the scenario's faults demand.
+    `programs` carries out on nodes' programs what the scenario's faults demand. `metrics` measure the run; without them, new
+    observers do, as the scenario asks.
     """
-    if record is None:
-        return _drive(world, link, seed, runner, realtime, watcher or NullProgress(), programs)
-    from zwerm.record.recording import Recording
+    scenario = world.scenario
+    if metrics is None:
+        metrics = observers_of(scenario, world.scene.arena)
+    sampling = Sampling(world, metrics, watcher or NullProgress())
+    with ExitStack() as stack:
+        observers: list[TickObserver] = []
+        if record is not None:
+            from zwerm.record.recording import Recording
 
-    about = {"scenario": world.scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
-    with Recording(record, world.scenario.time.dt_s, about) as recording:
-        world.recording = recording
-        world.telemetry.listeners.append(recording.telemetry)
-        return _drive(world, link, seed, runner, realtime, watcher or NullProgress(), programs)
+            about = {"scenario": scenario.model_dump_json(exclude_defaults=True), "seed": str(seed), "runner": runner}
+            recording = stack.enter_context(Recording(record, scenario.time.dt_s, about))
+            world.telemetry.listeners.append(recording.telemetry)
+            observers.append(ExchangeObserver(world, recording))
+        observers.append(sampling)
+        driver = (
+            LockStep(world, link, observers, programs)
+            if realtime is None
+            else RealTime(world, link, realtime, observers, programs)
+        )
+        start = time.monotonic()
+        try:
+            with _collecting_seldom():
+                outcome, reason = driver.run(), driver.reason
+        except StragglerError as error:
+            outcome, reason = FAILED, str(error)
+        except KeyboardInterrupt:
+            outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
+        wall_s = time.monotonic() - start
+        sampling.finish()
+        return _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, link)
 
 
-def _drive(
-    world: World,
-    link: WorldLink,
-    seed: int,
-    runner: str,
-    realtime: float | None,
-    watcher: ProgressListener,
-    programs: NodeProcesses | None,
-) -> RunResult:
-    table = world.scenario.time
-    ticks = round(table.duration_s / table.dt_s)
-    stride, telling = max(1, ticks // HISTORY_SAMPLES), max(1, ticks // TOLD_TIMES)
-    history = History()
-    history.append(world.scene, world.dead)
-    world.observers.sample(truth_of(world))
+class Sampling:
+    """Samples a run after every tick: its metrics, its history for pictures, and its progress."""
 
-    def on_tick(world: World) -> None:
-        if world.observers.is_due(world.tick):
-            world.observers.sample(truth_of(world))
-            newest = world.observers.newest()
+    def __init__(self, world: World, observers: Observers, watcher: ProgressListener) -> None:
+        table = world.scenario.time
+        self.observers = observers
+        self.history = History()
+        self._world = world
+        self._watcher = watcher
+        self._ticks = round(table.duration_s / table.dt_s)
+        self._history_stride = max(1, self._ticks // HISTORY_SAMPLES)
+        self._progress_stride = max(1, self._ticks // PROGRESS_REPORTS)
+        self.history.append(world.scene, world.dead)
+        self.observers.subscribe(world.telemetry)
+        self.observers.sample(truth_of(world))
+
+    def __call__(self, world: World) -> None:
+        """Sample the tick that begins."""
+        if self.observers.is_due(world.tick):
+            self.observers.sample(truth_of(world))
+            newest = self.observers.newest()
             if "coverage_fraction" in newest:
-                watcher.covered(newest["coverage_fraction"], int(newest["robots_deployed"]))
-        if world.tick % stride == 0:
-            history.append(world.scene, world.dead)
-        if world.tick % telling == 0:
-            watcher.ticked(world.tick, ticks)
+                self._watcher.covered(newest["coverage_fraction"], int(newest["robots_deployed"]))
+        if world.tick % self._history_stride == 0:
+            self.history.append(world.scene, world.dead)
+        if world.tick % self._progress_stride == 0:
+            self._watcher.ticked(world.tick, self._ticks)
 
-    driver = (
-        LockStep(world, link, on_tick, programs)
-        if realtime is None
-        else RealTime(world, link, realtime, on_tick, programs)
-    )
-    start = time.monotonic()
-    try:
-        with _collecting_seldom():
-            outcome, reason = driver.run(), driver.reason
-    except StragglerError as error:
-        outcome, reason = FAILED, str(error)
-    except KeyboardInterrupt:
-        outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
-    wall_s = time.monotonic() - start
-    if world.tick % stride:
-        history.append(world.scene, world.dead)
-    return _result(world, seed, runner, outcome, reason, wall_s, driver, history, link)
+    def finish(self) -> None:
+        """Add the last scene to the history, if it is not there."""
+        if self._world.tick % self._history_stride:
+            self.history.append(self._world.scene, self._world.dead)
+
+
+class ExchangeRecorder(Protocol):
+    """Records the messages of every tick."""
+
+    def exchange(
+        self, tick: int, nodes: Sequence[int], observations: Sequence[bytes], answers: Sequence[bytes], scene: Scene
+    ) -> None:
+        """Record one tick: the observations sent to `nodes`, their answers (b"" for none), and the scene."""
+
+
+class ExchangeObserver:
+    """Gives the messages of every tick to a recorder, with the scene in which they were sent."""
+
+    def __init__(self, world: World, recorder: ExchangeRecorder) -> None:
+        self._recorder = recorder
+        self._scene = world.scene
+
+    def __call__(self, world: World) -> None:
+        """Record the tick that has ended."""
+        tick, nodes, observations, commands, _ = world.intake.exchange
+        self._recorder.exchange(tick, nodes, observations, commands, self._scene)
+        self._scene = world.scene
 
 
 @contextmanager
 def _collecting_seldom() -> Iterator[None]:
-    """Let Python look for cycles of garbage a hundred times less often: messages are part of none, and make up most objects."""
+    """Let Python search for garbage cycles 100 times less often: messages form no cycles, and most objects are messages."""
     often, *rest = gc.get_threshold()
     gc.set_threshold(100 * often, *rest)
     try:
@@ -239,20 +281,20 @@ def _result(
     reason: str,
     wall_s: float,
     driver: LockStep | RealTime,
-    history: History,
+    sampling: Sampling,
     link: WorldLink,
 ) -> RunResult:
-    scenario = world.scenario
-    metrics = measure(world)
-    metrics["refused_messages"] = float(world.refused.total())
+    scenario, status, intake = world.scenario, world.status, world.intake
+    metrics = measure(world, sampling.observers)
+    metrics["refused_messages"] = float(intake.refused.total())
     if isinstance(driver, RealTime):
-        metrics["late_commands"] = float(world.answers.late_count)
+        metrics["late_commands"] = float(intake.late_count)
         metrics["deadman_stops"] = float(driver.deadman_stops)
         metrics["tick_overruns"] = float(driver.overruns)
     counts = None
     if scenario.metrics.cells is not None:
         position = world.scene.position[world.scene.present]
-        counts = cell_counts(position, world.arena.bounds, scenario.metrics.cells)
+        counts = cell_counts(position, world.scene.arena.bounds, scenario.metrics.cells)
     return RunResult(
         scenario=scenario,
         seed=seed,
@@ -261,24 +303,24 @@ def _result(
         reason=reason,
         trace=world.trace.hex(),
         ticks=world.tick,
-        sim_s=round(world.time_s, 9),
+        sim_s=round(world.scene.time_s, 9),
         wall_s=round(wall_s, 6),
-        robots=world.count,
-        robot_ticks=world.robot_ticks,
+        robots=scenario.robots.count,
+        robot_ticks=intake.observed_count,
         metrics=metrics,
         radio=radio_report(world.medium, world.tick),
         middleware_lost=driver.lost,
-        crashed=sorted({*world.crashed, *world.lives.ever.get("crashed", ())}),
-        restarted=sorted(world.lives.ever.get("restarted", ())),
-        hindered={what: sorted(world.lives.ever.get(what, ())) for what in ("paused", "slow", "late")},
-        faults=[table.model_dump() for _, table in world.fault_tables],
+        crashed=sorted({*status.crashed, *status.ever("crashed")}),
+        restarted=sorted(status.ever("restarted")),
+        hindered={event: sorted(status.ever(event)) for event in HINDRANCES},
+        faults=[table.model_dump() for table in world.schedule.tables],
         missed_faults=[fault.in_words for fault in world.schedule.missed],
-        arena=world.arena,
-        history=history,
+        arena=world.scene.arena,
+        history=sampling.history,
         cell_counts=counts,
-        refused=dict(world.refused + Counter(getattr(link, "refused", {}))),
-        series={name: np.array(values) for name, values in world.observers.series().items()},
+        refused=dict(intake.refused + Counter(getattr(link, "refused", {}))),
+        series={name: np.array(values) for name, values in sampling.observers.series().items()},
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,
-        tracebacks={node: failure.traceback for node, failure in world.failures.items()},
+        tracebacks={node: failure.traceback for node, failure in status.failures.items()},
     )

@@ -1,5 +1,6 @@
 """Reading scenarios: by the name of a built-in one or by a path, with overrides, checked as a whole."""
 
+import copy
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from pydantic import ValidationError
 from zwerm.errors import ScenarioError
 from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.overrides import override
+from zwerm.scenario.renamed import rename
 from zwerm.scenario.tables import Scenario
 from zwerm.scenario.types import OpenTable
 
@@ -60,9 +62,11 @@ def tables_of(name: str, overrides: tuple[str, ...] = ()) -> tuple[dict[str, Any
     """Return what `load` would validate, and the scenario's file. Raises ScenarioError where there is none to validate."""
     path = locate(name)
     tables = read(path)
+    rename(tables, str(path))
     tables.setdefault("name", path.stem)
     for assignment in overrides:
         override(tables, assignment)
+    rename(tables, str(path))
     return tables, path
 
 
@@ -71,6 +75,8 @@ def validate(tables: dict[str, Any], place: str, folder: Path) -> Scenario:
 
     Raises ScenarioError with every mistake, each led by `place`.
     """
+    tables = copy.deepcopy(tables)
+    rename(tables, place)
     try:
         scenario = Scenario.model_validate(tables)
     except ValidationError as error:

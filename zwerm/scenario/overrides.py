@@ -4,6 +4,7 @@ import tomllib
 from typing import Any
 
 from zwerm.errors import ScenarioError
+from zwerm.scenario.renamed import renamed_path
 
 
 def override(tables: dict[str, Any], assignment: str) -> None:
@@ -18,7 +19,7 @@ def override(tables: dict[str, Any], assignment: str) -> None:
         value = tomllib.loads(f"value = {text}")["value"] if "\n" not in text else text
     except tomllib.TOMLDecodeError:
         value = text
-    *parents, last = path.strip().split(".")
+    *parents, last = renamed_path(path.strip()).split(".")
     place: Any = tables
     for depth, part in enumerate(parents):
         place = _enter(place, part, ".".join(parents[: depth + 1]), assignment)

@@ -102,7 +102,7 @@ class PlacementTable(Table):
     poses: list[Pose] | None = None
 
 
-class InflowTable(Table):
+class EntranceTable(Table):
     """Robots wait in a depot and enter one by one, at random places of a rectangle; they leave in another."""
 
     every_s: Positive
@@ -118,7 +118,7 @@ class RobotsTable(Table):
     parameters: dict[str, Any] = {}
     body: BodyTable = BodyTable()
     placement: PlacementTable = PlacementTable()
-    inflow: InflowTable | None = None
+    entrance: EntranceTable | None = None
     sensors: list[OpenTable] = []
     on_crash: Literal["fail", "continue"] = "fail"
 

@@ -16,8 +16,8 @@ from joblib import Parallel, delayed, parallel_config
 from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import BrokenProcessPool
 
-from zwerm.study.plan import Trial
 from zwerm.study.trial import Row, failed_row, run_trial
+from zwerm.study.trial_plan import Trial
 
 
 def run_trials(trials: Sequence[Trial], jobs: int) -> Generator[Row, None, None]:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from zwerm.study.plan import label
 from zwerm.study.summary import Results, SummaryLine
 from zwerm.study.swarm_figures import draw_density, draw_tracks
+from zwerm.study.trial_plan import label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,13 +14,13 @@ from joblib import cpu_count
 
 from zwerm.errors import ScenarioError
 from zwerm.run.runner import Runner
-from zwerm.study.plan import Trial, make_points, make_trials
 from zwerm.study.pool import run_trials
 from zwerm.study.rows import Key, Rows
 from zwerm.study.study_tables import Setting, Study
 from zwerm.study.summary import Results
 from zwerm.study.trial import Row
-from zwerm.world.drivers.lockstep import FAILED
+from zwerm.study.trial_plan import Trial, make_points, make_trials
+from zwerm.world.tick.completion import FAILED
 
 
 class StudyListener(Protocol):

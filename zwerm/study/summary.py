@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from zwerm.maths.statistics import Sample, condense, half_width
-from zwerm.study.plan import Point
 from zwerm.study.study_tables import CELL_METRICS, Published, Setting, Study
 from zwerm.study.trial import Row
-from zwerm.world.drivers.lockstep import FAILED
+from zwerm.study.trial_plan import Point
 from zwerm.world.scene import Floats
+from zwerm.world.tick.completion import FAILED
 
 _CELL_CHOICE = dict(zip(CELL_METRICS, (np.argmin, np.argmax), strict=True))
 

@@ -11,11 +11,11 @@ import shapely
 
 from zwerm.record.history import Tracks
 from zwerm.run.runner import run
-from zwerm.study.plan import Point
 from zwerm.study.summary import Results
+from zwerm.study.trial_plan import Point
 from zwerm.world.arena.arena import Arena
 from zwerm.world.fields.registry import make_field
-from zwerm.world.metrics.voronoi_coverage import Rings, VoronoiCells
+from zwerm.world.geometry.voronoi_cells import Rings, VoronoiCells
 from zwerm.world.scene import Floats
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ import numpy as np
 from zwerm.errors import ZwermError
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
-from zwerm.study.plan import Trial
-from zwerm.world.drivers.lockstep import FAILED, INTERRUPTED
+from zwerm.study.trial_plan import Trial
+from zwerm.world.tick.completion import FAILED, INTERRUPTED
 
 Row = dict[str, Any]
 

@@ -43,7 +43,7 @@ def compare(run: TwinRun) -> dict[str, Any]:
         "outcome": run.outcome,
         "ticks": run.world.tick,
         "wall_s": round(run.wall_s, 3),
-        "late_commands": run.world.answers.late_count,
+        "late_commands": run.world.intake.late_count,
         "middleware_lost": run.middleware_lost,
         "modelled": {
             "sent": model_sent,

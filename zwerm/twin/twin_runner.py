@@ -20,9 +20,9 @@ from zwerm.link.peer_radio import MET, LogLine, Station, Transport, read_log
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import NullProgress, ProgressListener, new_run_id
 from zwerm.scenario.tables import Scenario
-from zwerm.world.drivers.lockstep import COMPLETED, INTERRUPTED, TIME_LIMIT
 from zwerm.world.drivers.realtime import RealTime
 from zwerm.world.radio import ROBOTS
+from zwerm.world.tick.completion import COMPLETED, INTERRUPTED, TIME_LIMIT
 from zwerm.world.world import World
 
 MEET_DEADLINE_S: Final = 30.0
@@ -78,7 +78,7 @@ def run_twin(scenario: Scenario, seed: int, transport: Transport, listener: Prog
         with LocalSwarm(new_run_id(), members, progress=listener.joined, paced=True, stations=stations) as swarm:
             _wait_until_connected(logs)
             network = Network(namespaces, impairments, transport)
-            network.impair(world.draws)
+            network.impair(world.scene.draws)
             driver = _driver(world, swarm, network, impairments, listener)
             before, start = _segments(namespaces, members), time.monotonic()
             try:
@@ -115,7 +115,7 @@ def _driver(
     table = world.scenario.time
     ticks = round(table.duration_s / table.dt_s)
 
-    def on_sense(world: World) -> None:
+    def block_stopped(world: World) -> None:
         pairs = [
             pair
             for name in world.medium.channels
@@ -123,10 +123,10 @@ def _driver(
         ]
         network.block(pairs)
 
-    def on_tick(world: World) -> None:
+    def report(world: World) -> None:
         listener.ticked(world.tick, ticks)
 
-    return RealTime(world, swarm.link, 1.0, on_tick, swarm, on_sense)
+    return RealTime(world, swarm.link, 1.0, [report], swarm, block_stopped)
 
 
 def _stations(

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch, PathPatch
 from zwerm.record.history import Tracks
 from zwerm.view.canvas import BLUE, NOTHING, ORANGE, OUTSIDE, SKY, VERMILLION, WALL, YELLOW, Sheet, outline
 from zwerm.world.arena.arena import Arena
-from zwerm.world.metrics.coverage import cell_counts
+from zwerm.world.metrics.position_coverage import cell_counts
 from zwerm.world.metrics.sight import SeenArea
 from zwerm.world.scene import Floats, Ints
 

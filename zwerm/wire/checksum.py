@@ -1,7 +1,7 @@
 """Frames: a payload with a checksum, for radios that damage bits.
 
-A frame is the CRC-32 of the payload (zlib's polynomial; 4 bytes, big-endian) and then the payload. It finds every error of
-up to 3 bits in payloads of this length, and all but one in 4e9 of the others. It proves nothing about who sent it.
+A frame is the CRC-32 of the payload (zlib's polynomial; 4 bytes, big-endian) followed by the payload. It detects every error of
+up to 3 bits in payloads of this length, and all other errors but one in 4e9. It does not authenticate the sender.
 """
 
 from struct import pack, unpack_from
@@ -32,18 +32,18 @@ def unseal(frame: bytes) -> bytes:
 
 
 class Sealed:
-    """How messages of the types `messages`, structs or a union of them, cross a radio that damages bits."""
+    """A codec for messages of the types `messages` (a struct or a union) on a radio that damages bits."""
 
     def __init__(self, messages: Any) -> None:
         self._encode = msgspec.msgpack.Encoder().encode
         self._decode = msgspec.msgpack.Decoder(messages).decode
 
     def write(self, message: Any) -> bytes:
-        """Return the payload of a packet that says this."""
+        """Return the payload of a packet with this message."""
         return seal(self._encode(message))
 
     def read(self, payload: bytes) -> Any:
-        """Return what a packet says, or None where that is nothing: it was damaged on its way, or is somebody else's."""
+        """Return the message in a packet, or None where it was damaged or is of another type."""
         try:
             return self._decode(unseal(payload))
         except (ProtocolError, *REFUSABLE):

@@ -12,17 +12,17 @@ _OF_A_NODE = re.compile(rf"{ROOT}/[^/]+/(?:node/([0-9]+)/(?:obs|cmd)|(?:hello|al
 
 
 def observation_key(run: str, node: Node) -> str:
-    """Where the world publishes a node's observations."""
+    """The key on which the world publishes a node's observations."""
     return f"{ROOT}/{run}/node/{node}/obs"
 
 
 def command_key(run: str, node: Node) -> str:
-    """Where a node publishes its commands."""
+    """The key on which a node publishes its commands."""
     return f"{ROOT}/{run}/node/{node}/cmd"
 
 
 def hello_key(run: str, node: Node) -> str:
-    """Where a node asks to join: a query, answered with a Welcome."""
+    """The key of a node's request to join: a query, answered with a Welcome."""
     return f"{ROOT}/{run}/hello/{node}"
 
 
@@ -32,17 +32,17 @@ def alive_key(run: str, node: Node) -> str:
 
 
 def air_key(run: str, channel: str, sender: Node, to: Node | None = None) -> str:
-    """Where a node's radio on a real network sends: to everybody on a channel, or to one."""
+    """The key on which a node's radio on a real network sends: to all nodes of a channel, or to one."""
     return f"{ROOT}/{run}/air/{channel}/{sender}/{'all' if to is None else to}"
 
 
 def hail_key(run: str, node: Node) -> str:
-    """Where a node's radio says hello to the others."""
+    """The key on which a node's radio announces itself to the others."""
     return f"{ROOT}/{run}/hail/{node}"
 
 
 def truth_key(run: str, topic: str) -> str:
-    """Where the world publishes what only viewers may see."""
+    """The key on which the world publishes the truth, for viewers only."""
     return f"{ROOT}/{run}/truth/{topic}"
 
 

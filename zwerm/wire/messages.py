@@ -1,12 +1,12 @@
-"""All that crosses the wire: one `Observation` in, one `Command` out, and the messages that open and end a node's life.
+"""All messages on the wire: one `Observation` to a node, one `Command` back, and the messages that open and end its life.
 
-Messages are MessagePack maps with field names, so that any language can join; small parts that come in numbers (a
-bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as `type`, for
-example "command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and trailing
-bytes are refused with a reason that can be counted.
+Messages are MessagePack maps with field names, so that a node can be written in any language; small parts that come in numbers
+(a bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as `type`, for example
+"command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and trailing bytes are refused,
+each with a reason that is counted.
 
-New fields go last, with defaults; a field at its default is left out of a message (those of a drive are not). Angles
-are radians in (-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
+New fields go last, with defaults; a field at its default is left out of a message (except in drives). Angles are radians in
+(-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
 """
 
 import re
@@ -18,7 +18,7 @@ import msgspec
 from msgspec import Struct
 
 from zwerm.errors import ProtocolError
-from zwerm.wire.telemetry import plain_numbers, telemetry_error
+from zwerm.wire.telemetry_rules import plain_numbers, telemetry_error
 
 PROTOCOL_VERSION: Final = 1
 
@@ -26,11 +26,11 @@ PROTOCOL_VERSION: Final = 1
 MESSAGE_BYTES_MAX: Final = 65_536
 
 
-# What holds numbers and bytes only is part of no cycle: `gc=False` spares the collector counting and visiting it.
+# Structs of numbers and bytes are part of no reference cycle: with `gc=False` the collector ignores them.
 
 
 class _Part(Struct, frozen=True, gc=False, array_like=True, forbid_unknown_fields=True):
-    """A part of a message that may come in numbers: an array on the wire."""
+    """A part that may occur many times in a message: an array on the wire."""
 
 
 class _Message(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True, tag_field="type"):
@@ -94,7 +94,7 @@ class Displacement(_Part, frozen=True):
 
 
 class Packet(_Part, frozen=True):
-    """A radio packet delivered now. `sender` is None where the channel does not tell it."""
+    """A radio packet delivered now. `sender` is None on an anonymous channel."""
 
     channel: str
     payload: bytes
@@ -102,7 +102,7 @@ class Packet(_Part, frozen=True):
 
 
 class Observation(_Message, frozen=True, tag=f"observation/{PROTOCOL_VERSION}"):
-    """All that a node learns at one tick. A sensor the scenario does not give the node is None, and not on the wire."""
+    """The input of a node at one tick. A sensor that the node does not have is None, and not on the wire."""
 
     tick: int
     time_s: float
@@ -126,8 +126,8 @@ SENSOR_FIELDS: Final = Observation.__struct_fields__[3:]
 # --- what a node commands -------------------------------------------------------------------------------------------
 
 
-# Drives are sent whole: msgspec leaves out a number only where it is the default's own object, so that equal drives
-# could differ in their bytes, and runs in their traces.
+# Drives are encoded with all fields. msgspec omits a default number only if it is the same object, so equal drives could
+# otherwise differ in their bytes, and equal runs in their traces.
 
 
 class BodyVelocity(Struct, frozen=True, gc=False, forbid_unknown_fields=True, tag_field="kind", tag="velocity"):
@@ -154,7 +154,7 @@ class Transmission(_Part, frozen=True):
 
 
 class Wake(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True):
-    """When the node wants its next observation: at `at_s`, or at the first event it names, if that is earlier.
+    """The time of the node's next observation: `at_s`, or the first of the events it names, if that is earlier.
 
     With nothing set the node sleeps until the run ends.
     """
@@ -214,9 +214,9 @@ class Hello(_Message, frozen=True, tag=f"hello/{PROTOCOL_VERSION}"):
 
 
 class Welcome(_Message, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
-    """The world's answer to `Hello`: what the node is and what it may know of itself, or why it is refused.
+    """The world's answer to `Hello`: the node's controller and setup, or the reason of a refusal.
 
-    In a `paced` run, one in real time, observations come whether or not the node has answered the one before.
+    In a `paced` run (real time) observations come also while the node has not answered the one before.
     """
 
     refused: str = ""
@@ -226,7 +226,7 @@ class Welcome(_Message, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
 
 
 class Goodbye(_Message, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
-    """The world tells a node that its life is over, and why; the node closes and exits. Or a node says that it leaves."""
+    """The world ends a node's run and gives the reason; the node closes and exits. Or a node announces that it leaves."""
 
     reason: str
 
@@ -236,22 +236,21 @@ class Goodbye(_Message, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
 _encoder = msgspec.msgpack.Encoder()
 encode: Final[Callable[[object], bytes]] = _encoder.encode
 
-# For the hot paths; what they raise is turned into a ProtocolError by `refusal`. In a union a message must carry its
-# type.
+# For the hot paths; `refusal` turns their exceptions into a ProtocolError. In a union a message must carry its type.
 decode_observation: Final = msgspec.msgpack.Decoder(Observation).decode
 decode_answer: Final = msgspec.msgpack.Decoder(Command | Failure).decode
 decode_hello: Final = msgspec.msgpack.Decoder(Hello | Goodbye).decode
 decode_welcome: Final = msgspec.msgpack.Decoder(Welcome).decode
 decode_to_node: Final = msgspec.msgpack.Decoder(Observation | Goodbye).decode
 
-# What msgspec says of a message of another type, such as "command/2".
+# The error text of msgspec for a message of another type, such as "command/2".
 _OTHER_TYPE = re.compile(r"Invalid value '\w+/([0-9]{1,9})' - at `\$\.type`")
 
 REFUSABLE: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
 def refusal(error: Exception) -> ProtocolError:
-    """Return what a decoder raised as a ProtocolError.
+    """Return the exception of a decoder as a ProtocolError.
 
     Its reason is `schema` (unknown or missing field, wrong type, another message), `version`, or `malformed` (not
     MessagePack, truncated, trailing bytes).
@@ -266,8 +265,8 @@ def refusal(error: Exception) -> ProtocolError:
 def open_answer(payload: bytes) -> Command | Failure:
     """Return the command or failure in `payload`.
 
-    Raises ProtocolError with the reasons of `refusal`, or `oversized`, or `not-finite` for a number that is none in the
-    drive or the wake, or `telemetry` for a name or number that breaks the rules of `zwerm.wire.telemetry`.
+    Raises ProtocolError with the reasons of `refusal`, or `oversized`; or `not-finite` for a number in the drive or the wake;
+    or `telemetry` for a name or number that breaks the rules of `zwerm.wire.telemetry_rules`.
     """
     if len(payload) > MESSAGE_BYTES_MAX:
         raise ProtocolError("oversized", f"{len(payload)} bytes, at most {MESSAGE_BYTES_MAX}")
@@ -279,7 +278,7 @@ def open_answer(payload: bytes) -> Command | Failure:
         raise ProtocolError("telemetry", str(found)) if "`$.telemetry" in str(found) else found from None
     if type(answer) is Command:
         drive, wake = answer.drive, answer.wake
-        # Most drives are finite velocities: those are seen to be without a call.
+        # Most drives are finite velocities: these pass without a function call.
         if not (
             drive is None
             or (type(drive) is BodyVelocity and isfinite(drive.forward_m_s + drive.left_m_s + drive.turn_rad_s))

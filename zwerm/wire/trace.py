@@ -23,13 +23,13 @@ class Trace:
     def extend(self, tick: int, nodes: Sequence[int], observations: Sequence[bytes], commands: Sequence[bytes]) -> None:
         """Chain one tick; the three sequences are parallel and ordered by node id. A node that gave none has b"".
 
-        They must not change afterwards: the work is put off until `catch_up`, or until it is needed.
+        They must not change afterwards: the hash is computed in `catch_up`, or when it is needed.
         """
         self.catch_up()
         self._newest = tick, nodes, observations, commands
 
     def catch_up(self) -> None:
-        """Do the work that was put off: best while others work."""
+        """Compute the hash of the newest tick: best while the nodes work."""
         if self._newest is None:
             return
         tick, nodes, observations, commands = self._newest

@@ -12,8 +12,8 @@ from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.fence import SIXTY_RAD, VERTEX_BESIDE_RAD, Fence, Side, fence, wedges
 from zwerm.agents.sensor_coverage.frontier.holes import holes, is_bare, sides
-from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 

@@ -10,8 +10,8 @@ from typing import Final
 
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.sensor_coverage.motion.homing import Vector, slide
+from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame
-from zwerm.agents.sensor_coverage.motion.parameters import RobotParameters
 from zwerm.wire.messages import BodyVelocity
 
 STOP: Final = BodyVelocity()

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from itertools import islice
 from typing import Final
 
+from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, add_wall, refined_reference, wrapped
-from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
-from zwerm.agents.sensor_coverage.frontier.services import FrontierService
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, UNSAID, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory

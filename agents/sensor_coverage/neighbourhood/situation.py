@@ -6,13 +6,13 @@ from collections.abc import Callable, Generator, Sequence
 import numpy as np
 
 from zwerm.agents.runtime.contract import Setup
-from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Landmark, Sighting
-from zwerm.agents.sensor_coverage.motion.drives import DriveResult, DriveToResult, correct, deploy, move
 from zwerm.agents.sensor_coverage.motion.homing import Vector
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive, Locomotion
-from zwerm.agents.sensor_coverage.motion.parameters import RobotParameters
+from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
+from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult, DriveToResult, correct, deploy, move
 from zwerm.agents.sensor_coverage.neighbourhood.failure_detector import FailureDetector
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap, MakePlanner
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation

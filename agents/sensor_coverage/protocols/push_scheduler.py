@@ -17,7 +17,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
 )
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
-from zwerm.agents.sensor_coverage.protocols.completion import CompletionProtocol
+from zwerm.agents.sensor_coverage.protocols.completion_census import CompletionProtocol
 from zwerm.agents.sensor_coverage.protocols.component import Component
 
 COVERED: Final = "covered"

@@ -38,7 +38,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     SlotMemory,
     TakeSlot,
 )
-from zwerm.agents.sensor_coverage.motion.drives import DriveResult
+from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain

@@ -3,8 +3,8 @@
 import pytest
 
 from zwerm.agents.runtime.node import Node
-from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, UNSAID, StateBeacon
 from zwerm.agents.sensor_coverage.messages.peers import read, write
@@ -47,7 +47,7 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
         held = [each.local_map.slot for each in robots if each.push is None and each.local_map.slot != NOWHERE]
         assert len(held) == len(set(held)), f"tick {world.tick}: each has a place of its own, but {sorted(held)}"
 
-    driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), watch)
+    driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), [watch])
     return driver.run(), world, out()
 
 
@@ -192,9 +192,9 @@ def test_a_leader_that_stays_occupies_the_new_slot_if_its_follower_came_after_al
 @pytest.mark.parametrize(
     ("settings", "line"),
     [
-        (("services.path=mesh",), 'services.path: expected "coordinator" or "gradient", got "mesh"'),
+        (("services.path=mesh",), "services.path: expected 'coordinator' or 'gradient', got 'mesh'"),
         (("services.pathh=gradient",), "services.pathh"),
-        (("services.path=gradient",), "services.path: robots find the path from one base station"),
+        (("services.path=gradient",), "services: path=gradient, redundancy=none needs 1 to 1 base stations, got 3"),
     ],
 )
 def test_an_invalid_choice_of_services_is_one_line(settings: tuple[str, ...], line: str) -> None:

@@ -256,7 +256,7 @@ def test_the_swarm_repairs_the_holes_that_dead_robots_leave() -> None:
 
     def kill(world: World) -> None:
         if world.tick in (300, 450):
-            alive = [r for r in world.scene.present_ids().tolist() if r and r not in world.crashed]
+            alive = [r for r in world.scene.present_ids().tolist() if r and r not in world.status.crashed]
             killed.append(alive[len(alive) // 2])
             world.crash(killed[-1], "struck by lightning")
 
@@ -273,12 +273,12 @@ def test_a_robot_that_dies_at_the_depots_door_is_followed_by_another(unlucky: in
     scenario = load("sensor-coverage", (*HALL, "robots.on_crash=continue"))
 
     def kill(world: World) -> None:
-        if world.scene.present[unlucky] and unlucky not in world.crashed:
+        if world.scene.present[unlucky] and unlucky not in world.status.crashed:
             world.crash(unlucky, "struck by lightning")
 
     outcome, world = drive(scenario, kill)
     assert outcome == "completed"
-    assert unlucky in world.crashed
+    assert unlucky in world.status.crashed
     assert measure(world)["coverage_fraction"] >= 0.99
 
 

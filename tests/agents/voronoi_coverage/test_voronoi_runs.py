@@ -9,13 +9,13 @@ import shapely
 from zwerm.errors import ScenarioError
 from zwerm.run.runner import run
 from zwerm.scenario.load import built_in
-from zwerm.study.plan import make_points, make_trials
 from zwerm.study.study_tables import built_in as built_in_studies
 from zwerm.study.study_tables import load_study
 from zwerm.study.trial import run_trial
+from zwerm.study.trial_plan import make_points, make_trials
 from zwerm.world.arena.arena import Arena
 from zwerm.world.fields.lamp import Lamp
-from zwerm.world.metrics.voronoi_coverage import Rings
+from zwerm.world.geometry.voronoi_cells import Rings
 
 TABLE1 = "voronoi-coverage-table1"
 _SENSED = (

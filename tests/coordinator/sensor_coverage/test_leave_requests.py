@@ -307,5 +307,5 @@ def test_negotiating_robots_without_a_peer_radio_are_refused() -> None:
     with pytest.raises(ScenarioError) as caught:
         validate(tables, "here", path.parent)
     assert caught.value.mistakes == [
-        "here: expected services.redundancy: robots that agree among themselves need the table [radio]"
+        "here: expected services: path=coordinator, redundancy=link needs the table [radio]"
     ]

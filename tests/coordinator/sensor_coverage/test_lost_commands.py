@@ -274,7 +274,7 @@ def drive(scenario: Scenario) -> tuple[str, World, SensorCoverageCoordinator]:
 
     link = MemoryLink({node: each.answer for node, each in nodes.items()}, again)
     outcome = LockStep(world, link, programs=link).run()
-    coordinator = nodes[world.count]._controller
+    coordinator = nodes[scenario.robots.count]._controller
     assert isinstance(coordinator, SensorCoverageCoordinator)
     return outcome, world, coordinator
 

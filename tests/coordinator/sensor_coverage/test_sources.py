@@ -31,7 +31,7 @@ Point = tuple[float, float]
 
 def test_the_robots_are_dealt_out_to_the_depots_in_turn_and_an_empty_one_refuses() -> None:
     world = assemble(load("sensor-coverage-multi-source", ("robots.count=9",)), 1)
-    depots = world._depots
+    depots = world.bodies.depots
     assert depots is not None
     out = []
     for station in (2, 0, 1, 1, 1):
@@ -44,10 +44,10 @@ def test_the_robots_are_dealt_out_to_the_depots_in_turn_and_an_empty_one_refuses
 
 def test_of_robots_released_at_once_one_enters_a_tick() -> None:
     world = assemble(load("sensor-coverage-multi-source", ("robots.count=9",)), 1)
-    assert world._depots is not None
+    assert world.bodies.depots is not None
     for station in (1, 0):
-        world._depots.release(station)
-    entering = [world._depots.entering(world.scene) for _ in range(3)]
+        world.bodies.depots.release(station)
+    entering = [world.bodies.depots.entering(world.scene) for _ in range(3)]
     assert [each and each[0] for each in entering] == [4, 3, None]
 
 

@@ -215,7 +215,7 @@ def test_a_free_spot_is_found_until_the_rectangle_is_full() -> None:
     occupied = np.empty((0, 2))
     found = 0
     for robot in range(200):
-        spot = free_spot(entry, BUSY, occupied, 0.05, draws, "inflow", robot, 0)
+        spot = free_spot(entry, BUSY, occupied, 0.05, draws, "entry", robot, 0)
         if spot is not None:
             found += 1
             assert BUSY.contains(spot[None], 0.05).all()
@@ -223,6 +223,6 @@ def test_a_free_spot_is_found_until_the_rectangle_is_full() -> None:
             assert len(occupied) == 0 or np.hypot(*(occupied - spot).T).min() >= 0.1
             occupied = np.vstack([occupied, spot])
     assert 5 < found < 25
-    repeated = free_spot(entry, BUSY, np.empty((0, 2)), 0.05, Draws(5), "inflow", 0, 0)
+    repeated = free_spot(entry, BUSY, np.empty((0, 2)), 0.05, Draws(5), "entry", 0, 0)
     assert repeated is not None
     assert repeated.tolist() == occupied[0].tolist()

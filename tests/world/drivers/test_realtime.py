@@ -17,7 +17,7 @@ from zwerm.deploy.swarm import LocalSwarm
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import new_run_id
-from zwerm.world.drivers.realtime import OWED_MAX, RealTime
+from zwerm.world.drivers.realtime import UNANSWERED_MAX, RealTime
 from zwerm.world.world import World
 
 SOON_S = 30.0
@@ -51,9 +51,9 @@ def test_the_world_goes_on_while_a_program_starts_and_observes_it_once_it_has() 
             assert started.wait(SOON_S)
 
     link.start, link.send = start_when_the_world_has_gone_on, counted  # type: ignore[method-assign]
-    assert RealTime(world, link, 20.0, on_tick, link).run() == "time-limit"
+    assert RealTime(world, link, 20.0, [on_tick], link).run() == "time-limit"
     assert waited == [True]
-    assert world.lives.ever == {"crashed": [1], "restarted": [1]}
+    assert world.status.history == {"crashed": [1], "restarted": [1]}
     assert 5 < observed[1] <= 40 - 10
     assert observed[0] == 40
 
@@ -72,14 +72,14 @@ def test_a_hung_robot_is_sent_no_more_than_it_can_owe_and_is_observed_again_when
             if world.tick == 10:
                 swarm.pause(2)
             elif world.tick == 120:
-                assert observed[2] <= 10 + OWED_MAX
+                assert observed[2] <= 10 + UNANSWERED_MAX
                 swarm.resume(2)
 
         swarm.link.send = counted  # type: ignore[method-assign]
-        driver = RealTime(world, swarm.link, 1.0, on_tick, swarm)
+        driver = RealTime(world, swarm.link, 1.0, [on_tick], swarm)
         assert driver.run() == "time-limit"
         assert observed[0] == observed[1] == observed[3] == 200
-        assert 10 + OWED_MAX < observed[2] < 200
+        assert 10 + UNANSWERED_MAX < observed[2] < 200
         assert driver.deadman_stops >= 1
 
 

@@ -198,7 +198,7 @@ def test_overlapping_faults_are_all_active_and_end_one_by_one() -> None:
 
 
 def test_a_fault_begins_when_a_robot_is_deployed() -> None:
-    robots = {"inflow": {"every_s": 0.4, "entry_m": [0.5, 0.5, 1.5, 1.5]}, "placement": {}}
+    robots = {"entrance": {"every_s": 0.4, "entry_m": [0.5, 0.5, 1.5, 1.5]}, "placement": {}}
     life = Life(faulty({"kind": "blackout", "when": {"robot_deployed": 2}, "for_s": 0.3}, robots=robots))
     entered = life.awake(2)[0]
     assert entered == 8
@@ -210,7 +210,7 @@ def test_a_fault_begins_when_a_coverage_is_reached() -> None:
         ("cell_coverage_fraction", {"cells": [2, 2]}),
         ("area_coverage_fraction", {"coverage_radius_m": 0.7}),
     ):
-        robots = {"inflow": {"every_s": 0.1, "entry_m": [0.1, 0.1, 1.9, 1.9]}, "placement": {}, "count": 8}
+        robots = {"entrance": {"every_s": 0.1, "entry_m": [0.1, 0.1, 1.9, 1.9]}, "placement": {}, "count": 8}
         when = {"metric": metric, "at_least": 0.7}
         life = Life(faulty({"kind": "blackout", "when": when}, robots=robots, metrics=metrics))
         begun = life.heard(1, 0)[-1] + 1
@@ -232,7 +232,7 @@ def test_a_crashed_robot_is_not_observed_and_returns_without_memory_as_a_new_inc
     assert position[0] == pytest.approx(1.7 + 0.001 * (5 + 10), abs=1e-6), "its motors stood still meanwhile"
     assert life.orders[5] == [ProcessAction("kill", 1)]
     assert life.orders[10] == [ProcessAction("start", 1)]
-    assert life.world.lives.ever == {"crashed": [1], "restarted": [1]}
+    assert life.world.status.history == {"crashed": [1], "restarted": [1]}
 
 
 def test_packets_to_a_crashed_robot_are_dropped_with_their_cause() -> None:
@@ -258,7 +258,7 @@ def test_a_paused_robot_keeps_its_packets_and_memory_and_its_motors_stop_after_t
     assert life.heard(0, 1) == [*range(5), *range(15, 19)]
     assert life.steps(0, 1) == list(range(1, 10)), "it goes on where it was"
     assert len(life.observed[15][1].inbox) == 3 * 11, "its mail has waited"
-    assert life.world.lives.ever == {"paused": [1]}
+    assert life.world.status.history == {"paused": [1]}
     assert life.world.scene.position[1, 0] == pytest.approx(1.7 + 0.001 * (5 + 3 + 5), abs=1e-6)
 
 
@@ -267,7 +267,7 @@ def test_a_slow_robot_is_observed_once_in_every_ticks_and_its_packets_are_that_l
     assert life.awake(1) == [0, 1, 2, 3, 4, 8, 12, 16, 17, 18, 19]
     # Observed at 4, 8 and 12, it answers at 7, 11 and 15.
     assert life.heard(0, 1) == [0, 1, 2, 3, 7, 11, 15, 16, 17, 18]
-    assert life.world.lives.ever == {"slow": [1]}
+    assert life.world.status.history == {"slow": [1]}
 
 
 def test_a_late_joiner_is_not_observed_before_its_time_and_its_body_is_in_the_arena() -> None:
@@ -275,7 +275,7 @@ def test_a_late_joiner_is_not_observed_before_its_time_and_its_body_is_in_the_ar
     assert life.awake(1) == list(range(10, 20))
     assert life.world.medium.summary()["dropped"] == {"receiver-down": 3 * 10}
     assert life.world.scene.position[1, 0] == pytest.approx(1.7 + 0.001 * 10, abs=1e-6)
-    assert life.world.lives.ever == {"late": [1]}
+    assert life.world.status.history == {"late": [1]}
     assert life.orders[10] == [ProcessAction("start", 1)]
 
 
@@ -410,7 +410,7 @@ SENSES = {"sensors": [{"kind": "bearings"}, {"kind": "touch"}, {"kind": "line_of
 
 def drawn(run_seed: int = 1, **rates: Any) -> list[dict[str, Any]]:
     chosen = faulty(random_faults=RATES | rates, robots=SENSES)
-    return [table.model_dump() for _, table in assemble(chosen, run_seed).fault_tables]
+    return [table.model_dump() for table in assemble(chosen, run_seed).schedule.tables]
 
 
 def test_a_random_schedule_has_its_rates_is_sorted_and_can_be_run_as_written() -> None:
@@ -418,7 +418,7 @@ def test_a_random_schedule_has_its_rates_is_sorted_and_can_be_run_as_written() -
     assert [fault["at_s"] for fault in found] == sorted(fault["at_s"] for fault in found)
     # 10 kinds x 4000 / h x 2 s: 22 expected a seed, Poisson.
     chosen = faulty(random_faults=RATES, robots=SENSES)
-    arena = assemble(chosen, 1).arena
+    arena = assemble(chosen, 1).scene.arena
     schedules = [random_faults(chosen, seed, arena) for seed in range(300)]
     assert len({fault.kind for schedule in schedules for fault in schedule}) == 10
     counts = [len(schedule) for schedule in schedules]
@@ -440,7 +440,7 @@ def test_a_random_schedule_depends_on_its_seed_and_no_kind_on_another() -> None:
 def test_random_stuck_switches_are_drawn_among_those_that_the_sensor_has(touch: dict[str, int]) -> None:
     robots = {"sensors": [{"kind": "touch", **touch}]}
     chosen = faulty(random_faults={"stuck_touch_per_h": 4_000.0}, robots=robots)
-    arena = assemble(faulty(robots=robots), 1).arena
+    arena = assemble(faulty(robots=robots), 1).scene.arena
     tables = [table for seed in range(100) for table in random_faults(chosen, seed, arena)]
     # About 220 faults: the chance that one switch of 12 is never drawn is below 1e-7.
     assert {table.parameters["switch"] for table in tables} == set(range(touch.get("switches", 8)))

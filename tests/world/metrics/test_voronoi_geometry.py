@@ -19,7 +19,7 @@ from zwerm.world.fields.linear import Linear
 from zwerm.world.geometry import tessellation
 from zwerm.world.geometry.quadrature import integrate
 from zwerm.world.geometry.tessellation import Tessellation
-from zwerm.world.metrics.voronoi_coverage import VoronoiCells
+from zwerm.world.geometry.voronoi_cells import VoronoiCells
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 HEPTAGON = [(0.5 + 0.5 * math.cos(angle), 0.5 + 0.4 * math.sin(angle)) for angle in np.arange(7) * (math.tau / 7)]

@@ -10,7 +10,7 @@ from zwerm.run.assembly import assemble
 from zwerm.wire.messages import Command
 from zwerm.world.scene import Scene
 from zwerm.world.tick import telemetry
-from zwerm.world.tick.telemetry import DISTINCT_NAMES_MAX, TelemetryRecord, TelemetrySink
+from zwerm.world.tick.telemetry import DISTINCT_NAMES_MAX, TelemetrySink
 
 
 @pytest.fixture
@@ -26,8 +26,8 @@ def at(scene: Scene, tick: int) -> Scene:
 
 def test_numbers_are_kept_as_columns_in_the_order_of_the_run(scene: Scene) -> None:
     sink = TelemetrySink(0.1)
-    sink.accept(at(scene, 2), 1, Command(telemetry={"battery": 0.5, "load": 2.0}), decides=False)
-    sink.accept(at(scene, 4), 0, Command(telemetry={"battery": 0.75}), decides=False)
+    sink.accept(at(scene, 2), 1, Command(telemetry={"battery": 0.5, "load": 2.0}))
+    sink.accept(at(scene, 4), 0, Command(telemetry={"battery": 0.75}))
     found = sink.arrays()
     assert found.tick.tolist() == [2, 2, 4]
     assert found.time_s.tolist() == pytest.approx([0.2, 0.2, 0.4])
@@ -40,7 +40,7 @@ def test_numbers_are_kept_as_columns_in_the_order_of_the_run(scene: Scene) -> No
 def test_a_metric_of_telemetry_is_the_mean_over_nodes_of_each_nodes_newest_value(scene: Scene) -> None:
     sink = TelemetrySink()
     for node, value in ((0, 9.0), (0, 1.0), (1, 4.0)):
-        sink.accept(scene, node, Command(telemetry={"load": value}), decides=False)
+        sink.accept(scene, node, Command(telemetry={"load": value}))
     assert sink.metrics() == {"telemetry.load": 2.5}
     assert TelemetrySink().metrics() == {}
 
@@ -48,7 +48,7 @@ def test_a_metric_of_telemetry_is_the_mean_over_nodes_of_each_nodes_newest_value
 def test_beyond_its_cap_numbers_are_counted_and_not_kept_but_the_newest_values_are(scene: Scene) -> None:
     sink = TelemetrySink(numbers_max=3)
     for value in range(5):
-        sink.accept(scene, 0, Command(telemetry={"load": float(value)}), decides=False)
+        sink.accept(scene, 0, Command(telemetry={"load": float(value)}))
     assert sink.arrays().value.tolist() == [0.0, 1.0, 2.0]
     assert sink.metrics() == {"telemetry.load": 4.0, "telemetry_dropped": 2.0}
 
@@ -56,7 +56,7 @@ def test_beyond_its_cap_numbers_are_counted_and_not_kept_but_the_newest_values_a
 def test_names_beyond_the_limit_of_a_run_are_dropped(scene: Scene) -> None:
     sink = TelemetrySink()
     for number in range(DISTINCT_NAMES_MAX + 5):
-        sink.accept(scene, 0, Command(telemetry={f"n{number}": 1.0}), decides=False)
+        sink.accept(scene, 0, Command(telemetry={f"n{number}": 1.0}))
     assert sink.dropped == 5
     assert len(sink.metrics()) == DISTINCT_NAMES_MAX + 1
 
@@ -66,7 +66,7 @@ def test_snapshots_share_the_positions_of_their_tick_and_are_bounded_by_their_by
     arrays = here.position.nbytes + here.present.nbytes
     sink = TelemetrySink(bytes_max=20 + arrays)
     for node in range(3):
-        sink.accept(here, node, Command(snapshot=bytes(10)), decides=False)
+        sink.accept(here, node, Command(snapshot=bytes(10)))
     assert [each.node for each in sink.snapshots] == [0, 1]
     assert all(each.position is here.position for each in sink.snapshots)
     assert sink.dropped == 1
@@ -81,7 +81,7 @@ def test_five_robots_over_3000_ticks_stay_within_the_stated_bound_of_memory(scen
         for tick in range(3_000):
             here = at(scene, tick)
             for node in range(5):
-                sink.accept(here, node, Command(telemetry=numbers, snapshot=bytes(10_000)), decides=False)
+                sink.accept(here, node, Command(telemetry=numbers, snapshot=bytes(10_000)))
         held, _ = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
@@ -93,27 +93,19 @@ def test_five_robots_over_3000_ticks_stay_within_the_stated_bound_of_memory(scen
 
 def test_a_listener_gets_every_record_whatever_is_dropped(scene: Scene) -> None:
     sink = TelemetrySink(numbers_max=0, bytes_max=0)
-    heard: list[TelemetryRecord] = []
+    heard: list[telemetry.TelemetryRecord] = []
     sink.listeners.append(heard.append)
-    sink.accept(scene, 3, Command(telemetry={"x": True}, snapshot=b"s"), decides=False)
-    sink.accept(scene, 3, Command(), decides=False)
+    sink.accept(scene, 3, Command(telemetry={"x": True}, snapshot=b"s"))
+    sink.accept(scene, 3, Command())
     [record] = heard
     assert (record.node, record.numbers, record.snapshot) == (3, {"x": 1.0}, b"s")
     assert sink.dropped == 2
 
 
-def test_only_a_node_that_decides_ends_the_run_as_impossible(scene: Scene) -> None:
-    sink = TelemetrySink()
-    sink.accept(scene, 2, Command(gave_up="lost"), decides=False)
-    assert sink.gave_up == ""
-    sink.accept(scene, 2, Command(gave_up="lost"), decides=True)
-    assert sink.gave_up == "node 2 gave up: lost"
-
-
 def test_positions_of_a_snapshot_are_those_of_its_tick_after_the_robots_have_moved() -> None:
     world = assemble(scenario(robots={"controller": "reporters:Silent", "sensors": []}), 1)
     before = world.scene.position.copy()
-    world.telemetry.accept(world.scene, 0, Command(snapshot=b"s"), decides=False)
+    world.telemetry.accept(world.scene, 0, Command(snapshot=b"s"))
     from zwerm.wire.messages import WheelSpeeds, encode
 
     for tick in range(3):

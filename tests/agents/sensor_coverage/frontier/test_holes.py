@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.holes import Hole, holes, is_bare, sides
-from zwerm.agents.sensor_coverage.frontier.parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.maths.simplicial import FlagComplex

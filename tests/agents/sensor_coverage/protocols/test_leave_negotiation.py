@@ -118,7 +118,7 @@ def drive(scenario: Scenario, seed: int) -> tuple[World, list[LocalRobot]]:
         held = [each.local_map.slot for each in robots() if each.push is None and each.local_map.slot != NOWHERE]
         assert len(held) == len(set(held))
 
-    LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), look).run()
+    LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), [look]).run()
     return world, robots()
 
 
@@ -150,7 +150,7 @@ def test_the_removal_metric_finds_a_removal_that_opens_a_hole() -> None:
 
     def report(node: int, member: bool) -> None:
         command = Command(snapshot=encode_snapshot(MembershipSnapshot(member)))
-        world.telemetry.accept(world.scene, node, command, decides=False)
+        world.telemetry.accept(world.scene, node, command)
 
     for node in (1, 2):  # the hub of a wheel, and then one of its rim: a hole comes, and goes
         report(node, False)

@@ -1,0 +1,53 @@
+"""The order of one tick, the same for every driver.
+
+A driver decides how long it waits for answers and how programs are started and stopped. The world decides everything else,
+also when the run ends.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+
+from zwerm.link import WorldLink
+from zwerm.world.tick.node_status import ProcessAction
+from zwerm.world.world import World
+
+TickObserver = Callable[[World], object]
+
+
+class Driver(ABC):
+    """Drives a world over a link. Every one of `observers` is called with the world once a tick has ended.
+
+    `reason` says why a run failed.
+    """
+
+    def __init__(self, world: World, link: WorldLink, observers: Sequence[TickObserver] = ()) -> None:
+        self._world = world
+        self._link = link
+        self._observers = tuple(observers)
+        self.reason = ""
+
+    def run(self) -> str:
+        """Drive until the run ends, and return its outcome."""
+        world = self._world
+        while (ending := world.ending()) is None:
+            self._carry_out(world.begin())
+            self._exchange()
+            if world.ending(within_tick=True) is None:
+                world.advance()
+                for observe in self._observers:
+                    observe(world)
+        self.reason = ending.reason
+        return ending.outcome
+
+    @property
+    @abstractmethod
+    def lost(self) -> int:
+        """How many observations living nodes have not answered."""
+
+    @abstractmethod
+    def _carry_out(self, actions: Sequence[ProcessAction]) -> None:
+        """Carry out the actions of this tick on the nodes' programs."""
+
+    @abstractmethod
+    def _exchange(self) -> None:
+        """Send the observations of this tick, and take the answers."""

@@ -1,0 +1,102 @@
+"""Completion: the one rule that decides when a run ends, and with which outcome.
+
+A run ends, in this order of precedence, when a node crashed and the scenario says `robots.on_crash = "fail"`; when a deciding
+node gave up; when the task is done; or at the time limit. Both drivers ask the same rule after every tick.
+"""
+
+from collections.abc import Collection, Mapping
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from zwerm.catalogue import BASE
+from zwerm.scenario.tables import Scenario
+from zwerm.world.scene import Bools
+
+# The outcomes of a run. The driver's caller sets INTERRUPTED.
+COMPLETED: Final = "completed"
+TIME_LIMIT: Final = "time-limit"
+FAILED: Final = "failed"
+INTERRUPTED: Final = "interrupted"
+
+
+class Ending(NamedTuple):
+    """The outcome of a run, and the reason of a failure."""
+
+    outcome: str
+    reason: str = ""
+
+
+class Completion:
+    """Collects the nodes' reports on the task: done, or given up.
+
+    The deciding nodes are the coordinator, unless the algorithm's bases decide, and then the base stations. If there are any,
+    the first one alone completes the task. Otherwise all living robots have to be done, and robots that left count as done.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._robots = scenario.robots.count
+        self._coordinator = self._robots if scenario.coordinator is not None else None
+        self._last_tick = round(scenario.time.duration_s / scenario.time.dt_s)
+        self._fails_on_crash = scenario.robots.on_crash == "fail"
+        stations = range(scenario.base.stations if scenario.base is not None else 0)
+        bases_decide = scenario.variant is not None and scenario.variant.decides == BASE
+        centre = [] if self._coordinator is None or bases_decide else [self._coordinator]
+        self._deciding = [*centre, *stations]
+        self._done: Bools = np.zeros(self._robots + (self._coordinator is not None), dtype=np.bool_)
+        self.any_done = False
+        self._gave_up = ""
+
+    def report(self, node: int, done: bool) -> None:
+        """Take the `done` field of a node's newest command; needless while no node was `any_done` and `done` is false."""
+        self._done[node] = done
+        self.any_done = True
+
+    def give_up(self, node: int, reason: str, dead: Collection[int]) -> None:
+        """Take that a node gave up; it counts only from a node that decides.
+
+        A base station decides beside a deciding coordinator only while the coordinator is in `dead`.
+        """
+        centre = self._coordinator
+        if node in self._deciding and (centre not in self._deciding or node == centre or centre in dead):
+            self._gave_up = f"node {node} gave up: {reason}"
+
+    def restart(self, node: int) -> None:
+        """Drop a node's report: its program lost its memory."""
+        self._done[node] = False
+
+    @property
+    def done_fraction(self) -> float:
+        """The fraction of robots whose newest command says that their part is done."""
+        return float(self._done[: self._robots].mean())
+
+    def crash_ending(self, tick: int, crashed: Mapping[int, str]) -> Ending | None:
+        """Return the ending that the first of the `crashed` nodes causes at `tick`, or None."""
+        if not crashed or not self._fails_on_crash:
+            return None
+        node, reason = next(iter(crashed.items()))
+        return Ending(FAILED, f"node {node} crashed at tick {tick}: {reason}")
+
+    def completed(self, exited: Collection[int], dead: Collection[int]) -> bool:
+        """Tell whether the task is done; `exited` are the robots that left, `dead` the nodes that never return."""
+        if self._deciding:
+            return bool(self._done[self._deciding[0]])
+        if not (self.any_done or exited):
+            return False
+        over = self._done.copy()
+        over[list(exited)] = True
+        over[list(dead)] = True
+        return bool(over.all()) and len(dead) < self._robots
+
+    def ending(
+        self, tick: int, crashed: Mapping[int, str], exited: Collection[int], dead: Collection[int]
+    ) -> Ending | None:
+        """Return how the run ends before `tick`, or None if it goes on."""
+        failed = self.crash_ending(tick, crashed)
+        if failed is not None:
+            return failed
+        if self._gave_up:
+            return Ending(FAILED, self._gave_up)
+        if self.completed(exited, dead):
+            return Ending(COMPLETED)
+        return Ending(TIME_LIMIT) if tick >= self._last_tick else None

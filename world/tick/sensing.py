@@ -1,0 +1,65 @@
+"""Sensing: reads all sensors of a swarm and makes the encoded observations of one tick."""
+
+from collections.abc import Iterator, Sequence
+from itertools import chain, repeat
+from typing import Any
+
+import numpy as np
+
+from zwerm.wire.messages import SENSOR_FIELDS, Observation, Packet, encode
+from zwerm.world.faults import Fault
+from zwerm.world.faults.sensing import read
+from zwerm.world.scene import Ints, Scene
+from zwerm.world.sensors import Sensor
+from zwerm.world.tick.precompute import PrecomputedReadings, Readings
+
+Inboxes = Sequence[tuple[Packet, ...]]
+
+
+class Sensing:
+    """The sensors of every robot, and the sensor faults that are in force, `faults`."""
+
+    def __init__(self, sensors: Sequence[Sensor]) -> None:
+        self.faults: Sequence[Fault] = ()
+        self.sensors = {sensor.field: sensor for sensor in sensors}
+        # One column of readings for each field, up to the last field that a sensor fills.
+        last = max((SENSOR_FIELDS.index(field) for field in self.sensors), default=-1)
+        self._columns = SENSOR_FIELDS[: last + 1]
+        self._robots: Ints = np.zeros(0, dtype=np.int64)  # observed last
+        self._precomputed: PrecomputedReadings | None = None
+
+    def readings(self, scene: Scene, robots: Ints) -> Readings:
+        """Return the readings of each of `robots` in `scene`, by field; empty without robots."""
+        precomputed, self._precomputed, self._robots = self._precomputed, None, robots
+        if precomputed is not None and not self.faults and precomputed.valid_for(scene, robots):
+            return precomputed.readings
+        return self._read_all(scene, robots) if len(robots) else {}
+
+    def precompute(self, scene: Scene) -> None:
+        """Read the sensors of the robots that were observed last in the next scene, unless a sensor fault is in force."""
+        if len(self._robots) and not self.faults:
+            self._precomputed = PrecomputedReadings(scene, self._robots, self._read_all(scene, self._robots))
+
+    def read(self, field: str, scene: Scene, robots: Ints) -> Sequence[Any]:
+        """Return the readings of one field for each of `robots`."""
+        sensor = self.sensors[field]
+        return read(sensor, self.faults, scene, robots) if self.faults else sensor.read(scene, robots)
+
+    def observations(
+        self, scene: Scene, robots: int, nodes: int, readings: Readings, inboxes: Inboxes | None
+    ) -> Iterator[bytes]:
+        """Yield the encoded observation of each node: `robots` robots, and after them nodes without sensors up to `nodes`.
+
+        `inboxes` holds the packets of each node; None means that nobody receives any.
+        """
+        columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]
+        ticks, times = repeat(scene.tick, robots), repeat(scene.time_s)
+        packets: Any = repeat(()) if inboxes is None else inboxes
+        made: Iterator[Observation] = map(Observation, ticks, times, packets, *columns)
+        if robots < nodes:
+            rest = [()] * (nodes - robots) if inboxes is None else inboxes[robots:]
+            made = chain(made, (Observation(scene.tick, scene.time_s, inbox) for inbox in rest))
+        return map(encode, made)
+
+    def _read_all(self, scene: Scene, robots: Ints) -> Readings:
+        return {field: self.read(field, scene, robots) for field in self.sensors}

@@ -1,0 +1,21 @@
+"""The true poses of all robots over time."""
+
+from dataclasses import dataclass
+
+from zwerm.world.scene import Bools, Floats, Ints
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Positions:
+    """The true poses of n robots at k times. Where a robot is not in the arena its pose is nan.
+
+    A scenario of less than 2,000 ticks has a sample at every tick; a longer one at even intervals of at most a thousandth of
+    its duration, and at the end.
+    """
+
+    time_s: Floats  # (k,) [s]
+    node: Ints  # (n,)
+    x_m: Floats  # (k, n) [m]
+    y_m: Floats  # (k, n) [m]
+    heading_rad: Floats  # (k, n) [rad], not wrapped
+    present: Bools  # (k, n)
