@@ -9,6 +9,7 @@ from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role, algorithm_of, names
 from zwerm.errors import ControllerError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
+from zwerm.world.bodies.drives import find_drive
 
 
 def controller_for(scenario: Scenario, role: Role, name: str) -> str:
@@ -56,7 +57,7 @@ def node_specs(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
         radius_m=robots.body.radius_m,
         max_speed_m_s=robots.body.max_speed_m_s,
         max_turn_rad_s=robots.body.max_turn_rad_s,
-        wheel_base_m=robots.body.wheel_base_m if robots.body.kind == "differential" else 0.0,
+        wheel_base_m=robots.body.wheel_base_m if find_drive(robots.body.kind).has_wheels else 0.0,
     )
     sensors = tuple(table.kind for table in robots.sensors)
     channels = (("robots",) if scenario.radio is not None else ()) + (("uplink",) if scenario.coordinator else ())

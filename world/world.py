@@ -35,7 +35,7 @@ from zwerm.world.tick.lifecycle import Lifecycle
 from zwerm.world.tick.node_status import NodeAnswer, NodeStatus, ProcessAction
 from zwerm.world.tick.sensing import Sensing
 from zwerm.world.tick.telemetry import TelemetrySink
-from zwerm.world.tick.wakes import SIGNATURES, Wakes
+from zwerm.world.tick.wakes import WakeEvent, Wakes
 
 Send = Callable[[int, bytes], object]
 
@@ -64,7 +64,8 @@ class World:
         self.telemetry = TelemetrySink(dt_s)
         self.trace = Trace()
         self._sensing = Sensing(sensors)
-        self._wakes = Wakes(nodes, dt_s)
+        events = {each.field: WakeEvent(each.wake_event, each.signature) for each in sensors if each.wake_event}
+        self._wakes = Wakes(nodes, dt_s, events)
         deadman_ticks = ticks(scenario.time.deadman_s, dt_s)
         self._lifecycle = Lifecycle(self.status, self._wakes, self.bodies, self.medium, self.completion, deadman_ticks)
         for node in [*self.scene.present_ids().tolist(), *coordinator]:
@@ -111,7 +112,7 @@ class World:
                 send(node, observation)
         # Bookkeeping comes after sending: the nodes work meanwhile.
         self.intake.begin_tick(tick, nodes, observations)
-        for field in SIGNATURES:
+        for field in self._wakes.events:
             if field in readings:
                 self._wakes.remember(field, nodes[: len(robots)], readings[field])
         return nodes, observations
@@ -217,8 +218,8 @@ class World:
         """Wake the sleepers whose contacts or visible ids have changed."""
         if not self.scene.moved.any():
             return
-        for field in SIGNATURES:
-            if field in self._sensing.sensors and len(watchers := self._wakes.watchers(field)):
+        for field in self._wakes.events:
+            if len(watchers := self._wakes.watchers(field)):
                 self._wakes.note_readings(field, watchers, self._sensing.read(field, self.scene, watchers), self.tick)
 
     def _apply(self, answers: Sequence[NodeAnswer]) -> list[tuple[int, tuple[Transmission, ...]]]:

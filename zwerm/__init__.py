@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         Wake,
         WheelSpeeds,
     )
+    from zwerm.world.bodies import Drive
     from zwerm.world.faults import Fault, FaultContext, FaultTable, ProgramStates
     from zwerm.world.fields import Field
     from zwerm.world.metrics import Metric, MetricContext, Truth
@@ -72,6 +73,7 @@ _NAMES: Final = {
     "zwerm.world.scene": ("Scene",),
     "zwerm.world.radio": ("ModelContext", "Packets", "RadioModel", "RadioModelTable", "Transmissions", "Verdict"),
     "zwerm.world.faults": ("Fault", "FaultContext", "FaultTable", "ProgramStates"),
+    "zwerm.world.bodies": ("Drive",),
     "zwerm.world.fields": ("Field",),
     "zwerm.world.metrics": ("Metric", "MetricContext", "Truth"),
     "zwerm.world.tick.telemetry": ("TelemetryArrays", "TelemetryRecord"),
@@ -94,6 +96,7 @@ __all__ = [
     "Controller",
     "ControllerError",
     "Displacement",
+    "Drive",
     "Fault",
     "FaultContext",
     "FaultTable",

@@ -190,6 +190,12 @@ FIELDS: Final = {
     "linear": "zwerm.world.fields.linear:Linear",
 }
 
+# Drives, by the `kind` of `[robots.body]`.
+DRIVES: Final = {
+    "differential": "zwerm.world.bodies.differential:Differential",
+    "holonomic": "zwerm.world.bodies.holonomic:Holonomic",
+}
+
 RADIO_MODELS: Final = {
     "range": "zwerm.world.radio.models.range:DiscRange",
     "line_of_sight": "zwerm.world.radio.models.line_of_sight:LineOfSightModel",
@@ -235,7 +241,15 @@ METRICS: Final = {
 
 def plugins() -> dict[str, Mapping[str, str]]:
     """Return the rows of every kind of plug-in."""
-    return {"sensor": SENSORS, "field": FIELDS, "radio model": RADIO_MODELS, "metric": METRICS, "command": COMMANDS}
+    return {
+        "sensor": SENSORS,
+        "field": FIELDS,
+        "drive": DRIVES,
+        "radio model": RADIO_MODELS,
+        "fault": FAULTS,
+        "metric": METRICS,
+        "command": COMMANDS,
+    }
 
 
 def row_of(file_name: str) -> Algorithm | None:

@@ -11,18 +11,24 @@ from typing import Final
 import msgspec
 import numpy as np
 
+from zwerm.catalogue import DRIVES
 from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.plugin_names import class_named
 from zwerm.scenario.tables import BodyTable
 from zwerm.wire.messages import BodyVelocity, WheelSpeeds
+from zwerm.world.bodies import Drive, Velocities
 from zwerm.world.scene import Floats
 
 # Ticks of noise drawn at once. Draws are keyed by tick, so the size of a block changes only the cost.
 _BLOCK_TICKS: Final = 64
 
-_KINDS: Final[dict[str, type[BodyVelocity] | type[WheelSpeeds]]] = {
-    "differential": WheelSpeeds,
-    "holonomic": BodyVelocity,
-}
+
+def find_drive(kind: str) -> type[Drive]:
+    """Return the class that `kind` names. Raises ValueError, in one line, where there is none or it is no drive."""
+    found = class_named(DRIVES.get(kind, kind), "drive", DRIVES)
+    if not issubclass(found, Drive) or getattr(found, "command", None) not in (BodyVelocity, WheelSpeeds):
+        raise ValueError(f"{kind} is no drive: expected a subclass of zwerm.Drive whose `command` is a type of drive")
+    return found
 
 
 class Drives:
@@ -34,17 +40,14 @@ class Drives:
     def __init__(self, body: BodyTable, count: int, draws: Draws) -> None:
         self._body = body
         self._draws = draws
-        self.kind: type[BodyVelocity] | type[WheelSpeeds] = _KINDS[body.kind]
+        self._drive = find_drive(body.kind)(body)
+        self.kind = self._drive.command
         self._axes = len(self.kind.__struct_fields__)
         self._commanded: Floats = np.zeros((count, self._axes))
         self.lagging = body.latency_ticks > 0
         self._pending = [self._commanded.copy() for _ in range(body.latency_ticks - 1)]
         self._noise_block = -1
         self._noise: Floats = np.zeros((_BLOCK_TICKS, count, self._axes))
-        if body.kind == "differential":
-            self._limit: Floats = np.full(2, body.max_speed_m_s)
-        else:
-            self._limit = np.array([body.max_speed_m_s, body.max_speed_m_s, body.max_turn_rad_s])
 
     def command(self, drives: Mapping[int, BodyVelocity | WheelSpeeds]) -> None:
         """Set the new drives of some robots, all of type `kind`."""
@@ -56,7 +59,7 @@ class Drives:
         for pending in (self._commanded, *self._pending):
             pending[robot] = 0.0
 
-    def velocities(self, tick: int) -> tuple[Floats, Floats | None, Floats]:
+    def velocities(self, tick: int) -> Velocities:
         """Return (forward [m/s], left [m/s] or None, turn [rad/s]), each (n,), for the step from `tick` to the next.
 
         Call it once a tick: before `command` where drives are `lagging`, after it otherwise.
@@ -68,14 +71,7 @@ class Drives:
             acting = self._commanded
         if self._body.drive_noise_fraction:
             acting = acting * self._noise_at(tick)
-        if self._axes == 2:
-            acting = np.minimum(np.maximum(acting, -self._limit), self._limit)
-            left, right = acting[:, 0], acting[:, 1]
-            return (left + right) * 0.5, None, (right - left) / self._body.wheel_base_m
-        speed = np.hypot(acting[:, 0], acting[:, 1])
-        scale = np.minimum(1.0, self._limit[0] / np.maximum(speed, 1e-300))
-        turn = np.minimum(np.maximum(acting[:, 2], -self._limit[2]), self._limit[2])
-        return acting[:, 0] * scale, acting[:, 1] * scale, turn
+        return self._drive.velocities(acting)
 
     def _noise_at(self, tick: int) -> Floats:
         block, offset = divmod(tick, _BLOCK_TICKS)

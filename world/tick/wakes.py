@@ -1,45 +1,45 @@
 """Wake rule: which nodes are observed at a tick. It is the same in every runner, and a sleeping robot costs nothing.
 
 A node that gave no wake is observed at every tick. A node with a wake sleeps until its time comes or one of its events
-happens: a packet waits for it, its closed touch switches differ from those it observed last, or the ids it sees do. Contacts
-and ids are compared after every tick at which any robot moved, entered or left.
+happens: a packet waits for it, or the reading of a sensor differs from the one it observed last. A sensor states its event
+(`Sensor.wake_event`, `Sensor.signature`): touch, a change of the closed switches; bearings, of the ids in sight. Readings are
+compared after every tick at which any robot moved, entered or left.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any, Final
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from zwerm.wire.messages import Bearing, Contact, Wake
+from zwerm.wire.messages import Wake
 from zwerm.world.scene import Bools, Floats, Ints
 
 NEVER: Final = math.inf
 
 
-def _closed(reading: Sequence[Contact]) -> Any:
-    return tuple(contact.bearing_rad for contact in reading)
+class WakeEvent(NamedTuple):
+    """The event of one sensor: the field of `Wake` that asks for it, and the part of a reading whose change it is."""
 
-
-def _ids(reading: Sequence[Bearing]) -> Any:
-    return tuple(bearing.node for bearing in reading)
-
-
-# The part of a sensor's reading whose change is an event, by the field of the observation.
-SIGNATURES: Final[dict[str, Callable[[Any], Any]]] = {"touch": _closed, "bearings": _ids}
+    asked_by: str
+    signature: Callable[[Any], Hashable]
 
 
 class Wakes:
-    """The wake state of `count` nodes. No node is awake before `admit`."""
+    """The wake state of `count` nodes. No node is awake before `admit`.
 
-    def __init__(self, count: int, dt_s: float) -> None:
+    `events` are the sensors' wake events, by the field of the observation.
+    """
+
+    def __init__(self, count: int, dt_s: float, events: Mapping[str, WakeEvent]) -> None:
+        self.events = dict(events)
         self._dt_s = dt_s
         self._due: Floats = np.full(count, NEVER)  # the tick of the next observation
         self._on_packet: Bools = np.zeros(count, dtype=np.bool_)
-        self._watching: dict[str, Bools] = {field: np.zeros(count, dtype=np.bool_) for field in SIGNATURES}
-        self._newest: dict[str, dict[int, Any]] = {field: {} for field in SIGNATURES}  # readings
+        self._watching: dict[str, Bools] = {field: np.zeros(count, dtype=np.bool_) for field in self.events}
+        self._newest: dict[str, dict[int, Any]] = {field: {} for field in self.events}  # readings
         self._unmerged: dict[str, tuple[Sequence[int], Sequence[Any]]] = {}  # the newest of all nodes observed together
-        self._seen: dict[str, dict[int, Any]] = {field: {} for field in SIGNATURES}  # signatures of watching nodes
+        self._seen: dict[str, dict[int, Any]] = {field: {} for field in self.events}  # signatures of watching nodes
         self._asleep: dict[int, None] = {}
         self._ids: Ints = np.zeros(0, dtype=np.int64)
         self._stale = True
@@ -61,10 +61,11 @@ class Wakes:
         due = NEVER if wake.at_s is None else float(np.ceil(wake.at_s / self._dt_s - 1e-9))
         self._due[node] = max(due, tick + 1)
         self._on_packet[node] = wake.on_packet
-        for field, watching in (("touch", wake.on_contact), ("bearings", wake.on_visible)):
+        for field, event in self.events.items():
+            watching = getattr(wake, event.asked_by)
             self._watching[field][node] = watching
             if watching and node in self._newest[field]:
-                self._seen[field][node] = SIGNATURES[field](self._newest[field][node])
+                self._seen[field][node] = event.signature(self._newest[field][node])
         self._asleep[node] = None
         self._stale = True
 
@@ -80,7 +81,7 @@ class Wakes:
 
     def note_readings(self, field: str, nodes: Ints, readings: Sequence[Any], tick: int) -> None:
         """Wake those of `nodes` whose reading differs from the one they observed last."""
-        signature, seen = SIGNATURES[field], self._seen[field]
+        signature, seen = self.events[field].signature, self._seen[field]
         for node, reading in zip(nodes.tolist(), readings, strict=True):
             if signature(reading) != seen.get(node):
                 self._due[node] = tick

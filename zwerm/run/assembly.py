@@ -12,6 +12,7 @@ from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
+from zwerm.world.bodies.drives import find_drive
 from zwerm.world.fields import Field
 from zwerm.world.fields.registry import make_field
 from zwerm.world.metrics.observers import Observers, make_observers
@@ -65,6 +66,7 @@ def prepare(scenario: Scenario) -> Prepared:
     field, table = None, scenario.field
     sensors, observers = None, None
     arena = _attempt(lambda: Arena.from_table(scenario.arena, scenario.folder), scenario, mistakes)
+    _attempt(lambda: check_drive(scenario), scenario, mistakes)
     _attempt(lambda: check_controllers(scenario), scenario, mistakes)
     if arena is not None and table is not None:
         bounds = arena.bounds
@@ -92,6 +94,14 @@ def _sensors(scenario: Scenario, arena: Arena, field: Field | None) -> Sequence[
     landmarks = np.array(scenario.landmarks, dtype=np.float64).reshape(-1, 2)
     surroundings = Surroundings(arena, scenario.robots.count, landmarks=landmarks, field=field)
     return make_sensors(scenario.robots.sensors, surroundings, "robots.sensors", scenario.place)
+
+
+def check_drive(scenario: Scenario) -> None:
+    """Find the drive of the robots' body. Raises ScenarioError where there is none of that name."""
+    try:
+        find_drive(scenario.robots.body.kind)
+    except ValueError as error:
+        raise ScenarioError([f"robots.body.kind: {error}"]) from None
 
 
 def check_controllers(scenario: Scenario) -> None:

@@ -72,9 +72,12 @@ class ArenaTable(Table):
 
 
 class BodyTable(Table):
-    """A robot's body. A command takes effect `latency_ticks` ticks after the observation it answers."""
+    """A robot's body. A command takes effect `latency_ticks` ticks after the observation it answers.
 
-    kind: Literal["differential", "holonomic"] = "differential"
+    `kind` is the drive: `differential`, `holonomic`, or a class of your own as module:Class.
+    """
+
+    kind: str = "differential"
     radius_m: Positive = 0.037
     mass_kg: Positive = 0.152
     wheel_base_m: Positive = 0.051
