@@ -1,6 +1,6 @@
 """Node specifications: the controller class and the Setup of every node of a run."""
 
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
@@ -8,8 +8,12 @@ from zwerm.agents.runtime.contract import Body, Setup
 from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role, algorithm_of, names
 from zwerm.errors import ControllerError
 from zwerm.maths.keyed_random import Draws
+from zwerm.scenario.parameter_files import with_file_texts
 from zwerm.scenario.tables import Scenario
 from zwerm.world.bodies.drives import find_drive
+
+# The table of a scenario that names the controller of each role.
+TABLES: Final[dict[Role, str]] = {ROBOT: "robots", BASE: "base", COORDINATOR: "coordinator"}
 
 
 def controller_for(scenario: Scenario, role: Role, name: str) -> str:
@@ -77,7 +81,7 @@ def node_specs(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
                 stream_key=key,
                 body=body if placed else None,
                 channels=channels if placed else ("uplink",),
-                parameters=parameters,
+                parameters=with_file_texts(parameters, scenario.folder, f"{TABLES[role]}.parameters"),
                 services=services,
                 bases=() if placed or scenario.base is None else tuple(range(scenario.base.stations)),
             ),

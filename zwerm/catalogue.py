@@ -133,6 +133,31 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         scenarios=("voronoi-*",),
     ),
     Algorithm(
+        name="landmark_exploration",
+        title="Landmark-based exploration with bearings and contact only",
+        paper="Ramaithitima, Bhattacharya 2018",
+        page="papers/landmark-exploration.md",
+        controllers={
+            ROBOT: {
+                "landmark-exploration": "zwerm.agents.landmark_exploration:Explorer",
+                "landmark-navigator": "zwerm.agents.landmark_exploration:Navigator",
+            },
+            COORDINATOR: {"landmark-exploration": "zwerm.coordinator.landmark_exploration:LandmarkCoordinator"},
+        },
+        variants=(
+            Variant({"map": "coordinator", "assignment": "coordinator"}, decides=COORDINATOR),
+            Variant({"map": "coordinator", "assignment": "claims"}, decides=COORDINATOR),
+            Variant({"map": "gossip", "assignment": "coordinator"}, decides=COORDINATOR, radio=True),
+            Variant({"map": "gossip", "assignment": "claims"}, decides=ROBOT, coordinator=False, radio=True),
+        ),
+        metrics=(
+            "zwerm.world.metrics.landmark_exploration:Exploration",
+            "zwerm.world.metrics.landmark_exploration:Navigation",
+        ),
+        layers=("zwerm.view.landmark_exploration:LandmarkComplexLayer",),
+        scenarios=("landmark-*",),
+    ),
+    Algorithm(
         name="computation_free",
         title="Spatial coverage without computation",
         paper="Özdemir, Gauci, Kolling, Hall, Groß 2019",

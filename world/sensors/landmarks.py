@@ -24,11 +24,12 @@ _SHORT = 1e-9
 
 
 class LandmarksTable(Table):
-    """Which landmarks are seen, and how well."""
+    """Which landmarks are seen, and how well. With `presence_only` every bearing reads 0: only ids are sensed."""
 
     range_m: Positive | None = None
     through_walls: bool = False
     sd_rad: NonNegative = 0.0
+    presence_only: bool = False
 
 
 class Landmarks(Sensor):
@@ -43,6 +44,7 @@ class Landmarks(Sensor):
         if len(surroundings.landmarks) == 0:
             raise ValueError("the landmark sensor needs landmarks, and the scenario has none")
         self._range_m, self._sd_rad = parameters.range_m, parameters.sd_rad
+        self._presence_only = parameters.presence_only
         self._through_walls = parameters.through_walls or surroundings.arena.is_convex
         self._landmarks = surroundings.landmarks
         self._tree = cKDTree(surroundings.landmarks)
@@ -55,12 +57,14 @@ class Landmarks(Sensor):
         if not self._through_walls:
             clear = self._clear(scene, robots, robots[row], landmark)
             row, landmark = row[clear], landmark[clear]
+        ends = np.searchsorted(row, np.arange(len(robots)), side="right")
+        if self._presence_only:
+            return portions([LandmarkBearing(each, 0.0) for each in landmark.tolist()], ends)
         robot = robots[row]
         dx, dy = (self._landmarks[landmark] - scene.position[robot]).T
         bearing = np.arctan2(dy, dx) - scene.heading[robot]
         if self._sd_rad > 0.0:
             bearing += self._sd_rad * scene.draws.normal("sensor.landmarks", scene.tick, robot, landmark)
-        ends = np.searchsorted(row, np.arange(len(robots)), side="right")
         return portions(list(map(LandmarkBearing, landmark.tolist(), wrap(bearing).tolist())), ends)
 
     def _within_range(self, scene: Scene, robots: Ints) -> tuple[Ints, Ints]:

@@ -10,8 +10,10 @@ from zwerm.catalogue import BASE, COORDINATOR, ROBOT, SENSORS, Role
 from zwerm.deploy.node_specs import controller_for
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
+from zwerm.scenario.parameter_files import with_file_texts
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
+from zwerm.world.arena.scatter import with_landmarks
 from zwerm.world.bodies.drives import find_drive
 from zwerm.world.fields import Field
 from zwerm.world.fields.registry import make_field
@@ -34,6 +36,7 @@ def assemble_run(scenario: Scenario, seed: int) -> tuple[World, Observers]:
 
     Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the faults and the placement.
     """
+    scenario = _with_landmarks(scenario, seed)
     arena, sensors, observers = prepare(scenario)
     mistakes: list[str] = []
     world = _attempt(lambda: World(scenario, seed, arena, sensors), scenario, mistakes)
@@ -62,6 +65,7 @@ def prepare(scenario: Scenario) -> Prepared:
 
     Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
     """
+    scenario = _with_landmarks(scenario, 1)
     mistakes: list[str] = []
     field, table = None, scenario.field
     sensors, observers = None, None
@@ -78,6 +82,16 @@ def prepare(scenario: Scenario) -> Prepared:
     if arena is None or sensors is None or observers is None or mistakes:
         raise ScenarioError(mistakes)
     return Prepared(arena, sensors, observers)
+
+
+def _with_landmarks(scenario: Scenario, seed: int) -> Scenario:
+    """Return the scenario with its landmarks scattered, or as it is where the arena has a mistake: `prepare` reports that."""
+    try:
+        return with_landmarks(scenario, seed)
+    except ScenarioError as error:
+        if any(line.startswith("scatter") for line in error.mistakes):
+            raise ScenarioError([f"{scenario.place}: {line}" for line in error.mistakes]) from None
+        return scenario
 
 
 def _attempt(make: Callable[[], T], scenario: Scenario, mistakes: list[str]) -> T | None:
@@ -136,4 +150,8 @@ def _controller_mistakes(
         for sensor in getattr(found, "sensors", ())
         if sensor not in sensors
     ]
+    try:
+        with_file_texts(parameters, scenario.folder, f"{table}.parameters")
+    except ScenarioError as error:
+        mistakes += error.mistakes
     return mistakes + struct_mistakes(parameters_of(found), parameters, f"{table}.parameters")

@@ -135,6 +135,7 @@ class RunResult:
             {name: values.tolist() for name, values in self.series.items()},
             (*layers_of(self.scenario.robots.controller), *self.scenario.pictures.layers),
             None if self.scenario.coordinator is None else self.robots,
+            self.scenario.landmarks,
         )
 
     @property

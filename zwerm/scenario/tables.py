@@ -159,6 +159,16 @@ class CoordinatorTable(Table):
     parameters: dict[str, Any] = {}
 
 
+class ScatterTable(Table):
+    """Landmarks at random places, none in a wall: every place in the arena sees one within `dispersion_m`.
+
+    They are drawn from `seed`, or else from the run's.
+    """
+
+    dispersion_m: Positive
+    seed: Annotated[int, Field(ge=0)] | None = None
+
+
 class ChannelTable(Table):
     """The models of a channel. `loss` is independent loss; `models` judge packets in order. `check` audits every tick.
 
@@ -271,6 +281,7 @@ class Scenario(Table):
     services: dict[str, str] | None = None
     field: OpenTable | None = None
     landmarks: list[Point] = []
+    scatter: ScatterTable | None = None
     radio: RadioTable | None = None
     uplink: ChannelTable | None = None
     faults: list[OpenTable] = []

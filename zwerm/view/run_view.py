@@ -13,7 +13,7 @@ class RunView:
     """The drawable part of one run: `name` is its scenario and seed, `ending` says how it ended.
 
     `cells` is (columns, rows); `snapshots` and `series` are those of the run's result; `coordinator` is the id of its node.
-    `layers` are classes of picture layers, as `module:Class`, drawn in this order over the arena.
+    `landmarks` are places [m]. `layers` are classes of picture layers, as `module:Class`, drawn in this order over the arena.
     """
 
     arena: Arena
@@ -29,6 +29,7 @@ class RunView:
     series: Mapping[str, Sequence[float]] = field(default_factory=dict)
     layers: Sequence[str] = ()
     coordinator: int | None = None
+    landmarks: Sequence[tuple[float, float]] = ()
 
     @property
     def title(self) -> str:

@@ -1,0 +1,329 @@
+"""The robot of landmark-based exploration (Ramaithitima and Bhattacharya 2018), with a coordinator or without.
+
+It knows bearings to the landmarks it sees, contact, its compass and its radio. At every tick it takes its observation into
+its map and writes what is news into its log; the log goes to the coordinator, or to the other robots by gossip. Its tasks,
+a frontier and the way there, come from the coordinator, or it chooses and claims them by itself. `services` says which.
+"""
+
+from typing import ClassVar, Final
+
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.boundary_trace import inconsistent
+from zwerm.agents.landmark_exploration.mapping.cost_utility import Offer, Policy, cost_utility, nearest_frontier
+from zwerm.agents.landmark_exploration.mapping.frontier_status import (
+    ABANDONED,
+    BOUNDARY,
+    CLEAR,
+    REOPENED,
+    TIMED_OUT,
+    pair_of,
+)
+from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, columns, write_told
+from zwerm.agents.landmark_exploration.motion import Drive, Outcome, explore, roam, travel, wander
+from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, Parameters
+from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Message, Order, Register, Report, Vector
+from zwerm.agents.landmark_exploration.sharing.log_entries import observation_entries, status_entries
+from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
+from zwerm.agents.landmark_exploration.sharing.orders import OrderIntake, Task, landmark_bytes
+from zwerm.agents.landmark_exploration.sharing.registers import Registers
+from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
+from zwerm.agents.landmark_exploration.sharing.upload import Upload
+from zwerm.agents.landmark_exploration.view import Slide, View
+from zwerm.agents.runtime.contract import Controller, Setup
+from zwerm.errors import ControllerError
+from zwerm.wire.messages import Command, Observation, Packet, Transmission
+
+# Ticks between reports of a free robot, and of a busy one: what tells the coordinator that it lives.
+FREE_REPORT_TICKS: Final = 5
+BUSY_REPORT_TICKS: Final = 50
+# Ticks after which a robot that found no frontier to explore looks for one again: at first, and at most.
+RETRY_TICKS: Final = 10
+RETRY_TICKS_MAX: Final = 80
+# A robot looks around where it begins, and then only while it explores: what an idle robot happens to see would open
+# frontiers for ever. It looks again where it is cut off: for so many ticks there was a frontier for it, and no way there.
+LOOK_TICKS: Final = 5
+CUT_OFF_TICKS: Final = 200
+# Ticks for which a robot leaves a frontier alone that it did not get to.
+AVOID_TICKS: Final = 300
+# Ticks between what a robot tells those who watch the run.
+TELEMETRY_TICKS: Final = 25
+
+ROBOTS: Final = "robots"
+UPLINK: Final = "uplink"
+
+
+class Explorer(Controller):
+    """Explores until no frontier is left."""
+
+    sensors: ClassVar[tuple[str, ...]] = ("landmarks", "compass_rad", "touch")
+    Parameters: ClassVar[type[Parameters]] = Parameters
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        rules: Parameters = self.parameters
+        assert setup.body is not None
+        self._speed_m_s = setup.body.max_speed_m_s
+        self._bytes_max = rules.message_bytes_max
+        self.view = View()
+        self.map = LandmarkMap(rules.presence_only)
+        self.replica = Replica()
+        self._origin = origin_of(setup.node, setup.incarnation)
+        self._slide = Slide(self.random)
+        self._claims = setup.services.get("assignment", "coordinator") == "claims"
+        if rules.presence_only and not self._claims:
+            raise ControllerError("presence_only: robots without bearings need services.assignment=claims")
+        gossips = setup.services.get("map", "coordinator") == "gossip"
+        self._channel = ROBOTS if gossips else UPLINK
+        self.registers = Registers(rules.lease_ticks, rules.dead_ticks, rules.robots_expected)
+        self._gossip: Gossip | None = None
+        if (gossips or self._claims) and self._channel in setup.channels:
+            self._gossip = Gossip(setup.node, self.replica, self.registers, self._learn, rules.message_bytes_max)
+        self._carries = (gossips and self._claims) or rules.strategy == "random-walk" or rules.presence_only
+        self._upload: Upload | None = None
+        if not self._claims and UPLINK in setup.channels:
+            self._upload = Upload(self.replica, self._origin, rules.message_bytes_max)
+        self._intake = OrderIntake(setup.incarnation % 256)
+        self._task: Task | None = None
+        self._halted = False
+        self._reached = True
+        self._report_at = 0
+        self._stamp = 0
+        self._claim = 0
+        self._frozen = False
+        self._quiet_since = 0
+        self._choose_at = 0
+        self._patience_ticks = RETRY_TICKS
+        self._news_at = 0
+        self._no_way_since: int | None = None
+        self._cut_off = False
+        self._failures: dict[int, int] = {}
+        self._avoid_until: dict[int, int] = {}
+        self._outbox: list[Transmission] = []
+        self._seen: list[Snapshot] = []
+        self._told_status = (False, False)
+        self._drive: Drive = self._live()
+        self.done = False
+
+    def step(self, observation: Observation) -> Command:
+        """Perceive, listen, act, speak."""
+        self.view.take(observation)
+        for packet in observation.inbox:
+            self._hear(packet)
+        if self._looks():
+            self._observe()
+        direction = self._slide.along(next(self._drive), self.view)
+        self._judge()
+        self._speak()
+        outbox, self._outbox = tuple(self._outbox), []
+        return Command(
+            drive=self.view.drive(direction, self._speed_m_s), outbox=outbox, done=self.done, snapshot=self._snapshot()
+        )
+
+    def _looks(self) -> bool:
+        """Tell whether the robot adds what it sees to the map."""
+        if self._frozen or self._halted:
+            return False
+        if self.parameters.strategy == "random-walk" or self.parameters.presence_only:
+            return True
+        return self._task is not None or self._cut_off or self.view.tick <= LOOK_TICKS
+
+    # --- the map ----------------------------------------------------------------------------------------------------
+
+    def _observe(self) -> None:
+        """Take what is seen into the map, and write it down if it is news."""
+        snapshot = self.view.snapshot
+        number = self.replica.vector.get(self._origin, 0)
+        parts = (len(snapshot.landmarks) - 1) // 13  # the entry that completes an observation gives it its rank
+        if len(snapshot.landmarks) and self.map.observe(snapshot, (number + max(parts, 0), self._origin)):
+            self._news_at = self.view.tick
+            self._write(observation_entries(snapshot))
+            if self._claims:
+                self._seen.append(snapshot)
+
+    def _raise(self, keys: list[int], status: int) -> None:
+        """Raise frontiers to a status, and write it down."""
+        if self.map.raise_all(keys, status):
+            self._write(status_entries(keys, status))
+
+    def _write(self, entries: list[bytes]) -> None:
+        stretch = self.replica.append(self._origin, entries)
+        if self._gossip is not None:
+            self._gossip.announce(stretch)
+
+    def _learn(self, stretch: Stretch, held: int) -> None:
+        """Take in what others wrote. A frozen robot thaws if that leaves anything to explore."""
+        self.map.read(stretch, held)
+        if self._frozen and (self.map.frontiers.open or self.parameters.presence_only):
+            self._frozen = False
+        self._quiet_since = self.view.tick
+
+    # --- what to do -------------------------------------------------------------------------------------------------
+
+    def _live(self) -> Drive:
+        """Carry out one task after the other, and walk about while there is none."""
+        idle = wander(self.view, self.random, self.parameters.turn_sd_rad)
+        if self.parameters.presence_only:
+            idle = roam(self.view, self.random, lambda: self._news_at == self.view.tick)
+        while True:
+            if self._task is None:
+                self._choose()
+            if self._task is None or self._task.key is None:
+                # Where robots carry the map to each other, the idle ones do; where a coordinator has it they wait for it.
+                waits = not (self._carries or self._cut_off)
+                yield None if self._halted or waits else next(idle)
+                continue
+            task = self._task
+            outcome = yield from self._carry_out(task)
+            if task is self._task:
+                self._conclude(task, outcome)
+                self._task = None
+
+    def _carry_out(self, task: Task) -> Drive:
+        """Navigate to the frontier, then explore it; end early where there is another task."""
+        assert task.key is not None
+        (a, b), rules = pair_of(task.key), self.parameters
+
+        def superseded() -> bool:
+            return self._task is not task
+
+        def is_clear() -> bool:
+            return self.map.frontiers.status(a, b) == CLEAR or superseded()
+
+        def is_there() -> bool:
+            return (a in self.view.bearing and b in self.view.bearing) or is_clear()
+
+        outcome = yield from travel(self.view, task.path, self.random, is_there)
+        if outcome == "unreached" or superseded():
+            return "unreached"
+        return (yield from explore(self.view, a, b, self.random, is_clear, rules.cross_ticks, rules.search_ticks))
+
+    def _conclude(self, task: Task, outcome: Outcome) -> None:
+        """Note how a task ended."""
+        assert task.key is not None
+        self._reached = outcome != "unreached"
+        self._claim = 0
+        self._report_at = 0
+        if self._gossip is not None:
+            self._gossip.hurry()
+        if outcome == "boundary":
+            self._raise([task.key], BOUNDARY)
+        elif outcome == "timed-out":
+            self._raise([task.key], task.status)
+        elif outcome == "unreached" and self._claims:
+            failures = self._failures[task.key] = self._failures.get(task.key, 0) + 1
+            if failures >= FAILURES_MAX:
+                self._raise([task.key], task.status)
+            else:
+                self._avoid_until[task.key] = self.view.tick + AVOID_TICKS
+
+    def _choose(self) -> None:
+        """Choose a frontier and claim it, where robots do that by themselves."""
+        rules, tick = self.parameters, self.view.tick
+        if not self._claims or self._frozen or rules.strategy == "random-walk" or tick < self._choose_at:
+            return
+        frontiers = self.map.frontiers
+        avoided = dict.fromkeys(key for key, until in self._avoid_until.items() if tick < until)
+        choice = offer = None
+        if frontiers.open:
+            alone = rules.strategy == "nearest-frontier"
+            policy: Policy = nearest_frontier if alone else cost_utility(rules.beta)
+            offer = Offer(frontiers, () if alone else self.registers.claims(self.setup.node, tick), avoided)
+            choice = policy(self.map.complex, self.view.snapshot.landmarks, offer)
+        if choice is None:
+            if offer is None or offer.is_empty():
+                self._no_way_since = None
+            elif self._no_way_since is None:
+                self._no_way_since = tick
+            self._cut_off = self._no_way_since is not None and tick - self._no_way_since >= CUT_OFF_TICKS
+            self._choose_at = tick + self._patience_ticks
+            self._patience_ticks = min(2 * self._patience_ticks, RETRY_TICKS_MAX)
+            return
+        self._patience_ticks = RETRY_TICKS
+        self._no_way_since, self._cut_off = None, False
+        status = ABANDONED if frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
+        self._task = Task(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status)
+        self._claim = choice.key + 1
+        if self._gossip is not None:
+            self._gossip.hurry()
+
+    def _judge(self) -> None:
+        """Freeze where nothing has been left to explore for a while, and conclude where all robots have."""
+        tick = self.view.tick
+        if not self._claims or self._gossip is None:
+            return
+        rules = self.parameters
+        if self._task is not None or self.map.frontiers.open or (rules.presence_only and self._news_at == tick):
+            self._quiet_since = tick
+        quiet_ticks = rules.stagnation_ticks if rules.presence_only else rules.freeze_ticks
+        if not self._frozen and tick - self._quiet_since >= quiet_ticks:
+            again = inconsistent(self.map.frontiers)
+            if again:
+                self._raise(again, REOPENED)
+                self._quiet_since = tick
+            elif self.parameters.strategy != "random-walk":
+                self._frozen = True
+                self._gossip.hurry()
+        self.done = self._frozen and self.registers.concluded(self.replica.digest, tick)
+
+    # --- the radio --------------------------------------------------------------------------------------------------
+
+    def _hear(self, packet: Packet) -> None:
+        message = messages.read(packet.payload)
+        if message is None or packet.sender is None:
+            return
+        if packet.channel == UPLINK and isinstance(message, Order):
+            self._obey(message)
+        elif packet.channel == UPLINK and self._upload is not None and isinstance(message, Vector):
+            self._upload.acknowledge(message)
+        elif packet.channel == self._channel and self._gossip is not None:
+            self._gossip.hear(packet.sender, message, self.view.tick)
+
+    def _obey(self, order: Order) -> None:
+        task = None if self._claims else self._intake.accept(order)
+        if task is None:
+            return
+        self._report_at = 0
+        self._halted = task.key is None and not task.walk
+        self._cut_off = task.walk
+        self._reached = True
+        self._task = None if task.key is None else task
+
+    def _speak(self) -> None:
+        tick = self.view.tick
+        if self._gossip is not None:
+            self._send(self._channel, self._gossip.tick(tick, self._register))
+        if self._upload is not None:
+            self._send(UPLINK, [Said(None, each) for each in self._upload.tick(tick)])
+            if tick >= self._report_at:
+                free = self._task is None
+                self._report_at = tick + (FREE_REPORT_TICKS if free else BUSY_REPORT_TICKS)
+                self._send(UPLINK, [Said(None, self._report(free))])
+
+    def _report(self, free: bool) -> Message:
+        life, order = self._intake.newest
+        landmarks = landmark_bytes(self.view.snapshot.landmarks)
+        entries = self.replica.vector.get(self._origin, 0)
+        return Report(self.setup.incarnation % 256, life, order, free, self._reached, entries, landmarks)
+
+    def _register(self) -> Register:
+        self._stamp += 1
+        frozen = self.replica.digest + 1 if self._frozen else 0
+        return Register(self.setup.node, self.setup.incarnation, self._stamp, self._claim, frozen)
+
+    def _send(self, channel: str, said: list[Said]) -> None:
+        self._outbox += [Transmission(channel, messages.write(message), to) for to, message in said]
+
+    # --- for those who watch ----------------------------------------------------------------------------------------
+
+    def _snapshot(self) -> bytes:
+        """Return what those who watch the run may know: what this robot saw first, and what it has left to do."""
+        status = (bool(self.map.frontiers.open), self.done)
+        if not self._claims or (self.view.tick % TELEMETRY_TICKS and status == self._told_status):
+            return b""
+        self._told_status = status
+        seen, self._seen = self._seen, []
+        claim = () if not self._claim else ((self.setup.node, *pair_of(self._claim - 1)),)
+        count = len(self.map.frontiers.open)
+        return write_told(MapTold(*columns(seen), open=count, done=self.done, of_robot=True, assigned=claim))

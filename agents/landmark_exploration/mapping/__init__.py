@@ -1,0 +1,1 @@
+"""The map: landmark complex, frontiers, and the choice among them. Pure modules."""

@@ -1,0 +1,54 @@
+"""Bearings in 256 steps of a full turn, and what a set of them tells about where the observer stands.
+
+A step is 1.4 degrees, less than the standard deviation of the sensor (pi/72), and fits into a byte of a message. All robots
+derive the same from an observation because all derive it from these steps.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+STEPS: Final = 256
+HALF: Final = STEPS // 2
+_PER_RAD: Final = STEPS / (2.0 * math.pi)
+
+
+class Snapshot(NamedTuple):
+    """An observation: the ids of the landmarks seen, ascending, and the bearing of each in steps, in the compass frame."""
+
+    landmarks: tuple[int, ...]
+    bearings: tuple[int, ...]
+
+
+def to_steps(bearing_rad: float) -> int:
+    """Return a bearing in steps, in [0, STEPS)."""
+    return round(bearing_rad * _PER_RAD) % STEPS
+
+
+def to_rad(steps: int) -> float:
+    """Return a bearing [rad] in [0, 2 pi)."""
+    return steps / _PER_RAD
+
+
+def is_left(bearing_a: int, bearing_b: int) -> bool:
+    """Tell whether the observer stands left of the line from landmark a to landmark b.
+
+    It does iff the relative bearing (theta_b - theta_a) mod 2 pi is in (0, pi).
+    """
+    return 0 < (bearing_b - bearing_a) % STEPS < HALF
+
+
+def is_inside(bearings: Sequence[int]) -> bool:
+    """Tell whether the observer stands inside the convex hull of the landmarks it sees.
+
+    It does iff there are three or more and no two adjacent bearings are pi or more apart (section IV-A, Fig. 4).
+    """
+    if len(bearings) < 3:
+        return False
+    ordered = sorted(bearings)
+    before = ordered[-1] - STEPS
+    for each in ordered:
+        if each - before >= HALF:
+            return False
+        before = each
+    return True

@@ -1,0 +1,229 @@
+"""The next frontier for a robot, and the way there: cost-utility over the navigation graph.
+
+Section IV-C of Ramaithitima and Bhattacharya 2018: CU(S, <a, b>) = U(<a, b>) - beta C(S, <a, b>). The cost C is that of the
+cheapest path from the present observation S to an observation with a and b; the utility U is the number of open frontiers
+that share a landmark with <a, b>, divided by one more than the number of robots sent to a or b. The search ends as soon as
+no frontier farther away can be better.
+"""
+
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from heapq import heappop, heappush
+from typing import NamedTuple, Protocol
+
+from zwerm.agents.landmark_exploration.mapping.frontier_status import Frontiers, pair_of
+from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
+
+# The vertex before the first of a path: the robot itself.
+HERE = -1
+
+
+class Reached(NamedTuple):
+    """A vertex of the navigation graph and what it costs to get there. `before` HERE: from the present observation."""
+
+    cost: float
+    vertex: int
+    before: int
+
+
+class Choice(NamedTuple):
+    """A frontier (its key), the vertices to pass on the way to it, in order, and what the robot gains."""
+
+    key: int
+    path: tuple[int, ...]
+    gain: float
+
+
+def reach(complex_: LandmarkComplex, landmarks: Sequence[int]) -> Iterator[Reached]:
+    """Yield the vertices that can be navigated to from where `landmarks` are seen, the cheapest first (Dijkstra 1959)."""
+    queue = [(1.0 / (shared - 1), vertex, HERE) for vertex, shared in complex_.adjacent(landmarks).items()]
+    queue.sort()
+    best = {vertex: cost for cost, vertex, _ in queue}
+    done: set[int] = set()
+    neighbours = complex_.neighbours
+    while queue:
+        cost, vertex, before = heappop(queue)
+        if vertex in done:
+            continue
+        done.add(vertex)
+        yield Reached(cost, vertex, before)
+        for other, shared in neighbours[vertex].items():
+            farther = cost + 1.0 / (shared - 1)
+            if farther < best.get(other, 1e300):
+                best[other] = farther
+                heappush(queue, (farther, other, vertex))
+
+
+def path_to(vertex: int, before: Mapping[int, int]) -> tuple[int, ...]:
+    """Return the vertices from the present observation to `vertex`, given the vertex before each."""
+    path = [vertex]
+    while before[path[-1]] != HERE:
+        path.append(before[path[-1]])
+    return tuple(reversed(path))
+
+
+class Offer:
+    """The open frontiers that are free, and what each is worth: its utility, worked out when it is asked for.
+
+    `taken` are the keys of frontiers that robots are sent to, `avoided` others that are not to be chosen.
+    """
+
+    def __init__(self, frontiers: Frontiers, taken: Iterable[int], avoided: Collection[int] = ()) -> None:
+        self._frontiers = frontiers
+        self._taken: dict[int, None] = {}
+        self._avoided = avoided
+        self._sent: dict[int, int] = {}  # landmark: robots sent to a frontier with it
+        self._utility: dict[int, float] = {}
+        self._most: float | None = None
+        for key in taken:
+            self.take(key)
+
+    def take(self, key: int) -> None:
+        """Note that a robot is sent to a frontier."""
+        self._taken[key] = None
+        for landmark in pair_of(key):
+            self._sent[landmark] = self._sent.get(landmark, 0) + 1
+        self._utility.clear()
+
+    def most(self) -> float:
+        """Return a bound that no utility exceeds, now or later."""
+        if self._most is None:
+            at = self._frontiers.open_at
+            self._most = float(max([at[key >> 16] + at[key & 0xFFFF] for key in self._frontiers.open], default=0))
+        return self._most
+
+    def is_empty(self) -> bool:
+        """Tell whether no frontier is free."""
+        return not any(self.is_free(key) for key in self._frontiers.open)
+
+    def is_free(self, key: int) -> bool:
+        """Tell whether a frontier is open and may be chosen."""
+        return key in self._frontiers.open and key not in self._taken and key not in self._avoided
+
+    def utility(self, key: int) -> float:
+        """Return U(<a, b>) of a frontier that is free."""
+        known = self._utility.get(key)
+        if known is None:
+            a, b = pair_of(key)
+            robots = self._sent.get(a, 0) + self._sent.get(b, 0)
+            if robots and (b << 16 | a) in self._taken:
+                robots -= 1  # that one is sent to both
+            known = self._utility[key] = self._frontiers.sharing(key) / (1 + robots)
+        return known
+
+    def best_in(
+        self, simplex: Sequence[int], vertex: int, price: float, useful: bool, best: tuple[float, int, int] | None
+    ) -> tuple[float, int, int] | None:
+        """Return the better of `best` and the best free frontier among the landmarks of an observation.
+
+        Each is (gain, -key, vertex). The gain is the utility, if it is to be `useful`, less `price`.
+        """
+        at = self._frontiers.open_at
+        live = [landmark for landmark in simplex if at.get(landmark)]
+        if len(live) < 2:
+            return best
+        if best is not None and useful:
+            counts = sorted([at[landmark] for landmark in live])
+            if counts[-1] + counts[-2] - price < best[0]:
+                return best
+        open_ = self._frontiers.open
+        for i, a in enumerate(live):
+            for b in live[i + 1 :]:
+                for key in (a << 16 | b, b << 16 | a):
+                    if key in open_ and self.is_free(key):
+                        candidate = (self.utility(key) - price if useful else -price), -key, vertex
+                        if best is None or candidate[:2] > best[:2]:
+                            best = candidate
+        return best
+
+
+class Policy(Protocol):
+    """Chooses a frontier of an offer for a robot that sees `landmarks`."""
+
+    def __call__(self, complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer) -> Choice | None:
+        """Return the choice, or None where no free frontier can be reached."""
+
+
+def cost_utility(beta: float) -> Policy:
+    """Return the policy of the paper: the greatest utility less `beta` times the cost."""
+
+    def choose(complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer) -> Choice | None:
+        return _best(complex_, landmarks, offer, beta, offer.most())
+
+    return choose
+
+
+def nearest_frontier(complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer) -> Choice | None:
+    """Return the frontier that costs least to reach (Yamauchi 1998: robots share the map, and do not coordinate)."""
+    return _best(complex_, landmarks, offer, 1.0, None)
+
+
+class Costs(NamedTuple):
+    """What it costs to reach each open frontier, and the way: the vertex that has it, and the vertex before each."""
+
+    cost: dict[int, float]
+    vertex: dict[int, int]
+    before: dict[int, int]
+
+    def path(self, key: int) -> tuple[int, ...]:
+        """Return the vertices on the way to a frontier."""
+        vertex = self.vertex[key]
+        return () if vertex == HERE else path_to(vertex, self.before)
+
+
+def frontier_costs(complex_: LandmarkComplex, landmarks: Sequence[int], frontiers: Frontiers) -> Costs:
+    """Return the cost of every open frontier that can be reached from where `landmarks` are seen."""
+    found = Costs({}, {}, {})
+    _note_costs(sorted(landmarks), HERE, 0.0, frontiers, found)
+    for cost, vertex, before in reach(complex_, landmarks):
+        found.before[vertex] = before
+        _note_costs(complex_.simplices[vertex], vertex, cost, frontiers, found)
+        if len(found.cost) == len(frontiers.open):
+            break
+    return found
+
+
+def _note_costs(simplex: Sequence[int], vertex: int, cost: float, frontiers: Frontiers, found: Costs) -> None:
+    live = [landmark for landmark in simplex if frontiers.open_at.get(landmark)]
+    for i, a in enumerate(live):
+        for b in live[i + 1 :]:
+            for key in (a << 16 | b, b << 16 | a):
+                if key in frontiers.open and key not in found.cost:
+                    found.cost[key], found.vertex[key] = cost, vertex
+
+
+def min_pos(mine: Costs, others: Sequence[Costs]) -> Choice | None:
+    """Return the frontier towards which fewest robots are better placed; of equals the nearest (Bautin et al. 2012).
+
+    The rank of a robot towards a frontier is the number of robots to which it costs less to get there.
+    """
+    best: tuple[int, float, int] | None = None
+    for key, cost in mine.cost.items():
+        rank = sum(other.cost.get(key, math.inf) < cost for other in others)
+        if best is None or (rank, cost, key) < best:
+            best = rank, cost, key
+    return None if best is None else Choice(best[2], mine.path(best[2]), -float(best[0]))
+
+
+def _best(
+    complex_: LandmarkComplex, landmarks: Sequence[int], offer: Offer, slope: float, most: float | None
+) -> Choice | None:
+    """Return the free frontier with the greatest gain; of equals the smallest key.
+
+    The gain is the utility, at most `most`, less `slope` times the cost; without `most` it is the cost alone.
+    """
+    if offer.is_empty():
+        return None
+    best: tuple[float, int, int] | None = None  # gain, -key, vertex
+    best = offer.best_in(sorted(landmarks), HERE, 0.0, most is not None, best)
+    before: dict[int, int] = {}
+    simplices, bound = complex_.simplices, most or 0.0
+    for cost, vertex, previous in reach(complex_, landmarks):
+        if best is not None and bound - slope * cost < best[0]:
+            break
+        before[vertex] = previous
+        best = offer.best_in(simplices[vertex], vertex, slope * cost, most is not None, best)
+    if best is None:
+        return None
+    value, negative_key, vertex = best
+    return Choice(-negative_key, () if vertex == HERE else path_to(vertex, before), value)

@@ -1,0 +1,103 @@
+"""Frontiers: ordered pairs of landmarks, and what is known of the region to the left of each.
+
+The frontier <a, b> is the region left of the line from landmark a to landmark b (Ramaithitima and Bhattacharya 2018, section
+IV-A). A status only ever rises, so that statuses from several robots merge by maximum, in any order.
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import HALF, STEPS, Snapshot, is_inside
+
+UNKNOWN: Final = 0
+UNEXPLORED: Final = 1
+TIMED_OUT: Final = 2  # explored until the time limit: a potential obstacle boundary
+REOPENED: Final = 3  # to be explored once more, because the trace of the 1-skeleton contradicts a boundary here
+ABANDONED: Final = 4  # timed out again
+BOUNDARY: Final = 5  # an obstacle was touched there
+CLEAR: Final = 6
+
+_IS_OPEN: Final = (False, True, False, True, False, False, False)
+
+# Landmark ids are below this.
+LANDMARKS_MAX: Final = 1 << 16
+
+Pair = tuple[int, int]
+
+
+def key_of(a: int, b: int) -> int:
+    """Return the key of the frontier <a, b>."""
+    return a << 16 | b
+
+
+def pair_of(key: int) -> Pair:
+    """Return the frontier of a key."""
+    return key >> 16, key & 0xFFFF
+
+
+class Frontiers:
+    """The status of every frontier. `open` holds the keys of those to be explored."""
+
+    def __init__(self) -> None:
+        self.statuses: dict[int, int] = {}
+        self.open: dict[int, None] = {}
+        self.open_at: dict[int, int] = {}  # landmark: open frontiers that it is part of
+
+    def status(self, a: int, b: int) -> int:
+        """Return the status of <a, b>."""
+        return self.statuses.get(a << 16 | b, UNKNOWN)
+
+    def is_open(self, a: int, b: int) -> bool:
+        """Tell whether <a, b> is to be explored."""
+        return a << 16 | b in self.open
+
+    def raise_to(self, key: int, status: int) -> bool:
+        """Raise a frontier to a status; tell whether that was news."""
+        known = self.statuses.get(key, UNKNOWN)
+        if status <= known:
+            return False
+        self.statuses[key] = status
+        if _IS_OPEN[status] != _IS_OPEN[known]:
+            change = 1 if _IS_OPEN[status] else -1
+            for landmark in pair_of(key):
+                self.open_at[landmark] = self.open_at.get(landmark, 0) + change
+            if change > 0:
+                self.open[key] = None
+            else:
+                del self.open[key]
+        return True
+
+    def note(self, snapshot: Snapshot) -> bool:
+        """Take in an observation; tell whether any status rose.
+
+        Seen from inside the hull of the landmarks, every frontier that the observer is in is clear. All others become
+        unexplored if they were unknown. A pair in line with the observer is neither left nor right.
+        """
+        statuses, news = self.statuses, False
+        landmarks, bearings = snapshot
+        count, inside = len(landmarks), is_inside(bearings)
+        for i in range(1, count):
+            b, of_b = landmarks[i], bearings[i]
+            for j in range(i):
+                a, relative = landmarks[j], (of_b - bearings[j]) % STEPS
+                forth, back = a << 16 | b, b << 16 | a
+                if inside and relative not in (0, HALF):
+                    if relative > HALF:
+                        forth, back = back, forth
+                    if statuses.get(forth) != CLEAR:
+                        news = self.raise_to(forth, CLEAR) or news
+                elif forth not in statuses:
+                    news = self.raise_to(forth, UNEXPLORED) or news
+                if back not in statuses:
+                    news = self.raise_to(back, UNEXPLORED) or news
+        return news
+
+    def sharing(self, key: int) -> int:
+        """Return how many open frontiers have a landmark in common with this one, itself included if it is open."""
+        a, b = pair_of(key)
+        both = (key in self.open) + (b << 16 | a in self.open)
+        return self.open_at.get(a, 0) + self.open_at.get(b, 0) - both
+
+    def with_status(self, status: int) -> Iterator[int]:
+        """Yield the keys of all frontiers of a status, ascending."""
+        return iter(sorted(key for key, each in self.statuses.items() if each == status))

@@ -1,0 +1,70 @@
+"""The map of a robot or of the coordinator: the landmark complex and the frontiers, derived from logs.
+
+What is shared are observations, and statuses that no observation implies; all else is derived, by the same rules everywhere.
+So maps made of the same logs are equal, whatever the order in which the logs' entries came.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.frontier_status import CLEAR, Frontiers
+from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
+from zwerm.agents.landmark_exploration.sharing import log_entries as entries
+from zwerm.agents.landmark_exploration.sharing.replica import Stretch
+
+# Parts of one observation beyond this are nonsense, and forgotten.
+_PARTS_MAX: Final = 4096
+
+
+class LandmarkMap:
+    """Complex and frontiers. `version` counts changes. Without bearings (`presence_only`) there are no frontiers."""
+
+    def __init__(self, presence_only: bool = False) -> None:
+        self._presence_only = presence_only
+        self.complex = LandmarkComplex()
+        self.frontiers = Frontiers()
+        self.version = 0
+        self._parts: dict[int, list[tuple[int, int]]] = {}  # by origin, of an observation that is not complete
+
+    def observe(self, snapshot: Snapshot, rank: tuple[int, int] = (0, 0)) -> bool:
+        """Take in an observation; tell whether it was news: a simplex more, or a status that rose."""
+        risen = not self._presence_only and self.frontiers.note(snapshot)
+        news = self.complex.update(snapshot, rank) or risen
+        self.version += news
+        return news
+
+    def read(self, stretch: Stretch, held: int) -> None:
+        """Take in the entries of a stretch from entry number `held` on; what cannot be read is left out."""
+        for number in range(held, stretch.first + len(stretch.entries)):
+            self._read(stretch.origin, number, stretch.entries[number - stretch.first])
+
+    def raise_all(self, keys: Sequence[int], status: int) -> bool:
+        """Raise frontiers to a status; tell whether that was news."""
+        news = [self.frontiers.raise_to(key, status) for key in keys]
+        self.version += any(news)
+        return any(news)
+
+    def _read(self, origin: int, number: int, entry: bytes) -> None:
+        try:
+            if entry[:1] == bytes([entries.STATUSES]):
+                status, keys = entries.read_statuses(entry)
+                if status <= CLEAR:
+                    self.raise_all(keys, status)
+                return
+            bearings = entries.read_bearings(entry)
+        except ValueError:
+            return
+        whole = [*self._parts.pop(origin, ()), *bearings]
+        if entry[0] == entries.OBSERVATION:
+            self.observe(entries.snapshot_of(whole), (number, origin))
+        elif len(whole) <= _PARTS_MAX:
+            self._parts[origin] = whole
+
+    def content(self) -> Any:
+        """Return all that is known, in a form that is equal for equal maps."""
+        return (
+            sorted(self.complex.simplices.values()),
+            self.complex.table,
+            sorted(self.frontiers.statuses.items()),
+        )

@@ -1,0 +1,43 @@
+"""What a scenario may set of landmark-based exploration."""
+
+from typing import Annotated, Final, Literal
+
+from msgspec import Meta, Struct
+
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BYTES, SMALL_BYTES
+
+Ticks = Annotated[int, Meta(ge=1, le=1_000_000)]
+NonNegative = Annotated[float, Meta(ge=0.0)]
+
+# Of robots that choose by themselves, and of a coordinator that assigns.
+Strategy = Literal["cost-utility", "nearest-frontier", "random-walk"]
+CentralStrategy = Literal["cost-utility", "nearest-frontier", "min-pos"]
+
+# Failures to get to a frontier before it is given up: it is then taken for a potential obstacle boundary.
+FAILURES_MAX: Final = 2
+
+
+class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
+    """The robots' parameters; those of choosing frontiers count where robots choose by themselves.
+
+    `beta` weighs the cost against the utility. A robot has `cross_ticks` to cross the line of a frontier, and `search_ticks` to
+    search behind it (minimal effort: 1). `message_bytes_max` caps every radio message. A claim is void when its robot has
+    been silent for `lease_ticks`; a robot silent for `dead_ticks` is presumed dead. A robot that has found nothing left to
+    explore for `freeze_ticks` adds nothing to the map any more. `robots_expected` is how many robots must agree that all is
+    explored; one that was never heard of counts as silent from the start. `turn_sd_rad` is the random walk's turn a tick.
+    With `presence_only` no bearing is used: robots know which landmarks they see, and stop when nothing was new for
+    `stagnation_ticks`.
+    """
+
+    beta: NonNegative = 10.0
+    strategy: Strategy = "cost-utility"
+    cross_ticks: Ticks = 40
+    search_ticks: Ticks = 40
+    message_bytes_max: Annotated[int, Meta(ge=SMALL_BYTES, le=LARGE_BYTES)] = LARGE_BYTES
+    lease_ticks: Ticks = 150
+    dead_ticks: Ticks = 1_500
+    freeze_ticks: Ticks = 40
+    robots_expected: Annotated[int, Meta(ge=1, le=100_000)] = 1
+    turn_sd_rad: NonNegative = 0.05
+    presence_only: bool = False
+    stagnation_ticks: Ticks = 60

@@ -1,0 +1,1 @@
+"""How robots and the coordinator share logs, registers and orders over a lossy radio."""

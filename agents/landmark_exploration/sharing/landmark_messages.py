@@ -1,0 +1,109 @@
+"""What crosses the radio in landmark-based exploration: under a checksum, and small.
+
+With a cap of `SMALL_BYTES` every packet fits into a small radio frame. Entries are never longer than one such packet (see
+`entries`); vectors, registers and paths are cut into packets that each make sense alone.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, Final
+
+from msgspec import Meta, Struct
+
+from zwerm.wire.checksum import Sealed
+
+# The smallest cap that is supported [bytes]; a radio of tens of bytes at a time has this much.
+SMALL_BYTES: Final = 64
+
+# Without a cap no packet is longer than about this [bytes].
+LARGE_BYTES: Final = 1_000
+
+Count = Annotated[int, Meta(ge=0, le=2**53)]
+Digest = Annotated[int, Meta(ge=0, le=2**62)]
+Bytes = Annotated[bytes, Meta(max_length=LARGE_BYTES)]
+
+
+class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A whole message, led by its tag."""
+
+
+# --- the map ---------------------------------------------------------------------------------------------------------
+
+
+class Entries(_Message, frozen=True, tag="e"):
+    """Successive entries of a log, from number `first` on."""
+
+    origin: Count
+    first: Count
+    entries: tuple[Bytes, ...]
+
+
+class Vector(_Message, frozen=True, tag="v"):
+    """The sender's version vector for all origins in [low, high): origin, count, origin, count, ...
+
+    An origin that is not named has no entries. With `ask` the receiver shall send what the sender lacks.
+    """
+
+    low: Count
+    high: Count
+    counts: tuple[Count, ...]
+    ask: bool
+
+
+class Register(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """What a robot says of itself; the one with the greatest (incarnation, stamp) counts.
+
+    `claim`: the key of the frontier that it explores, plus 1; 0: none. `frozen`: the digest, plus 1, of the logs with which it
+    found nothing left to explore, and to which it adds nothing any more; 0: none.
+    """
+
+    node: Count
+    incarnation: Count
+    stamp: Count
+    claim: Count = 0
+    frozen: Digest = 0
+
+
+class Beacon(_Message, frozen=True, tag="b"):
+    """The digest of the sender's version vector, and registers, the sender's own first."""
+
+    digest: Digest
+    registers: tuple[Register, ...]
+
+
+# --- robots and coordinator --------------------------------------------------------------------------------------------
+
+
+class Report(_Message, frozen=True, tag="r"):
+    """To the coordinator: the robot has the order `order` of the coordinator's `life`, and, if `free`, is done with it.
+
+    `reached` False: it did not get to the frontier. `entries`: how many its log has. `landmarks`: those it sees, 2 bytes each.
+    """
+
+    incarnation: Count
+    life: Count
+    order: Count
+    free: bool
+    reached: bool
+    entries: Count
+    landmarks: Bytes
+
+
+class Order(_Message, frozen=True, tag="o"):
+    """To a robot: part `part` of `parts` of the order number `order`, in bytes.
+
+    What the parts say in a row stands in `orders`. `incarnation` is that of the robot it is meant for.
+    """
+
+    life: Count
+    incarnation: Count
+    order: Count
+    part: Count
+    parts: Count
+    bytes_: Bytes
+
+
+Message = Entries | Vector | Beacon | Report | Order
+
+_sealed: Final = Sealed(Message)
+write: Final[Callable[[Message], bytes]] = _sealed.write
+read: Final[Callable[[bytes], Message | None]] = _sealed.read

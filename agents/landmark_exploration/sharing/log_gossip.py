@@ -1,0 +1,143 @@
+"""Gossip: robots in radio range make their logs and registers equal, whatever is lost, late or said twice.
+
+New entries are broadcast once, at once. Beacons carry a digest of the version vector; whose digest differs is sent the vector,
+rarely, and answers with what the sender lacks (anti-entropy; Demers et al. 1987). Every message makes sense alone, and none is
+waited for: loss costs time only. A hub, the coordinator in the middle of a star, also tells on what it hears.
+"""
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import (
+    LARGE_BYTES,
+    Beacon,
+    Entries,
+    Message,
+    Register,
+    Vector,
+)
+from zwerm.agents.landmark_exploration.sharing.packing import counts_of, pack_entries, pack_vector
+from zwerm.agents.landmark_exploration.sharing.registers import Registers
+from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch
+
+# Ticks between a robot's beacons, and between the vectors it sends.
+BEACON_TICKS: Final = 8
+SYNC_TICKS: Final = 4
+# A beacon whose digest differed counts for so many ticks.
+DIFFERS_TICKS: Final = 12
+# Entries in answer to one vector, at most.
+ANSWER_ENTRIES_MAX: Final = 150
+SMALL_ANSWER_ENTRIES_MAX: Final = 40
+# Bytes of a beacon beside its registers, and the most that a register takes.
+_BEACON_BYTES: Final = 4 + 3 + 9
+_REGISTER_BYTES: Final = 22
+_REGISTERS_MAX: Final = 16
+
+
+class Said(NamedTuple):
+    """A message to one node, or (None) to all that hear it."""
+
+    to: int | None
+    message: Message
+
+
+class Gossip:
+    """One node's part. `learn` is called with every stretch that brought something, and how much of it was known before.
+
+    `me` is the node whose register is its own; a hub has none. To be told everything heard by `hear`, then asked by `tick`.
+    """
+
+    def __init__(
+        self,
+        me: int,
+        replica: Replica,
+        registers: Registers,
+        learn: Callable[[Stretch, int], None],
+        bytes_max: int = LARGE_BYTES,
+        hub: bool = False,
+    ) -> None:
+        self._me = me
+        self._replica = replica
+        self._registers = registers
+        self._learn = learn
+        self._bytes_max = bytes_max
+        self._hub = hub
+        self._answer_max = ANSWER_ENTRIES_MAX if bytes_max >= LARGE_BYTES else SMALL_ANSWER_ENTRIES_MAX
+        self._differs: dict[int, int] = {}  # node: the tick of its last beacon with another digest
+        self._synced: dict[int, int] = {}  # node: the tick at which it was last sent the vector
+        self._beacon_at = me % BEACON_TICKS
+        self._sync_at = 0
+        self._outgoing: list[Said] = []
+        self._fresh: list[Stretch] = []
+
+    def announce(self, stretch: Stretch) -> None:
+        """Broadcast new entries of this node's own log."""
+        self._fresh.append(stretch)
+
+    def hurry(self) -> None:
+        """Send a beacon with the next tick: something of this node's register has changed."""
+        self._beacon_at = 0
+
+    def hear(self, sender: int, message: Message, tick: int) -> None:
+        """Take in a message."""
+        match message:
+            case Entries():
+                stretch = Stretch(message.origin, message.first, message.entries)
+                held = self._replica.vector.get(stretch.origin, 0)
+                new = self._replica.extend(stretch)
+                if new:
+                    learnt = Stretch(stretch.origin, held, tuple(new))
+                    self._learn(learnt, held)
+                    if self._hub:
+                        self._fresh.append(learnt)
+                elif stretch.first > held:
+                    self._differs[sender] = tick
+            case Vector():
+                self._answer(sender, message, tick)
+            case Beacon():
+                news = [self._registers.merge(each, tick) for each in message.registers if each.node != self._me]
+                if self._hub and any(news):
+                    self._beacon_at = min(self._beacon_at, tick + 1)
+                if message.digest != self._replica.digest:
+                    self._differs[sender] = tick
+                else:
+                    self._differs.pop(sender, None)
+            case _:
+                pass
+
+    def tick(self, tick: int, own: Callable[[], Register] | None) -> list[Said]:
+        """Return what to send now; `own` makes the node's own register, with a new stamp."""
+        said, self._outgoing = self._outgoing, []
+        for stretch in self._fresh:
+            said += [Said(None, each) for each in pack_entries(stretch, self._bytes_max)]
+        self._fresh.clear()
+        if tick >= self._beacon_at:
+            self._beacon_at = tick + BEACON_TICKS
+            leading = []
+            if own is not None:
+                self._registers.merge(own(), tick)
+                leading = [self._me]
+            most = min(_REGISTERS_MAX, max(1, (self._bytes_max - _BEACON_BYTES) // _REGISTER_BYTES))
+            said.append(Said(None, Beacon(self._replica.digest, self._registers.to_tell(leading, most, tick))))
+        if tick >= self._sync_at:
+            said += self._ask(tick)
+        return said
+
+    def _ask(self, tick: int) -> list[Said]:
+        """Send the version vector to the node, of those whose digests differ, that was sent it longest ago."""
+        waiting = [node for node, since in self._differs.items() if tick - since <= DIFFERS_TICKS]
+        if not waiting:
+            return []
+        partner = min(waiting, key=lambda node: (self._synced.get(node, -1), node))
+        del self._differs[partner]
+        self._synced[partner] = tick
+        self._sync_at = tick + SYNC_TICKS
+        return [Said(partner, each) for each in pack_vector(self._replica.vector, self._bytes_max, ask=True)]
+
+    def _answer(self, sender: int, vector: Vector, tick: int) -> None:
+        theirs, mine = counts_of(vector), self._replica.vector
+        origins = [origin for origin in sorted(mine) if vector.low <= origin < vector.high]
+        for stretch in self._replica.missing(theirs, origins, self._answer_max):
+            self._outgoing += [Said(sender, each) for each in pack_entries(stretch, self._bytes_max)]
+        if any(count > mine.get(origin, 0) for origin, count in theirs.items()):
+            self._differs[sender] = tick

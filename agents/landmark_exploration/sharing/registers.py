@@ -1,0 +1,82 @@
+"""What robots say of themselves, the newest of each: claims with leases, and who has nothing left to explore.
+
+Registers merge by the greatest (incarnation, stamp), in any order. A robot raises its stamp with every beacon, so that a
+claim of a robot from which nothing new was heard for a lease, by the listener's own clock, is void: no clocks are compared.
+
+**Termination.** A robot that finds nothing left to explore *freezes*: it adds nothing to its log any more until it receives an
+entry that it does not have. Its register then holds the digest of its logs. Where every robot has said that it is frozen
+with the same digest, none of them can ever add anything: the first of them to do so would have had to receive an entry that
+none of them has, from a robot that is not among them. It does not matter when each of them said it. So a conclusion is wrong
+only about robots that were not heard of, that lost their memory since, or that fell silent for so long that they were presumed
+dead. All have to agree for `settle_ticks`, so that a robot in reach that has lost its memory is heard of.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Register
+
+# All robots have to agree for so many ticks: a few beacons, of which some may be lost.
+SETTLE_TICKS: Final = 60
+
+
+class Registers:
+    """The newest register of every robot that was heard of, by node, and the tick at which it came."""
+
+    def __init__(
+        self, lease_ticks: int, dead_ticks: int, robots_expected: int, settle_ticks: int = SETTLE_TICKS
+    ) -> None:
+        self.newest: dict[int, Register] = {}
+        self._heard: dict[int, int] = {}
+        self._told: dict[int, int] = {}  # when each was last told on
+        self._lease_ticks = lease_ticks
+        self._dead_ticks = dead_ticks
+        self._robots_expected = robots_expected
+        self._settle_ticks = settle_ticks
+        self._agreed: tuple[int, int] | None = None  # a digest, and the tick since which all agree on it
+
+    def merge(self, register: Register, tick: int) -> bool:
+        """Take in a register heard at `tick`; tell whether it was newer than what is known of its robot."""
+        known = self.newest.get(register.node)
+        if known is not None and _age(register) <= _age(known):
+            return False
+        self.newest[register.node] = register
+        self._heard[register.node] = tick
+        return True
+
+    def is_silent(self, node: int, tick: int) -> bool:
+        """Tell whether nothing new was heard of a robot for so long that it is presumed dead."""
+        return tick - self._heard.get(node, 0) >= self._dead_ticks
+
+    def claims(self, me: int, tick: int) -> Iterator[int]:
+        """Yield the keys of the frontiers that other robots claim, by a lease that has not run out."""
+        for node, register in self.newest.items():
+            if node != me and register.claim and tick - self._heard[node] < self._lease_ticks:
+                yield register.claim - 1
+
+    def to_tell(self, first: Iterable[int], most: int, tick: int) -> tuple[Register, ...]:
+        """Return up to `most` registers: of the robots in `first`, then those that were told on longest ago."""
+        leading = list(first)
+        rest = sorted(
+            (node for node in self.newest if node not in leading), key=lambda node: (self._told.get(node, -1), node)
+        )
+        chosen = (leading + rest)[:most]
+        for node in chosen:
+            self._told[node] = tick
+        return tuple(self.newest[node] for node in chosen)
+
+    def concluded(self, digest: int, tick: int) -> bool:
+        """Tell whether all robots have nothing left to explore, with the logs of this digest. To be asked once a tick."""
+        living = [node for node in self.newest if not self.is_silent(node, tick)]
+        unheard = self._robots_expected - len(self.newest)
+        agreed = living and all(self.newest[node].frozen == digest + 1 for node in living)
+        if not agreed or (unheard > 0 and tick < self._dead_ticks):
+            self._agreed = None
+            return False
+        if self._agreed is None or self._agreed[0] != digest:
+            self._agreed = digest, tick
+        return tick - self._agreed[1] >= self._settle_ticks
+
+
+def _age(register: Register) -> tuple[int, int]:
+    return register.incarnation, register.stamp

@@ -1,0 +1,226 @@
+"""How complete a landmark complex is, and whether its topology is that of the arena.
+
+A place is covered if the set of all landmarks that are visible there is a face of the complex. The completion is the covered
+fraction of a grid of places in free space (the union of the simplices' hulls would do for a picture, but saturates below 1:
+hulls do not reach the walls). Truth is used here, and only here: robots know no place.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from zwerm.agents.landmark_exploration.mapping.map_reports import GoalTold, MapTold, read_told
+from zwerm.maths.strong_collapse import betti
+from zwerm.scenario.tables import Scenario
+from zwerm.world.arena.arena import Arena
+from zwerm.world.arena.scatter import with_landmarks
+from zwerm.world.metrics import Metric, MetricContext, Truth
+from zwerm.world.metrics.sight import obstacles
+from zwerm.world.scene import Floats
+from zwerm.world.tick.telemetry import TelemetryRecord
+
+# Places a range: the grid is this many times finer than the sensor's range.
+PLACES_PER_RANGE: Final = 10
+# Lines of sight judged at a time.
+_LINES_AT_ONCE: Final = 20_000
+# The fractions of completion whose first time is a metric, in per cent.
+MILESTONES: Final = (90.0, 91.5, 95.0)
+
+
+def milestone(percent: float) -> str:
+    """Return the name of the metric that says when the completion first was so much."""
+    return f"iterations_to_{percent:g}_percent_completion".replace(".", "_")
+
+
+class Completion:
+    """The places that the complex does not cover yet; simplices only ever cover more."""
+
+    def __init__(self, arena: Arena, landmarks: Floats, range_m: float) -> None:
+        places = _places(arena, range_m / PLACES_PER_RANGE)
+        self.places = len(places)
+        counts: dict[int, int] = {}
+        for seen in visible(arena, landmarks, range_m, places):
+            bits = sum(1 << landmark for landmark in seen)
+            counts[bits] = counts.get(bits, 0) + 1
+        counts.pop(0, None)  # where nothing is visible nothing can be covered
+        self._covered = 0
+        self._left: dict[int, dict[int, int]] = {}  # by smallest landmark: set of landmarks as bits, number of places
+        for bits, count in counts.items():
+            first = (bits & -bits).bit_length() - 1
+            self._left.setdefault(first, {})[bits] = count
+
+    def add(self, simplices: Iterable[Iterable[int]]) -> None:
+        """Cover the places of which all visible landmarks are in one of `simplices`."""
+        for simplex in simplices:
+            members = list(simplex)
+            outside = ~sum(1 << landmark for landmark in members)
+            for landmark in members:
+                left = self._left.get(landmark)
+                if left:
+                    covered = [bits for bits in left if not bits & outside]
+                    self._covered += sum(left.pop(bits) for bits in covered)
+
+    @property
+    def fraction(self) -> float:
+        """The fraction of places that are covered."""
+        return self._covered / self.places if self.places else 0.0
+
+
+def _places(arena: Arena, spacing_m: float) -> Floats:
+    xmin, ymin, xmax, ymax = arena.bounds
+    x, y = np.meshgrid(
+        np.arange(xmin + spacing_m / 2.0, xmax, spacing_m), np.arange(ymin + spacing_m / 2.0, ymax, spacing_m)
+    )
+    places = np.column_stack([x.ravel(), y.ravel()])
+    inside: Floats = places[arena.contains(places)]
+    return inside
+
+
+def visible(arena: Arena, landmarks: Floats, range_m: float, places: Floats) -> list[list[int]]:
+    """Return the ids of the landmarks that are visible at each of places (k, 2) [m], ascending."""
+    seen: list[list[int]] = [[] for _ in places]
+    if not len(landmarks) or not len(places):
+        return seen
+    near = cKDTree(landmarks).query_ball_point(places, range_m, return_sorted=True)
+    place = np.repeat(np.arange(len(places)), [len(each) for each in near])
+    landmark = np.concatenate([np.array(each, dtype=np.int64) for each in near])
+    for start in range(0, len(place), _LINES_AT_ONCE):
+        some = slice(start, start + _LINES_AT_ONCE)
+        clear = ~arena.blocked(places[place[some]], landmarks[landmark[some]])
+        for i, j in zip(place[some][clear].tolist(), landmark[some][clear].tolist(), strict=True):
+            seen[i].append(j)
+    return seen
+
+
+def maximal(simplices: Iterable[Sequence[int]]) -> list[tuple[int, ...]]:
+    """Return the simplices that are no face of another one, each once."""
+    holders: dict[int, set[int]] = {}
+    found: dict[int, tuple[int, ...]] = {}
+    for number, simplex in enumerate(sorted({tuple(sorted(each)) for each in simplices}, key=lambda s: (-len(s), s))):
+        groups = [holders.get(landmark, set()) for landmark in simplex]
+        if not groups or set.intersection(*groups):
+            continue
+        found[number] = simplex
+        for landmark in simplex:
+            holders.setdefault(landmark, set()).add(number)
+    return list(found.values())
+
+
+class Exploration(Metric):
+    """How complete the map is that the coordinator has, or all robots together, and how far it was when."""
+
+    names: ClassVar[Sequence[str]] = (
+        "completion_fraction", "iterations", "landmarks", "free_simplices", "landmark_complex_pieces",
+        "landmark_complex_holes", "obstacles", "open_frontiers", "concluded_early",
+        *map(milestone, MILESTONES),
+    )  # fmt: skip
+
+    def __init__(self, parameters: Any, context: MetricContext) -> None:
+        self._context = context
+        self._reports: list[tuple[int, int, MapTold]] = []
+        self._truth: Truth | None = None
+
+    def report(self, record: TelemetryRecord) -> None:
+        """Take what a node says of its map."""
+        told = read_told(record.snapshot) if record.snapshot else None
+        if isinstance(told, MapTold):
+            self._reports.append((record.tick, record.node, told))
+
+    def sample(self, truth: Truth) -> None:
+        """Take the tick, and who is dead."""
+        self._truth = truth
+
+    def metrics(self) -> dict[str, float]:
+        """Return the metrics, or nothing where nobody told of a map."""
+        range_m, truth = landmark_range_m(self._context.scenario), self._truth
+        if range_m is None or truth is None or not self._reports:
+            return {}
+        arena, landmarks = self._context.arena, landmarks_of(self._context.scenario, truth)
+        completion = Completion(arena, landmarks, range_m)
+        reached: dict[str, float] = {}
+        for tick, _, told in self._reports:
+            completion.add(told.simplices)
+            for percent in MILESTONES:
+                if completion.fraction >= percent / 100.0:
+                    reached.setdefault(milestone(percent), float(tick))
+        complex_ = maximal(simplex for _, _, told in self._reports for simplex in told.simplices)
+        pieces, holes = betti(complex_)
+        return {
+            "completion_fraction": completion.fraction,
+            "iterations": float(truth.scene.tick),
+            **reached,
+            "landmarks": float(len(landmarks)),
+            "free_simplices": float(len(complex_)),
+            "landmark_complex_pieces": float(pieces),
+            "landmark_complex_holes": float(holes),
+            "obstacles": float(obstacles(arena)),
+            **self._left_open(truth),
+        }
+
+    def _left_open(self, truth: Truth) -> dict[str, float]:
+        """Return the frontiers left open; and 1 where a robot concluded while a living one knew an open frontier, else 0."""
+        newest: dict[int, int] = {}
+        early = robots = 0.0
+        for _, node, told in self._reports:
+            newest[node] = told.open
+            robots = max(robots, float(told.of_robot))
+            if told.of_robot and told.done and any(count for each, count in newest.items() if each not in truth.dead):
+                early = 1.0
+        living = [count for node, count in newest.items() if node not in truth.dead]
+        found = {"open_frontiers": float(max(living, default=0))}
+        return found | {"concluded_early": early} if robots else found
+
+
+class Navigation(Metric):
+    """The fraction of goals that robots reached, and the iterations that took.
+
+    A goal counts as reached where the robot said so, and all landmarks of the goal were indeed visible.
+    """
+
+    names: ClassVar[Sequence[str]] = ("navigation_goals", "navigation_success_fraction", "navigation_iterations_mean")
+
+    def __init__(self, parameters: Any, context: MetricContext) -> None:
+        self._context = context
+        self._ends: list[tuple[Floats, GoalTold]] = []
+        self._truth: Truth | None = None
+
+    def report(self, record: TelemetryRecord) -> None:
+        """Take the end of a way."""
+        told = read_told(record.snapshot) if record.snapshot else None
+        if isinstance(told, GoalTold):
+            self._ends.append((record.position[record.node].copy(), told))
+
+    def sample(self, truth: Truth) -> None:
+        """Take the truth at the end."""
+        self._truth = truth
+
+    def metrics(self) -> dict[str, float]:
+        """Return the metrics, or nothing where nobody navigates."""
+        range_m = landmark_range_m(self._context.scenario)
+        if not self._ends or range_m is None or self._truth is None:
+            return {}
+        landmarks = landmarks_of(self._context.scenario, self._truth)
+        seen = visible(self._context.arena, landmarks, range_m, np.array([place for place, _ in self._ends]))
+        reached = [
+            end for (_, end), there in zip(self._ends, seen, strict=True) if end.arrived and set(end.goal) <= set(there)
+        ]
+        return {
+            "navigation_goals": float(len(self._ends)),
+            "navigation_success_fraction": len(reached) / len(self._ends),
+            "navigation_iterations_mean": float(np.mean([end.iterations for end in reached])) if reached else math.nan,
+        }
+
+
+def landmarks_of(scenario: Scenario, truth: Truth) -> Floats:
+    """Return (l, 2) the places of the landmarks [m], scattered as for the run."""
+    return np.array(with_landmarks(scenario, truth.scene.draws.seed).landmarks, dtype=np.float64).reshape(-1, 2)
+
+
+def landmark_range_m(scenario: Scenario) -> float | None:
+    """Return the range of the robots' landmark sensor [m], or None where it has none."""
+    tables = [each for each in scenario.robots.sensors if each.kind == "landmarks"]
+    found = tables[0].parameters.get("range_m") if tables else None
+    return None if found is None else float(found)

@@ -1,0 +1,105 @@
+"""The picture layer of landmark-based exploration: the landmark complex over the arena, open frontiers, and assignments.
+
+As Figs. 10 to 13 of Ramaithitima and Bhattacharya 2018: the complex is drawn where its landmarks truly are, which no robot
+knows. Each simplex is the convex hull of its landmarks. Importing this module needs matplotlib.
+"""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, Final
+
+import numpy as np
+import shapely
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, read_told
+from zwerm.record.history import Tracks
+from zwerm.view.canvas import Sheet
+from zwerm.view.layer import Layer
+from zwerm.view.run_view import RunView
+from zwerm.world.scene import Floats
+
+SIMPLEX: Final = "#F2DFA7"
+EDGE: Final = "#C9B271"
+LANDMARK: Final = "#2E8B57"
+FRONTIER: Final = "#00A35C"
+ASSIGNED: Final = "#A3195B"
+
+
+class LandmarkComplexLayer(Layer):
+    """The complex as the nodes of the run told of it: the coordinator's, or the union of all robots' observations."""
+
+    colours: ClassVar[Sequence[str]] = (SIMPLEX, EDGE, LANDMARK, FRONTIER, ASSIGNED)
+    legend_entries: ClassVar[int] = 6
+    animation_s: ClassVar[float | None] = 20.0
+    headline: ClassVar[Sequence[str]] = (
+        *("completion_fraction", "iterations", "open_frontiers", "landmark_complex_holes", "obstacles", "landmarks"),
+        "navigation_success_fraction",
+    )
+    plain_swarm: ClassVar[bool] = True
+
+    def __init__(self, sheet: Sheet, view: RunView, names: bool = False) -> None:
+        self._axes = sheet.axes
+        self._landmarks = np.array(view.landmarks, dtype=np.float64).reshape(-1, 2)
+        self._view = view
+        told = [(each.time_s, each.node, read_told(each.snapshot)) for each in view.snapshots]
+        self._records = [(time_s, node, each) for time_s, node, each in told if isinstance(each, MapTold)]
+        self._hulls: list[tuple[float, Floats]] = []
+        self._lines: list[tuple[float, Floats]] = []
+        for time_s, _, report in self._records:
+            for simplex in report.simplices:
+                self._note(time_s, self._landmarks[list(simplex)])
+        self._simplices = PolyCollection([], facecolors=SIMPLEX, edgecolors="none", linewidths=0, zorder=1.2)
+        self._edges = LineCollection([], colors=EDGE, linewidths=0.4, zorder=1.3)
+        self._frontier = LineCollection([], colors=FRONTIER, linewidths=0.9, linestyles="dashed", zorder=2.4)
+        self._assigned = LineCollection([], colors=ASSIGNED, linewidths=1.0, zorder=2.6)
+        for each in self.artists:
+            self._axes.add_collection(each, autolim=False)
+        self._axes.plot(*self._landmarks.T, linestyle="none", marker="*", markersize=3.0, color=LANDMARK, zorder=2.0)
+
+    @classmethod
+    def applies(cls, view: RunView) -> bool:
+        """Tell whether the run has landmarks."""
+        return len(view.landmarks) > 0
+
+    @property
+    def artists(self) -> list[Any]:
+        """The collections that `show` changes."""
+        return [self._simplices, self._edges, self._frontier, self._assigned]
+
+    def show(self, tracks: Tracks, index: int, at_s: float | None) -> None:
+        """Show what was known at `at_s`, or at the end."""
+        until = float("inf") if at_s is None else at_s + 1e-9
+        self._simplices.set_verts([hull for time_s, hull in self._hulls if time_s <= until])
+        self._edges.set_segments([line for time_s, line in self._lines if time_s <= until])
+        newest = {node: report for time_s, node, report in self._records if time_s <= until}
+        position = tracks.position[index]
+        frontiers: list[Floats] = []
+        assigned: list[Floats] = []
+        for _, report in sorted(newest.items()):
+            frontiers += [self._landmarks[list(pair)] for pair in report.frontiers]
+            assigned += [
+                np.array([position[robot], self._landmarks[[a, b]].mean(axis=0)]) for robot, a, b in report.assigned
+            ]
+        self._frontier.set_segments(frontiers)
+        self._assigned.set_segments(assigned)
+
+    def legend(self) -> Sequence[Line2D | Patch]:
+        """Return the entries for all that may be shown."""
+        star: dict[str, Any] = {"marker": "*", "markersize": 5, "linestyle": "none"}
+        return [
+            Line2D([], [], color=LANDMARK, **star, label="landmark"),
+            Patch(facecolor=SIMPLEX, edgecolor=EDGE, label="simplex: landmarks seen together"),
+            Line2D([], [], color=FRONTIER, linestyle="dashed", linewidth=1.2, label="open frontier"),
+            Line2D([], [], color=ASSIGNED, linewidth=1.2, label="robot and its frontier"),
+        ]
+
+    def _note(self, time_s: float, corners: Floats) -> None:
+        hull = shapely.convex_hull(shapely.multipoints(corners))
+        if hull.geom_type == "Polygon":
+            ring = np.asarray(hull.exterior.coords)
+            self._hulls.append((time_s, ring))
+            self._lines.append((time_s, ring))
+        elif hull.geom_type == "LineString":
+            self._lines.append((time_s, np.asarray(hull.coords)))
