@@ -1,29 +1,36 @@
 """The parts of the documentation that come from the code: tables, sensors, messages, commands.
 
 `pages.py` writes what a function of GENERATED returns into the pages, below the line `<!-- generated: NAME -->`. A test checks
-that every name is known, used and up to date. The file is a MkDocs hook as well, which draws the picture of the index.
+that every name is known, used and up to date.
 """
 
-import atexit
 import inspect
 import re
-import shutil
 import sys
-import tempfile
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 import typer
-from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
 from pydantic import BaseModel
 
 from zwerm.agents.runtime import controllers
-from zwerm.catalogue import ALGORITHMS, BASE, COORDINATOR, FAULTS, FIELDS, RADIO_MODELS, ROBOT, SENSORS, names
+from zwerm.catalogue import (
+    ALGORITHMS,
+    BASE,
+    COORDINATOR,
+    FAULTS,
+    FIELDS,
+    METRICS,
+    RADIO_MODELS,
+    ROBOT,
+    SENSORS,
+    names,
+    row_of,
+)
 from zwerm.cli.app import app
-from zwerm.run.runner import run
 from zwerm.scenario.load import built_in, load
 from zwerm.scenario.tables import Scenario, metrics_table
 from zwerm.scenario.types import OpenTable
@@ -305,14 +312,34 @@ def _plain(text: str | None) -> str:
     return re.sub(r"\[/?bold\]", "`", inspect.cleandoc(text or ""))
 
 
-def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the picture of the index: a run of the first scenario, drawn as it is today; called by MkDocs."""
-    folder = Path(tempfile.mkdtemp(prefix="zwerm-docs-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    name = "images/sensor-coverage.png"
-    run("sensor-coverage", runner="inline").picture(folder / name)
-    files.append(File.generated(config, name, abs_src_path=str(folder / name)))
-    return files
+GALLERY: Final = Path(__file__).parent / "images" / "gallery"
+
+
+def gallery() -> str:
+    """Return every picture of the gallery, by algorithm, with the summary of its scenario."""
+    parts = []
+    for row in ALGORITHMS:
+        scenarios = [name for name in built_in() if row_of(name) is row and (GALLERY / f"{name}.png").exists()]
+        if scenarios:
+            page = f"\n\nPaper: {row.paper}. [Page]({row.page})." if row.page else ""
+            parts.append(f"## {row.title}{page}")
+        for name in scenarios:
+            summary = load(name).summary
+            parts.append(f"### `{name}`\n\n{summary}.\n\n![{summary}](images/gallery/{name}.png)")
+    return "\n\n".join(parts)
+
+
+def metric_list() -> str:
+    """Return every group of metrics: the key or the algorithm that switches it on, its parameters, and its names."""
+    groups = [(f"`[metrics] {key}`", where) for key, where in METRICS.items()]
+    groups += [(f"{row.title}", where) for row in ALGORITHMS for where in row.metrics]
+    lines = ["| measured with | metrics | what they measure |", "| --- | --- | --- |"]
+    for switch, where in groups:
+        module, _, name = where.partition(":")
+        found = getattr(import_module(module), name)
+        shown = ", ".join(f"`{each}`" for each in found.names)
+        lines.append(f"| {switch} | {shown} | {escaped(first_paragraph(found.__doc__))} |")
+    return "\n".join(lines)
 
 
 GENERATED: Final[dict[str, Callable[[], str]]] = {
@@ -321,7 +348,9 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
     "controllers": controller_list,
     "fields": field_list,
     "faults": fault_list,
+    "gallery": gallery,
     "messages": messages,
+    "metrics": metric_list,
     "parts": part_list,
     "radio-models": radio_models,
     "scenario-tables": scenario_tables,

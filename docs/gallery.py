@@ -10,30 +10,37 @@ import io
 from pathlib import Path
 from typing import Final
 
-from PIL import Image
+from PIL import Image, ImageColor
 
 import zwerm
 from zwerm.scenario.load import built_in
+from zwerm.view.canvas import BLUE, ORANGE, OUTSIDE, SKY, VERMILLION, WALL, YELLOW
 
 FOLDER: Final = Path(__file__).parent / "images" / "gallery"
 SEED: Final = 1
-WIDTH_MAX: Final = 900  # pixels
-COLOURS: Final = (96, 64, 48, 32, 16)  # tried in this order until the file is small enough
+WIDTHS: Final = (900, 760, 640)  # pixels, tried in this order
+HEIGHT_MAX: Final = 1200
+COLOURS: Final = (96, 64, 48, 32, 16)  # besides those that are kept; tried in this order until the file is small enough
+# Colours that few pixels have, and that a palette made for the whole picture would lose.
+KEPT: Final = ("#FFFFFF", BLUE, ORANGE, OUTSIDE, SKY, VERMILLION, WALL, YELLOW)
 BYTES_MAX: Final = 150_000
 
 
 def small(path: Path) -> bytes:
-    """Return a PNG with a palette, at most WIDTH_MAX pixels wide and BYTES_MAX large where COLOURS allow it."""
-    with Image.open(path) as picture:
-        picture = picture.convert("RGB")
-        if picture.width > WIDTH_MAX:
-            height = round(picture.height * WIDTH_MAX / picture.width)
-            picture = picture.resize((WIDTH_MAX, height), Image.Resampling.LANCZOS)
+    """Return a PNG with a palette, at most BYTES_MAX large where one of WIDTHS and COLOURS allows it."""
+    with Image.open(path) as opened:
+        whole = opened.convert("RGB")
+    for width in WIDTHS:
+        picture = whole.copy()
+        picture.thumbnail((width, HEIGHT_MAX), Image.Resampling.LANCZOS)
         for colours in COLOURS:
+            palette = Image.new("P", (1, 1))
+            most_used = picture.quantize(colours, dither=Image.Dither.NONE).getpalette() or []
+            palette.putpalette([*(value for colour in KEPT for value in ImageColor.getrgb(colour)), *most_used])
             file = io.BytesIO()
-            picture.quantize(colours, dither=Image.Dither.NONE).save(file, "PNG", optimize=True)
+            picture.quantize(palette=palette, dither=Image.Dither.NONE).save(file, "PNG", optimize=True)
             if file.tell() <= BYTES_MAX:
-                break
+                return file.getvalue()
     return file.getvalue()
 
 
