@@ -18,6 +18,7 @@ HEAVY = ("pydantic", "shapely", "pymunk", "zenoh", "scipy", "PIL", "matplotlib",
 # What README and documentation import besides `zwerm`, and why.
 DOCUMENTED: dict[str, str] = {
     "zwerm.scenario.types": "the types of parameters of plug-ins: NonNegative, Rectangle",
+    "zwerm.agents.landmark_exploration.mapping.map_file": "reading and writing the map files of landmark exploration",
     "zwerm.world.faults.air": "the base class of faults of the radio",
     "zwerm.world.radio.network_rules": "the rules of the network of a twin",
 }

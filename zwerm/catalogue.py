@@ -171,6 +171,16 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         scenarios=("computation-free*",),
     ),
     Algorithm(
+        name="robot_teams",
+        title="Sensor-based coverage by robot teams",
+        paper="Latimer, Srinivasa, Lee-Shue, Sonne, Choset, Hurst 2002",
+        page="papers/robot-teams.md",
+        controllers={ROBOT: {"robot-teams": "zwerm.agents.robot_teams:TeamRobot"}},
+        metrics=("zwerm.world.metrics.robot_teams:TeamCoverage",),
+        layers=("zwerm.view.robot_teams:CellsLayer",),
+        scenarios=("robot-teams*",),
+    ),
+    Algorithm(
         name="gossip",
         title="Demonstrations of the radio: gossip and beacons",
         controllers={ROBOT: {"beacon": "zwerm.agents.gossip:Beacon", "gossip-max": "zwerm.agents.gossip:GossipMax"}},

@@ -1,0 +1,195 @@
+"""The map of ends, ports and mates, derived from a set of facts, and the certificate of complete coverage.
+
+Every end of a segment needs a mate, the other end, once the segment is swept; and has two ports, the arcs of the boundary that
+leave it to either side. Coverage is complete if and only if no end lacks its mate and no port is open: then every slab between
+two slices is bounded by swept segments and traced arcs only. That presumes that the spacing is at most twice the footprint's
+radius, and at most the sum of the footprint's radius and the body's diameter, so that an obstacle between two slices that
+no arc reaches hides nothing.
+
+A dead robot may hide ends for ever. They count for nothing: its own footprint covers what is there, and arcs lead around it.
+
+Ends that two robots measured a little differently are one: those of one slice and side are joined where neighbours are at most
+`TOLERANCE_MM` apart. The joined ends are a function of the set of facts alone, so that merging maps needs no order.
+"""
+
+import heapq
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+
+from zwerm.agents.robot_teams.facts import LEFT, RIGHT, Arc, End, Fact, FactSet, Segment, Void
+
+TOLERANCE_MM: Final = 120
+
+# A port: an end, and the side on which the arc leaves.
+Port = tuple[End, int]
+
+
+class Step(NamedTuple):
+    """One way from an end to another: along the swept segment (`direction` 0), or along the arc on that side."""
+
+    direction: int
+    stop: End
+    length_mm: int
+
+
+class Certificate(NamedTuple):
+    """Why coverage is complete, or what is missing."""
+
+    ends: int
+    ends_without_mate: tuple[End, ...]
+    open_ports: tuple[Port, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether at least one end is known and nothing is open."""
+        return self.ends > 0 and not self.ends_without_mate and not self.open_ports
+
+
+class SliceMap:
+    """What a robot knows of the free space: its facts, and the graph of ends that follows from them."""
+
+    def __init__(self) -> None:
+        self.facts = FactSet()
+        self._known = -1
+        self._levels: dict[tuple[int, int], list[tuple[int, int, End]]] = {}
+        self._mates: dict[End, Step] = {}
+        self._arcs: dict[Port, Step] = {}
+        self._by_slice: dict[int, list[Segment]] = {}
+        self._certificate = Certificate(0, (), ())
+
+    def add(self, fact: Fact) -> bool:
+        """Add one fact; tell whether it is new."""
+        return self.facts.add(fact)
+
+    def merge(self, facts: Iterable[Fact]) -> int:
+        """Add all of `facts`; return how many are new."""
+        return sum([self.facts.add(fact) for fact in facts])
+
+    def end(self, end: End) -> End | None:
+        """Return the known end that `end` is a measurement of, or None."""
+        self._derive()
+        nearest, apart = None, TOLERANCE_MM + 1
+        for low, high, known in self._levels.get((end.slice, end.side), ()):
+            distance = max(low - end.y_mm, end.y_mm - high, 0)
+            if distance < apart:
+                nearest, apart = known, distance
+        return nearest
+
+    def mate(self, end: End) -> Step | None:
+        """Return the way along the swept segment of a known end, or None while it is not swept."""
+        self._derive()
+        return self._mates.get(end)
+
+    def arc(self, end: End, direction: int) -> Step | None:
+        """Return the way along the arc that leaves a known end on the side `direction`, or None while it is open."""
+        self._derive()
+        return self._arcs.get((end, direction))
+
+    def is_swept(self, k: int, y_mm: int) -> bool:
+        """Tell whether a swept segment of slice k reaches within the tolerance of the height y."""
+        self._derive()
+        low, high = y_mm - 4 * TOLERANCE_MM, y_mm + 4 * TOLERANCE_MM
+        return any(segment.bottom_mm <= high and segment.top_mm >= low for segment in self._by_slice.get(k, ()))
+
+    @property
+    def arcs_known(self) -> bool:
+        """Whether any arc was traced."""
+        self._derive()
+        return bool(self._arcs)
+
+    @property
+    def certificate(self) -> Certificate:
+        """What is open, sorted."""
+        self._derive()
+        return self._certificate
+
+    def distances(self, start: End) -> dict[End, int]:
+        """Return the length [mm] of the shortest known way from a known end to every end that can be reached."""
+        return {end: length for end, (length, _) in self._shortest(start).items()}
+
+    def route(self, start: End, stop: End) -> list[tuple[End, Step]] | None:
+        """Return the shortest known way as (end, step) pairs; empty where start is stop, None where there is none."""
+        found = self._shortest(start)
+        if stop not in found:
+            return None
+        steps: list[tuple[End, Step]] = []
+        while stop != start:
+            previous = found[stop][1]
+            assert previous is not None
+            steps.append(previous)
+            stop = previous[0]
+        return steps[::-1]
+
+    def _shortest(self, start: End) -> dict[End, tuple[int, tuple[End, Step] | None]]:
+        self._derive()
+        found: dict[End, tuple[int, tuple[End, Step] | None]] = {start: (0, None)}
+        heap = [(0, start)]
+        while heap:
+            length, end = heapq.heappop(heap)
+            if length > found[end][0]:
+                continue
+            for step in (self._mates.get(end), self._arcs.get((end, LEFT)), self._arcs.get((end, RIGHT))):
+                if step is None:
+                    continue
+                total = length + step.length_mm
+                if step.stop not in found or total < found[step.stop][0]:
+                    found[step.stop] = total, (end, step)
+                    heapq.heappush(heap, (total, step.stop))
+        return found
+
+    def _derive(self) -> None:
+        """Work out ends, mates and arcs anew if facts were added."""
+        if len(self.facts) == self._known:
+            return
+        self._known = len(self.facts)
+        segments, arcs = self.facts.segments, self.facts.arcs
+        ends_of_arcs = [end for arc in arcs for end in (arc.start, arc.stop)]
+        self._levels = _joined([end for segment in segments for end in segment.ends] + ends_of_arcs)
+        self._mates, self._arcs, self._by_slice = {}, {}, {}
+        for segment in segments:
+            self._by_slice.setdefault(segment.slice, []).append(segment)
+            self._mate(segment)
+        for arc in arcs:
+            self._join(arc)
+        ends = sorted(end for level in self._levels.values() for _, _, end in level)
+        voids = self.facts.voids
+        reached = [end for end in ends if not any(_hides(void, end) for void in voids)]
+        self._certificate = Certificate(
+            len(ends),
+            tuple([end for end in reached if end not in self._mates]),
+            tuple([(end, side) for end in reached for side in (LEFT, RIGHT) if (end, side) not in self._arcs]),
+        )
+
+    def _known_end(self, end: End) -> End:
+        for low, high, known in self._levels[end.slice, end.side]:
+            if low <= end.y_mm <= high:
+                return known
+        raise KeyError(end)
+
+    def _mate(self, segment: Segment) -> None:
+        top, bottom = map(self._known_end, segment.ends)
+        length = segment.top_mm - segment.bottom_mm
+        self._mates.setdefault(top, Step(0, bottom, length))
+        self._mates.setdefault(bottom, Step(0, top, length))
+
+    def _join(self, arc: Arc) -> None:
+        (start, there), (stop, back) = ((self._known_end(end), side) for end, side in arc.ports)
+        self._arcs.setdefault((start, there), Step(there, stop, arc.length_mm))
+        self._arcs.setdefault((stop, back), Step(back, start, arc.length_mm))
+
+
+def _hides(void: Void, end: End) -> bool:
+    return void.slice == end.slice and void.low_mm <= end.y_mm <= void.high_mm
+
+
+def _joined(ends: Iterable[End]) -> dict[tuple[int, int], list[tuple[int, int, End]]]:
+    """Return by slice and side the groups of neighbouring ends, ascending: the lowest, the highest, and its name."""
+    levels: dict[tuple[int, int], list[tuple[int, int, End]]] = {}
+    for end in sorted(set(ends)):
+        level = levels.setdefault((end.slice, end.side), [])
+        if level and end.y_mm - level[-1][1] <= TOLERANCE_MM:
+            low, _, known = level[-1]
+            level[-1] = low, end.y_mm, known
+        else:
+            level.append((end.y_mm, end.y_mm, end))
+    return levels

@@ -1,0 +1,266 @@
+"""One robot's work: travel along known ways, find a slice of a corridor, sweep it, and hunt for critical points.
+
+The work is written as generators: each yields a manoeuvre, or None to wait a tick, and is resumed when the manoeuvre is done.
+They add what they find to the map, and keep `at`, the end where the robot stands.
+"""
+
+from collections.abc import Callable, Generator
+from typing import Final, Protocol
+
+from zwerm.agents.robot_teams.facts import LEFT, RIGHT, End, Fact, Segment
+from zwerm.agents.robot_teams.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
+from zwerm.agents.robot_teams.messages import HUNTS, SWEEPS, TRAVELS, Plan
+from zwerm.agents.robot_teams.senses import Senses
+from zwerm.agents.robot_teams.slice_map import SliceMap
+
+Story = Generator[Manoeuvre | None, None, None]
+
+# A journey or a hunt that takes more steps than this has lost its way.
+STEPS_MAX: Final = 400
+# So often a step of a journey may lead elsewhere than the map says.
+ASTRAY_MAX: Final = 3
+# A robot farther than this from its end approaches it first [m].
+AT_END_M: Final = 0.06
+
+
+class NoWay(Exception):
+    """No known way leads there."""
+
+
+class Lost(Exception):
+    """A manoeuvre failed, or led elsewhere than the map says."""
+
+
+class Mates(Protocol):
+    """What a robot knows of its teammates in a corridor."""
+
+    def slot(self, room: int | None) -> int:
+        """Return which slice of the corridor is this robot's, given for how many it found room; negative for none."""
+
+    def claimed(self, k: int) -> bool:
+        """Tell whether a teammate takes slice k in this corridor."""
+
+    def sweeping(self, k: int) -> bool:
+        """Tell whether another robot is sweeping slice k now."""
+
+    def awaits_predecessor(self) -> bool:
+        """Tell whether the predecessor has still to sweep its slice."""
+
+
+class Work:
+    """What one robot does and where it stands. `sense` gives its newest senses."""
+
+    def __init__(
+        self, slice_map: SliceMap, grid: Grid, step_m: float, sense: Callable[[], Senses], parked: Parked
+    ) -> None:
+        self.map = slice_map
+        self.at: End | None = None
+        self.phase = TRAVELS
+        self.found = False
+        self.spare = False
+        self.claim: int | None = None
+        self.room: int | None = None
+        self.sweeping: int | None = None
+        self.failures = 0
+        self.found_facts: list[Fact] = []
+        self._grid = grid
+        self._step_m = step_m
+        self._sense = sense
+        self._parked = parked
+
+    # --- finding itself -----------------------------------------------------------------------------------------------
+
+    def localise(self, side: int, swept_by_others: Callable[[int], bool]) -> Story:
+        """Find an end from anywhere: go to a slice and along it to its end on `side`; sweep it if it is new."""
+        self.at = self.sweeping = None
+        seek = Seek(self._grid)
+        yield seek
+        self.sweeping = seek.slice
+        up = Sweep(seek.slice, side, self._grid, self._step_m, self._parked)
+        yield up
+        if up.end is None:
+            raise Lost
+        known = self.map.end(up.end)
+        if known is not None:
+            self.at, self.sweeping = known, None
+            return
+        # The formation's first corridor: join the own end to the predecessor's, come back, and sweep.
+        start = self.at = up.end
+        if not self.map.arcs_known and (yield from self.trace(LEFT)):
+            yield from self.travel(start)
+        yield from self.sweep()
+        yield from self._hunt(up.slice, RIGHT, swept_by_others)
+
+    def link(self, direction: int, swept_by_others: Callable[[int], bool]) -> Story:
+        """Walk back to the predecessor's slice: what joins the maps of robots that began apart."""
+        self.found = self.spare = False
+        self.phase = HUNTS
+        at = self.at
+        if at is None:
+            raise Lost
+        yield from self._hunt(at.slice, direction, swept_by_others)
+
+    # --- single steps -------------------------------------------------------------------------------------------------
+
+    def sweep(self) -> Story:
+        """Sweep the slice from the end where the robot is to the other end."""
+        start = self.at
+        if start is None:
+            raise Lost
+        yield from self._approach(start)
+        sweep = Sweep(start.slice, -start.side, self._grid, self._step_m, self._parked)
+        self.sweeping = start.slice
+        yield sweep
+        self.sweeping = None
+        end = sweep.end
+        if end is None:
+            raise Lost
+        low, high = sorted((start.y_mm, end.y_mm))
+        known = self.map.end(start)
+        if known is None or self.map.mate(known) is None or self.map.end(end) is None:
+            self._note(Segment(start.slice, low, high))
+        self.at = self.map.end(end)
+
+    def trace(self, direction: int) -> Generator[Manoeuvre | None, None, bool]:
+        """Follow the boundary from the end where the robot is to the next; tell whether that is on another slice."""
+        start = self.at
+        if start is None:
+            raise Lost
+        senses = self._sense()
+        depth = (senses.x_m - self._grid.x_m(start.slice)) * direction
+        if abs(depth) > 0.6 or abs(senses.y_m - start.y_mm / 1000.0) > 0.6:
+            yield from self._approach(start)
+        trace = Trace(start, direction, self._grid, self._parked)
+        yield trace
+        arc, end = trace.arc, trace.end
+        if end is None:
+            raise Lost
+        # Where a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known.
+        known = self.map.end(start)
+        if arc is not None and (known is None or self.map.arc(known, direction) is None):
+            self._note(arc)
+        self.at = self.map.end(end)
+        if self.at is None:
+            raise Lost
+        return end.slice != start.slice
+
+    def travel(self, stop: End) -> Story:
+        """Go to a known end by the shortest known way."""
+        astray = 0
+        for _ in range(STEPS_MAX):
+            start = self._here()
+            goal = self.map.end(stop)
+            if start is None or goal is None:
+                raise Lost
+            self.at = start
+            if start == goal:
+                return
+            route = self.map.route(start, goal)
+            if route is None:
+                raise NoWay
+            step = route[0][1]
+            if step.direction == 0:
+                yield from self.sweep()
+            else:
+                yield from self.trace(step.direction)
+            if self._here() != self.map.end(step.stop):
+                astray += 1
+                if astray > ASTRAY_MAX:
+                    raise NoWay
+        raise NoWay
+
+    def _note(self, fact: Fact) -> None:
+        if self.map.add(fact):
+            self.found_facts.append(fact)
+
+    def _here(self) -> End | None:
+        """Return the known end at which the robot stands, if it stands at one."""
+        return None if self.at is None else self.map.end(self.at)
+
+    def _approach(self, end: End) -> Story:
+        senses = self._sense()
+        dx, dy = senses.x_m - self._grid.x_m(end.slice), senses.y_m - end.y_mm / 1000.0
+        if dx * dx + dy * dy > AT_END_M**2:
+            yield Approach(end, self._grid, self._parked)
+
+    # --- a corridor ---------------------------------------------------------------------------------------------------
+
+    def corridor(self, plan: Plan, mates: "Mates") -> Story:
+        """Take a slice of a corridor, sweep it, and hunt back to the predecessor's slice."""
+        self.found = self.spare = False
+        self.claim = self.room = None
+        self.phase = TRAVELS
+        try:
+            yield from self.travel(plan.anchor)
+        except NoWay:
+            self.spare = True
+            return
+        if not (yield from self._take_slot(plan, mates)):
+            self.spare = True
+            return
+        mine = self.at
+        if mine is None:
+            raise Lost
+        self.phase, self.claim = SWEEPS, mine.slice
+        if self.map.mate(mine) is None:
+            yield from self.sweep()
+        self.phase = HUNTS
+        while mates.awaits_predecessor():
+            yield None
+        yield from self._hunt(mine.slice, plan.direction, mates.sweeping)
+
+    def _take_slot(self, plan: Plan, mates: "Mates") -> Generator[Manoeuvre | None, None, bool]:
+        """Trace forward, one slice a robot; tell whether there is a slice for this one.
+
+        The robot that finds no more room tells for how many there is; then those in front take the slices that there are.
+        """
+        at = self.at
+        if at is None:
+            raise Lost
+        ends = [at] if plan.own_slice else []
+        while True:
+            wanted = mates.slot(self.room)
+            if wanted < 0:
+                return False
+            if wanted < len(ends):
+                if self.at != ends[wanted]:
+                    try:
+                        yield from self.travel(ends[wanted])
+                    except NoWay:
+                        return False
+                return True
+            passes = yield from self.trace(plan.direction)
+            at = self.at
+            if at is None:
+                raise Lost
+            if not passes or (self.map.mate(at) is not None and not mates.claimed(at.slice)):
+                self.room = len(ends)
+            else:
+                ends.append(at)
+
+    def _hunt(self, k: int, direction: int, swept_by_others: Callable[[int], bool]) -> Story:
+        """Walk round the slab behind slice k, sweeping what is new, until the end reached is swept.
+
+        Fig. 4 (i) and (ii) of the paper are both this loop.
+        """
+        for _ in range(STEPS_MAX):
+            at = self.at
+            if at is None:
+                raise Lost
+            into = -direction if at.slice == k else direction
+            if self.map.arc(at, into) is not None:
+                return
+            yield from self.trace(into)
+            at = self.at
+            if at is None:
+                raise Lost
+            while self.map.mate(at) is None and swept_by_others(at.slice):
+                yield None
+                at = self.map.end(at) or at
+            self.at = at
+            if self.map.mate(at) is not None:
+                return
+            if at.slice == k:
+                self.found = True
+            yield from self.sweep()
+        raise Lost

@@ -1,0 +1,68 @@
+"""Random polygonal arenas, keyed by a seed: a bent hall with some obstacles, and a place where a team can start in line."""
+
+import math
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPolygon, Point, Polygon
+
+# The free space is opened by a disc a little larger than the body: no gap through which it fits by a hair only.
+OPENING_M = 0.3
+SPACING_M = 0.95
+ORIGIN_M = 0.37
+
+
+def random_arena(seed: int, robots: int) -> tuple[dict[str, Any], list[list[float]]]:
+    """Return the `[arena]` table of seed `seed`, and the poses of `robots` robots that start in line, one slice apart."""
+    random = np.random.default_rng(10_000 + seed)
+    while True:
+        width, height = random.uniform(10.0, 18.0), random.uniform(8.0, 14.0)
+        hall = _hall(random, width, height)
+        blocks = [_block(random, width, height) for _ in range(int(random.integers(0, 5)))]
+        free = hall.difference(shapely.union_all(blocks)) if blocks else hall
+        opened = free.buffer(-OPENING_M, join_style="mitre").buffer(OPENING_M, join_style="mitre").intersection(free)
+        part = max(shapely.get_parts(opened), key=lambda each: each.area)
+        part = shapely.remove_repeated_points(part.simplify(0.02), 0.05)
+        if not isinstance(part, Polygon) or not part.is_valid or part.area < 40.0:
+            continue
+        poses = _line(random, part, robots)
+        if poses is not None:
+            rings = [np.round(np.asarray(ring.coords)[:-1], 3).tolist() for ring in (part.exterior, *part.interiors)]
+            return {"polygon": rings[0], "obstacles": rings[1:]}, poses
+
+
+def _hall(random: np.random.Generator, width: float, height: float) -> Polygon:
+    """Return a star-shaped polygon of random corners about the middle of a box."""
+    count = int(random.integers(5, 12))
+    angles = np.sort(random.uniform(0.0, 2.0 * math.pi, count))
+    radius = random.uniform(0.55, 1.0, count)
+    x = width / 2.0 * (1.0 + radius * np.cos(angles))
+    y = height / 2.0 * (1.0 + radius * np.sin(angles))
+    shape = Polygon(np.column_stack([x, y])).buffer(0)
+    if isinstance(shape, MultiPolygon) or shape.is_empty or shape.area < 0.4 * width * height:
+        return Polygon([(0, 0), (width, 0), (width, height), (0, height)])
+    return shape
+
+
+def _block(random: np.random.Generator, width: float, height: float) -> Polygon:
+    """Return a random polygon with 3 to 7 corners."""
+    count = int(random.integers(3, 8))
+    angles = np.sort(random.uniform(0.0, 2.0 * math.pi, count))
+    radius = random.uniform(0.5, 2.2) * random.uniform(0.5, 1.0, count)
+    x = random.uniform(0.1, 0.9) * width + radius * np.cos(angles)
+    y = random.uniform(0.1, 0.9) * height + radius * np.sin(angles)
+    return Polygon(np.column_stack([x, y])).buffer(0)
+
+
+def _line(random: np.random.Generator, free: Polygon, robots: int) -> list[list[float]] | None:
+    """Return poses in a row, each near a slice of its own, or None where there is no room for such a row."""
+    inner = free.buffer(-0.3)
+    xmin, ymin, xmax, ymax = inner.bounds
+    for _ in range(200):
+        first = math.ceil((random.uniform(xmin, xmax) - ORIGIN_M) / SPACING_M)
+        y = random.uniform(ymin, ymax)
+        places = [(ORIGIN_M + (first + i) * SPACING_M + 0.02, y) for i in range(robots)]
+        if all(inner.contains(Point(place)) for place in places):
+            return [[round(x, 3), round(y, 3), 0.0] for x, y in places]
+    return None

@@ -1,0 +1,121 @@
+"""What a team of robots covered, by exact polygons: the area that footprints swept, of the area that they can sweep.
+
+The robots' centres can be where their bodies fit, in the part of that space in which they started: the free space eroded by the
+body's radius. Their footprints can sweep the free space within the footprint's radius of it. A circle is a polygon of 4 * 32
+sides inside it; the same in both areas.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, ClassVar, Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString, MultiPolygon, Point, Polygon
+from shapely.ops import unary_union
+
+from zwerm.world.metrics import Metric, MetricContext, Truth
+from zwerm.world.tick.telemetry import TelemetryRecord
+
+Floats = NDArray[np.float64]
+
+QUARTER_SEGMENTS: Final = 32
+# The path is simplified by at most this much before it is widened [m].
+SIMPLIFY_M: Final = 1e-3
+# The body presses against walls: how much nearer than its radius its centre may come [m].
+PRESSED_M: Final = 1e-3
+
+
+def reachable(free: Polygon | MultiPolygon, starts: Floats, radius_m: float) -> Polygon | MultiPolygon:
+    """Return the places [m] of the centre of a body of `radius_m` that can be reached from `starts` (n, 2)."""
+    inner = free.buffer(-(radius_m - PRESSED_M), quad_segs=QUARTER_SEGMENTS)
+    parts = [
+        part
+        for part in shapely.get_parts(inner)
+        if any(part.distance(Point(start)) < 2.0 * PRESSED_M for start in starts)
+    ]
+    return unary_union(parts)
+
+
+def sweepable(
+    free: Polygon | MultiPolygon, starts: Floats, radius_m: float, footprint_m: float
+) -> Polygon | MultiPolygon:
+    """Return the part of the free space that footprints of `footprint_m` can sweep [m]."""
+    return reachable(free, starts, radius_m).buffer(footprint_m, quad_segs=QUARTER_SEGMENTS).intersection(free)
+
+
+def swept(paths: Sequence[Floats], footprint_m: float, free: Polygon | MultiPolygon) -> Polygon | MultiPolygon:
+    """Return the part of the free space that footprints swept along `paths`, each (t, 2) [m]."""
+    strips = []
+    for path in paths:
+        line = LineString(path).simplify(SIMPLIFY_M) if len(path) > 1 else Point(path[0])
+        coords = shapely.get_coordinates(line)
+        for first in range(0, max(1, len(coords) - 1), 50):
+            part = coords[first : first + 51]
+            piece = LineString(part) if len(part) > 1 else Point(part[0])
+            strips.append(piece.buffer(footprint_m, quad_segs=QUARTER_SEGMENTS))
+    return unary_union(strips).intersection(free)
+
+
+def coverage(
+    free: Polygon | MultiPolygon, paths: Sequence[Floats], radius_m: float, footprint_m: float
+) -> dict[str, float]:
+    """Return `coverage_fraction` and `repeat_coverage_fraction` of `paths`, one (t, 2) array [m] for each robot.
+
+    Repeat coverage is the area that footprints pass over on all paths, over the area that can be swept, less one.
+    """
+    starts = np.array([path[0] for path in paths])
+    area = sweepable(free, starts, radius_m, footprint_m)
+    done = swept(paths, footprint_m, free)
+    length_m = sum(float(np.hypot(*np.diff(path, axis=0).T).sum()) for path in paths)
+    return {
+        "coverage_fraction": done.intersection(area).area / area.area,
+        "repeat_coverage_fraction": length_m * 2.0 * footprint_m / area.area - 1.0,
+        "path_length_m": length_m,
+        "sweepable_area_m2": area.area,
+    }
+
+
+class TeamCoverage(Metric):
+    """Coverage by the footprints of all robots, from their paths, and what the robots report of their map."""
+
+    names: ClassVar[Sequence[str]] = (
+        *("coverage_fraction", "repeat_coverage_fraction", "path_length_m", "sweepable_area_m2", "completion_time_s"),
+        *("certificate_satisfied", "critical_points", "divisions", "merges"),
+    )
+    every_s: ClassVar[float | None] = 0.05
+
+    def __init__(self, parameters: Any, context: MetricContext) -> None:
+        robots = context.scenario.robots
+        self._free = context.arena.free
+        self._radius_m = robots.body.radius_m
+        self._footprint_m = float(robots.parameters.get("footprint_m", 0.5))
+        self._paths: list[Floats] = []
+        self._numbers: dict[int, dict[str, float]] = {}
+        self._truth: Truth | None = None
+
+    def report(self, record: TelemetryRecord) -> None:
+        """Keep the newest numbers of every robot."""
+        self._numbers.setdefault(record.node, {}).update(record.numbers)
+
+    def sample(self, truth: Truth) -> None:
+        """Note where the robots are."""
+        self._paths.append(truth.scene.position.copy())
+        self._truth = truth
+
+    def metrics(self) -> dict[str, float]:
+        """Return the coverage by exact polygons, and the reports of the robots that live."""
+        if self._truth is None:
+            return {}
+        paths = np.array(self._paths)
+        tracks = [paths[:, robot] for robot in range(paths.shape[1])]
+        living = [numbers for node, numbers in self._numbers.items() if node not in self._truth.dead]
+        return {
+            **coverage(self._free, tracks, self._radius_m, self._footprint_m),
+            "completion_time_s": self._truth.time_s if self._truth.completed else math.nan,
+            "certificate_satisfied": float(bool(living) and all(n.get("certificate_satisfied") for n in living)),
+            "critical_points": max([numbers.get("critical_points", 0.0) for numbers in living], default=0.0),
+            "divisions": sum([numbers.get("divisions", 0.0) for numbers in self._numbers.values()]),
+            "merges": sum([numbers.get("merges", 0.0) for numbers in self._numbers.values()]),
+        }
