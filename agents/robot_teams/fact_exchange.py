@@ -3,8 +3,8 @@
 from typing import Final
 
 from zwerm.agents.robot_teams.facts import Arc, Fact, Segment, Void
-from zwerm.agents.robot_teams.messages import Beacon
 from zwerm.agents.robot_teams.slice_map import SliceMap
+from zwerm.agents.robot_teams.team_messages import Beacon
 
 # For how long a new fact is in every beacon, how long sets may differ before all facts are sent, and how often those are [s].
 NEW_S: Final = 1.5

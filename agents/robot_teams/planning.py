@@ -9,8 +9,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.robot_teams.facts import LEFT, RIGHT, TOP, End
-from zwerm.agents.robot_teams.messages import READY, Plan, Status, View
 from zwerm.agents.robot_teams.slice_map import SliceMap
+from zwerm.agents.robot_teams.team_messages import READY, Plan, Status, View
 
 FAR: Final = 10**9
 # The side of the anchor of a plan that only joins the maps of robots that began apart.

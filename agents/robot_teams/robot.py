@@ -11,17 +11,6 @@ from zwerm.agents.robot_teams.corridor_mates import CorridorMates
 from zwerm.agents.robot_teams.fact_exchange import FactExchange
 from zwerm.agents.robot_teams.facts import BOTTOM, PASSES, TOP, Arc, End, Segment, Void
 from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre, mm
-from zwerm.agents.robot_teams.membership import Membership
-from zwerm.agents.robot_teams.messages import (
-    READY,
-    Beacon,
-    FoundSnapshot,
-    Plan,
-    Status,
-    decode_beacon,
-    encode_beacon,
-    encode_snapshot,
-)
 from zwerm.agents.robot_teams.pilot import FAILED, IDLE, RUNNING, Pilot
 from zwerm.agents.robot_teams.planning import (
     FAR,
@@ -36,6 +25,17 @@ from zwerm.agents.robot_teams.planning import (
 )
 from zwerm.agents.robot_teams.senses import Senses, Sensing
 from zwerm.agents.robot_teams.slice_map import SliceMap
+from zwerm.agents.robot_teams.team_membership import Membership
+from zwerm.agents.robot_teams.team_messages import (
+    READY,
+    Beacon,
+    FoundSnapshot,
+    Plan,
+    Status,
+    decode_beacon,
+    encode_beacon,
+    encode_snapshot,
+)
 from zwerm.agents.robot_teams.work import Lost, NoWay, Work
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError, ProtocolError

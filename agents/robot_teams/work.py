@@ -9,9 +9,9 @@ from typing import Final, Protocol
 
 from zwerm.agents.robot_teams.facts import LEFT, RIGHT, End, Fact, Segment
 from zwerm.agents.robot_teams.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
-from zwerm.agents.robot_teams.messages import HUNTS, SWEEPS, TRAVELS, Plan
 from zwerm.agents.robot_teams.senses import Senses
 from zwerm.agents.robot_teams.slice_map import SliceMap
+from zwerm.agents.robot_teams.team_messages import HUNTS, SWEEPS, TRAVELS, Plan
 
 Story = Generator[Manoeuvre | None, None, None]
 

@@ -5,8 +5,8 @@ import pytest
 
 from zwerm.agents.robot_teams.fact_exchange import FACTS_MAX, FactExchange
 from zwerm.agents.robot_teams.facts import Segment
-from zwerm.agents.robot_teams.messages import Beacon, View, decode_beacon, encode_beacon
 from zwerm.agents.robot_teams.slice_map import SliceMap
+from zwerm.agents.robot_teams.team_messages import Beacon, View, decode_beacon, encode_beacon
 
 DT_S = 0.25
 
