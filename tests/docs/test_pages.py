@@ -16,6 +16,7 @@ NUMBERS_MAX = 2
 # Tables that hold numbers and no measurements, by page and first line.
 NOT_MEASURED: dict[str, set[str]] = {
     "architecture.md": {"| step | method | effect |"},
+    "papers/robot-teams.md": {"| part | what it does | section |", "| parameter | default | what it is |"},
     "comparison.md": {"| | Zwerm | ARGoS | Webots | VMAS | IR-SIM | ROS 2 with Gazebo |"},
 }
 
