@@ -130,7 +130,7 @@ def test_an_input_error_of_compare_is_one_line_and_status_2(
 
 def test_study_with_json_prints_one_object(gossip: Path, tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(
-        'scenario = "talk.toml"\nseeds = 2\nmetrics = ["delivered_fraction", "nothing"]\n'
+        'scenario = "talk.toml"\nseeds = 2\nmetrics = ["delivered_fraction", "telemetry.nothing"]\n'
         "[[paper.points]]\nvalues = { delivered_fraction = { at_least = 0.01 } }\n"
     )
     ran = zwerm("study", "study.toml", "--jobs", "1", "--json", cwd=tmp_path)
@@ -138,4 +138,4 @@ def test_study_with_json_prints_one_object(gossip: Path, tmp_path: Path) -> None
     [point] = json.loads(ran.stdout)["points"]
     assert point["metrics"]["delivered_fraction"]["n"] == 2
     assert point["metrics"]["delivered_fraction"]["paper_is_bound"] is True
-    assert point["metrics"]["nothing"] == {"n": 0, "mean": None, "sd": None, "half_width": None}
+    assert point["metrics"]["telemetry.nothing"] == {"n": 0, "mean": None, "sd": None, "half_width": None}

@@ -45,32 +45,35 @@ def rows_of(study: Study, told: dict[str, list[dict[str, Any]]]) -> Comparison:
 def test_a_difference_is_over_pairs_of_seeds_with_students_interval(gossip: Path) -> None:
     ours, theirs = [3.0, 5.0, 4.0, math.nan, 9.0], [2.5, 4.0, 4.25, 1.0]
     comparison = rows_of(
-        planned(gossip, (), metrics=["cost"]),
+        planned(gossip, (), metrics=["telemetry.cost"]),
         {
-            "often": [{"outcome": "completed", "cost": each} for each in theirs],
-            "seldom": [{"outcome": "completed", "cost": each} for each in ours],
+            "often": [{"outcome": "completed", "telemetry.cost": each} for each in theirs],
+            "seldom": [{"outcome": "completed", "telemetry.cost": each} for each in ours],
         },
     )
     [place] = comparison.places
-    found = comparison.difference(place, place.points[1], "cost")
+    found = comparison.difference(place, place.points[1], "telemetry.cost")
     low, high = stats.ttest_rel(ours[:3], theirs[:3]).confidence_interval(0.95)
     assert found.n == 3
     assert (found.mean - found.half_width, found.mean + found.half_width) == pytest.approx((low, high))
     # Rounding is no difference: its interval would be as narrow as it is, and leave out zero.
     assert _difference(0.1 + 0.2, 0.3) == 0.0
     # The means are of all that have a value, pairs or not.
-    assert comparison.sample(place.points[1], "cost").n == 4
+    assert comparison.sample(place.points[1], "telemetry.cost").n == 4
 
 
 def test_a_failed_run_counts_with_its_measured_values_and_its_reason(gossip: Path) -> None:
     gave_up = "node 160 gave up: cut-off: no path leads to the frontier, 3 frontier edges left"
     crashed = "node {} crashed at tick 5: ValueError"
     comparison = rows_of(
-        planned(gossip, (), metrics=["cost"]),
+        planned(gossip, (), metrics=["telemetry.cost"]),
         {
-            "often": [{"outcome": "completed", "cost": 1.0}, {"outcome": "time-limit", "cost": 2.0}],
+            "often": [
+                {"outcome": "completed", "telemetry.cost": 1.0},
+                {"outcome": "time-limit", "telemetry.cost": 2.0},
+            ],
             "seldom": [
-                {"outcome": "failed", "reason": gave_up, "cost": 4.0},
+                {"outcome": "failed", "reason": gave_up, "telemetry.cost": 4.0},
                 *({"outcome": "failed", "reason": crashed.format(node)} for node in (3, 12)),
             ],
         },
@@ -81,7 +84,7 @@ def test_a_failed_run_counts_with_its_measured_values_and_its_reason(gossip: Pat
         "failed (cut-off)": 1,
         "failed (node N crashed at tick N: ValueError)": 2,
     }
-    assert comparison.difference(place, place.points[1], "cost").mean == 3.0
+    assert comparison.difference(place, place.points[1], "telemetry.cost").mean == 3.0
     assert comparison.sample(place.points[0], "completed").mean == 0.5
     assert comparison.difference(place, place.points[1], "completed").mean == -0.5
 
@@ -91,7 +94,7 @@ def test_a_setting_without_effect_on_a_variant_runs_its_trials_once(tmp_path: Pa
         "sensor-coverage",
         [parse_variant("central"), parse_variant("decentralised:services.path=gradient")],
         [parse_sweep('faults=none:[],crash:[{kind="crash", nodes=["coordinator"], at_s=1.0}]')],
-        metrics=["coverage_fraction"],
+        metrics=["delivered_fraction"],
     )
     study.table.set.append("time.duration_s=2.0")
     result = run_study(study, tmp_path / "rows.parquet", seeds=[1, 2], jobs=1)
@@ -103,15 +106,15 @@ def test_a_setting_without_effect_on_a_variant_runs_its_trials_once(tmp_path: Pa
     none, crash = comparison.places
     assert none.points[1].fingerprint == crash.points[1].fingerprint
     assert crash.points[0].scenario.faults
-    assert comparison.difference(crash, crash.points[1], "coverage_fraction").n == 2
+    assert comparison.difference(crash, crash.points[1], "delivered_fraction").n == 2
 
 
 def test_unmeasured_and_zero_metrics_are_left_out_unless_requested(gossip: Path) -> None:
-    rows = [{"outcome": "completed", "coverage_fraction": 0.0, "robots_deployed": 3.0}]
+    rows = [{"outcome": "completed", "delivered_fraction": 0.0, "robots_deployed": 3.0}]
     told = {"often": rows, "seldom": rows}
     assert rows_of(planned(gossip, ()), told).metrics == ["robots_deployed"]
-    assert rows_of(planned(gossip, (), metrics=["coverage_fraction"]), told).metrics == ["coverage_fraction"]
-    assert set(METRICS) > {"coverage_fraction", "robots_deployed"}
+    assert rows_of(planned(gossip, (), metrics=["delivered_fraction"]), told).metrics == ["delivered_fraction"]
+    assert set(METRICS) > {"delivered_fraction", "robots_deployed"}
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from zwerm.agents.sensor_coverage.protocols.transport.mailbox import TRIES_MAX, 
 from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.link.memory import MemoryLink
-from zwerm.run.assembly import assemble
+from zwerm.run.assembly import assemble_run
 from zwerm.run.measurement import measure
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
@@ -27,12 +27,13 @@ ALONE = (*HALL, "services.path=gradient")
 NOISE = "robots.sensors.0.sd_rad=0.0436332"
 
 
-def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
+def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot], dict[str, float]]:
     """Run inline, and return how it ended, the world, and the robots that are out.
 
     At no tick may two robots that are not part of a push have the same place, or a robot that is out be gone.
     """
-    world = assemble(scenario, 1)
+    world, observers = assemble_run(scenario, 1)
+    observers.subscribe(world.telemetry)
     nodes = {node: Node(*each) for node, each in node_specs(scenario, 1).items()}
     seen: dict[int, None] = {}
 
@@ -48,7 +49,7 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot]]:
         assert len(held) == len(set(held)), f"tick {world.tick}: each has a place of its own, but {sorted(held)}"
 
     driver = LockStep(world, MemoryLink({node: each.answer for node, each in nodes.items()}), [watch])
-    return driver.run(), world, out()
+    return driver.run(), world, out(), measure(world, observers)
 
 
 # --- words and letters ----------------------------------------------------------------------------------------------
@@ -129,8 +130,7 @@ def test_decentralised_robots_cover_a_small_hall_about_as_well_as_under_a_coordi
 )
 def test_no_robot_is_lost_or_counted_twice_on_a_lossy_radio(air: tuple[str, ...]) -> None:
     scenario = load("sensor-coverage", (*ALONE, *air))
-    outcome, world, robots = drive(scenario)
-    found = measure(world)
+    outcome, _world, robots, found = drive(scenario)
     slots = [robot.local_map.slot for robot in robots if not robot.situation.waiting]
     assert outcome == "completed"
     assert found["coverage_fraction"] >= 0.98

@@ -1,7 +1,6 @@
 """A coordinator whose uplink loses, repeats and delays: no command is carried out twice, and no robot is counted twice."""
 
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 
@@ -31,7 +30,7 @@ from zwerm.coordinator.sensor_coverage.coordinator import SensorCoverageCoordina
 from zwerm.coordinator.sensor_coverage.retry_policy import BURST_TRIES, RetryPolicy
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.link.memory import MemoryLink
-from zwerm.run.assembly import assemble
+from zwerm.run.assembly import assemble_run
 from zwerm.run.measurement import measure
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
@@ -263,9 +262,10 @@ def test_a_silent_robot_counts_as_dead_only_when_losses_cannot_explain_its_silen
 # --- the whole swarm --------------------------------------------------------------------------------------------------
 
 
-def drive(scenario: Scenario) -> tuple[str, World, SensorCoverageCoordinator]:
+def drive(scenario: Scenario) -> tuple[str, World, SensorCoverageCoordinator, dict[str, float]]:
     """Run inline, and return how it ended, the world, and the coordinator in its last life."""
-    world = assemble(scenario, 1)
+    world, observers = assemble_run(scenario, 1)
+    observers.subscribe(world.telemetry)
     nodes = {node: Node(*each) for node, each in node_specs(scenario, 1).items()}
 
     def again(node: int, incarnation: int) -> Callable[[bytes], bytes]:
@@ -276,14 +276,13 @@ def drive(scenario: Scenario) -> tuple[str, World, SensorCoverageCoordinator]:
     outcome = LockStep(world, link, programs=link).run()
     coordinator = nodes[scenario.robots.count]._controller
     assert isinstance(coordinator, SensorCoverageCoordinator)
-    return outcome, world, coordinator
+    return outcome, world, coordinator, measure(world, observers)
 
 
 @pytest.mark.parametrize("air", ["uplink.loss=0.1", "uplink.loss=0.5", "uplink.loss=0.8", BURSTS, MANGLED])
 def test_no_robot_is_lost_or_counted_twice_on_a_lossy_uplink(air: str) -> None:
     scenario = load("sensor-coverage", (*HALL, air))
-    outcome, world, coordinator = drive(scenario)
-    found: dict[str, Any] = measure(world)
+    outcome, world, coordinator, found = drive(scenario)
     placed = [robot for robot in coordinator.slots.occupant.values() if robot]
     waiting = list(coordinator.sources.waiting.values())
     out = [robot for robot in world.scene.present_ids().tolist() if robot]
