@@ -13,6 +13,7 @@ from zwerm.view.layer import Layer, Stage
 from zwerm.view.run_view import RunView
 from zwerm.view.swarm_artists import Swarm, gone_at_the_end
 from zwerm.world.metrics.sight import SeenArea, hexagonal_packing_robots
+from zwerm.world.tick.telemetry import PREFIX
 
 NO_BREAK: Final = "\N{NO-BREAK SPACE}"
 UNITS: Final = {"_m_s": " m/s", "_m2": " m²", "_m": " m", "_s": " s"}
@@ -99,10 +100,11 @@ class Composition:
     def metrics_in_words(self, metrics: Mapping[str, float]) -> str:
         """Return metrics on one line: fractions in percent, other numbers with the unit that their names end in.
 
-        A layer's headline replaces the whole list where the run has its first metric.
+        A layer's headline replaces the whole list where the run has its first metric. Telemetry is left to the table.
         """
         headline = next((kind.headline for kind in self.layers if kind.headline), ())
-        chosen = headline if headline and headline[0] in metrics else tuple(metrics)
+        rest = tuple(name for name in metrics if not name.startswith(PREFIX))
+        chosen = headline if headline and headline[0] in metrics else rest
         words = []
         for name, value in ((name, metrics[name]) for name in chosen if name in metrics):
             if name.endswith("_fraction"):
