@@ -73,7 +73,7 @@ lock:  ## resolve the dependencies anew (needs uv)
 	$(COMPILE) --extra frames --group dev --constraint requirements.txt --upgrade --output-file requirements-dev.txt
 
 clean:  ## remove .venv and everything that was built
-	rm -rf $(VENV) build dist site *.egg-info zwerm/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) build dist site *.egg-info zwerm/maths/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 $(RUN_READY): requirements.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || \
