@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot, to_steps
+from zwerm.agents.landmark_exploration.mapping.frontier_status import LANDMARKS_MAX
 from zwerm.wire.messages import BodyVelocity, Observation
 
 _FULL: Final = 2.0 * math.pi
@@ -22,11 +23,12 @@ class View:
         self.snapshot = Snapshot((), ())
 
     def take(self, observation: Observation) -> None:
-        """Take in an observation."""
+        """Take in an observation. Landmarks with ids of LANDMARKS_MAX or more are left out: an entry of a log has no room."""
         self.tick += 1
         heading = self.heading_rad = observation.compass_rad or 0.0
         seen = observation.landmarks or ()
-        self.bearing = {each.landmark: each.bearing_rad + heading for each in seen}
+        known = [each for each in seen if each.landmark < LANDMARKS_MAX]
+        self.bearing = {each.landmark: each.bearing_rad + heading for each in known}
         self.snapshot = Snapshot(
             tuple(self.bearing), tuple([to_steps(bearing_rad) for bearing_rad in self.bearing.values()])
         )

@@ -23,10 +23,16 @@ from zwerm.errors import ControllerError
 from zwerm.maths.keyed_random import stream
 from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission, Wake, WheelSpeeds
 
+# Parameters that a controller needs, or that fit the small bodies of the kit.
+PARAMETERS: dict[str, dict[str, Any]] = {
+    "landmark-navigator": {"map_file": '{"format": "landmark-map/1", "observations": [[[0, 1, 2], [0, 60, 120]]]}'},
+    "robot-teams": {"footprint_m": 0.4, "spacing_m": 0.5},
+}
+
 
 @pytest.mark.parametrize("name", names(ROBOT))
 def test_a_built_in_controller_conforms(name: str) -> None:
-    check(find(name), channels=("robots", "uplink"))
+    check(find(name), PARAMETERS.get(name), channels=("robots", "uplink"))
 
 
 class Wanderer:
