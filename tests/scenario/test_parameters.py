@@ -25,7 +25,8 @@ from zwerm.scenario.load import load
         ("base.controller=beacons", "base.controller: expected a built-in controller (", "got 'beacons'"),
         (
             "coordinator.controller=beacon",
-            "coordinator.controller: expected a built-in coordinator (sensor-coverage, landmark-exploration) or module:Class, got 'beacon'",
+            "coordinator.controller: expected a built-in coordinator (sensor-coverage, "
+            "landmark-exploration) or module:Class, got 'beacon'",
             "",
         ),
         ("coordinator.controller=nobody:Nobody", "coordinator.controller: cannot import 'nobody': ", "'nobody'"),
