@@ -5,7 +5,6 @@ the tables at once. The shorthands come first: range, line of sight, loss.
 """
 
 import inspect
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,6 +17,7 @@ from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.plugin_names import class_named
+from zwerm.scenario.renamed import warn_once
 from zwerm.scenario.tables import ChannelTable, Scenario
 from zwerm.scenario.types import OpenTable
 from zwerm.world.arena.arena import Arena
@@ -34,8 +34,6 @@ from zwerm.world.radio import (
 from zwerm.world.radio.links import Links
 from zwerm.world.radio.nodes import node_count, selected
 from zwerm.world.scene import Bools
-
-_warned: dict[str, None] = {}
 
 
 class Selected:
@@ -133,7 +131,9 @@ def make_model(
     except ValueError as error:
         raise ScenarioError([f"{path}.kind: {error}"]) from None
     if table.kind in RENAMED_RADIO_MODELS:
-        _warn(f"{scenario.place}: {path}.kind: {table.kind!r} is deprecated, use {RENAMED_RADIO_MODELS[table.kind]!r}")
+        warn_once(
+            f"{scenario.place}: {path}.kind: {table.kind!r} is deprecated, use {RENAMED_RADIO_MODELS[table.kind]!r}"
+        )
     key = kind.draw_key or table.kind
     counts[key] += 1
     try:
@@ -169,10 +169,3 @@ def tables_of(table: ChannelTable, path: str) -> list[tuple[str, OpenTable]]:
     if table.loss:
         found.append((f"{path}.loss", OpenTable.model_validate({"kind": "loss", "fraction": table.loss})))
     return [*found, *((f"{path}.models.{index}", model) for index, model in enumerate(table.models))]
-
-
-def _warn(line: str) -> None:
-    """Write a warning to standard error, once in a process."""
-    if line not in _warned:
-        _warned[line] = None
-        sys.stderr.write(f"zwerm: warning: {line}\n")

@@ -9,6 +9,7 @@ from air import DT_S, Radio, ring
 
 from zwerm.catalogue import RADIO_MODELS, RENAMED_RADIO_MODELS
 from zwerm.errors import ProtocolError, ScenarioError
+from zwerm.scenario import renamed
 from zwerm.wire.checksum import seal, unseal
 from zwerm.wire.messages import Transmission
 from zwerm.world.radio import RadioModel, RadioModelTable, registry
@@ -389,7 +390,7 @@ FORMER: dict[str, dict[str, Any]] = {
 def test_a_former_name_of_a_model_works_with_one_warning_and_the_same_random_numbers(
     former: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(registry, "_warned", {})
+    monkeypatch.setattr(renamed, "_warned", {})
     walls = [[[50.0, 40.0], [50.0, 60.0]]]
 
     def summary(kind: str) -> dict[str, Any]:
