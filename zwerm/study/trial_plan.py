@@ -1,7 +1,8 @@
 """The trials of a study: each variant at each point of the grid with each seed. All scenarios are checked first.
 
-The fingerprint of a point depends on all inputs of its trials except the seed: the scenario, the shape of the arena, the
-contents of files and user modules that the scenario names, and Zwerm's version (not its code between two releases).
+The fingerprint of a point depends on all inputs of its trials except the seed. These are the scenario, the shape of the
+arena, the contents of files and user modules that the scenario names, and Zwerm's version (not its code between two
+releases).
 """
 
 import itertools
