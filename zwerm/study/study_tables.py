@@ -23,7 +23,7 @@ Setting = bool | int | float | str
 # Reserved names of columns of the results.
 RESERVED = (
     *("study", "variant", "seed", "outcome", "reason", "trace", "fingerprint", "ticks", "sim_s", "wall_s"),
-    *("cell_counts", "series_time_s"),
+    *("modules", "cell_counts", "series_time_s"),
 )
 # Reserved columns that a study may report like a metric.
 REPORTABLE_COLUMNS = ("ticks", "sim_s", "wall_s")
