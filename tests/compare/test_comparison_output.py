@@ -67,9 +67,7 @@ def marker_places(gossip: Path, tmp_path: Path, sweep: str, monkeypatch: pytest.
     return [list(map(float, each.lines[0].get_xdata())) for each in figures[0].axes[0].containers]
 
 
-def test_markers_stand_at_the_values_of_a_sweep(
-    gossip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_markers_stand_at_the_values_of_a_sweep(gossip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert marker_places(gossip, tmp_path, "radio.loss=0.0,0.5", monkeypatch) == [[0.0, 0.5], [0.0, 0.5]]
     named = marker_places(gossip, tmp_path, "radio.models=few:[],many:[{kind='loss',fraction=0.5}]", monkeypatch)
     assert named[0] != named[1]

@@ -290,6 +290,7 @@ class Scenario(Table):
     pictures: PicturesTable = PicturesTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")
+    _overrides: tuple[str, ...] = PrivateAttr(default=())
 
     @model_validator(mode="after")
     def _variant_can_run(self) -> Self:
@@ -319,3 +320,8 @@ class Scenario(Table):
     def place(self) -> str:
         """What messages call it: its file."""
         return self._place
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """The settings, `path=value`, that were applied to it."""
+        return self._overrides

@@ -118,7 +118,7 @@ def _make_point(
     if name not in built_in_scenarios() and beside.is_file():
         name = str(beside)
     axes = [each for axis, value in settings.items() for each in _assignments(study, variant, axis, value)]
-    scenario = load(name, (*study.table.set, *variant.set, *sets, *axes))
+    scenario = load(name, (*study.table.set, *variant.set, *sets, *axes), tuple(sets))
     prepared = prepare(scenario)
     modules = identities.modules(scenario, runner)
     fingerprint = identities.fingerprint(scenario, prepared.arena.segments.tobytes(), modules)
