@@ -130,7 +130,7 @@ def check_controllers(scenario: Scenario) -> None:
     robots, base, coordinator = scenario.robots, scenario.base, scenario.coordinator
     kinds = [table.kind for table in robots.sensors]
     # A controller may name what it needs by the sensor's kind or by the field of the observation that it fills.
-    given = [*kinds, *(field for kind in kinds if (field := _field_of(kind)))]
+    given = [*kinds, *filter(None, map(_field_of, kinds))]
     mistakes = _controller_mistakes(scenario, "robots", ROBOT, robots.controller, robots.parameters, given)
     if base is not None:
         mistakes += _controller_mistakes(scenario, "base", BASE, base.controller, base.parameters, given)
@@ -142,12 +142,12 @@ def check_controllers(scenario: Scenario) -> None:
         raise ScenarioError(list(dict.fromkeys(mistakes)))
 
 
-def _field_of(kind: str) -> str:
-    """Return the field of the observation, or of its `extra`, that a sensor fills; "" where there is no such sensor."""
+def _field_of(kind: str) -> str | None:
+    """Return the field that a sensor fills, or None if there is no such sensor; `make_sensors` reports that mistake."""
     try:
         return find_sensor(kind).field
-    except ValueError:  # reported where sensors are made
-        return ""
+    except ValueError:
+        return None
 
 
 def _controller_mistakes(
