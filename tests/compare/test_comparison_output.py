@@ -64,7 +64,7 @@ def marker_places(gossip: Path, tmp_path: Path, sweep: str, monkeypatch: pytest.
     monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
     result = run_study(planned(gossip, (sweep,)), tmp_path / "out.parquet", seeds=[1], jobs=1)
     draw_comparison(tmp_path / "figure.png", Comparison(result.results))
-    return [list(map(float, each.lines[0].get_xdata())) for each in figures[0].axes[0].containers]
+    return [list(map(float, each[0].get_xdata())) for each in figures[0].axes[0].containers]
 
 
 def test_markers_stand_at_the_values_of_a_sweep(gossip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
