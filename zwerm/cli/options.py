@@ -24,6 +24,7 @@ Sets = Annotated[
     typer.Option("--set", metavar="PATH=VALUE", help="Override a setting of the scenario; may be given often."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
 Picture = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--picture", metavar="FILE.png", help="Where to draw the run; runs/SCENARIO-seedN.png by default."),

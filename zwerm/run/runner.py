@@ -12,6 +12,7 @@ from typing import Final, Literal, Protocol, get_args
 import numpy as np
 
 from zwerm.agents.runtime.contract import Setup
+from zwerm.agents.runtime.controllers import make
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import ScenarioError, StragglerError
@@ -111,6 +112,7 @@ def run(
         )
         return drive(world, link, seed, runner, realtime, watcher, record, link, metrics)
     _refuse_main(members)
+    _try_controllers(members)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
     with LocalSwarm(
@@ -131,6 +133,15 @@ def _refuse_main(specs: Mapping[int, tuple[str, Setup]]) -> None:
             raise ScenarioError(
                 [f"{name}: robot processes do not import the program itself: move the class to a module, or run inline"]
             )
+
+
+def _try_controllers(specs: Mapping[int, tuple[str, Setup]]) -> None:
+    """Make one controller of each kind. Raises ControllerError, which each robot's process would report apart."""
+    firsts: dict[str, Setup] = {}
+    for name, setup in specs.values():
+        firsts.setdefault(name, setup)
+    for name, setup in firsts.items():
+        make(name, setup)
 
 
 def serve(
