@@ -29,7 +29,7 @@ def find(name: str) -> type[Any]:
         inspect.signature(found).bind(None)
     except (TypeError, ValueError):
         raise ControllerError(f"{name}: a controller's constructor takes its Setup: __init__(self, setup)") from None
-    kind = parameters_of(found)
+    kind: Any = parameters_of(found)
     if not isinstance(kind, type) or not issubclass(kind, msgspec.Struct):
         raise ControllerError(f"{name}: its Parameters must be a subclass of msgspec.Struct, got {kind!r}")
     return found

@@ -35,11 +35,12 @@ class RunProgress:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._progress.stop()
+        self.suspend()
 
     def suspend(self) -> None:
         """Remove the display for good: a debugger needs the terminal."""
-        self._progress.stop()
+        if self._tasks:
+            self._progress.stop()
 
     def joined(self, count: int, total: int) -> None:
         """Show that `count` of `total` robots have joined."""
