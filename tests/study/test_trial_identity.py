@@ -9,10 +9,10 @@ import pytest
 from support import ROOT, scenario
 
 from zwerm.scenario.tables import Scenario
+from zwerm.scenario.user_modules import find_user_modules, spec_of
 from zwerm.study import trial_identity
 from zwerm.study.rows import read_rows
 from zwerm.study.trial_identity import Identities, LoadedModules, still_same, zwerm_identity
-from zwerm.study.user_modules import find_user_modules, spec_of
 
 CONTROLLER = """
 from zwerm import Command, Controller, WheelSpeeds

@@ -22,7 +22,7 @@ from typing import Any, Final
 
 from zwerm.catalogue import ALGORITHMS, algorithm_of
 from zwerm.scenario.tables import Scenario
-from zwerm.study.user_modules import SourceFile, UserModules, digest_of, find_user_modules, is_users, spec_of
+from zwerm.scenario.user_modules import SourceFile, UserModules, digest_of, find_user_modules, is_users, spec_of
 from zwerm.version import __version__
 
 # Libraries whose versions can change a result.

@@ -15,9 +15,9 @@ from zwerm.run.runner import Runner
 from zwerm.scenario.load import built_in as built_in_scenarios
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
+from zwerm.scenario.user_modules import UserModules
 from zwerm.study.study_tables import CELL_METRICS, REPORTABLE_COLUMNS, Setting, Study, VariantTable
 from zwerm.study.trial_identity import Identities
-from zwerm.study.user_modules import UserModules
 from zwerm.world.metrics.observers import is_measured
 
 
