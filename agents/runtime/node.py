@@ -90,9 +90,17 @@ class Node:
             Failure(
                 tick,
                 _printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX],
-                _printable(traceback.format_exc())[-TRACEBACK_CHARS_MAX:],
+                _printable("".join(_formatted(error)))[-TRACEBACK_CHARS_MAX:],
             )
         )
+
+
+def _formatted(error: BaseException) -> list[str]:
+    """Return the traceback of an error without the frame of this file, which tells nothing of the controller."""
+    trace = error.__traceback__
+    if trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return traceback.format_exception(type(error), error, trace)
 
 
 def _printable(text: str) -> str:

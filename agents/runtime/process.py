@@ -64,6 +64,7 @@ def main(
     if parent is not None and not parent.is_alive():  # it died before die_with_parent took effect
         sys.exit(EXIT_LOST)
     set_threads(ONE_THREAD if is_local(endpoint) and station is None else TWO_THREADS)
+    sys.breakpointhook = _no_terminal
     here = str(Path.cwd())
     if here not in sys.path:
         sys.path.append(here)  # the place of a user's own controllers
@@ -79,6 +80,10 @@ def main(
         sys.stderr.flush()
         os._exit(code)  # closing the radio's session waits for messages that the network loses
     sys.exit(code)
+
+
+def _no_terminal(*_: object, **__: object) -> None:
+    raise RuntimeError("breakpoint() needs a terminal, and a robot process has none: run with --inline")
 
 
 async def run_node(

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import assemble, prepare
 from zwerm.scenario.load import load, tables_of, validate
+from zwerm.scenario.overrides import blame
 from zwerm.scenario.tables import Scenario
 
 Path = tuple[str, ...]
@@ -41,7 +42,8 @@ def _mistakes_of_the_rest(name: str, overrides: tuple[str, ...]) -> list[str]:
         prepare(validate(rest, str(file), file.parent))
     except ScenarioError as error:
         found = [each.removeprefix(f"{file}: ") for each in error.mistakes]
-        return [f"{file}: {each}" for each in found if not any(_touches(each, path) for path in unsound)]
+        lines = [f"{file}: {each}" for each in found if not any(_touches(each, path) for path in unsound)]
+        return blame(lines, str(file), overrides)
     return []
 
 

@@ -291,6 +291,7 @@ class Scenario(Table):
     pictures: PicturesTable = PicturesTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")
+    _overrides: tuple[str, ...] = PrivateAttr(default=())
 
     @model_validator(mode="after")
     def _variant_can_run(self) -> Self:
@@ -320,3 +321,8 @@ class Scenario(Table):
     def place(self) -> str:
         """Name of the scenario in messages: its file."""
         return self._place
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """The settings, `path=value`, that were applied to it."""
+        return self._overrides
