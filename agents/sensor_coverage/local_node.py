@@ -38,7 +38,7 @@ class LocalNode(Controller):
         self.advice_client: AdviceClient | None = None
         if setup.services.get("redundancy") == "coordinator":
             self.advice_client = AdviceClient(setup.dt_s)
-        self._claimed = False
+        self._claimed: bool | None = False if setup.incarnation == 1 else None  # a former one may have claimed
         self._search = 0
 
     @property
@@ -63,7 +63,7 @@ class LocalNode(Controller):
             self._search = self.completion.search
             situation.local_map.reopen()
         self.components.poll(situation.tick)
-        if bool(situation.claims) != self._claimed:
+        if bool(situation.claims) is not self._claimed:
             self._claimed = bool(situation.claims)
             situation.telemetry["claims_frontier"] = self._claimed
         telemetry, situation.telemetry = situation.telemetry, {}
