@@ -16,7 +16,7 @@ from zwerm.agents.sensor_coverage.protocols.ending.completion_census import Comp
 from zwerm.wire.messages import Command, Observation, Wake
 
 CODECS: Final = {
-    peers.CHANNEL: Codec(peers.read_envelope, peers.write, in_envelopes=True),
+    peers.CHANNEL: Codec(peers.read, peers.write, in_envelopes=True),
     advice.CHANNEL: Codec(advice.read, advice.write),
 }
 

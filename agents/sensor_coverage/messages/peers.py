@@ -1,9 +1,9 @@
 """All messages between neighbours on the robots' radio channel, in envelopes that are sealed under a checksum."""
 
 from collections.abc import Callable
-from typing import Final
+from typing import Annotated, Final
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from zwerm.agents.sensor_coverage.messages.beacons import PathVector, StateBeacon, StateRequest
 from zwerm.agents.sensor_coverage.messages.incarnations import ANY, Incarnation
@@ -27,11 +27,19 @@ PeerMessage = (
 )
 
 
+Number = Annotated[int, Meta(ge=0, le=2**62)]
+
+
 class Envelope(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A message with the incarnation of its sender, and that of its receiver (ANY: unknown, or many receivers)."""
+    """A message with the incarnation of its sender, and that of its receiver (ANY: unknown, or many receivers).
+
+    `number` counts the sender's broadcasts; a message to one robot has 0. Each message is sent in `copies` equal packets.
+    """
 
     sender: Incarnation
     receiver: Incarnation
+    number: Number
+    copies: Number
     message: PeerMessage
 
 
@@ -39,9 +47,9 @@ _sealed: Final = Sealed(Envelope)
 read_envelope: Final[Callable[[bytes], Envelope | None]] = _sealed.read
 
 
-def write(message: PeerMessage, sender: int = 1, receiver: int = ANY) -> bytes:
+def write(message: PeerMessage, sender: int = 1, receiver: int = ANY, number: int = 0, copies: int = 1) -> bytes:
     """Return the packet with a message from an incarnation of its sender to one of its receiver."""
-    return _sealed.write(Envelope(sender, receiver, message))
+    return _sealed.write(Envelope(sender, receiver, number, copies, message))
 
 
 def read(payload: bytes) -> PeerMessage | None:
