@@ -223,11 +223,15 @@ class PushScheduler(Component):
 
     def _not_ready(self, tick: int) -> bool:
         """Return whether a visible robot has no slot yet, and may be ready soon."""
-        states = self._map.states
-        homeless = [n for n in self._situation.bearings if n not in states or states[n].slot == NOWHERE]
+        homeless = self._homeless()
         if not homeless or self._released_at is not None:
             self._not_ready_since = tick
-        return tick - self._not_ready_since < READY_TICKS_MAX and bool(homeless) and self._released_at is None
+        return tick - self._not_ready_since < READY_TICKS_MAX and homeless and self._released_at is None
+
+    def _homeless(self) -> bool:
+        """Return whether a visible robot that is not dead has no slot."""
+        states = self._map.states
+        return any(node not in states or states[node].slot == NOWHERE for node in self._situation.bearings)
 
     def _rear_has_left(self) -> bool:
         """Return whether the robot that the push took from the base has its slot: the next robot has time to average."""
@@ -242,9 +246,12 @@ class PushScheduler(Component):
             self.release = True
             self._released_at = tick
             self._released_before = self.released
-        elif self.released == self._released_before and tick - self._released_at > RELEASE_TICKS_MAX:
-            self.outcome = "depot-dry: the depot is empty"
-            self._report_numbers()
+        elif self.released == self._released_before:
+            if tick - self._released_at > RELEASE_TICKS_MAX:
+                self.outcome = "depot-dry: the depot is empty"
+                self._report_numbers()
+        elif not self._homeless() or tick - self._released_at > READY_TICKS_MAX:
+            self._released_at = None  # the robot that came out is dead, or was never ready
 
     def _watch_quiet(self, tick: int) -> None:
         """Conclude from the census once no path has led to a frontier for some time."""
