@@ -10,7 +10,7 @@ when they meet. A wrong suspicion therefore costs time, and nothing else: facts 
 from collections.abc import Sequence
 from typing import Final
 
-from zwerm.agents.robot_teams.team_messages import Beacon, Status, View
+from zwerm.agents.robot_teams.protocols.team_messages import Beacon, Status, View
 
 # How long the lead repeats views that it made for others, and how long a meeting is remembered [s].
 REPEAT_S: Final = 10.0
