@@ -11,6 +11,9 @@ it. A wreck also blocks ways that were free. Ways therefore prefer segments and 
 no way leads from an end to what is open, all that can be reached from that end is covered if and only if every end that
 ways from it reach has a mate and two arcs, none of them blocked.
 
+A slice may graze an obstacle: one robot stops there, and another sweeps past. An end that lies inside a swept segment
+is no end of anything that is left to cover, and counts for nothing either.
+
 Ends that two robots measured a little differently are one: those of one slice and side are joined where neighbours are at most
 `TOLERANCE_MM` apart. The joined ends are a function of the set of facts alone, so that merging maps needs no order.
 """
@@ -194,10 +197,11 @@ class SliceMap:
             found = [(self._known_end(end), side) for end, side in arc.ports]
             joined.update([(known, side) for known, side in found if known is not None])
             self._join(arc)
-        sides = [(end, side) for end in ends for side in (LEFT, RIGHT)]
+        counting = [end for end in ends if not self._is_passed(end)]
+        sides = [(end, side) for end in counting for side in (LEFT, RIGHT)]
         self._certificate = Certificate(
             len(ends),
-            tuple([end for end in ends if end not in mated]),
+            tuple([end for end in counting if end not in mated]),
             tuple([port for port in sides if port not in joined]),
         )
 
@@ -207,6 +211,11 @@ class SliceMap:
             if low <= end.y_mm <= high:
                 return known
         return None
+
+    def _is_passed(self, end: End) -> bool:
+        """Tell whether a robot swept past an end."""
+        low, high = end.y_mm - TOLERANCE_MM, end.y_mm + TOLERANCE_MM
+        return any(segment.bottom_mm < low and high < segment.top_mm for segment in self._by_slice.get(end.slice, ()))
 
     def _mate(self, segment: Segment) -> None:
         top, bottom = map(self._known_end, segment.ends)
@@ -224,8 +233,9 @@ class SliceMap:
         self._arcs.setdefault((stop, back), Step(back, start, arc.length_mm))
 
 
-def _wrecks_first(fact: Segment | Arc) -> tuple[bool, Segment | Arc]:
-    return not fact.wrecks, fact
+def _wrecks_first(fact: Segment | Arc) -> tuple[bool, int, Segment | Arc]:
+    """Return the rank of a way: beside a wreck before others, and of two segments the longer one."""
+    return not fact.wrecks, fact.bottom_mm - fact.top_mm if isinstance(fact, Segment) else 0, fact
 
 
 def _blocks(void: Void, segment: Segment) -> bool:
