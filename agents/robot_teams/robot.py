@@ -7,27 +7,27 @@ from typing import Annotated, ClassVar, Final
 import msgspec
 from msgspec import Meta, Struct
 
-from zwerm.agents.robot_teams.protocols.corridor_mates import CorridorMates
-from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
 from zwerm.agents.robot_teams.mapping.facts import BOTTOM, PASSES, TOP, Arc, End, Return, Segment, Void, Wreck
+from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.motion.manoeuvres import Grid, Manoeuvre, mm
 from zwerm.agents.robot_teams.motion.pilot import FAILED, IDLE, RUNNING, Pilot
-from zwerm.agents.robot_teams.planning import LINK, latest_plans
 from zwerm.agents.robot_teams.motion.senses import GAP_M, Senses, Sensing
 from zwerm.agents.robot_teams.motion.wrecks import WreckWatch
-from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
+from zwerm.agents.robot_teams.planning import LINK, latest_plans
+from zwerm.agents.robot_teams.protocols.central_membership import CoordinatedMembership
+from zwerm.agents.robot_teams.protocols.corridor_mates import CorridorMates
+from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
 from zwerm.agents.robot_teams.protocols.team_membership import Membership
 from zwerm.agents.robot_teams.protocols.team_messages import (
     READY,
     Beacon,
     FoundSnapshot,
-    Plan,
     Status,
     decode_beacon,
     encode_beacon,
     encode_snapshot,
 )
-from zwerm.agents.robot_teams.team_lead import TeamLead
+from zwerm.agents.robot_teams.team_lead import TeamLead, findings
 from zwerm.agents.robot_teams.work import Lost, NoWay, Work
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError, ProtocolError
@@ -40,6 +40,8 @@ MUSTER_S: Final = 1.0
 PARKED_M: Final = 0.75
 # A wreck hides what is nearer to it than this, beyond two bodies' radii [m].
 HIDDEN_M: Final = GAP_M - 0.005
+# The channel to the coordinator.
+UPLINK: Final = "uplink"
 # The lead decides every so many ticks.
 DECIDE_TICKS: Final = 4
 
@@ -78,7 +80,11 @@ class TeamRobot(Controller):
             )
         self.map = SliceMap()
         self.pilot = Pilot(setup.node, body.max_speed_m_s, setup.dt_s, self.random)
-        self.membership = Membership(setup.node, setup.dt_s, table.silence_s)
+        # All cells are planned by the coordinator, or by the leads of teams.
+        self._central = setup.services.get("cells") == "coordinator"
+        membership = CoordinatedMembership if self._central else Membership
+        self.membership: Membership = membership(setup.node, setup.dt_s, table.silence_s)
+        self._channels = tuple([each for each in setup.channels if (each == UPLINK) == self._central])
         self._view = self.membership.view
         self.exchange = FactExchange(self.map, setup.dt_s)
         self.lead = TeamLead(
@@ -109,7 +115,7 @@ class TeamRobot(Controller):
         self._epoch = 0
         self._every = max(1, round(table.beacon_s / setup.dt_s))
         self._urgent = False
-        self._told_count = -1
+        self._told = -1, False
         self._done = False
         self._left_off = False
 
@@ -221,7 +227,7 @@ class TeamRobot(Controller):
     def _watch(self, senses: Senses) -> None:
         """Look for wrecks, tell what they hide, and whether robots that were taken for dead live."""
         tick, roster, voids = senses.tick, self.membership.roster, self.map.voids
-        if self.setup.channels:
+        if self._channels:
             for node in self._wrecks.watch(senses, voids):
                 place = next(other for other in senses.robots if other.node == node)
                 self._note_wreck(self._wrecks.wrecks[node], place.x_m, place.y_m)
@@ -269,12 +275,11 @@ class TeamRobot(Controller):
                     apart = math.hypot(status.x_mm / 1000.0 - senses.x_m, status.y_mm / 1000.0 - senses.y_m)
                     near = apart <= table.meeting_m
             self.membership.receive(beacon, tick, near)
-            if beacon.sender in self.membership.view.members or near:
+            if self.membership.knows(beacon.sender) or near:
                 self.exchange.receive(beacon, tick)
             else:
                 self.exchange.forget(beacon.sender)
-            view = self.membership.view
-            if beacon.sender in view.members and not self.membership.leads:
+            if self.membership.knows(beacon.sender) and not self.membership.leads:
                 self.lead.follow(beacon.plans)
 
     def _status(self, senses: Senses, tick: int) -> Status:
@@ -301,14 +306,13 @@ class TeamRobot(Controller):
 
     def _say(self, observation: Observation, senses: Senses) -> tuple[Transmission, ...]:
         tick = observation.tick
-        if not self.setup.channels or not (self._urgent or (tick + self.setup.node) % self._every == 0):
+        if not self._channels or not (self._urgent or (tick + self.setup.node) % self._every == 0):
             return ()
         self._urgent = False
         membership = self.membership
         parcel = self.exchange.outgoing(tick)
         mine = self._status(senses, tick)
-        others = [status for node, status in sorted(membership.roster.statuses.items()) if node != self.setup.node]
-        others = [status for status in others if status.node in membership.view.members]
+        others = [] if self._central else membership.others()
         beacon = Beacon(
             self.setup.node,
             membership.outgoing(),
@@ -320,24 +324,15 @@ class TeamRobot(Controller):
             *parcel,
         )
         frame = seal(encode_beacon(beacon))
-        return tuple([Transmission(channel, frame) for channel in self.setup.channels])
+        return tuple([Transmission(channel, frame) for channel in self._channels])
 
     def _telemetry(self) -> dict[str, float | bool]:
         """Return the certificate and what the team came to, whenever the map has grown."""
         facts = self.map.facts
-        if len(facts) == self._told_count:
+        if (len(facts), self._done) == self._told:
             return {}
-        self._told_count = len(facts)
-        certificate, membership = self.map.certificate, self.membership
-        return {
-            "certificate_satisfied": certificate.complete,
-            "ends": certificate.ends,
-            "ends_without_mate": len(certificate.ends_without_mate),
-            "open_ports": len(certificate.open_ports),
-            "critical_points": len({arc.ports for arc in facts.arcs if arc.kind != PASSES}),
-            "divisions": membership.divisions,
-            "merges": membership.merges,
-        }
+        self._told = len(facts), self._done
+        return {"certificate_satisfied": self._done, **findings(self.map, self.membership)}
 
     def _snapshot(self) -> bytes:
         """Return what this robot has found since the last tick, encoded; empty where it found nothing."""

@@ -6,6 +6,7 @@ A robot that leads its team runs it, and so does a coordinator, for all robots.
 from collections.abc import Sequence
 from typing import Final
 
+from zwerm.agents.robot_teams.mapping.facts import PASSES
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.planning import (
     FAR,
@@ -28,6 +29,20 @@ SKIP_S: Final = 30.0
 # After so long without a new corridor free robots take tasks however far, and then in cells where others work [s].
 FAR_AFTER_S: Final = 20.0
 ANY_AFTER_S: Final = 60.0
+
+
+def findings(slice_map: SliceMap, membership: Membership) -> dict[str, float | bool]:
+    """Return what a map and a team came to, as named numbers for observers."""
+    certificate, facts = slice_map.certificate, slice_map.facts
+    return {
+        "ends": certificate.ends,
+        "ends_without_mate": len(certificate.ends_without_mate),
+        "open_ports": len(certificate.open_ports),
+        "critical_points": len({arc.ports for arc in facts.arcs if arc.kind != PASSES}),
+        "wrecks": len({void.wreck.node for void in slice_map.voids}),
+        "divisions": membership.divisions,
+        "merges": membership.merges,
+    }
 
 
 class TeamLead:

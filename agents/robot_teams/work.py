@@ -8,9 +8,9 @@ from collections.abc import Callable, Generator
 from typing import Final, Protocol
 
 from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, End, Fact, Segment
+from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.motion.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
 from zwerm.agents.robot_teams.motion.senses import Senses
-from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, SWEEPS, TRAVELS, Plan
 
 Story = Generator[Manoeuvre | None, None, None]

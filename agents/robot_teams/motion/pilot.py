@@ -226,7 +226,9 @@ class Pilot:
         return self._node < other.node and ticks * self._dt_s < MOVING_WAIT_S
 
     def _into(self, senses: Senses, way: Vector) -> bool:
-        return any(r.gap_m <= CONTACT_M and r.wreck is None and way[0] * r.nx + way[1] * r.ny > 0.2 for r in senses.robots)
+        return any(
+            r.gap_m <= CONTACT_M and r.wreck is None and way[0] * r.nx + way[1] * r.ny > 0.2 for r in senses.robots
+        )
 
     def _limited(self, senses: Senses, way: Vector) -> Vector:
         """Return the velocity along `way`, less what would close more than half of a gap in one tick."""

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from zwerm.agents.robot_teams.protocols.fact_exchange import FACTS_MAX, FactExchange
 from zwerm.agents.robot_teams.mapping.facts import Segment
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
+from zwerm.agents.robot_teams.protocols.fact_exchange import FACTS_MAX, FactExchange
 from zwerm.agents.robot_teams.protocols.team_messages import Beacon, View, decode_beacon, encode_beacon
 
 DT_S = 0.25

@@ -3,6 +3,7 @@
 import msgspec
 
 from zwerm.agents.robot_teams.mapping.facts import RIGHT, TOP, Arc, End, Segment
+from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.planning import (
     LINK,
     Task,
@@ -15,7 +16,6 @@ from zwerm.agents.robot_teams.planning import (
     reservation,
     room,
 )
-from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, Plan, Status, View
 
 VIEW = View(2, 0, (0, 1, 2, 3))
