@@ -91,6 +91,7 @@ class TeamCoverage(Metric):
         self._free = context.arena.free
         self._radius_m = robots.body.radius_m
         self._footprint_m = float(robots.parameters.get("footprint_m", 0.5))
+        self._coordinator = context.coordinator
         self._paths: list[Floats] = []
         self._numbers: dict[int, dict[str, float]] = {}
         self._truth: Truth | None = None
@@ -105,12 +106,14 @@ class TeamCoverage(Metric):
         self._truth = truth
 
     def metrics(self) -> dict[str, float]:
-        """Return the coverage by exact polygons, and the reports of the robots that live."""
+        """Return the coverage by exact polygons, and the reports of the robots that live, or of the coordinator."""
         if self._truth is None:
             return {}
         paths = np.array(self._paths)
         tracks = [paths[:, robot] for robot in range(paths.shape[1])]
         living = [numbers for node, numbers in self._numbers.items() if node not in self._truth.dead]
+        if self._coordinator in self._numbers:
+            living = [self._numbers[self._coordinator]]
         return {
             **coverage(self._free, tracks, self._radius_m, self._footprint_m),
             "completion_time_s": self._truth.time_s if self._truth.completed else math.nan,
