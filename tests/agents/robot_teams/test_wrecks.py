@@ -1,6 +1,18 @@
 """A robot is taken for a wreck by touch, rest and silence together; what names a wreck is void once that robot lives."""
 
-from zwerm.agents.robot_teams.mapping.facts import BOTTOM, LEFT, RIGHT, TOP, Arc, End, Fact, Return, Segment, Void, Wreck
+from zwerm.agents.robot_teams.mapping.facts import (
+    BOTTOM,
+    LEFT,
+    RIGHT,
+    TOP,
+    Arc,
+    End,
+    Fact,
+    Return,
+    Segment,
+    Void,
+    Wreck,
+)
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.motion.senses import Beside, Senses
 from zwerm.agents.robot_teams.motion.wrecks import STILL_S, TOUCHED_S, WreckWatch
