@@ -1,13 +1,13 @@
 """Grid maps of the planning benchmarks, as exact arenas: MovingAI maps (`.map`) and coverage instances on them (`.mcpp`).
 
-A `.map` file is text (Sturtevant, Benchmarks for Grid-Based Pathfinding, 2012). Four lines come first: `type octile` (or another
-word), `height ROWS`, `width COLUMNS` and `map`. ROWS lines of COLUMNS characters follow, the top row first. `.`, `G` and `S` are
-free (ground, and shallow water); `@`, `O`, `T` and `W` are not (out of bounds, trees, and water).
+A `.map` file is text (Sturtevant, Benchmarks for Grid-Based Pathfinding, 2012). Four lines come first: `type octile` (or
+another word), `height ROWS`, `width COLUMNS` and `map`. ROWS lines of COLUMNS characters follow, the top row first. `.`, `G` and
+`S` are free (ground, and shallow water); `@`, `O`, `T` and `W` are not (out of bounds, trees, and water).
 
-A `.mcpp` file is YAML (the instances beside Tang and Ma, Large-Scale Multi-Robot Coverage Path Planning via Local Search, 2024):
-`map` is the name of a `.map` file without its suffix, and `root` has the start cell of each robot, as [column, row] with row 0 at
-the top, or as the number column * ROWS + row. The weights of an instance are costs of edges of a graph, which an arena has
-not; other keys are ignored. The `.map` file stands beside the instance, or in a folder `gridmaps` there or one above.
+A `.mcpp` file is YAML (instances beside Tang and Ma, Large-Scale Multi-Robot Coverage Path Planning via Local Search, 2024).
+`map` is the name of a `.map` file without its suffix. `root` has the start cell of each robot: [column, row] with row 0 at the
+top, or the number column * ROWS + row. The weights of an instance are costs of edges of a graph, which an arena has not; other
+keys are ignored. The `.map` file stands beside the instance, or in a folder `gridmaps` there or one above.
 
 A cell becomes a square of `arena.resolution_m`. The outline follows the cells exactly. Cells that touch at a corner are not
 connected. Every mistake is one line that names the file.

@@ -53,9 +53,10 @@ class TimeTable(Table):
 class ArenaTable(Table):
     """The space robots live in: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
 
-    `map` is a ROS map_server YAML, or a bitmap (dark is wall) with `resolution_m` or `size_m`, or a grid map (MovingAI `.map`, or
-    `.mcpp`) with `resolution_m`; `start` is a place [m] in the part to keep, else the largest is. Paths are relative to the scenario. `scale` multiplies all lengths, or `free_area_m2`
-    is the free space after scaling. Then gaps narrower than `passage_m` are closed, and what lies behind them is left out."""
+    `map` is a ROS map_server YAML, a bitmap (dark is wall) with `resolution_m` or `size_m`, or a grid map (MovingAI `.map`, or
+    `.mcpp`) with `resolution_m`; `start` is a place [m] in the part to keep, else the largest is. Paths are relative to the
+    scenario. `scale` multiplies all lengths, or `free_area_m2` is the free space after scaling. Then gaps narrower than
+    `passage_m` are closed, and what lies behind them is left out."""
 
     size_m: Size | None = None
     polygon: list[Point] | None = Field(default=None, min_length=3)
