@@ -1,8 +1,8 @@
 """Grid maps of the planning benchmarks, as exact arenas: MovingAI maps (`.map`) and coverage instances on them (`.mcpp`).
 
 A `.map` file is text (Sturtevant, Benchmarks for Grid-Based Pathfinding, 2012). Four lines come first: `type octile` (or
-another word), `height ROWS`, `width COLUMNS` and `map`. ROWS lines of COLUMNS characters follow, the top row first. `.`, `G` and
-`S` are free (ground, and shallow water); `@`, `O`, `T` and `W` are not (out of bounds, trees, and water).
+another word), `height ROWS`, `width COLUMNS` and `map`. ROWS lines of COLUMNS characters follow, the top row first. The
+characters `.`, `G` and `S` are free (ground, and shallow water); `@`, `O`, `T` and `W` are not (out of bounds, trees, water).
 
 A `.mcpp` file is YAML (instances beside Tang and Ma, Large-Scale Multi-Robot Coverage Path Planning via Local Search, 2024).
 `map` is the name of a `.map` file without its suffix. `root` has the start cell of each robot: [column, row] with row 0 at the
