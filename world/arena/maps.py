@@ -2,7 +2,7 @@
 
 A cell of a ROS map is free where its occupancy is below `free_thresh`; unknown cells are not free. A pixel of a bitmap is
 free where it is brighter than mid-grey on a white ground; the lower left corner is the origin. `raster` turns cells into a
-polygon. `grid_maps` reads the text files of planning benchmarks. Every mistake is one line that names the file.
+polygon. Every mistake is one line that names the file.
 """
 
 import math
@@ -22,7 +22,6 @@ from zwerm.errors import ScenarioError
 from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.tables import ArenaTable
 from zwerm.scenario.types import Finite, Fraction, Point, Positive
-from zwerm.world.arena.grid_maps import SUFFIXES, grid_space
 from zwerm.world.arena.raster import component, outline
 
 Floats = NDArray[np.float64]
@@ -69,8 +68,6 @@ def read_map(path: Path, table: ArenaTable) -> Polygon:
 
     Raises ScenarioError.
     """
-    if path.suffix.lower() in SUFFIXES:
-        return grid_space(path, table)
     grid = _ros_map(path, table) if path.suffix.lower() in _ROS_SUFFIXES else _bitmap(path, table)
     if not grid.free.any():
         raise ScenarioError([f"arena.map: {path}: expected at least one free cell, got none"])

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.robot_teams.mapping.facts import Arc, End, Wreck
-from zwerm.agents.robot_teams.motion.senses import Senses, Vector
-from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGHT_HAND, WallFollower
+from zwerm.agents.robot_teams.motion.senses import Senses
+from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGHT_HAND, Vector, WallFollower
 
 # A contact blocks a sweep if this much of its normal lies along the motion.
 BLOCKS: Final = 0.02

@@ -13,7 +13,8 @@ from typing import Final
 import numpy as np
 
 from zwerm.agents.robot_teams.motion.manoeuvres import Manoeuvre
-from zwerm.agents.robot_teams.motion.senses import Beside, Senses, Vector
+from zwerm.agents.robot_teams.motion.senses import Beside, Senses
+from zwerm.agents.robot_teams.motion.wall_following import Vector
 
 # A robot nearer than this [m], beyond the gap that is kept, is in contact.
 CONTACT_M: Final = 0.04

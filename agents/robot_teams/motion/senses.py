@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from zwerm.agents.robot_teams.mapping.facts import Wreck
+from zwerm.agents.robot_teams.motion.wall_following import Vector
 from zwerm.wire.messages import Observation
 
 # The gap that robots keep between their bodies [m]: more than a touch switch reaches, so that what is touched is a wall.
@@ -15,8 +16,6 @@ STANDS_M: Final = 0.004
 
 # A wreck nearer than this, beyond the gap that is kept, is a wall [m].
 DEAD_M: Final = 0.04
-
-Vector = tuple[float, float]
 
 
 class Beside(NamedTuple):
