@@ -38,8 +38,8 @@ class Node:
     """One node: its controller and the wire format around it.
 
     `answer` returns the encoded command for one encoded observation. If the controller raises, it calls `on_failure` and
-    returns the encoded Failure. `answer` is a closure over local names, because attribute look-ups cost most of an answer: in
-    a large swarm the robot's objects leave the processor's cache between two ticks.
+    returns the encoded Failure. `answer` is a closure over local names, because attribute look-ups cost most of an
+    answer. In a large swarm the objects of a robot leave the processor's cache between two ticks.
     """
 
     def __init__(self, controller: str, setup: Setup, on_failure: Callable[[], object] = _nothing) -> None:

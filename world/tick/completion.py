@@ -1,7 +1,8 @@
 """Completion: the one rule that decides when a run ends, and with which outcome.
 
-A run ends, in this order of precedence, when a node crashed and the scenario says `robots.on_crash = "fail"`; when a deciding
-node gave up; when the task is done; or at the time limit. Both drivers ask the same rule after every tick.
+A run ends for one of these reasons, in this order of precedence: a node crashed and the scenario says `robots.on_crash
+= "fail"`; a deciding node gave up; the task is done; the time limit is reached. Both drivers ask the same rule after
+every tick.
 """
 
 from collections.abc import Collection, Mapping

@@ -1,7 +1,7 @@
 """Every mistake in a scenario at once, of whichever stage: its tables, or what is made of them.
 
-What is made of tables can only be checked where they are sound. So what is unsound is left out, and the rest is checked as
-if it were the whole; what is then said about a place that was left out, or is around or inside one, is not believed.
+Objects can be made of correct tables only. So wrong tables are left out, and the rest is checked as if it were
+complete. Mistakes at, around or inside a place that was left out are then ignored, because the omission may cause them.
 """
 
 import copy

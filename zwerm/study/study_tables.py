@@ -1,6 +1,6 @@
 """A study's file as strict typed tables: scenarios, settings, seeds, and a paper's values.
 
-The rules are those of a scenario: unknown keys and wrong types are refused, and all errors are reported at once, each as
+The rules are those of a scenario. Unknown keys and wrong types are refused. All errors are reported at once, each as
 `file: path: rule, got value`. `plan` checks whether the settings exist in the scenario.
 """
 
