@@ -25,15 +25,15 @@ class CensusWave(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tru
 class CensusTally(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag="tally"):
     """To the parent: the counted robots, their frontier claims, and the latest wave in which one of them was disturbed.
 
-    `lives` is the sum of the robots' random incarnation numbers. `present` are the counted robots, and `dead` those
+    `incarnations` is the sum of the robots' random incarnation numbers. `present` are the counted robots, and `dead` those
     that one of them sees and that do not answer it. `roster` has robots that were let out, if the wave lacked any.
     """
 
     number: Count
     robots: Count
     claims: Count
-    stirred: Count
-    lives: Count
+    disturbed: Count
+    incarnations: Count
     present: bytes = b""
     dead: bytes = b""
     roster: bytes = b""

@@ -9,7 +9,7 @@ import pytest
 from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.local_node import CODECS
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
-from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, UNSAID, StateBeacon, StateRequest
+from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, StateBeacon, StateRequest
 from zwerm.agents.sensor_coverage.messages.incarnations import ADOPTED, adopted_slot, first_count
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, read_envelope, write
 from zwerm.agents.sensor_coverage.messages.robot_sets import from_bytes, members, robot_set, to_bytes
@@ -107,7 +107,7 @@ def test_a_set_of_robots_survives_the_wire() -> None:
 
 
 def state(slot: int = NOWHERE, moving: bool = False, waiting: bool = False) -> StateBeacon:
-    return StateBeacon(1, slot, 3, moving, waiting, 1, (), (), (), UNSAID)
+    return StateBeacon(1, slot, 3, moving, waiting, 1, (), (), (), NO_PATH_VECTOR)
 
 
 def test_the_guests_of_the_base_are_robots_that_never_left() -> None:

@@ -187,8 +187,8 @@ class Census:
             self._number,
             1 + sum(each.robots for each in tallies),
             self._claims + sum(each.claims for each in tallies),
-            max([self._disturbed, *(each.stirred for each in tallies)]),
-            (self._incarnation + sum(each.lives for each in tallies)) % INCARNATIONS,
+            max([self._disturbed, *(each.disturbed for each in tallies)]),
+            (self._incarnation + sum(each.incarnations for each in tallies)) % INCARNATIONS,
             to_bytes(present),
             to_bytes(dead),
             b"" if self._roster == self._wave_roster else to_bytes(self._roster),
@@ -201,7 +201,7 @@ class Census:
         self._concluded = (
             before is not None
             and before.claims == counted.claims == 0
-            and before.lives == counted.lives
-            and counted.stirred < before.number
+            and before.incarnations == counted.incarnations
+            and counted.disturbed < before.number
         )
         return []
