@@ -1,5 +1,7 @@
 """Controllers by name: those of the catalogue, and `module:Class` for any other."""
 
+import inspect
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -37,6 +39,12 @@ def make(name: str, setup: Setup) -> Stepper:
     except msgspec.ValidationError as error:
         raise ControllerError(f"{name}: {error}") from None
     return controller
+
+
+def step_place(found: type[Any]) -> str:
+    """Return where a controller answers, such as " (mine.py:12, in Mine.step)", or "" where that is not known."""
+    code = getattr(inspect.unwrap(found.step), "__code__", None)
+    return "" if code is None else f" ({Path(code.co_filename).name}:{code.co_firstlineno}, in {found.__name__}.step)"
 
 
 def parameters_of(found: type[Any]) -> type[Any]:

@@ -71,10 +71,13 @@ class Completion:
         return float(self._done[: self._robots].mean())
 
     def crash_ending(self, tick: int, crashed: Mapping[int, str]) -> Ending | None:
-        """Return the ending that the first of the `crashed` nodes causes at `tick`, or None."""
+        """Return the ending that the lowest of the `crashed` nodes causes at `tick`, or None.
+
+        The run ends at the first tick with a crash, so which node is named does not depend on the order of arrival.
+        """
         if not crashed or not self._fails_on_crash:
             return None
-        node, reason = next(iter(crashed.items()))
+        node, reason = min(crashed.items())
         return Ending(FAILED, f"node {node} crashed at tick {tick}: {reason}")
 
     def completed(self, exited: Collection[int], dead: Collection[int]) -> bool:

@@ -11,7 +11,7 @@ for each message would cost more than the work on the message.
 import contextlib
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Final
 
 import msgspec
@@ -112,6 +112,17 @@ class ZenohWorldLink:
         farewell = encode(Goodbye(reason))
         for node in sorted(self._joined):
             self._put[node](farewell)
+
+    def idle(self, nodes: Sequence[int], timeout_s: float) -> list[int]:
+        """Dismiss `nodes`, whose answers are missing, and return those that leave within `timeout_s` without an answer."""
+        farewell = encode(Goodbye("its answer did not come in time"))
+        asked = [node for node in nodes if node in self._joined]
+        for node in asked:
+            self._put[node](farewell)
+        self.wait_joined(lambda joined: not any(node in joined for node in asked), timeout_s)
+        left = [node for node in asked if node not in self._joined]
+        answered = {arrival.node for arrival in self.receive_many(0, 0.0) if arrival.payload is not None}
+        return [node for node in left if node not in answered]
 
     def close(self) -> None:
         """Release all resources of the link; idempotent."""

@@ -56,6 +56,9 @@ class RunResult:
     series: dict[str, Floats] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     tracebacks: dict[int, str] = field(default_factory=dict)
+    crash_reasons: dict[int, str] = field(
+        default_factory=dict
+    )  # "tick 5: ..." by node, of programs that ended on their own
     telemetry: TelemetryArrays = field(default_factory=TelemetryArrays.empty)
     snapshots: list[TelemetryRecord] = field(default_factory=list)
 
@@ -98,7 +101,12 @@ class RunResult:
             "metrics": self.metrics,
             "radio": self.radio,
             "middleware_lost": self.middleware_lost,
-            "nodes": {"crashed": self.crashed, "restarted": self.restarted, **self.hindered},
+            "nodes": {
+                "crashed": self.crashed,
+                "restarted": self.restarted,
+                **self.hindered,
+                "reasons": {str(node): reason for node, reason in sorted(self.crash_reasons.items())},
+            },
             "faults": self.faults,
         }
 

@@ -322,5 +322,6 @@ def _result(
         series={name: np.array(values) for name, values in sampling.observers.series().items()},
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,
+        crash_reasons={node: f"tick {status.crash_ticks[node]}: {why}" for node, why in status.crashed.items()},
         tracebacks={node: failure.traceback for node, failure in status.failures.items()},
     )
