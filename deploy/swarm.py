@@ -27,9 +27,10 @@ from zwerm.deploy.supervisor import (
     prepare,
 )
 from zwerm.errors import LinkError
+from zwerm.link.membership import ExpectedNode
 from zwerm.link.peer_radio import Station
-from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials
-from zwerm.link.world_link import ExpectedNode, ZenohWorldLink
+from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials, close_without_waiting
+from zwerm.link.world_link import ZenohWorldLink
 from zwerm.wire.messages import encode
 
 Members = Mapping[int, tuple[str, Setup]]
@@ -239,6 +240,7 @@ class RemoteSwarm(_Swarm):
                 )
             count = len(self.link.joined)
             self._progress(count, total)
+        close_without_waiting()
 
     def _end(self) -> None:
         self.link.dismiss("the run is over")

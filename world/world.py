@@ -137,6 +137,9 @@ class World:
         Raises ProtocolError, and counts its reason, for a stray message; the node is still awaited then. A controller that
         raised has crashed. So has one whose answer is refused: it gives no other.
         """
+        if node in self.status.crashed:  # a program that the run has given up acts for no body
+            self.intake.refused["crashed"] += 1
+            raise ProtocolError("crashed", f"node {node} crashed at tick {self.status.crash_ticks[node]}")
         try:
             answer = self.intake.accept(node, payload, late_allowed)
         except ProtocolError as error:

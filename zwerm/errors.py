@@ -26,7 +26,7 @@ class ProtocolError(ZwermError):
     def __init__(self, reason: str, detail: str) -> None:
         super().__init__(f"{reason}: {detail}")
         self.reason = reason
-        self.stray = reason in ("out-of-order", "unasked", "duplicate")
+        self.stray = reason in ("out-of-order", "unasked", "duplicate", "crashed")
 
 
 class StragglerError(ZwermError):

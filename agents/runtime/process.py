@@ -57,12 +57,12 @@ def main(
 
     With a `station` the process moves into its network namespace and sends packets over that network.
     """
+    die_with_parent(_server)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)
-    die_with_parent()
     parent = parent_process()
-    if parent is not None and not parent.is_alive():  # it died before die_with_parent took effect
-        sys.exit(EXIT_LOST)
+    if parent is not None and not parent.is_alive():  # where the kernel has no die_with_parent
+        os._exit(EXIT_LOST)
     set_threads(ONE_THREAD if is_local(endpoint) and station is None else TWO_THREADS)
     here = str(Path.cwd())
     if here not in sys.path:
@@ -193,7 +193,21 @@ def _is_goodbye(payload: bytes) -> bool:
         return False
 
 
-def die_with_parent() -> None:
-    """Tell the kernel to kill this process when its parent dies (Linux only)."""
+def die_with_parent(parent: int | None = None) -> None:
+    """Tell the kernel to kill this process when its parent dies (Linux only).
+
+    Exits at once if `parent` is not the parent any more: it died before the kernel was told, and the kernel says nothing then.
+    """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if parent is not None and os.getppid() != parent:
+            os._exit(EXIT_LOST)
+
+
+_server: int | None = None
+
+
+def serve_robots() -> None:
+    """Note that this process is the server that robots are forked from: a robot ends when it is not their parent any more."""
+    global _server
+    _server = os.getpid()
