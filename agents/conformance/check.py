@@ -103,12 +103,14 @@ def _declarations(
     if not callable(getattr(controller, "step", None)):
         found.append("it has no method step(observation)")
     declared = getattr(controller, "sensors", ())
+    given = () if sensors is None else sensors
+    fields = [kind.field for each in given if (kind := sensor_class(each)) is not None]
     if not isinstance(declared, tuple | list) or not all(isinstance(each, str) for each in declared):
         return [*found, f"sensors: expected a tuple of names, got {declared!r}"]
     for sensor in declared:
-        if sensor_class(sensor) is None and not extra:
+        if sensor_class(sensor) is None and sensor not in fields and not extra:
             found.append(f"sensors: {sensor!r} is none that Zwerm knows; give a reading of your own with extra=")
-        if sensors is not None and sensor not in sensors:
+        if sensors is not None and sensor not in (*given, *fields):
             found.append(f"sensors: it declares {sensor!r}, which check() does not give")
     kind = getattr(controller, "Parameters", NoParameters)
     if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct)):

@@ -12,6 +12,7 @@ import os
 import socket
 import threading
 from collections.abc import Mapping
+from pathlib import Path
 from struct import Struct as Layout
 from typing import Any, Final
 
@@ -111,11 +112,11 @@ def close_without_waiting() -> None:
     Zenoh sets SO_LINGER to 10 s. Closing a connection whose other end is gone then blocks one of its few threads for 10 s, and so
     delays the detection of each further loss by 10 s. There is no setting for it in Zenoh.
     """
-    for name in os.listdir("/dev/fd"):
-        with contextlib.suppress(OSError):  # the descriptor of the listing itself, or one that is no socket
-            with socket.socket(fileno=os.dup(int(name))) as connection:
-                if connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER.size) == _ZENOH_LINGER:
-                    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
+    for path in list(Path("/dev/fd").iterdir()):
+        # An OSError comes of the descriptor of the listing itself, or of one that is no socket.
+        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(int(path.name))) as connection:
+            if connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER.size) == _ZENOH_LINGER:
+                connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
 
 
 _LINGER: Final = Layout("ii")

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from zwerm.agents.runtime.controllers import find, parameters_of, step_place
-from zwerm.catalogue import BASE, COORDINATOR, ROBOT, SENSORS, Role
+from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role
 from zwerm.deploy.node_specs import controller_for, node_specs
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
@@ -127,7 +127,7 @@ def check_controllers(scenario: Scenario) -> None:
     robots, base, coordinator = scenario.robots, scenario.base, scenario.coordinator
     kinds = [table.kind for table in robots.sensors]
     # A controller may name what it needs by the sensor's kind or by the field of the observation that it fills.
-    given = [*kinds, *(find_sensor(kind).field for kind in kinds if kind in SENSORS)]
+    given = [*kinds, *filter(None, map(_field_of, kinds))]
     mistakes = _controller_mistakes(scenario, "robots", ROBOT, robots.controller, robots.parameters, given)
     if base is not None:
         mistakes += _controller_mistakes(scenario, "base", BASE, base.controller, base.parameters, given)
@@ -137,6 +137,14 @@ def check_controllers(scenario: Scenario) -> None:
         )
     if mistakes:
         raise ScenarioError(list(dict.fromkeys(mistakes)))
+
+
+def _field_of(kind: str) -> str | None:
+    """Return the field that a sensor fills, or None if there is no such sensor; `make_sensors` reports that mistake."""
+    try:
+        return find_sensor(kind).field
+    except ValueError:
+        return None
 
 
 def _controller_mistakes(
