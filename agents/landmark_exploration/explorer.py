@@ -19,7 +19,7 @@ from zwerm.agents.landmark_exploration.mapping.frontier_status import (
     pair_of,
 )
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, columns, write_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, columns, write_report
 from zwerm.agents.landmark_exploration.motion import Drive, Outcome, explore, roam, travel, wander
 from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, Parameters
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
@@ -326,4 +326,4 @@ class Explorer(Controller):
         seen, self._seen = self._seen, []
         claim = () if not self._claim else ((self.setup.node, *pair_of(self._claim - 1)),)
         count = len(self.map.frontiers.open)
-        return write_told(MapTold(*columns(seen), open=count, done=self.done, of_robot=True, assigned=claim))
+        return write_report(MapReport(*columns(seen), open=count, done=self.done, of_robot=True, assigned=claim))

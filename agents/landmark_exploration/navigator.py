@@ -13,7 +13,7 @@ from msgspec import Meta, Struct
 from zwerm.agents.landmark_exploration.mapping.cost_utility import path_to, reach
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.mapping.map_file import read_map
-from zwerm.agents.landmark_exploration.mapping.map_reports import GoalTold, write_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import GoalReport, write_report
 from zwerm.agents.landmark_exploration.motion import Drive, travel, wander
 from zwerm.agents.landmark_exploration.view import Slide, View
 from zwerm.agents.runtime.contract import Controller, Setup
@@ -114,7 +114,7 @@ class Navigator(Controller):
         for goal in self._goals:
             began = self.view.tick
             outcome = yield from navigate(self.view, self.map, goal, self.random)
-            self._told = write_told(GoalTold(tuple(goal), outcome == "arrived", self.view.tick - began))
+            self._told = write_report(GoalReport(tuple(goal), outcome == "arrived", self.view.tick - began))
             yield None
         self._done = True
         while True:

@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar
 from msgspec import Meta, Struct
 
 from zwerm.agents.runtime.contract import Controller, Setup
-from zwerm.maths.kept_cell import KeptCell
+from zwerm.maths.cached_voronoi_cell import CachedVoronoiCell
 from zwerm.wire.messages import BodyVelocity, Command, Observation
 
 
@@ -36,7 +36,7 @@ class VoronoiCoverage(Controller):
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
         table: Any = self.parameters
-        self._cell = KeptCell()
+        self._cell = CachedVoronoiCell()
         self._gain_per_s = table.gain_per_s
         self._tolerance2 = table.tolerance_m**2
 

@@ -28,7 +28,7 @@ from zwerm.agents.landmark_exploration.mapping.cost_utility import (
 )
 from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, REOPENED, TIMED_OUT, pair_of
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, columns, write_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, columns, write_report
 from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, CentralStrategy, NonNegative, Ticks
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BYTES, Entries, Report, Vector
@@ -351,4 +351,6 @@ class LandmarkCoordinator:
         assigned = tuple((node, *pair_of(task.key)) for node, task in tasks.items() if task and task.key is not None)
         frontiers = tuple(pair_of(key) for key in list(self.map.frontiers.open)[:FRONTIERS_TOLD_MAX])
         count = len(self.map.frontiers.open)
-        return write_told(MapTold(*columns(seen), open=count, done=self._done, frontiers=frontiers, assigned=assigned))
+        return write_report(
+            MapReport(*columns(seen), open=count, done=self._done, frontiers=frontiers, assigned=assigned)
+        )

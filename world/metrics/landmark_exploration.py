@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from scipy.spatial import cKDTree
 
-from zwerm.agents.landmark_exploration.mapping.map_reports import GoalTold, MapTold, read_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import GoalReport, MapReport, read_report
 from zwerm.maths.strong_collapse import betti
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
@@ -120,13 +120,13 @@ class Exploration(Metric):
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         self._context = context
-        self._reports: list[tuple[int, int, MapTold]] = []
+        self._reports: list[tuple[int, int, MapReport]] = []
         self._truth: Truth | None = None
 
     def report(self, record: TelemetryRecord) -> None:
         """Take what a node says of its map."""
-        told = read_told(record.snapshot) if record.snapshot else None
-        if isinstance(told, MapTold):
+        told = read_report(record.snapshot) if record.snapshot else None
+        if isinstance(told, MapReport):
             self._reports.append((record.tick, record.node, told))
 
     def sample(self, truth: Truth) -> None:
@@ -184,13 +184,13 @@ class Navigation(Metric):
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         self._context = context
-        self._ends: list[tuple[Floats, GoalTold]] = []
+        self._ends: list[tuple[Floats, GoalReport]] = []
         self._truth: Truth | None = None
 
     def report(self, record: TelemetryRecord) -> None:
         """Take the end of a way."""
-        told = read_told(record.snapshot) if record.snapshot else None
-        if isinstance(told, GoalTold):
+        told = read_report(record.snapshot) if record.snapshot else None
+        if isinstance(told, GoalReport):
             self._ends.append((record.position[record.node].copy(), told))
 
     def sample(self, truth: Truth) -> None:

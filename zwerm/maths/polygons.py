@@ -152,7 +152,7 @@ def estimated_centroid(cell: Polygon, value: float, gx: float, gy: float) -> Poi
 
 
 def nearest_point(polygon: Polygon) -> Point:
-    """Return the place on the rim of `polygon` (not empty) that is nearest to the origin."""
+    """Return the point on the boundary of `polygon` (not empty) that is nearest to the origin."""
     best, nearest = float("inf"), polygon[0]
     x0, y0 = polygon[-1]
     for x1, y1 in polygon:

@@ -22,7 +22,7 @@ from zwerm.agents.landmark_exploration.mapping.frontier_status import (
     pair_of,
 )
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, read_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, read_report
 from zwerm.agents.landmark_exploration.sharing.log_entries import snapshot_of
 
 FORMAT: Final = "landmark-map/1"
@@ -76,12 +76,12 @@ def read_map(text: str) -> LandmarkMap:
     return map_
 
 
-def map_told(snapshots: Iterable[bytes]) -> LandmarkMap:
+def map_of_reports(snapshots: Iterable[bytes]) -> LandmarkMap:
     """Return the map of all observations in the snapshots that the nodes of a run reported, in that order."""
     map_ = LandmarkMap()
     number = 0
-    for told in map(read_told, snapshots):
-        if isinstance(told, MapTold):
+    for told in map(read_report, snapshots):
+        if isinstance(told, MapReport):
             for landmarks, bearings in zip(told.simplices, told.bearings, strict=True):
                 map_.observe(snapshot_of(zip(landmarks, bearings, strict=True)), (number, 0))
                 number += 1

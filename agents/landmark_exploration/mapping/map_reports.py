@@ -9,7 +9,7 @@ from msgspec import Struct
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
 
 
-class MapTold(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-map"):
+class MapReport(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-map"):
     """What is new in a map since the last report: `simplices` with the bearings at which they were seen.
 
     Of the coordinator also its open `frontiers`, and the robots `assigned`, as (robot, a, b); of a robot its `claim`, how many
@@ -25,7 +25,7 @@ class MapTold(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-map
     assigned: tuple[tuple[int, int, int], ...] = ()
 
 
-class GoalTold(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-goal"):
+class GoalReport(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-goal"):
     """The end of a way to a goal, a set of landmarks."""
 
     goal: tuple[int, ...]
@@ -33,21 +33,21 @@ class GoalTold(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-go
     iterations: int
 
 
-Told = MapTold | GoalTold
+AnyReport = MapReport | GoalReport
 
 _encode: Final = msgspec.msgpack.Encoder().encode
-_decoder: Final = msgspec.msgpack.Decoder(MapTold | GoalTold)
+_decoder: Final = msgspec.msgpack.Decoder(MapReport | GoalReport)
 
 
-def write_told(told: Told) -> bytes:
+def write_report(told: AnyReport) -> bytes:
     """Return a report as bytes."""
     return _encode(told)
 
 
-def read_told(snapshot: bytes) -> Told | None:
+def read_report(snapshot: bytes) -> AnyReport | None:
     """Return a report, or None where the bytes are none."""
     try:
-        told: Told = _decoder.decode(snapshot)
+        told: AnyReport = _decoder.decode(snapshot)
     except msgspec.MsgspecError:
         return None
     return told

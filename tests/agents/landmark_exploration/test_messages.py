@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
 from zwerm.agents.landmark_exploration.mapping.frontier_status import BOUNDARY, key_of
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.mapping.map_file import map_told, read_map, write_map
-from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, write_told
+from zwerm.agents.landmark_exploration.mapping.map_file import map_of_reports, read_map, write_map
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, write_report
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing import log_entries as entries
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Report, Vector
@@ -146,8 +146,8 @@ def test_a_map_survives_its_file() -> None:
     map_.raise_all([key_of(3, 2)], BOUNDARY)
     again = read_map(write_map(map_))
     assert again.content() == map_.content()
-    told = write_told(MapTold(((1, 2, 3),), ((0, 90, 180),), open=3))
-    assert map_told([b"nothing", told]).complex.table == {(1, 2, 3): (0, 90, 180)}
+    told = write_report(MapReport(((1, 2, 3),), ((0, 90, 180),), open=3))
+    assert map_of_reports([b"nothing", told]).complex.table == {(1, 2, 3): (0, 90, 180)}
 
 
 @pytest.mark.parametrize(
