@@ -109,8 +109,8 @@ def open_session(settings: Mapping[str, Any], purpose: str) -> zenoh.Session:
 def close_without_waiting() -> None:
     """Let the TCP connections that Zenoh has opened so far close at once.
 
-    Zenoh sets SO_LINGER to 10 s. Closing a connection whose other end is gone then blocks one of its few threads for 10 s, and so
-    delays the detection of each further loss by 10 s. There is no setting for it in Zenoh.
+    Zenoh sets SO_LINGER to 10 s. Closing a connection whose other end is gone then blocks one of its few threads for 10 s,
+    and so delays the detection of each further loss by 10 s. There is no setting for it in Zenoh.
     """
     for path in list(Path("/dev/fd").iterdir()):
         # An OSError comes of the descriptor of the listing itself, or of one that is no socket.
