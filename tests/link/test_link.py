@@ -209,9 +209,7 @@ def test_a_wrong_hello_is_refused_and_counted_by_its_reason(net: Network) -> Non
 def test_a_hello_of_an_unexpected_node_is_refused(private_tmp: Path) -> None:
     with network(private_tmp, members={0: ExpectedNode(1, "nobody", NIL)}) as net:
         node = net.node(1)
-        with pytest.raises(
-            LinkError, match=r"^node 1 at unixsock-stream/.*: the world refuses it: unknown: "
-        ):
+        with pytest.raises(LinkError, match=r"^node 1 at unixsock-stream/.*: the world refuses it: unknown: "):
             node.join()
         node.close()
         assert net.link.refused == {"unknown": 1}
