@@ -27,7 +27,7 @@ from zwerm.deploy.supervisor import (
     prepare,
 )
 from zwerm.errors import LinkError
-from zwerm.link.membership import ExpectedNode
+from zwerm.link.admission import ExpectedNode
 from zwerm.link.peer_radio import Station
 from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials, close_without_waiting
 from zwerm.link.world_link import ZenohWorldLink

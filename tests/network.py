@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import zenoh
 
 from zwerm.deploy.identity import issue, router_settings
-from zwerm.link.membership import ExpectedNode
+from zwerm.link.admission import ExpectedNode
 from zwerm.link.node_link import ZenohNodeLink
 from zwerm.link.session import TWO_THREADS, Credential, Credentials, open_session, set_threads
 from zwerm.link.world_link import ZenohWorldLink

@@ -17,7 +17,7 @@ from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError
 from zwerm.link import Answer, Arrival, WorldLink
-from zwerm.link.membership import ExpectedNode
+from zwerm.link.admission import ExpectedNode
 from zwerm.link.memory import MemoryLink
 from zwerm.wire.keys import command_key
 from zwerm.wire.messages import (

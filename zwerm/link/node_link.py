@@ -15,7 +15,7 @@ import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
 from zwerm.errors import LinkError
-from zwerm.link.membership import MEANINGS
+from zwerm.link.admission import MEANINGS
 from zwerm.link.session import (
     Credential,
     close_without_waiting,

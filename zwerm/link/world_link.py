@@ -20,7 +20,7 @@ from zenoh.handlers import Callback
 
 from zwerm.errors import LinkError
 from zwerm.link import Arrival, arrival
-from zwerm.link.membership import IDENTITY, NOT_JOINED, ExpectedNode, Membership
+from zwerm.link.admission import IDENTITY, NOT_JOINED, Admission, ExpectedNode
 from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threads
 from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
 from zwerm.wire.messages import REFUSABLE, Goodbye, Welcome, decode_hello, encode, refusal
@@ -37,7 +37,7 @@ class ZenohWorldLink:
         """Open the router's session, without waiting for nodes. Raises LinkError if it cannot listen."""
         self.refused: Counter[str] = Counter()
         self._run = run
-        self._members = Membership(members)
+        self._members = Admission(members)
         self._source_of: dict[str, int] = {}
         self._changed = threading.Condition()
         self._dismissed = False

@@ -1,4 +1,4 @@
-"""Membership: which incarnation of each node may join, has joined, or has ended. Without I/O, clock and threads.
+"""Admission: which incarnation of each node may join, has joined, or has ended. Without I/O, clock and threads.
 
 A node joins at most once in each incarnation. An incarnation that has ended, for whatever reason, stays ended: its credential
 is refused from then on, so a program that was cut off and comes back acts for no robot. `expect` admits the next incarnation.
@@ -38,7 +38,7 @@ class ExpectedNode(Struct, frozen=True):
 
 
 class Membership:
-    """The membership of a run that expects `members`. `joined` holds the incarnation of each node that has joined."""
+    """The admission to a run that expects `members`. `joined` holds the incarnation of each node that has joined."""
 
     def __init__(self, members: Mapping[int, ExpectedNode]) -> None:
         self.joined: dict[int, int] = {}
