@@ -177,6 +177,10 @@ class LocalSwarm(_Swarm):
         self._stopped.discard(node)
         self.supervisor.send_signal(node, signal.SIGCONT)
 
+    def end_of(self, node: int, wait_s: float) -> str:
+        """Return how a lost node's process ended, waiting for its end at most `wait_s`; "" where it runs on."""
+        return self.supervisor.end_of(node, wait_s)
+
     def restart(self, node: int) -> None:
         """Kill a node, start its next incarnation without its former state, and return when it has joined.
 

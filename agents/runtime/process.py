@@ -13,6 +13,7 @@ answered in the sending thread can block that thread.
 import asyncio
 import contextlib
 import ctypes
+import io
 import os
 import signal
 import sys
@@ -20,7 +21,7 @@ from collections.abc import Callable
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import msgspec
 import uvloop
@@ -63,6 +64,8 @@ def main(
     parent = parent_process()
     if parent is not None and not parent.is_alive():  # where the kernel has no die_with_parent
         os._exit(EXIT_LOST)
+    os.dup2(2, 1)  # standard output is for the results of the run
+    sys.stdout = _Prefixed(sys.stderr, f"node {credential.node}: ")
     set_threads(ONE_THREAD if is_local(endpoint) and station is None else TWO_THREADS)
     here = str(Path.cwd())
     if here not in sys.path:
@@ -79,6 +82,25 @@ def main(
         sys.stderr.flush()
         os._exit(code)  # closing the radio's session waits for messages that the network loses
     sys.exit(code)
+
+
+class _Prefixed(io.TextIOBase):
+    """A text stream that writes whole lines to `stream`, each after `prefix`."""
+
+    def __init__(self, stream: TextIO, prefix: str) -> None:
+        self._stream, self._prefix, self._line = stream, prefix, ""
+
+    def writable(self) -> bool:
+        """Tell that the stream can be written to."""
+        return True
+
+    def write(self, text: str) -> int:
+        """Write the lines that `text` completes."""
+        *whole, self._line = (self._line + text).split("\n")
+        if whole:
+            self._stream.write("".join(f"{self._prefix}{line}\n" for line in whole))
+            self._stream.flush()
+        return len(text)
 
 
 async def run_node(

@@ -31,7 +31,6 @@ def test_a_refused_command_is_a_crash_that_names_everything_at_once(
     assert result.outcome == "failed"
     assert result.reason == f"node 1 crashed at tick 3: {reason}"
     assert (result.crashed, result.middleware_lost) == ([1], 0)
-    assert result.wall_s < 60.0, "nothing waited for the deadline of stragglers"
 
 
 @pytest.mark.parametrize("runner", ["inline", "processes"])

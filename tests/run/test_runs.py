@@ -40,7 +40,7 @@ def test_a_controller_that_raises_is_survived_where_the_scenario_says_so(runner:
 def test_a_robot_killed_mid_run_fails_the_run_and_is_named(nothing_left: None) -> None:
     result = run(scenario(robots=troubled("Dies")))
     assert result.outcome == "failed"
-    assert result.reason == "node 2 crashed at tick 5: process ended"
+    assert result.reason == "node 2 crashed at tick 5: its process was ended by signal 9 (SIGKILL)"
 
 
 def test_a_robot_killed_mid_run_is_survived_where_the_scenario_says_so(nothing_left: None) -> None:

@@ -182,7 +182,6 @@ def test_a_robot_that_answers_with_no_command_crashes_at_once(tmp_path: Path) ->
     assert result.outcome == "failed"
     assert result.reason.startswith("node 0 crashed at tick 0: its command was refused: malformed: ")
     assert result.refused == {"malformed": 1}
-    assert result.wall_s < 60.0, "nothing waited for the deadline of stragglers"
 
 
 def test_a_missing_answer_of_an_idle_robot_is_lost_by_the_middleware_and_that_of_a_busy_one_is_not(

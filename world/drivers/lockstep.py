@@ -25,6 +25,9 @@ CRASH_GRACE_S: Final = 1.0
 # How long a node without an answer has to leave when it is told to: one that leaves was not busy, so a message was lost.
 PROBE_S: Final = 1.0
 
+# How long the driver waits for the exit code of a lost node's process. The connection ends before the process does.
+EXIT_CODE_S: Final = 2.0
+
 
 class LockStep(Driver):
     """Drives a world in lock-step. `run` raises StragglerError where a node misses the deadline."""
@@ -36,7 +39,7 @@ class LockStep(Driver):
         observers: Sequence[TickObserver] = (),
         programs: NodeProcesses | None = None,
     ) -> None:
-        super().__init__(world, link, observers)
+        super().__init__(world, link, observers, programs)
         self._processes = ProcessController(world, link, programs, self._take)
         self._straggler_s = world.scenario.time.straggler_s
         self._lost = 0
@@ -88,7 +91,7 @@ class LockStep(Driver):
         """Give an arrival to the world."""
         node, payload = arrival
         if payload is None:
-            self._world.crash(node, "process ended")
+            self._lose(node, EXIT_CODE_S)
             return
         with contextlib.suppress(ProtocolError):  # the world has counted it
             self._world.accept(node, payload)

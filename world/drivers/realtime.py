@@ -19,6 +19,8 @@ from zwerm.world.drivers.process_control import ActionThread
 from zwerm.world.tick.node_status import ProcessAction
 from zwerm.world.world import World
 
+EXIT_CODE_S: Final = 0.05  # how long a tick may wait for the exit code of a lost node's process
+
 # The unanswered observations at which a node is no longer observed: their number, and their total size in bytes.
 UNANSWERED_MAX: Final = 64
 UNANSWERED_BYTES_MAX: Final = 131_072
@@ -40,15 +42,14 @@ class RealTime(Driver):
         before_send: TickObserver | None = None,
     ) -> None:
         """`before_send` is called between sensing and sending."""
-        super().__init__(world, link, observers)
+        super().__init__(world, link, observers, programs)
         self._actions = ActionThread(programs)
         self._tick_s = world.scenario.time.dt_s / factor
         self._deadman_s = world.scenario.time.deadman_s
         self._before_send = before_send
         self._start_s = 0.0  # on the monotonic clock
-        self._unanswered: dict[
-            int, deque[tuple[int, int]]
-        ] = {}  # tick and size [bytes] of a node's unanswered observations
+        # The tick and size [bytes] of each node's unanswered observations.
+        self._unanswered: dict[int, deque[tuple[int, int]]] = {}
         self._silent_since_s: dict[int, float] = {}  # virtual time of the first of them
         self._dying: Counter[int] = Counter()  # kills that have been requested and not yet reported, by node
         self._starting: Counter[int] = Counter()
@@ -121,7 +122,7 @@ class RealTime(Driver):
                 self._world.refuse_stale()
             return
         if payload is None:
-            self._world.crash(node, "process ended")
+            self._lose(node, EXIT_CODE_S)
             return
         self._silent_since_s.pop(node, None)
         self._stopped.pop(node, None)

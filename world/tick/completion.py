@@ -1,7 +1,8 @@
 """Completion: the one rule that decides when a run ends, and with which outcome.
 
 A run ends, in this order of precedence, when a node crashed and the scenario says `robots.on_crash = "fail"`; when a deciding
-node gave up; when the task is done; or at the time limit. Both drivers ask the same rule after every tick.
+node gave up; when the task is done; when every robot is lost for good; or at the time limit. Both drivers ask the same rule
+after every tick.
 """
 
 from collections.abc import Collection, Mapping
@@ -102,4 +103,6 @@ class Completion:
             return Ending(FAILED, self._gave_up)
         if self.completed(exited, dead):
             return Ending(COMPLETED)
+        if len(dead) >= self._robots and all(robot in dead for robot in range(self._robots)):
+            return Ending(FAILED, "every robot was lost")
         return Ending(TIME_LIMIT) if tick >= self._last_tick else None

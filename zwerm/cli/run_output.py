@@ -1,13 +1,15 @@
 """The output of `zwerm run` and `zwerm world`: pictures, an animation, and the result as a table or as JSON."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final, NoReturn
 
 import typer
 
-from zwerm.cli.console import RunProgress, print_result
+from zwerm.cli.console import RunProgress, print_file, print_result
 from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, out, print_json
 from zwerm.errors import PictureError, ScenarioError
@@ -39,42 +41,54 @@ class RunOutput:
             raise ScenarioError(diagnostics)
 
     def report(self, result: RunResult) -> NoReturn:
-        """Draw and print the result, and exit with the status of its outcome."""
-        drawn, errors = self._draw_stills(result)
-        if result.scenario.random_faults is not None and not self.as_json:
-            drawn.append(_write_faults(result))
-        if self.animation is not None:
-            with RunProgress(err, "animation", quiet=self.as_json) as progress:
-                drawn.append(result.animate(self.animation, progress.ticked))
+        """Print the result, then write its files, and exit with the status of its outcome.
+
+        The result comes first: a full disk, or Ctrl-C while a picture is drawn, does not lose it.
+        """
         for node, traceback in sorted(result.tracebacks.items()):
             err.print(f"node {node} raised:\n{traceback}", markup=False, highlight=False, soft_wrap=True)
         if self.as_json:
             print_json(result.as_json())
         else:
-            print_result(out, result, drawn)
+            print_result(out, result)
             if self.radio_table is not None:
                 print_radio_ledger(out, result.radio, self.radio_table)
-        if errors:
-            raise PictureError("\n".join(errors))
         if result.reason:
             err.print(f"zwerm: {result.reason}", style="red", markup=False, highlight=False, soft_wrap=True)
+        errors = [*result.problems, *self._write_files(result)]
+        if errors:
+            raise PictureError("\n".join(errors))
         if result.outcome == "interrupted":
             raise typer.Exit(EXIT_INTERRUPTED)
         raise typer.Exit(0 if result.ok else EXIT_FAILED)
 
-    def _draw_stills(self, result: RunResult) -> tuple[list[Path], list[str]]:
-        """Return the pictures drawn, and the errors of moments that the run does not have; the result is still printed."""
-        drawn: list[Path] = []
-        errors: list[str] = []
+    def _write_files(self, result: RunResult) -> list[str]:
+        """Write pictures, faults and animation, and print the path of each. Return why some cannot be written."""
         path = self.picture or Path("runs") / f"{result.scenario.name}-seed{result.seed}.png"
+        files: list[Callable[[], Path]] = []
         if self.picture is not None or not self.as_json:
-            drawn.append(result.picture(path))
-        for moment in self.moments:
+            files.append(lambda: result.picture(path))
+        files += [partial(_draw_moment, result, path, moment) for moment in self.moments]
+        if result.scenario.random_faults is not None and not self.as_json:
+            files.append(lambda: _write_faults(result))
+        if self.animation is not None:
+            files.append(partial(self._animate, result, self.animation))
+        errors: list[str] = []
+        for write in files:
             try:
-                drawn.append(_draw_moment(result, path, moment))
+                written = write()
             except PictureError as error:
                 errors.append(str(error))
-        return drawn, errors
+            except OSError as error:
+                errors.append(f"{error.filename or path}: cannot be written: {error.strerror}")
+            else:
+                if not self.as_json:
+                    print_file(out, written)
+        return errors
+
+    def _animate(self, result: RunResult, path: Path) -> Path:
+        with RunProgress(err, "animation", quiet=self.as_json) as progress:
+            return result.animate(path, progress.ticked)
 
 
 def _draw_moment(result: RunResult, final: Path, moment: str) -> Path:

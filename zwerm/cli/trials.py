@@ -25,6 +25,10 @@ Out = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--out", metavar="FILE.parquet", help="Where the rows go; runs/NAME.parquet by default."),
 ]
+Timeout = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--timeout", min=1.0, metavar="S", help="End a trial without a result after S seconds: it failed."),
+]
 Retry = Annotated[bool, typer.Option("--retry", help="Run trials again that failed.")]
 
 

@@ -57,5 +57,8 @@ class NodeProcesses(Protocol):
     def resume(self, node: int) -> None:
         """Resume a paused process."""
 
+    def end_of(self, node: int, wait_s: float) -> str:
+        """Return how a lost node's process ended, waiting for its end at most `wait_s`; "" where that is not known."""
+
 
 Answer = Callable[[bytes], bytes]

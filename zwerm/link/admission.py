@@ -37,7 +37,7 @@ class ExpectedNode(Struct, frozen=True):
     paced: bool = False
 
 
-class Membership:
+class Admission:
     """The admission to a run that expects `members`. `joined` holds the incarnation of each node that has joined."""
 
     def __init__(self, members: Mapping[int, ExpectedNode]) -> None:

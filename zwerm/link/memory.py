@@ -73,3 +73,7 @@ class MemoryLink:
 
     def resume(self, node: int) -> None:
         """Do nothing: the world observes the node again."""
+
+    def end_of(self, node: int, wait_s: float) -> str:
+        """Return "": a node in memory has no process."""
+        return ""

@@ -55,6 +55,7 @@ class RunResult:
     missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
     series: dict[str, Floats] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)  # what could not be written during the run
     tracebacks: dict[int, str] = field(default_factory=dict)
     crash_reasons: dict[int, str] = field(
         default_factory=dict

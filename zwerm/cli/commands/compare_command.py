@@ -7,7 +7,7 @@ import typer
 
 from zwerm.cli.options import Json, ScenarioName, Sets
 from zwerm.cli.terminal import err, errors_as_lines, out, print_json
-from zwerm.cli.trials import Jobs, Out, Retry, Seeds, exit_with, print_trial_counts, study_extra
+from zwerm.cli.trials import Jobs, Out, Retry, Seeds, Timeout, exit_with, print_trial_counts, study_extra
 
 
 def compare(
@@ -58,6 +58,7 @@ def compare(
         ),
     ] = None,
     retry: Retry = False,
+    timeout: Timeout = None,
     as_json: Json = False,
 ) -> None:
     """Compare variants of a scenario, seed by seed: same seeds, same random draws, same faults.
@@ -105,6 +106,7 @@ def compare(
                 jobs=jobs,
                 sets=tuple(sets or ()),
                 retry=retry,
+                timeout_s=timeout,
                 runner="inline" if inline else "processes",
                 listener=progress,
             )

@@ -7,7 +7,7 @@ import typer
 
 from zwerm.cli.options import Json, Sets
 from zwerm.cli.terminal import err, errors_as_lines, out, print_json
-from zwerm.cli.trials import Jobs, Out, Retry, Seeds, exit_with, print_trial_counts, study_extra
+from zwerm.cli.trials import Jobs, Out, Retry, Seeds, Timeout, exit_with, print_trial_counts, study_extra
 
 
 def study(
@@ -17,6 +17,7 @@ def study(
     output: Out = None,
     sets: Sets = None,
     retry: Retry = False,
+    timeout: Timeout = None,
     as_json: Json = False,
 ) -> None:
     """Run a study: scenarios over a grid of settings and many seeds, compared with a paper's numbers.
@@ -42,7 +43,14 @@ def study(
         path = output or Path("runs") / f"{loaded.name}.parquet"
         with StudyProgress(err, loaded.name, quiet=as_json) as progress:
             result = run_study(
-                loaded, path, seeds=chosen, jobs=jobs, sets=tuple(sets or ()), retry=retry, listener=progress
+                loaded,
+                path,
+                seeds=chosen,
+                jobs=jobs,
+                sets=tuple(sets or ()),
+                retry=retry,
+                timeout_s=timeout,
+                listener=progress,
             )
         drawn = [draw_study(path.with_suffix(".png"), result.results)] if result.done else []
         if as_json:
