@@ -1,8 +1,8 @@
 """Processor time to find redundant robots by relative H2, and correctness of the certificates.
 
-Random swarms in a square whose border is the fence, about 1.6 robots per cell of 0.4 r_v. Prints the processor time to build
-the complex and to find the redundant robots with their certificate, and the time of gudhi for the Betti numbers of the same
-pair. Then checks the certificates of random complexes against gudhi.
+Random swarms in a square whose border is the fence, about 1.6 robots per cell of 0.4 r_v. Prints the processor time to
+build the complex and to find the redundant robots with their certificate. Beside it stands the time of gudhi for the
+Betti numbers of the same pair. Then checks the certificates of random complexes against gudhi.
 """
 
 import argparse

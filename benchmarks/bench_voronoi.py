@@ -1,7 +1,7 @@
 """Speed of Voronoi coverage inline on one core: robots with a control period of 0.02 s.
 
-Prints the factor over real time, and the processor time of one robot's tick [us]: of the whole emulator, and of the controller
-alone with the same observations.
+Prints the factor over real time, and the processor time of one robot's tick [us]. This time is given for the whole
+emulator, and for the controller alone with the same observations.
 """
 
 import argparse

@@ -1,14 +1,10 @@
-"""The coverage control algorithm as printed: move towards the estimated centroid of one's own Voronoi cell.
+"""The coverage control algorithm as printed: a robot moves towards the estimated centroid of its own Voronoi cell.
 
 The robot knows the positions of its neighbours relative to itself, the corners of the region, and the field's value and
-gradient where it stands; all in its body frame, so that it needs no compass. What it keeps from one
-observation to the next makes it quicker and changes no answer.
+gradient at its place. All are in its body frame, so it needs no compass. The cache between two observations saves time
+and changes no answer.
 
-Where the paper says nothing:
-- a robot at the same place as another has the same cell, and both move as one until something parts them;
-- a robot outside the region whose cell is empty heads for the nearest place of the region;
-- where no neighbour is sensed the cell is the whole region, which is what the definition gives;
-- where the field is zero or negative all over the cell, its centroid is that of a constant field.
+Rules for cases that the paper leaves open:
 """
 
 from typing import Annotated, Any, ClassVar

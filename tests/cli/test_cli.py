@@ -73,8 +73,12 @@ def test_check_reports_an_unknown_controller_and_an_unknown_sensor_beside_errors
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["run", "no-such"], "zwerm: no-such: expected a scenario file or the name of a built-in one; built in are "),
-        (["run", "computation-free", "--set", "robots.count=none"], "robots.count: "),
+        (["run", "no-such"], "zwerm: no-such: expected a scenario file or the name of a built-in one; nearest are "),
+        (["run", "computation-free", "--set", "robots.count=none"], "zwerm: --set robots.count=none: robots.count: "),
+        (["run", "computation-free", "--set", "robots.cuont=4"], "robots.cuont: unknown key; did you mean count?"),
+        (["run", "computation-free-comparison"], "run it with: zwerm study computation-free-comparison"),
+        (["study", "computation-free"], "run it with: zwerm run computation-free"),
+        (["run", "computation-free", "--set", "robots.controller=zoo:Robot:x"], "cannot import 'zoo': "),
         (["run", "computation-free", "--set", "robots"], "zwerm: --set robots: expected path=value"),
         (
             ["run", "computation-free", "--set", "robots.controller=nobody"],
@@ -82,6 +86,10 @@ def test_check_reports_an_unknown_controller_and_an_unknown_sensor_beside_errors
         ),
         (["run", "computation-free", "--set", "robots.controller=no_such_file:Robot"], "cannot import 'no_such_file'"),
         (["run", "computation-free", "--set", "robots.count=2000"], "robots.placement: no room for robot"),
+        (
+            ["world", "computation-free", "--listen", "foo", "--credentials", "k"],
+            "zwerm: --listen: expected an endpoint such as tcp/0.0.0.0:7447, got 'foo'",
+        ),
         (["run", "computation-free", "--inline", "--realtime", "0"], "zwerm: realtime: expected a factor > 0, got 0.0"),
         (
             ["robot", "--connect", "tcp/127.0.0.1:1", "--credentials", "none.key"],

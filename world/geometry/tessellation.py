@@ -1,9 +1,10 @@
 """Voronoi neighbours: the Delaunay triangulation of a swarm, stored from scene to scene.
 
-The triangulation of slowly moving robots seldom changes, so the previous one is tested first. It is the Delaunay triangulation
-of the new positions if its triangles still turn counter-clockwise, its hull is still convex, and no edge has to be flipped
-(Delaunay's lemma). This test is much faster than a new triangulation. A few edges are flipped in place (Lawson 1977).
-`Tessellation.pairs` states the result for robots at one place and swarms on one line. Ranges, walls and noise play no part.
+The triangulation of slowly moving robots seldom changes, so the previous one is tested first. It is the Delaunay
+triangulation of the new positions if its triangles still turn counter-clockwise, its hull is convex, and no edge must
+be flipped (Delaunay's lemma). This test is much faster than a new triangulation. A few edges are flipped in place
+(Lawson 1977). `Tessellation.pairs` states the result for robots at one place and swarms on one line. Ranges, walls and
+noise play no part.
 """
 
 from typing import Final, NamedTuple

@@ -29,13 +29,17 @@ class RunProgress:
         self._tasks: dict[str, TaskID] = {}
 
     def __enter__(self) -> Self:
-        self._progress.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._progress.stop()
+        self.suspend()
+
+    def suspend(self) -> None:
+        """Remove the display for good: a debugger needs the terminal."""
+        if self._tasks:
+            self._progress.stop()
 
     def joined(self, count: int, total: int) -> None:
         """Show that `count` of `total` robots have joined."""
@@ -55,6 +59,8 @@ class RunProgress:
 
     def _show(self, title: str, unit: str, done: float, total: int | None) -> None:
         task = self._tasks.get(title)
+        if not self._tasks:  # an error before it leaves no empty line
+            self._progress.start()
         if task is None:
             task = self._tasks[title] = self._progress.add_task(title, total=total, unit=unit)
         self._progress.update(task, completed=done, unit=unit)

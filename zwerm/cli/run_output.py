@@ -12,6 +12,7 @@ import typer
 from zwerm.cli.console import RunProgress, print_file, print_result
 from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, out, print_json
+from zwerm.cli.tracebacks import print_tracebacks
 from zwerm.errors import PictureError, ScenarioError
 from zwerm.run.result import RunResult
 
@@ -45,8 +46,7 @@ class RunOutput:
 
         The result comes first: a full disk, or Ctrl-C while a picture is drawn, does not lose it.
         """
-        for node, traceback in sorted(result.tracebacks.items()):
-            err.print(f"node {node} raised:\n{traceback}", markup=False, highlight=False, soft_wrap=True)
+        print_tracebacks(err, result.tracebacks)
         if self.as_json:
             print_json(result.as_json())
         else:

@@ -45,6 +45,8 @@ def print_trial_counts(result: "StudyResult", drawn: list[Path]) -> None:
     """Print how many trials ran, and the files written."""
     ran = f"{result.done} of {result.planned} trials, {result.ran} of them run now: {result.path}"
     err.print(ran, highlight=False, soft_wrap=True)
+    for why in result.unknown:
+        err.print(f"its rows are not used again: {why}", markup=False, highlight=False, soft_wrap=True)
     for each in drawn:
         err.print(f"picture: {each}", highlight=False, soft_wrap=True)
 

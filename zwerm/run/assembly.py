@@ -10,7 +10,9 @@ from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role
 from zwerm.deploy.node_specs import controller_for, node_specs
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
+from zwerm.scenario.overrides import blame
 from zwerm.scenario.parameter_files import with_file_texts
+from zwerm.scenario.plugin_names import look_in
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.arena.scatter import with_landmarks
@@ -36,12 +38,13 @@ def assemble_run(scenario: Scenario, seed: int) -> tuple[World, Observers]:
 
     Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the faults and the placement.
     """
+    look_in(scenario.folder)
     scenario = _with_landmarks(scenario, seed)
     arena, sensors, observers = prepare(scenario)
     mistakes: list[str] = []
     world = _attempt(lambda: World(scenario, seed, arena, sensors), scenario, mistakes)
     if world is None:
-        raise ScenarioError(mistakes)
+        raise ScenarioError(blame(mistakes, scenario.place, scenario.overrides))
     world.place_of = lambda node: step_place(find(node_specs(scenario, seed)[node][0]))
     return world, observers
 
@@ -66,6 +69,7 @@ def prepare(scenario: Scenario) -> Prepared:
 
     Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
     """
+    look_in(scenario.folder)
     scenario = _with_landmarks(scenario, 1)
     mistakes: list[str] = []
     field, table = None, scenario.field
@@ -81,7 +85,7 @@ def prepare(scenario: Scenario) -> Prepared:
         sensors = _attempt(lambda: _sensors(scenario, arena, field), scenario, mistakes)
         observers = _attempt(lambda: make_observers(scenario, arena, field), scenario, mistakes)
     if arena is None or sensors is None or observers is None or mistakes:
-        raise ScenarioError(mistakes)
+        raise ScenarioError(blame(mistakes, scenario.place, scenario.overrides))
     return Prepared(arena, sensors, observers)
 
 

@@ -1,8 +1,8 @@
 """A scenario: everything that defines an experiment but its seed, as strict typed tables read from TOML.
 
 Every table refuses keys it does not know and values of another type: "25" is no number, and true is no 1. All mistakes
-are reported at once, each as `file: path: rule, got value`. What a sensor or a controller takes as parameters is theirs
-to type; the tables here carry them as they are.
+are reported at once, each as `file: path: rule, got value`. Parameters of sensors and controllers are typed by their
+own classes; the tables here carry them unchanged.
 """
 
 from functools import cache
@@ -129,8 +129,9 @@ class RobotsTable(Table):
 class BaseTable(Table):
     """A base station: robot 0, which never moves. The others wait in its depot until it releases them, one at a time.
 
-    It stands at its `pose`, else at a random free place. With several `poses`, or `count` at random places, there are as many
-    base stations, robots 0, 1, ..., each with a depot of its own: the other robots are dealt out to them in turn.
+    It stands at its `pose`, else at a random free place. With several `poses`, or `count` at random places, there are
+    as many base stations: robots 0, 1, ... Each has a depot of its own, and the other robots are distributed to the
+    depots in turn.
     """
 
     controller: str
@@ -141,7 +142,7 @@ class BaseTable(Table):
 
     @property
     def stations(self) -> int:
-        """How many base stations there are."""
+        """Number of base stations."""
         return len(self.poses) if self.poses is not None else self.count or 1
 
     @model_validator(mode="after")
@@ -229,7 +230,7 @@ def _is_rate(key: str) -> bool:
 
 
 class MetricsTable(Table):
-    """What is measured of the run. Each other key switches on the metrics of its row in the catalogue, and is typed there.
+    """The metrics of the run. Each other key switches on the metrics of its row in the catalogue, and is typed there.
 
     Metrics that sample during a run do so every `every_s`. `own` names metrics of the user's own as `module:name`: a
     subclass of `zwerm.Metric`, or a function of the truth.
@@ -290,6 +291,7 @@ class Scenario(Table):
     pictures: PicturesTable = PicturesTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")
+    _overrides: tuple[str, ...] = PrivateAttr(default=())
 
     @model_validator(mode="after")
     def _variant_can_run(self) -> Self:
@@ -317,5 +319,10 @@ class Scenario(Table):
 
     @property
     def place(self) -> str:
-        """What messages call it: its file."""
+        """Name of the scenario in messages: its file."""
         return self._place
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """The settings, `path=value`, that were applied to it."""
+        return self._overrides

@@ -20,7 +20,7 @@ from zwerm.study.trial import Row
 
 Key = tuple[str, str, int]
 
-_TEXTS = ("study", "variant", "outcome", "reason", "trace", "fingerprint")
+_TEXTS = ("study", "variant", "outcome", "reason", "trace", "fingerprint", "modules")
 _FIRST = ("seed", "outcome", "reason", "trace", "fingerprint", "ticks", "sim_s", "wall_s")
 
 

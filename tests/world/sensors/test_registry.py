@@ -78,7 +78,7 @@ def test_every_built_in_sensor_reads_nobody_where_nobody_is_asked(make, scene):
             [
                 "robots.sensors.0.switches: expected >= 1, got 0",
                 "robots.sensors.0.false_negative: expected <= 1, got 1.5",
-                "robots.sensors.0.reach: unknown key",
+                "robots.sensors.0.reach: unknown key; did you mean reach_m?",
             ],
         ),
         (
@@ -104,7 +104,7 @@ def test_every_built_in_sensor_reads_nobody_where_nobody_is_asked(make, scene):
         ),
         (
             {"kind": "other_peoples:Barometer"},
-            ["robots.sensors.0.kind: module 'other_peoples' has no class 'Barometer'"],
+            ["robots.sensors.0.kind: module 'other_peoples' has no class 'Barometer'; did you mean Hygrometer?"],
         ),
         (
             {"kind": "other_peoples:Blind"},
