@@ -67,3 +67,17 @@ class Plain(Controller):
 
     def step(self, observation: Observation) -> Command:
         return Command(drive=WheelSpeeds(0.1, 0.5), wake=Wake(at_s=observation.time_s))
+
+
+class Sideways(Controller):
+    """Always commands the drive of another body."""
+
+    def step(self, observation: Observation) -> Command:
+        return Command(drive=BodyVelocity(0.1))
+
+
+class Talks(Controller):
+    """Always sends, with a radio or without."""
+
+    def step(self, observation: Observation) -> Command:
+        return Command(outbox=(Transmission("robots", b"x"),))
