@@ -32,14 +32,6 @@ def test_the_json_object_is_printed_although_the_disk_is_full(tmp_path: Path) ->
     assert "Traceback" not in ran.stderr
 
 
-def test_the_table_is_printed_before_a_picture_that_cannot_be_drawn(tmp_path: Path) -> None:
-    (tmp_path / "runs").write_text("not a folder")
-    ran = zwerm("run", "computation-free", "--inline", *SHORT, cwd=tmp_path)
-    assert ran.returncode == 2
-    assert "time-limit" in ran.stdout
-    assert "Traceback" not in ran.stderr
-
-
 @pytest.mark.parametrize("runner", ["--inline", "--processes"])
 def test_what_a_controller_prints_does_not_spoil_the_json_object(tmp_path: Path, runner: str) -> None:
     for name in ("ends.py",):

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
@@ -66,12 +66,18 @@ class RunProgress:
         self._progress.update(task, completed=done, unit=unit)
 
 
+# What a file is, by its suffix.
+FILE_KINDS: Final = {
+    **dict.fromkeys((".png", ".pdf", ".svg"), "picture"),
+    **dict.fromkeys((".gif", ".mp4"), "animation"),
+    ".toml": "faults drawn",
+    ".mcap": "recording",
+}
+
+
 def print_file(console: Console, path: Path) -> None:
     """Print the path of a file that a run has written, and what it is."""
-    kind = {".png": "picture", ".pdf": "picture", ".svg": "picture", ".toml": "faults drawn"}.get(
-        path.suffix, "animation"
-    )
-    console.print(f"{kind}: {path}", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"{FILE_KINDS[path.suffix.lower()]}: {path}", markup=False, highlight=False, soft_wrap=True)
 
 
 def print_result(console: Console, result: "RunResult") -> None:

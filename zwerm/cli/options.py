@@ -27,7 +27,11 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and no
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
 Picture = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--picture", metavar="FILE.png", help="Where to draw the run; runs/SCENARIO-seedN.png by default."),
+    typer.Option(
+        "--picture",
+        metavar="FILE",
+        help="Where to draw the run: .png, .pdf or .svg; runs/SCENARIO-seedN.png by default. Settings are part of the name.",
+    ),
 ]
 PictureAt = Annotated[
     Optional[list[str]],  # noqa: UP045
