@@ -3,8 +3,13 @@
 The channel drops packets to absent and switched-off receivers first. Faults judge before the models, but after the leading
 models that find receivers out of reach: a packet that a fault drops would have reached its receiver. These leading models
 use no random numbers, so the order of faults and models changes the causes and not the packets that pass.
+
+Models see a broadcast as packets to the receivers in reach (`reach`): those that are available, within the shortest reach
+that a model states. The packets to all others count for `absent`, `receiver-down` or the cause of that model. They get a link
+in the ledger only with `every_link`, because their number grows with all pairs of nodes.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -14,9 +19,11 @@ from numpy.typing import NDArray
 from zwerm.maths.keyed_random import key_part
 from zwerm.wire.messages import Packet, Transmission
 from zwerm.world.radio import PacketJudge, Packets, Transmissions, Verdict
+from zwerm.world.radio.availability import Absent, SwitchedOff
 from zwerm.world.radio.ledger import Ledger
 from zwerm.world.radio.links import Links
 from zwerm.world.radio.packet_queue import PacketBatch, PacketQueue
+from zwerm.world.radio.reach import Reach
 from zwerm.world.scene import Ints, Scene
 
 Outboxes = Sequence[tuple[int, Sequence[Transmission]]]
@@ -24,6 +31,9 @@ Outboxes = Sequence[tuple[int, Sequence[Transmission]]]
 # Key of a packet: its tick, its number among those of its sender at that tick, and the number of the copy.
 _TICK_BITS: Final = np.uint64(32)
 _COPY_BITS: Final = np.uint64(16)
+
+# Addressee of a broadcast.
+_EVERYONE: Final = -1
 
 
 class Channel:
@@ -39,6 +49,7 @@ class Channel:
         models: Sequence[PacketJudge] = (),
         anonymous: bool = False,
         links: Links | None = None,
+        every_link: bool = False,
     ) -> None:
         self.name = name
         self.models = list(models)
@@ -50,8 +61,13 @@ class Channel:
         self.dt_s = dt_s
         self._anonymous = anonymous
         self._audiences: dict[int, Ints] = {}
+        self._every_link = every_link
+        self._reach = Reach(members)
         # The number of leading models that find receivers out of reach.
         self._leading = next((at for at, model in enumerate(self.models) if not model.out_of_reach), len(self.models))
+        # The model that bounds broadcasts; the second one while a fault judges between the leading models and the others.
+        self._bound = _shortest(self.models)
+        self._leading_bound = _shortest(self.models[: self._leading])
 
     def carries(self, sender: int, to: int) -> bool:
         """Return whether `sender` may address `to`."""
@@ -82,41 +98,77 @@ class Channel:
         return sorted(zip(packets.sender[stopped].tolist(), packets.receiver[stopped].tolist(), strict=True))
 
     def send(
-        self, scene: Scene, outboxes: Outboxes, before: Sequence[PacketJudge] = (), faults: Sequence[PacketJudge] = ()
+        self,
+        scene: Scene,
+        outboxes: Outboxes,
+        absent: Absent,
+        off: SwitchedOff,
+        faults: Sequence[PacketJudge] = (),
     ) -> None:
         """Judge every packet that the nodes sent on this channel at this tick; (node, outbox) are in id order."""
-        name, ledger = self.name, self.ledger
+        name, ledger, center = self.name, self.ledger, self._center
         senders: list[int] = []
         ranks: list[int] = []
         payloads: list[bytes] = []
-        links: list[Ints] = []
+        addressees: list[int] = []
         sent: dict[int, int] = {}  # a node that answered late appears twice
         for node, outbox in outboxes:
             rank = sent.get(node, 0)
+            everyone = _EVERYONE if center is None or node == center else center
             for message in outbox:
                 if message.channel == name:
                     senders.append(node)
                     ranks.append(rank)
                     payloads.append(message.payload)
-                    links.append(self._audience(node) if message.to is None else self._link(node, message.to))
+                    addressees.append(everyone if message.to is None else message.to)
                     ledger.node_bytes[node] += len(message.payload)
                     rank += 1
             ledger.node_messages[node] += rank - sent.get(node, 0)
             sent[node] = rank
         if not senders:
             return
-        audience = list(map(len, links))
         traffic = Transmissions(scene, self.dt_s, np.array(senders), np.array(ranks), payloads)
-        link = np.concatenate(links)
-        transmission = np.repeat(np.arange(len(senders)), audience)
+        link, transmission = self._links_of(traffic, np.array(addressees), absent, off, bool(faults))
         key = key_part(_stamp(traffic))[transmission]
         ledger.send(link)
         packets = Packets(self.links, link, transmission, transmission, key)
-        for model in (*before, *self.models[: self._leading], *faults, *self.models[self._leading :]):
+        judges: list[PacketJudge] = [absent, off, *self.models[: self._leading], *faults, *self.models[self._leading :]]
+        for model in judges:
             if not len(packets):
                 return
             packets = self._apply(model.judge(traffic, packets), model, traffic, packets)
         self._enqueue(traffic, packets)
+
+    def _links_of(
+        self, traffic: Transmissions, to: Ints, absent: Absent, off: SwitchedOff, faulty: bool
+    ) -> tuple[Ints, Ints]:
+        """Return the links (k,) of all packets that may arrive, and the transmission (k,) of each; both are sorted.
+
+        Broadcasts, `to` (t,) = `_EVERYONE`, have no packets to nodes out of reach: the ledger counts these at once.
+        """
+        broadcast = to == _EVERYONE
+        if not broadcast.any():
+            return self.links.rows(traffic.sender, to), np.arange(len(to))
+        alone = np.flatnonzero(~broadcast)
+        which = np.flatnonzero(broadcast)
+        sender = traffic.sender[which]
+        if self._every_link:
+            links = [self._audience(node) for node in sender.tolist()]
+            link, transmission = np.concatenate(links), np.repeat(which, list(map(len, links)))
+        else:
+            model = self._leading_bound if faulty else self._bound
+            found = self._reach.find(traffic.scene, off.off, sender, _reach_m(model))
+            for counts, judge in ((found.absent, absent), (found.off, off), (found.beyond, model)):
+                if judge is not None:
+                    self.ledger.drop_unlinked(int(counts.sum()), judge.cause, judge.out_of_reach)
+            transmission = np.repeat(which, found.counts)
+            link = self.links.rows(traffic.sender[transmission], found.ids)
+        if len(alone):
+            link = np.concatenate([link, self.links.rows(traffic.sender[alone], to[alone])])
+            transmission = np.concatenate([transmission, alone])
+            order = np.argsort(transmission, kind="stable")
+            link, transmission = link[order], transmission[order]
+        return link, transmission
 
     def _apply(self, verdict: Verdict, model: PacketJudge, traffic: Transmissions, packets: Packets) -> Packets:
         """Return the packets that remain after a verdict of `model`."""
@@ -197,8 +249,21 @@ class Channel:
             links = self._audiences[sender] = self.links.rows(np.full(len(receivers), sender), receivers)
         return links
 
-    def _link(self, sender: int, to: int) -> Ints:
-        return self.links.rows(np.array([sender]), np.array([to]))
+
+def _shortest(models: Sequence[PacketJudge]) -> PacketJudge | None:
+    """Return the model with the shortest reach among those that no model with a memory precedes, or None without a bound."""
+    found: PacketJudge | None = None
+    for model in models:
+        if _reach_m(model) < _reach_m(found):
+            found = model
+        if not getattr(model, "memoryless", False):
+            break
+    return found
+
+
+def _reach_m(model: PacketJudge | None) -> float:
+    """Return the distance beyond which a model receives no broadcast [m]; infinite for one that states none."""
+    return float(getattr(model, "reach_m", math.inf))
 
 
 def _stamp(traffic: Transmissions) -> NDArray[np.uint64]:

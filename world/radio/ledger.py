@@ -1,9 +1,11 @@
 """Ledger: counts of sent, delivered and dropped packets, by link of a channel and by cause.
 
 At every tick and for every link: sent = delivered + dropped, by cause + in flight. Dropped packets are out of reach (their
-receivers were), or losses. A copy that the medium made counts as sent, and as a copy; a damaged packet that arrives counts as
-delivered, and as damaged. The age of information of a link is the time since its newest delivered packet was sent, from its
-first delivery on.
+receivers were), or losses. Packets of broadcasts that never had a receiver may be counted by cause only, without a link
+(`drop_unlinked`): they are part of the totals, and not of the counts by link.
+
+A copy that the medium made counts as sent, and as a copy; a damaged packet that arrives counts as delivered, and as damaged.
+The age of information of a link is the time since its newest delivered packet was sent, from its first delivery on.
 """
 
 from typing import Any
@@ -30,6 +32,8 @@ class Ledger:
         self._delivered = links.integers()
         self._lost: dict[str, Column] = {}  # by cause
         self._out_of_reach: dict[str, Column] = {}
+        self.unlinked: dict[str, int] = {}  # packets sent and dropped without a link, by cause
+        self._unlinked_out_of_reach = 0
         # Age of information [ticks]: sending of the newest packet, its delivery, the sum of ages, the largest age.
         self._newest = links.integers(-1)
         self._since = links.integers()
@@ -49,6 +53,13 @@ class Ledger:
             if column is None:
                 column = columns[cause] = self._links.integers()
             np.add.at(column.values, link, 1)
+
+    def drop_unlinked(self, count: int, cause: str, out_of_reach: bool) -> None:
+        """Count packets sent and dropped at once, with receivers in reach or out of it, on links that are not told apart."""
+        if count:
+            self.unlinked[cause] = self.unlinked.get(cause, 0) + count
+            if out_of_reach:
+                self._unlinked_out_of_reach += count
 
     def deliver(self, link: Ints, sent_tick: Ints, tick: int) -> None:
         """Count packets received at `tick` on `link` (k,) that were sent at `sent_tick` (k,)."""
@@ -70,6 +81,23 @@ class Ledger:
         self._since.values[link] = tick
 
     # --- totals -----------------------------------------------------------------------------------------------------
+
+    def sent_total(self) -> int:
+        """Return the packets sent, with or without a link."""
+        return int(self.sent().sum()) + sum(self.unlinked.values())
+
+    def dropped_total(self) -> dict[str, int]:
+        """Return the packets dropped, with or without a link, by cause; causes are sorted."""
+        found = {cause: int(column.sum()) for cause, column in self.dropped().items()}
+        for cause, count in self.unlinked.items():
+            found[cause] = found.get(cause, 0) + count
+        return {cause: count for cause, count in sorted(found.items()) if count}
+
+    def out_of_reach_total(self) -> int:
+        """Return the packets dropped because their receivers were out of reach, with or without a link."""
+        return int(self.out_of_reach().sum()) + self._unlinked_out_of_reach
+
+    # --- by link ----------------------------------------------------------------------------------------------------
 
     def sent(self) -> Ints:
         """Return the packets sent, by link."""

@@ -26,10 +26,10 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
         links = ledger.by_link() | {"age_mean_s": mean_s, "age_max_s": peak_s}
     delivered = int(ledger.delivered().sum())
     return {
-        "sent": int(ledger.sent().sum()),
+        "sent": ledger.sent_total(),
         "delivered": delivered,
-        "dropped": {cause: int(column.sum()) for cause, column in ledger.dropped().items() if column.any()},
-        "out_of_reach": int(ledger.out_of_reach().sum()),
+        "dropped": ledger.dropped_total(),
+        "out_of_reach": ledger.out_of_reach_total(),
         "in_flight": int(ledger.in_flight().sum()),
         "messages": ledger.node_messages.tolist(),
         "message_bytes": ledger.node_bytes.tolist(),
@@ -37,6 +37,7 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
         "age_mean_s": None if age is None else age[0],
         "age_max_s": None if age is None else age[1],
         "links": links,
+        "unlinked": dict(sorted(ledger.unlinked.items())),
     }
 
 
@@ -53,12 +54,12 @@ def messages(medium: Medium) -> int:
 def radio_metrics(medium: Medium, robots: int, tick: int) -> dict[str, float]:
     """Return the metrics of a radio over all channels; empty if no node sent a packet."""
     ledgers = [channel.ledger for channel in medium.channels.values()]
-    sent = sum(int(each.sent().sum()) for each in ledgers)
+    sent = sum(each.sent_total() for each in ledgers)
     if not sent:
         return {}
     messages = np.sum([each.node_messages[:robots] for each in ledgers], axis=0)
     message_bytes = np.sum([each.node_bytes[:robots] for each in ledgers], axis=0)
-    out_of_reach = sum(int(each.out_of_reach().sum()) for each in ledgers)
+    out_of_reach = sum(each.out_of_reach_total() for each in ledgers)
     found = {"out_of_reach_fraction": out_of_reach / sent}
     if sent > out_of_reach:
         found["delivered_fraction"] = sum(int(each.delivered().sum()) for each in ledgers) / (sent - out_of_reach)
