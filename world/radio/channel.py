@@ -5,8 +5,7 @@ models that find receivers out of reach: a packet that a fault drops would have 
 use no random numbers, so the order of faults and models changes the causes and not the packets that pass.
 
 Models see a broadcast as packets to the receivers in reach (`reach`): those that are available, within the shortest reach
-that a model states. The packets to all others count for `absent`, `receiver-down` or the cause of that model. They get a link
-in the ledger only with `every_link`, because their number grows with all pairs of nodes.
+that a model states. The packets to all others count for `absent`, `receiver-down` or the cause of that model.
 """
 
 import math
@@ -49,25 +48,23 @@ class Channel:
         models: Sequence[PacketJudge] = (),
         anonymous: bool = False,
         links: Links | None = None,
-        every_link: bool = False,
     ) -> None:
         self.name = name
         self.models = list(models)
         self.links = links or Links(nodes)
-        self.ledger = Ledger(self.links, nodes, dt_s)
+        self.ledger = Ledger(self.links, nodes, dt_s, members)
         self.queue = PacketQueue(nodes)
         self._members = members
         self._center = center
         self.dt_s = dt_s
         self._anonymous = anonymous
         self._audiences: dict[int, Ints] = {}
-        self._every_link = every_link
         self._reach = Reach(members)
         # The number of leading models that find receivers out of reach.
         self._leading = next((at for at, model in enumerate(self.models) if not model.out_of_reach), len(self.models))
-        # The model that bounds broadcasts; the second one while a fault judges between the leading models and the others.
+        # The model that bounds broadcasts. Faults judge before it, unless it is a leading one.
         self._bound = _shortest(self.models)
-        self._leading_bound = _shortest(self.models[: self._leading])
+        self._bound_leads = self._bound in self.models[: self._leading]
 
     def carries(self, sender: int, to: int) -> bool:
         """Return whether `sender` may address `to`."""
@@ -128,9 +125,9 @@ class Channel:
         if not senders:
             return
         traffic = Transmissions(scene, self.dt_s, np.array(senders), np.array(ranks), payloads)
-        link, transmission = self._links_of(traffic, np.array(addressees), absent, off, bool(faults))
+        bound = None if faults and not self._bound_leads else self._bound
+        link, transmission = self._links_of(traffic, np.array(addressees), absent, off, bound)
         key = key_part(_stamp(traffic))[transmission]
-        ledger.send(link)
         packets = Packets(self.links, link, transmission, transmission, key)
         judges: list[PacketJudge] = [absent, off, *self.models[: self._leading], *faults, *self.models[self._leading :]]
         for model in judges:
@@ -140,35 +137,32 @@ class Channel:
         self._enqueue(traffic, packets)
 
     def _links_of(
-        self, traffic: Transmissions, to: Ints, absent: Absent, off: SwitchedOff, faulty: bool
+        self, traffic: Transmissions, to: Ints, absent: Absent, off: SwitchedOff, bound: PacketJudge | None
     ) -> tuple[Ints, Ints]:
-        """Return the links (k,) of all packets that may arrive, and the transmission (k,) of each; both are sorted.
+        """Count all packets as sent. Return the links (k,) of those that models judge, and the transmissions (k,), ascending.
 
-        Broadcasts, `to` (t,) = `_EVERYONE`, have no packets to nodes out of reach: the ledger counts these at once.
+        Broadcasts have the addressee `_EVERYONE` in `to` (t,).
         """
+        sender, scene, ledger = traffic.sender, traffic.scene, self.ledger
         broadcast = to == _EVERYONE
-        if not broadcast.any():
-            return self.links.rows(traffic.sender, to), np.arange(len(to))
-        alone = np.flatnonzero(~broadcast)
-        which = np.flatnonzero(broadcast)
-        sender = traffic.sender[which]
-        if self._every_link:
-            links = [self._audience(node) for node in sender.tolist()]
-            link, transmission = np.concatenate(links), np.repeat(which, list(map(len, links)))
-        else:
-            model = self._leading_bound if faulty else self._bound
-            found = self._reach.find(traffic.scene, off.off, sender, _reach_m(model))
-            for counts, judge in ((found.absent, absent), (found.off, off), (found.beyond, model)):
-                if judge is not None:
-                    self.ledger.drop_unlinked(int(counts.sum()), judge.cause, judge.out_of_reach)
-            transmission = np.repeat(which, found.counts)
-            link = self.links.rows(traffic.sender[transmission], found.ids)
-        if len(alone):
-            link = np.concatenate([link, self.links.rows(traffic.sender[alone], to[alone])])
-            transmission = np.concatenate([transmission, alone])
-            order = np.argsort(transmission, kind="stable")
-            link, transmission = link[order], transmission[order]
-        return link, transmission
+        which, alone = np.flatnonzero(broadcast), np.flatnonzero(~broadcast)
+        link, transmission = self.links.rows(sender[alone], to[alone]), alone
+        ledger.send(link, addressed=True)
+        if not len(which):
+            return link, transmission
+        found = self._reach.find(scene, off.off, sender[which], _reach_m(bound))
+        ledger.broadcasts.add(sender[which], scene.present, off.off)
+        for reason, judge in (("absent", absent), ("off", off), ("beyond", bound)):
+            if judge is not None:
+                ledger.drop_unshown(reason, int(getattr(found, reason).sum()), judge.cause, judge.out_of_reach)
+        heard = np.repeat(which, found.counts)
+        near = self.links.rows(sender[heard], found.ids)
+        ledger.send(near)
+        if not len(alone):
+            return near, heard
+        transmission = np.concatenate([heard, transmission])
+        order = np.argsort(transmission, kind="stable")
+        return np.concatenate([near, link])[order], transmission[order]
 
     def _apply(self, verdict: Verdict, model: PacketJudge, traffic: Transmissions, packets: Packets) -> Packets:
         """Return the packets that remain after a verdict of `model`."""
@@ -197,7 +191,7 @@ class Channel:
         fresh = number > 0
         stamp = _stamp(traffic)[made.transmission] | made.copy.astype(np.uint64)
         made.key = np.where(fresh, key_part(stamp), made.key)
-        self.ledger.send(made.link[fresh])
+        self.ledger.send(made.link[fresh], addressed=True)
         self.ledger.copies += int(np.count_nonzero(fresh))
         return made
 

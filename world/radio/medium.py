@@ -46,15 +46,7 @@ class Medium:
             table = tables[name]
             models, links = made[name]
             self.channels[name] = Channel(
-                name,
-                ids,
-                center,
-                nodes,
-                dt_s,
-                models,
-                table is not None and table.anonymous,
-                links,
-                table is not None and (table.every_link or table.check),
+                name, ids, center, nodes, dt_s, models, table is not None and table.anonymous, links
             )
 
     def arrive(self, tick: int) -> Sequence[int]:

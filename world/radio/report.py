@@ -5,7 +5,6 @@ from typing import Any, Final
 import numpy as np
 
 from zwerm.world.radio.medium import Medium
-from zwerm.world.scene import Floats
 
 # Largest number of links with counts of their own in the JSON object.
 LINKS_IN_JSON_MAX: Final = 10_000
@@ -20,10 +19,7 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
     channel = medium.channels[name]
     ledger = channel.ledger
     age = ledger.ages_s(tick)
-    links = None
-    if channel.links.count <= LINKS_IN_JSON_MAX:
-        mean_s, peak_s = (_numbers(ages[ledger.order()]) for ages in ledger.link_ages_s(tick))
-        links = ledger.by_link() | {"age_mean_s": mean_s, "age_max_s": peak_s}
+    links = ledger.by_link(tick) if ledger.link_count() <= LINKS_IN_JSON_MAX else None
     delivered = int(ledger.delivered().sum())
     return {
         "sent": ledger.sent_total(),
@@ -37,13 +33,7 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
         "age_mean_s": None if age is None else age[0],
         "age_max_s": None if age is None else age[1],
         "links": links,
-        "unlinked": dict(sorted(ledger.unlinked.items())),
     }
-
-
-def _numbers(values: Floats) -> list[float | None]:
-    """Return numbers for JSON: None in place of nan."""
-    return [None if value != value else value for value in values.tolist()]
 
 
 def messages(medium: Medium) -> int:

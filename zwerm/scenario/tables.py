@@ -172,15 +172,13 @@ class ScatterTable(Table):
 class ChannelTable(Table):
     """The models of a channel. `loss` is independent loss; `models` judge packets in order. `check` audits every tick.
 
-    On an `anonymous` channel no receiver gets the id of a sender. With `every_link`, or `check`, the ledger counts packets to
-    receivers out of range, absent or switched off by link, and not in total only: the cost grows with all pairs of nodes.
+    On an `anonymous` channel no receiver gets the id of a sender.
     """
 
     loss: Fraction = 0.0
     models: list[OpenTable] = []
     anonymous: bool = False
     check: bool = False
-    every_link: bool = False
 
 
 class RadioTable(ChannelTable):
