@@ -395,6 +395,10 @@ def test_the_wheel_holds_every_package_and_scenario_exactly_once(tmp_path: Path)
     expected = [str(path) for path in sources("zwerm")] + ["zwerm/py.typed"]
     expected += [f"zwerm/{path}" for path in sources(*PARTS)]
     for part in ("scenarios", "studies"):
-        data = [path for ending in ("toml", "yaml", "pgm", "json") for path in (ROOT / part).rglob(f"*.{ending}")]
+        data = [
+            path
+            for ending in ("toml", "yaml", "pgm", "json", "map", "mcpp")
+            for path in (ROOT / part).rglob(f"*.{ending}")
+        ]
         expected += [f"zwerm/{path.relative_to(ROOT)}" for path in data]
     assert sorted(held) == sorted(expected)

@@ -8,7 +8,7 @@ One tick is, in this order:
 4. `accept`: take each answer; `awaited` are the nodes that still owe one.
 5. `advance`: apply the commands in id order, give their packets to the radio, and move the bodies to t_k+1.
 
-A driver decides when to advance: in lock-step when all nodes have answered, in real time when the clock says so. `ending`
+A driver decides when to advance. In lock-step that is when all nodes have answered, in real time by the clock. `ending`
 tells the driver when the run is over.
 
 The world is deterministic: its state after a tick is a function of the scenario, the seed and the accepted answers.
@@ -120,8 +120,8 @@ class World:
     def precompute(self) -> None:
         """Compute what does not depend on the answers to this tick's observations: best while the nodes work.
 
-        Where commands act a tick later or more, that is the motion of the bodies, and, as long as all nodes are awake, the
-        readings of the same robots after it. `observe` uses these readings if nothing changed in between.
+        With a latency of one tick or more this moves the bodies. While all nodes are awake it also computes the next
+        readings of the same robots. `observe` uses these readings if nothing changed in between.
         """
         self.trace.catch_up()
         next_scene = self.bodies.advance_early()

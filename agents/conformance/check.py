@@ -1,9 +1,10 @@
 """Test whether a controller fulfils the contract: `check(MyController)`, from any test suite.
 
-The kit makes and steps the controller as a runner does, with ordinary and unusual observations: empty readings, many
+The kit makes and steps the controller as a runner does. The observations are ordinary and unusual: empty readings, many
 readings, malformed packets, a very late tick. The controller must answer each observation with a command that the world
 accepts. Its answers must not depend on other controllers in the process, and it must not do what `purity` detects. All
-violations are reported at once. A controller without violations is not proven correct: the kit uses a few hundred observations.
+violations are reported at once. A controller without violations is not proven correct: the kit uses a few hundred
+observations.
 """
 
 import importlib
@@ -95,12 +96,14 @@ def _declarations(
     if not callable(getattr(controller, "step", None)):
         found.append("it has no method step(observation)")
     declared = getattr(controller, "sensors", ())
+    given = () if sensors is None else sensors
+    fields = [kind.field for each in given if (kind := sensor_class(each)) is not None]
     if not isinstance(declared, tuple | list) or not all(isinstance(each, str) for each in declared):
         return [*found, f"sensors: expected a tuple of names, got {declared!r}"]
     for sensor in declared:
-        if sensor_class(sensor) is None and not extra:
+        if sensor_class(sensor) is None and sensor not in fields and not extra:
             found.append(f"sensors: {sensor!r} is none that Zwerm knows; give a reading of your own with extra=")
-        if sensors is not None and sensor not in sensors:
+        if sensors is not None and sensor not in (*given, *fields):
             found.append(f"sensors: it declares {sensor!r}, which check() does not give")
     kind = getattr(controller, "Parameters", NoParameters)
     if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct)):

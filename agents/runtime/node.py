@@ -38,8 +38,8 @@ class Node:
     """One node: its controller and the wire format around it.
 
     `answer` returns the encoded command for one encoded observation. If the controller raises, it calls `on_failure` and
-    returns the encoded Failure. `answer` is a closure over local names, because attribute look-ups cost most of an answer: in
-    a large swarm the robot's objects leave the processor's cache between two ticks.
+    returns the encoded Failure. `answer` is a closure over local names, because attribute look-ups cost most of an
+    answer. In a large swarm the objects of a robot leave the processor's cache between two ticks.
     """
 
     def __init__(self, controller: str, setup: Setup, on_failure: Callable[[], object] = _nothing) -> None:
@@ -90,9 +90,17 @@ class Node:
             Failure(
                 tick,
                 _printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX],
-                _printable(traceback.format_exc())[-TRACEBACK_CHARS_MAX:],
+                _printable("".join(_formatted(error)))[-TRACEBACK_CHARS_MAX:],
             )
         )
+
+
+def _formatted(error: BaseException) -> list[str]:
+    """Return the traceback of an error without the frame of this file, which tells nothing of the controller."""
+    trace = error.__traceback__
+    if trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return traceback.format_exception(type(error), error, trace)
 
 
 def _printable(text: str) -> str:

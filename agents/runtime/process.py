@@ -4,10 +4,10 @@ The process answers each observation with one command, in order. It exits when t
 and with the process that started it. After a failure of its controller it exits once the world has confirmed the failure, so
 the world always knows the reason first. It ignores SIGINT: the process that started it handles Ctrl-C.
 
-The loop joins, waits and ends. Zenoh's thread answers observations where it delivers them. Passing each observation to the
-loop's thread costs more than all other work together (measured, one robot tick: 160 us of processor time instead of 106).
-In real time observations are passed to the loop all the same: a slow controller gets a backlog there, and a backlog that is
-answered in the sending thread can block that thread.
+The loop joins, waits and ends. Zenoh's thread answers observations where it delivers them. Passing each observation to
+the loop's thread costs more than all other work together (measured for one robot tick: 160 us of processor time instead
+of 106). In real time observations are passed to the loop nevertheless. The backlog of a slow controller collects there.
+If the sending thread answered it, the backlog could block that thread.
 """
 
 import asyncio
@@ -37,8 +37,8 @@ EXIT_FAILED: Final = 1
 EXIT_REFUSED: Final = 2
 EXIT_LOST: Final = 3
 
-# All robots wait for the world, so the world has priority if there are more processes than cores (measured: a few per cent
-# more ticks with 100 robots on two cores). The largest niceness would starve robots beside other programs.
+# All robots wait for the world. So the world has priority if there are more processes than cores (measured: a few per
+# cent more ticks with 100 robots on two cores). The largest niceness would starve robots beside other programs.
 NICENESS: Final = 5
 
 _PR_SET_PDEATHSIG: Final = 1
@@ -64,6 +64,7 @@ def main(
     if parent is not None and not parent.is_alive():  # it died before die_with_parent took effect
         sys.exit(EXIT_LOST)
     set_threads(ONE_THREAD if is_local(endpoint) and station is None else TWO_THREADS)
+    sys.breakpointhook = _no_terminal
     here = str(Path.cwd())
     if here not in sys.path:
         sys.path.append(here)  # the place of a user's own controllers
@@ -79,6 +80,10 @@ def main(
         sys.stderr.flush()
         os._exit(code)  # closing the radio's session waits for messages that the network loses
     sys.exit(code)
+
+
+def _no_terminal(*_: object, **__: object) -> None:
+    raise RuntimeError("breakpoint() needs a terminal, and a robot process has none: run with --inline")
 
 
 async def run_node(

@@ -1,9 +1,9 @@
 """Rigid bodies in the plane: pymunk discs that track the velocity of their drive, between walls.
 
-In every substep a body receives the force that would give it the velocity of its drive, so that contacts constrain it before
-it is integrated. A velocity set directly before each substep would be integrated first, and would discard what the solver
-computed for friction and contacts. Contacts are inelastic; without friction they never turn a body. Bodies have no other
-dynamics: no inertia between substeps, no slip.
+In every substep a body receives the force that would give it the velocity of its drive. So contacts constrain the
+velocity before it is integrated. A velocity set directly before each substep would be integrated first, and would
+discard what the solver computed for friction and contacts. Contacts are inelastic; without friction they never turn a
+body. Bodies have no other dynamics: no inertia between substeps, no slip.
 """
 
 from typing import Final

@@ -42,7 +42,7 @@ class Driver(ABC):
     @property
     @abstractmethod
     def lost(self) -> int:
-        """How many observations living nodes have not answered."""
+        """Number of observations that living nodes have not answered."""
 
     @abstractmethod
     def _carry_out(self, actions: Sequence[ProcessAction]) -> None:

@@ -36,7 +36,7 @@ class LockStep(Driver):
 
     @property
     def lost(self) -> int:
-        """How many observations living nodes have not answered: at most those of the last tick."""
+        """Number of observations that living nodes have not answered: at most those of the last tick."""
         return self._lost
 
     def _carry_out(self, actions: Sequence[ProcessAction]) -> None:

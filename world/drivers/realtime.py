@@ -1,9 +1,9 @@
 """Real time: the wall clock paces the ticks, and the world waits for no node.
 
 A command that misses its tick is counted and applied when it arrives. A robot without an answer for the deadman time is
-stopped until it answers again. A node with too many unanswered observations is not observed until it answers one, so that all
-messages to it fit into the buffers of the link and sending never blocks. While a fault kills or starts a program, its node is
-not observed either. Runs in real time are not repeatable, and their trace promises nothing.
+stopped until it answers again. A node with too many unanswered observations is not observed until it answers one. So
+all messages to it fit into the buffers of the link, and sending never blocks. While a fault kills or starts a program,
+its node is not observed either. Runs in real time are not repeatable, and their trace promises nothing.
 """
 
 import contextlib
@@ -56,7 +56,7 @@ class RealTime(Driver):
 
     @property
     def lost(self) -> int:
-        """How many observations living nodes have not answered yet, besides the newest of each node."""
+        """Number of observations that living nodes have not answered yet, besides the newest of each node."""
         dead = self._world.dead
         return sum(max(0, len(sizes) - 1) for node, sizes in self._unanswered.items() if node not in dead)
 

@@ -1,7 +1,7 @@
 """The metrics of sensor coverage: what its coordinator and base stations report, and what truth says of robots' decisions.
 
-A report counts only from the nodes that may give it: cycles, pushes and numbers of robots from the coordinator and the base
-stations; a claim of a frontier or a change of membership from each robot, of itself. Others are ignored.
+A report counts only from a node that may give it. The coordinator and the base stations report cycles, pushes and
+numbers of robots. Each robot reports its own frontier claim and its own membership. Others are ignored.
 """
 
 from collections.abc import Sequence
@@ -110,10 +110,10 @@ class Conclusion(Metric):
 
 
 class Removals(Metric):
-    """How many robots have left the complex, and how many of these departures changed its b0 or b1 in truth.
+    """Number of robots that have left the complex, and number of these departures that changed its true b0 or b1.
 
     The complex is that of all living robots in the arena that have not left it, by true visibility within
-    `metrics.sight_range_m`; measured only where that is given and robots leave by agreement.
+    `metrics.sight_range_m`. The metric needs that setting, and robots that leave by agreement.
     """
 
     names: ClassVar[Sequence[str]] = ("removals", "unsafe_removals")

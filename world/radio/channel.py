@@ -1,8 +1,9 @@
 """A channel of the radio: the permitted pairs of sender and receiver, and the models that judge each packet, in order.
 
-The channel drops packets to absent and switched-off receivers first. Faults judge before the models, but after the leading
-models that find receivers out of reach: a packet that a fault drops would have reached its receiver. These leading models
-use no random numbers, so the order of faults and models changes the causes and not the packets that pass.
+The channel drops packets to absent and switched-off receivers first. The leading models find receivers out of reach.
+Faults judge next, and then all other models. So a packet that a fault drops would have reached its receiver. These
+leading models use no random numbers, so the order of faults and models changes the causes and not the packets that
+pass.
 
 Models see a broadcast as packets to the receivers in reach (`reach`): those that are available, within the shortest reach
 that a model states. The packets to all others count for `absent`, `receiver-down` or the cause of that model.

@@ -1,9 +1,9 @@
 """Telemetry of a run: named numbers and snapshots that nodes report for observers of the run. No node receives them.
 
-Memory is bounded. Numbers are kept as columns, at most `NUMBERS_MAX` of them (`NUMBER_BYTES` each); snapshots as bytes with
-references to the position arrays of their tick, at most `SNAPSHOT_BYTES_MAX` bytes. Beyond a bound, or beyond
-`DISTINCT_NAMES_MAX` names in one run, a record is counted in `dropped` and not kept. The newest value of each known name of
-each node, and what listeners of the sink compute, do not depend on the first two bounds.
+Memory is bounded. Numbers are stored as columns, at most `NUMBERS_MAX` of them (`NUMBER_BYTES` each). Snapshots are
+stored as bytes with references to the position arrays of their tick, at most `SNAPSHOT_BYTES_MAX` bytes. Beyond a
+bound, or beyond `DISTINCT_NAMES_MAX` names in one run, a record is counted in `dropped` and not kept. The newest value
+of each known name of each node, and what listeners of the sink compute, do not depend on the first two bounds.
 """
 
 from array import array
@@ -26,7 +26,10 @@ DROPPED: Final = "telemetry_dropped"
 
 
 class TelemetryRecord(NamedTuple):
-    """What one command of a node reported, and the robots' true positions at that tick. The arrays must not be changed."""
+    """The report of one command of a node, and the robots' true positions at that tick.
+
+    The arrays must not be changed.
+    """
 
     tick: int
     time_s: float

@@ -1,9 +1,21 @@
 """Arguments and options that several commands share, with their help texts."""
 
+import re
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, Final, Optional
 
 import typer
+
+from zwerm.errors import ScenarioError
+
+_ENDPOINT: Final = re.compile(r"[a-z][a-z-]*/\S+")
+
+
+def check_endpoint(option: str, endpoint: str) -> None:
+    """Raise ScenarioError, in one line, where an option is given what is no Zenoh endpoint."""
+    if not _ENDPOINT.fullmatch(endpoint):
+        raise ScenarioError([f"{option}: expected an endpoint such as tcp/0.0.0.0:7447, got {endpoint!r}"])
+
 
 ScenarioName = Annotated[str, typer.Argument(help="A built-in scenario (see `zwerm list`) or a TOML file.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Keys all randomness of the run.")]
@@ -12,9 +24,14 @@ Sets = Annotated[
     typer.Option("--set", metavar="PATH=VALUE", help="Override a setting of the scenario; may be given often."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
 Picture = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--picture", metavar="FILE.png", help="Where to draw the run; runs/SCENARIO-seedN.png by default."),
+    typer.Option(
+        "--picture",
+        metavar="FILE",
+        help="Where to draw the run: .png, .pdf or .svg; runs/SCENARIO-seedN.png by default. Settings are part of the name.",
+    ),
 ]
 PictureAt = Annotated[
     Optional[list[str]],  # noqa: UP045

@@ -1,26 +1,34 @@
 """The output of `zwerm run` and `zwerm world`: pictures, an animation, and the result as a table or as JSON."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, NoReturn
 
 import typer
 
 from zwerm.cli.console import RunProgress, print_result
+from zwerm.cli.output_files import ANIMATIONS, PICTURES, RECORDINGS, OutputFile, check_outputs, run_stem
 from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, out, print_json
-from zwerm.errors import PictureError, ScenarioError
+from zwerm.cli.tracebacks import print_tracebacks
+from zwerm.errors import PictureError, ScenarioError, ZwermError
 from zwerm.run.result import RunResult
+
+NO_PICTURE: Final = "no picture is drawn: matplotlib is not installed; pip install matplotlib"
 
 _MOMENT: Final = re.compile(r"(?P<cycle>\d+)|(?P<at_s>\d+(\.\d+)?)s")
 
 
 @dataclass(frozen=True)
 class RunOutput:
-    """The output options of a command. Raises ScenarioError for a moment that is neither a cycle nor a time.
+    """The output options of a command.
 
-    `radio_table` is the number of links to print, or None for no table.
+    `radio_table` is the number of links to print, or None for no table. Raises ScenarioError for a moment that is neither a
+    cycle nor a time, and for files that cannot be written.
     """
 
     picture: Path | None
@@ -28,6 +36,7 @@ class RunOutput:
     animation: Path | None
     radio_table: int | None
     as_json: bool
+    record: Path | None = None
 
     def __post_init__(self) -> None:
         diagnostics = [
@@ -35,25 +44,45 @@ class RunOutput:
             for each in self.moments
             if not _MOMENT.fullmatch(each)
         ]
+        files = [
+            OutputFile("--picture", self.picture, PICTURES, "matplotlib", "all"),
+            OutputFile("--animate", self.animation, ANIMATIONS, "matplotlib", "all"),
+            OutputFile("--record", self.record, RECORDINGS, "mcap", "record"),
+        ]
+        if self.draws_by_default or self.moments:  # where they go without an option
+            files.append(OutputFile("runs", Path("runs") / "picture.png", PICTURES))
+        try:
+            check_outputs(files)
+        except ScenarioError as error:
+            diagnostics += error.mistakes
         if diagnostics:
             raise ScenarioError(diagnostics)
 
+    @property
+    def draws_by_default(self) -> bool:
+        """Tell whether a picture is drawn although no option asks for it."""
+        return self.picture is None and not self.as_json
+
     def report(self, result: RunResult) -> NoReturn:
         """Draw and print the result, and exit with the status of its outcome."""
-        drawn, errors = self._draw_stills(result)
+        written, errors = self._draw_stills(result)
         if result.scenario.random_faults is not None and not self.as_json:
-            drawn.append(_write_faults(result))
+            _attempt(lambda: _write_faults(result), written, errors)
         if self.animation is not None:
+            path = self.animation
             with RunProgress(err, "animation", quiet=self.as_json) as progress:
-                drawn.append(result.animate(self.animation, progress.ticked))
-        for node, traceback in sorted(result.tracebacks.items()):
-            err.print(f"node {node} raised:\n{traceback}", markup=False, highlight=False, soft_wrap=True)
+                _attempt(lambda: result.animate(path, progress.ticked), written, errors)
+        if self.record is not None:
+            written.append(self.record)
+        print_tracebacks(err, result.tracebacks)
         if self.as_json:
             print_json(result.as_json())
         else:
-            print_result(out, result, drawn)
+            print_result(out, result, written)
             if self.radio_table is not None:
                 print_radio_ledger(out, result.radio, self.radio_table)
+            if self.draws_by_default and self._lacks_matplotlib:
+                err.print(NO_PICTURE, highlight=False, markup=False, soft_wrap=True)
         if errors:
             raise PictureError("\n".join(errors))
         if result.reason:
@@ -62,19 +91,32 @@ class RunOutput:
             raise typer.Exit(EXIT_INTERRUPTED)
         raise typer.Exit(0 if result.ok else EXIT_FAILED)
 
+    @property
+    def _lacks_matplotlib(self) -> bool:
+        return find_spec("matplotlib") is None
+
     def _draw_stills(self, result: RunResult) -> tuple[list[Path], list[str]]:
-        """Return the pictures drawn, and the errors of moments that the run does not have; the result is still printed."""
+        """Return the pictures drawn, and the errors of those that were not; the result is still printed."""
         drawn: list[Path] = []
         errors: list[str] = []
-        path = self.picture or Path("runs") / f"{result.scenario.name}-seed{result.seed}.png"
-        if self.picture is not None or not self.as_json:
-            drawn.append(result.picture(path))
+        path = self.picture or Path("runs") / f"{_stem(result)}.png"
+        if self.picture is not None or (self.draws_by_default and not self._lacks_matplotlib):
+            _attempt(lambda: result.picture(path), drawn, errors)
         for moment in self.moments:
-            try:
-                drawn.append(_draw_moment(result, path, moment))
-            except PictureError as error:
-                errors.append(str(error))
+            _attempt(partial(_draw_moment, result, path, moment), drawn, errors)
         return drawn, errors
+
+
+def _attempt(write: Callable[[], Path], written: list[Path], errors: list[str]) -> None:
+    """Add the file that `write` writes to `written`, or the line that says why it could not."""
+    try:
+        written.append(write())
+    except (ZwermError, OSError) as error:
+        errors.append(str(error))
+
+
+def _stem(result: RunResult) -> str:
+    return run_stem(result.scenario.name, result.seed, result.scenario.overrides)
 
 
 def _draw_moment(result: RunResult, final: Path, moment: str) -> Path:
@@ -90,7 +132,7 @@ def _write_faults(result: RunResult) -> Path:
     """Write the random faults of the run as a scenario's fault tables."""
     from zwerm.scenario.toml import write_toml
 
-    path = Path("runs") / f"{result.scenario.name}-seed{result.seed}-faults.toml"
+    path = Path("runs") / f"{_stem(result)}-faults.toml"
     path.parent.mkdir(exist_ok=True)
     path.write_text(write_toml({"faults": result.faults}), encoding="utf-8")
     return path

@@ -12,8 +12,9 @@ from zwerm.errors import ZwermError
 
 EXIT_FAILED, EXIT_USER_ERROR, EXIT_INTERRUPTED = 1, 2, 130
 
-err: Final = Console(stderr=True)
-out: Final = Console()
+# Names such as `zoo:Robot` are no emoji.
+err: Final = Console(stderr=True, emoji=False)
+out: Final = Console(emoji=False)
 
 
 @contextmanager

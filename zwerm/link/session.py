@@ -31,7 +31,7 @@ SETTINGS: Final[Mapping[str, Any]] = {
 
 UNIX_PROTOCOL: Final = "unixsock-stream"
 
-# On one machine the kernel reports the end of a process at once, so the lease only limits how long a stopped process
+# On one machine the kernel reports the end of a process at once. So the lease only limits how long a stopped process
 # (SIGSTOP, a debugger) counts as connected. Over a network it is the time until a broken connection is detected.
 LEASE_LOCAL_MS: Final = 600_000
 LEASE_REMOTE_MS: Final = 10_000

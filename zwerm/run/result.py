@@ -1,4 +1,4 @@
-"""What a run leaves behind: its outcome, its numbers, and enough of its history to draw it."""
+"""The result of a run: its outcome, its numbers, and enough of its history to draw it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -26,8 +26,9 @@ if TYPE_CHECKING:  # pictures need matplotlib
 class RunResult:
     """The result of one run. `as_json` is what `zwerm run --json` prints.
 
-    `metrics` are the values at the end by name, `series` the metrics that were sampled during the run, as arrays (k,) by name,
-    `time_s` among them. `telemetry` are the numbers that nodes reported. `snapshots` are records for the algorithm's own
+    `metrics` are the values at the end by name. `series` are the metrics that were sampled during the run, as arrays
+    (k,) by name, `time_s` among them. `telemetry` are the numbers that nodes reported. `snapshots` are records for the
+    algorithm's own
     pictures. `history` is what pictures are drawn from; `positions` gives it as arrays.
     """
 
@@ -145,7 +146,7 @@ class RunResult:
 
     @property
     def ending(self) -> str:
-        """How many robots there were in the end, and how long the run was."""
+        """Number of robots at the end, and duration of the run."""
         there = int(self.metrics.get("robots_deployed", self.metrics.get("robots_in_arena", self.robots)))
         robots = f"{self.robots} robots" if there == self.robots else f"{there} of {self.robots} robots"
         return f"{robots}, {self.sim_s:g} s"

@@ -1,7 +1,7 @@
 """Every mistake in a scenario at once, of whichever stage: its tables, or what is made of them.
 
-What is made of tables can only be checked where they are sound. So what is unsound is left out, and the rest is checked as
-if it were the whole; what is then said about a place that was left out, or is around or inside one, is not believed.
+Objects can be made of correct tables only. So wrong tables are left out, and the rest is checked as if it were
+complete. Mistakes at, around or inside a place that was left out are then ignored, because the omission may cause them.
 """
 
 import copy
@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import assemble, prepare
 from zwerm.scenario.load import load, tables_of, validate
+from zwerm.scenario.overrides import blame
 from zwerm.scenario.tables import Scenario
 
 Path = tuple[str, ...]
@@ -41,7 +42,8 @@ def _mistakes_of_the_rest(name: str, overrides: tuple[str, ...]) -> list[str]:
         prepare(validate(rest, str(file), file.parent))
     except ScenarioError as error:
         found = [each.removeprefix(f"{file}: ") for each in error.mistakes]
-        return [f"{file}: {each}" for each in found if not any(_touches(each, path) for path in unsound)]
+        lines = [f"{file}: {each}" for each in found if not any(_touches(each, path) for path in unsound)]
+        return blame(lines, str(file), overrides)
     return []
 
 

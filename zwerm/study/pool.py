@@ -1,7 +1,7 @@
 """Run trials in parallel, in `jobs` worker processes with one thread each.
 
 Rows arrive as trials end, in any order. If a worker dies (out of memory, a crash in a library), the running trials are
-repeated one by one, and the trial that kills its process becomes a failed row. No worker remains after the iteration ends,
+repeated one by one. The trial that kills its process becomes a failed row. No worker remains after the iteration ends,
 is closed, or its process is killed.
 """
 

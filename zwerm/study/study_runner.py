@@ -1,7 +1,8 @@
 """Run the trials of a study that its file does not have yet, store each row, and summarise all rows.
 
 An interrupted study, or one with new seeds or grid values, continues with the missing trials. Rows of points that are no
-longer in the study stay in the file. Rows of a point whose scenario has changed are replaced.
+longer in the study stay in the file. Rows of a point whose scenario or code has changed are replaced; rows whose code cannot
+be known are never used again.
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from zwerm.study.rows import Key, Rows
 from zwerm.study.study_tables import Setting, Study
 from zwerm.study.summary import Results
 from zwerm.study.trial import Row
+from zwerm.study.trial_identity import still_same
 from zwerm.study.trial_plan import Trial, make_points, make_trials
 from zwerm.world.tick.completion import FAILED
 
@@ -45,6 +47,11 @@ class StudyResult:
     interrupted: bool
 
     @property
+    def unknown(self) -> list[str]:
+        """Code that cannot be known, in words: rows that depend on it are not used again."""
+        return list(dict.fromkeys(each for point in self.results.points for each in point.modules.unknown))
+
+    @property
     def failed(self) -> int:
         """Number of failed trials."""
         return self.results.failures.total()
@@ -69,10 +76,13 @@ def run_study(
     """
     if jobs is not None and jobs < 1:
         raise ScenarioError([f"jobs: expected >= 1, got {jobs}"])
-    points = make_points(study, sets)
+    points = make_points(study, sets, runner)
     trials = make_trials(study, points, study.table.seeds if seeds is None else seeds, runner)
     with Rows(out) as rows:
         distinct = _distinct(trials)
+        for trial in distinct:
+            if trial.key in rows.held and not _trusted(trial, rows.held[trial.key]):
+                del rows.held[trial.key]
         todo = [trial for trial in distinct if _wanted(rows.held.get(trial.key), retry)]
         ran, interrupted = 0, False
         if listener is not None:
@@ -99,6 +109,11 @@ def _distinct(trials: Sequence[Trial]) -> list[Trial]:
     for trial in trials:
         found.setdefault(trial.key, trial)
     return list(found.values())
+
+
+def _trusted(trial: Trial, row: Row) -> bool:
+    """Tell whether the code that gave a row is known, and is the code of now."""
+    return not trial.point.modules.unknown and still_same(row.get("modules", ""))
 
 
 def _wanted(row: Row | None, retry: bool) -> bool:

@@ -1,9 +1,10 @@
-"""All messages on the wire: one `Observation` to a node, one `Command` back, and the messages that open and end its life.
+"""All messages on the wire: one `Observation` to a node, one `Command` back, and the messages that open and close a
+connection.
 
-Messages are MessagePack maps with field names, so that a node can be written in any language; small parts that come in numbers
-(a bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as `type`, for example
-"command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and trailing bytes are refused,
-each with a reason that is counted.
+Messages are MessagePack maps with field names, so that a node can be written in any language. Small parts that occur in
+numbers (a bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as
+`type`, for example "command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and
+trailing bytes are refused, each with a reason that is counted.
 
 New fields go last, with defaults; a field at its default is left out of a message (except in drives). Angles are radians in
 (-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
@@ -126,7 +127,7 @@ SENSOR_FIELDS: Final = Observation.__struct_fields__[3:]
 # --- what a node commands -------------------------------------------------------------------------------------------
 
 
-# Drives are encoded with all fields. msgspec omits a default number only if it is the same object, so equal drives could
+# Drives are encoded with all fields. msgspec omits a default number only if it is the same object. Equal drives could
 # otherwise differ in their bytes, and equal runs in their traces.
 
 

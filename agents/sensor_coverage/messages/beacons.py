@@ -52,7 +52,7 @@ class Route(_Part, frozen=True):
     since: int = 0
 
 
-class PathVector(_Message, frozen=True, tag="w"):
+class PathVector(_Message, frozen=True, tag="path"):
     """The route from a slot, by the robot at the slot; `number` counts the sender's path vectors.
 
     `ended` has (slot, tick) of slots that have not been at the frontier since that tick, the newest last. `home` is the
@@ -67,13 +67,13 @@ class PathVector(_Message, frozen=True, tag="w"):
 
 
 # Stands for the path vector of a robot that has sent none.
-UNSAID: Final = PathVector(0, NOWHERE, None)
+NO_PATH_VECTOR: Final = PathVector(0, NOWHERE, None)
 
 
-class StateBeacon(_Message, frozen=True, tag="s"):
+class StateBeacon(_Message, frozen=True, tag="state"):
     """The state of a robot, as its neighbours need it.
 
-    `number` counts the sender's states, `epoch` its drives, and `samples` its averages of bearings. `could` has the
+    `number` counts the sender's states, `epoch` its drives, and `samples` its averages of bearings. `expandable` has the
     sides, as (other slot, sign), that it could expand. `waiting`: it stands at the base, ready to go. `redundant`: it
     has left the complex, and its body still stands at its slot.
     """
@@ -85,13 +85,13 @@ class StateBeacon(_Message, frozen=True, tag="s"):
     waiting: bool
     samples: int
     seen: tuple[SeenRobot, ...]
-    tries: tuple[Attempt, ...]
-    could: tuple[tuple[int, int], ...]
+    attempts: tuple[Attempt, ...]
+    expandable: tuple[tuple[int, int], ...]
     path_vector: PathVector
     redundant: bool = False
 
 
-class StateRequest(_Message, frozen=True, tag="a"):
+class StateRequest(_Message, frozen=True, tag="state-request"):
     """A request that these robots, or all if there are none, broadcast their states."""
 
     nodes: tuple[int, ...]

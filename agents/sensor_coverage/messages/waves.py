@@ -22,14 +22,14 @@ class CensusWave(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tru
 class CensusTally(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag="tally"):
     """To the parent: the counted robots, their frontier claims, and the latest wave in which one of them was disturbed.
 
-    `lives` is the sum of the robots' random incarnation numbers.
+    `incarnations` is the sum of the robots' random incarnation numbers.
     """
 
     number: Count
     robots: Count
     claims: Count
-    stirred: Count
-    lives: Count
+    disturbed: Count
+    incarnations: Count
 
 
 CensusMessage = CensusWave | CensusTally

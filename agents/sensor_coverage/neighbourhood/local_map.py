@@ -14,7 +14,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import Reference, add_wall
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, UNSAID, Route, SeenRobot, StateBeacon
+from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
@@ -162,7 +162,7 @@ class LocalMap(NeighbourTable):
             self.slot,
             self.epoch,
             self.samples,
-            [(n, s.epoch, s.seen, s.tries, s.could) for n, s in mutual.items()],
+            [(n, s.epoch, s.seen, s.attempts, s.expandable) for n, s in mutual.items()],
         )
         if self.slot == NOWHERE or self.redundant or self.heading is None or basis == self._plan_basis:
             return
@@ -178,7 +178,7 @@ class LocalMap(NeighbourTable):
         edges, gaps = islice(planner.plans(), 2)
         self.plans, self.gaps = list(edges), list(gaps)
         could = {
-            (edge(me, state.slot), sign) for state in mutual.values() for other, sign in state.could if other == me
+            (edge(me, state.slot), sign) for state in mutual.values() for other, sign in state.expandable if other == me
         }
         could |= {(edge(*each.key[:2]), each.key[2]) for each in self.plans}
         found = planner.fence
@@ -282,6 +282,6 @@ class LocalMap(NeighbourTable):
             seen,
             attempts_at(self._planner.attempt_log, self.slot),
             tuple(sorted({(other_end(each.key, self.slot), each.key[2]) for each in self.plans})),
-            UNSAID,
+            NO_PATH_VECTOR,
             self.redundant,
         )

@@ -142,8 +142,8 @@ class Census:
             self._number,
             1 + sum(each.robots for each in tallies),
             self._claims + sum(each.claims for each in tallies),
-            max([self._disturbed, *(each.stirred for each in tallies)]),
-            (self._incarnation + sum(each.lives for each in tallies)) % INCARNATIONS,
+            max([self._disturbed, *(each.disturbed for each in tallies)]),
+            (self._incarnation + sum(each.incarnations for each in tallies)) % INCARNATIONS,
         )
         self._counted = counted
         if self._parent is not None:
@@ -153,7 +153,7 @@ class Census:
         self._concluded = (
             before is not None
             and before.claims == counted.claims == 0
-            and before.lives == counted.lives
-            and counted.stirred < before.number
+            and before.incarnations == counted.incarnations
+            and counted.disturbed < before.number
         )
         return []

@@ -1,13 +1,12 @@
 """`zwerm study`: run a study, print its table and draw it."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from zwerm.cli.options import Json, Sets
 from zwerm.cli.terminal import err, errors_as_lines, out, print_json
-from zwerm.cli.trials import Jobs, Out, Retry, Seeds, exit_with, print_trial_counts, study_extra
+from zwerm.cli.trials import Jobs, Out, Retry, Seeds, exit_with, print_trial_counts, rows_file, study_extra, write_csv
 
 
 def study(
@@ -39,12 +38,13 @@ def study(
             from zwerm.study.study_tables import load_study, parse_seeds
         loaded = load_study(study)
         chosen = None if seeds is None else parse_seeds(seeds)
-        path = output or Path("runs") / f"{loaded.name}.parquet"
+        path = rows_file(output, loaded.name)
         with StudyProgress(err, loaded.name, quiet=as_json) as progress:
             result = run_study(
                 loaded, path, seeds=chosen, jobs=jobs, sets=tuple(sets or ()), retry=retry, listener=progress
             )
         drawn = [draw_study(path.with_suffix(".png"), result.results)] if result.done else []
+        drawn += write_csv(output, result)
         if as_json:
             print_json(study_json(result, drawn))
         elif result.done:

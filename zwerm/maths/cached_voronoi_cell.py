@@ -1,9 +1,9 @@
-"""A robot's own Voronoi cell, whose sides are mostly those it had at the observation before.
+"""The Voronoi cell of a robot, with a cache of the order of its sides.
 
-Which robots and which sides of the region bound a cell, and in what order, changes seldom; where they are changes always. So
-the order is kept, and the corners are the meetings of consecutive bisectors. That they bound the cell is not taken on trust:
-it is seen from the corners themselves, and where it is not so the cell is clipped and the order found anew. The order is the
-one that clipping finds, so what is kept changes no answer.
+The robots and the sides of the region that bound a cell seldom change between two observations; their positions always do. So
+the cell stores the order of its sides, and computes its corners as the intersections of consecutive bisectors. A test of the
+corners then shows whether they bound the cell. If not, the cell is clipped, and the order is found again. The order is always
+the one that clipping finds, so the cache changes no result.
 """
 
 from collections.abc import Sequence
@@ -31,55 +31,57 @@ class _MirrorImage:
 
 Neighbours = Sequence[RelativePosition]
 
-# A corner of a cell in the making, and what bounds the side that starts there.
+# A corner (x, y) [m] of a cell that is being clipped, and the label of the side that starts there.
 _Corner = tuple[float, float, int]
 
-# A cell reaches up to a bisector that is no side of it, and by rounding this much farther.
+# Factor by which rounding may move a corner beyond a bisector that only touches the cell.
 _TOUCHING: Final = 1.0 + 1e-9
 
 _COINCIDENT2: Final = COINCIDENT_M * COINCIDENT_M
 
 
-class KeptCell:
+class CachedVoronoiCell:
     """The Voronoi cell of one robot, at the origin of its own frame.
 
-    A side of the region is taken for the bisector with the robot's mirror image beyond it, so that there are only robots.
+    A side of the region is treated as the bisector between the robot and its mirror image behind that side. So all sides are
+    bisectors.
     """
 
     def __init__(self) -> None:
-        # How many neighbours and sides of the region there were when the order was found.
+        # Number of neighbours and of sides of the region when the order was found.
         self._others = self._sides = -1
-        self._walls: list[int] = []  # the region's sides that bound the cell, by the corner they end in
-        self._far_walls: list[int] = []  # those that do not
-        self._far_others: list[int] = []  # the neighbours that do not
-        # The neighbours that do, then the walls, as they follow one another; the first twice.
+        # Walls are sides of the region, by the index of the corner at their end.
+        self._walls: list[int] = []  # walls that bound the cell
+        self._far_walls: list[int] = []  # the other walls
+        self._far_others: list[int] = []  # neighbours that do not bound the cell
+        # The sides of the cell, counter-clockwise: indices of neighbours, then of walls. The first is repeated at the end.
         self._order: list[int] = []
 
     def target(self, region: Polygon, others: Neighbours, value: float, gx: float, gy: float) -> Point:
-        """Return where the robot should go: the centroid of its cell under the linear estimate value + gx x + gy y [m].
+        """Return the centroid of the cell under the linear estimate value + gx x + gy y of the field [m].
 
-        That is relative to the robot, and so the error vector. With an empty cell it is the nearest place of the region,
-        which must have corners.
+        The centroid is relative to the robot, so it is also the error vector. If the cell is empty, the nearest point of the
+        region is returned. The region must have corners.
         """
-        kept = None
+        centroid = None
         if len(others) == self._others and len(region) == self._sides:
-            kept = self._centroid(region, others, value, gx, gy)
-        if kept is None and self._find(region, others):
-            kept = self._centroid(region, others, value, gx, gy)
-        if kept is not None:
-            return kept
-        # Outside the region, a field that is negative somewhere in the cell, a region that is not convex, and the like.
+            centroid = self._centroid(region, others, value, gx, gy)
+        if centroid is None and self._find(region, others):
+            centroid = self._centroid(region, others, value, gx, gy)
+        if centroid is not None:
+            return centroid
+        # The robot is outside the region, or the field is negative in a part of the cell, or the region is not convex.
         self._others = -1
         cell = voronoi_cell(region, [(other.x_m, other.y_m) for other in others])
         return estimated_centroid(cell, value, gx, gy) or nearest_point(region)
 
     def _centroid(self, region: Polygon, others: Neighbours, value: float, gx: float, gy: float) -> Point | None:
-        """Return the centroid of the cell that is bounded as it was, or None where it is not. Schwager 2006, eqs. 14 to 18.
+        """Return the centroid of the cell in the stored order, or None if it is not valid. Schwager 2006, eqs. 14 to 18.
 
-        The cell is summed up as triangles from the robot to its sides. On each the integral of q phi, which is quadratic,
-        is a third of the area times the sum over the middles of its sides. With w twice the area, e a quarter of what phi
-        rises by from the robot to a corner, and s = value + e0 + e1, that is w (q0 (s + e0) + q1 (s + e1)) / 6; and the
-        mass is w (4 s - value) / 6. No term is negative, so nothing cancels.
+        The cell is divided into triangles from the robot to its sides. The integral of q phi over a triangle is a third of
+        its area times the sum of q phi at the middles of its sides, because q phi is quadratic. Let w be twice the area, e
+        a quarter of the rise of phi from the robot to a corner, and s = value + e0 + e1. Then the integral is
+        w (q0 (s + e0) + q1 (s + e1)) / 6, and the mass is w (4 s - value) / 6. No term is negative, so no digits cancel.
         """
         everyone = [*others, *_mirrored(region, self._walls)] if self._walls else others
         bounds = [everyone[which] for which in self._order]
@@ -90,7 +92,7 @@ class KeptCell:
         across = a0 * b1 - b0 * a1
         if across <= 0.0:
             return None
-        # The corner where two bisectors meet: a x + b y = c / 2 for either.
+        # The corner where two bisectors intersect: a x + b y = c / 2 for each of them.
         half = 0.5 / across
         x0, y0 = x_first, y_first = (c0 * b1 - b0 * c1) * half, (a0 * c1 - c0 * a1) * half
         e0 = e_first = gx * x0 + gy * y0
@@ -136,7 +138,7 @@ class KeptCell:
         w = x0 * y_first - y0 * x_first
         if y0 < 0.0 <= y_first:
             turns += 1
-        # Sides that turn left, about the robot, and once only: they are those of a convex polygon.
+        # The sides turn left around the robot exactly once: they are the sides of a convex polygon.
         if w < 0.0 or turns != 1 or self._is_cut(region, others, bounds, reach2):
             return None
         m = w * (value + e0 + e_first)
@@ -147,7 +149,7 @@ class KeptCell:
         return (sum_x + k * x0 + k_first * x_first) / mass, (sum_y + k * y0 + k_first * y_first) / mass
 
     def _is_cut(self, region: Polygon, others: Neighbours, bounds: list[RelativePosition], reach2: float) -> bool:
-        """Tell whether anything that does not bound the cell, whose corners are within the root of reach2, cuts it."""
+        """Return whether a neighbour or wall that is no side of the cell cuts it; `reach2` bounds its corners [m2]."""
         for end in self._far_walls:
             x0, y0 = region[end - 1]
             x1, y1 = region[end]
@@ -166,9 +168,9 @@ class KeptCell:
         return False
 
     def _find(self, region: Polygon, others: Neighbours) -> bool:
-        """Find what bounds the cell, by clipping; return whether anything does."""
+        """Find the sides of the cell by clipping; return whether it has any."""
         count, walls = len(others), len(region)
-        # A wall is counted by the corner it ends in.
+        # The label of a wall is `count` plus the index of the corner at its end.
         cell: list[_Corner] = [(x, y, count + (start + 1) % walls) for start, (x, y) in enumerate(region)]
         near = sorted([(other.x_m * other.x_m + other.y_m * other.y_m, which) for which, other in enumerate(others)])
         for distance2, which in near:
@@ -191,19 +193,19 @@ class KeptCell:
 
 
 def _mirrored(region: Polygon, walls: list[int]) -> list[RelativePosition]:
-    """Return the robot's mirror images beyond the walls that end in these corners of the region."""
+    """Return the mirror images of the robot behind the walls that end in these corners of the region."""
     images: list[RelativePosition] = []
     for end in walls:
         (x0, y0), (x1, y1) = region[end - 1], region[end]
         a, b, c = y1 - y0, x0 - x1, x0 * y1 - y0 * x1
-        # Beyond a wall that the robot is beyond itself there is no image: what is at its own place bounds nothing.
+        # If the robot is behind the wall itself, the image is put at the robot: a bisector with itself bounds nothing.
         twice = 2.0 * c / (a * a + b * b) if c > 0.0 else 0.0
         images.append(_MirrorImage(twice * a, twice * b))
     return images
 
 
 def _reaches(bounds: Sequence[RelativePosition], a: float, b: float, c: float) -> bool:
-    """Tell whether a corner of the cell lies beyond a x + b y = c."""
+    """Return whether a corner of the cell lies beyond a x + b y = c."""
     beyond = c * _TOUCHING
     for n0, n1 in pairwise(bounds):
         half = 0.5 / (n0.x_m * n1.y_m - n0.y_m * n1.x_m)
@@ -214,7 +216,7 @@ def _reaches(bounds: Sequence[RelativePosition], a: float, b: float, c: float) -
 
 
 def _clip(polygon: list[_Corner], a: float, b: float, c: float, label: int) -> list[_Corner]:
-    """Return the part of `polygon` where a x + b y <= c, its new side with this label. See `zwerm.maths.polygons.clip`."""
+    """Return the part of `polygon` where a x + b y <= c; the new side gets this label. See `zwerm.maths.polygons.clip`."""
     kept: list[_Corner] = []
     if not polygon:
         return kept
