@@ -10,7 +10,6 @@ import os
 import re
 import signal
 import threading
-import time
 import warnings
 from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
@@ -71,13 +70,11 @@ _ENDED_BY_TIMER: Final = "EXIT(1)"  # how joblib names the end by `dump_tracebac
 
 def _alone(trial: Trial, timeout_s: float | None) -> Row:
     """Run a trial in a pool of its own, and return its row."""
-    begin_s = time.monotonic()
     try:
         _, row = Parallel(n_jobs=2, batch_size=1)([delayed(_work)(0, trial, os.getpid(), timeout_s)])[0]
     except BrokenProcessPool as error:
         codes = re.search(r"exit codes of the workers are \{(.*)\}", str(error))
-        waited = timeout_s is not None and time.monotonic() - begin_s >= timeout_s
-        if waited and codes is not None and _ENDED_BY_TIMER in codes[1]:
+        if timeout_s is not None and codes is not None and _ENDED_BY_TIMER in codes[1]:
             return failed_row(trial, f"it had no result within {timeout_s:g} s")
         return failed_row(trial, f"its process died: {codes[1] if codes else type(error).__name__}")
     result: Row = row
