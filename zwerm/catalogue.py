@@ -162,7 +162,14 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         title="Sensor-based coverage by robot teams",
         paper="Latimer, Srinivasa, Lee-Shue, Sonne, Choset, Hurst 2002",
         page="papers/robot-teams.md",
-        controllers={ROBOT: {"robot-teams": "zwerm.agents.robot_teams:TeamRobot"}},
+        controllers={
+            ROBOT: {"robot-teams": "zwerm.agents.robot_teams:TeamRobot"},
+            COORDINATOR: {"robot-teams": "zwerm.coordinator.robot_teams:TeamCoordinator"},
+        },
+        variants=(
+            Variant({"cells": "team"}, decides=ROBOT, coordinator=False),
+            Variant({"cells": "coordinator"}, decides=COORDINATOR),
+        ),
         metrics=("zwerm.world.metrics.robot_teams:TeamCoverage",),
         layers=("zwerm.view.robot_teams:CellsLayer",),
         scenarios=("robot-teams*",),
