@@ -185,6 +185,8 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
 # Commands of the command line, in the order of `zwerm --help`, as `module:function`.
 COMMANDS: Final = {
     "list": "zwerm.cli.commands.list_command:list_catalogue",
+    "show": "zwerm.cli.commands.show_command:show",
+    "new": "zwerm.cli.commands.new_command:new",
     "check": "zwerm.cli.commands.check_command:check",
     "run": "zwerm.cli.commands.run_command:run",
     "world": "zwerm.cli.commands.world_command:world",

@@ -10,7 +10,7 @@ from typing import Final, NoReturn
 
 import typer
 
-from zwerm.cli.console import RunProgress, print_result
+from zwerm.cli.console import RunProgress, print_file, print_result
 from zwerm.cli.output_files import ANIMATIONS, PICTURES, RECORDINGS, OutputFile, check_outputs, run_stem
 from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, out, print_json
@@ -64,29 +64,24 @@ class RunOutput:
         return self.picture is None and not self.as_json
 
     def report(self, result: RunResult) -> NoReturn:
-        """Draw and print the result, and exit with the status of its outcome."""
-        written, errors = self._draw_stills(result)
-        if result.scenario.random_faults is not None and not self.as_json:
-            _attempt(lambda: _write_faults(result), written, errors)
-        if self.animation is not None:
-            path = self.animation
-            with RunProgress(err, "animation", quiet=self.as_json) as progress:
-                _attempt(lambda: result.animate(path, progress.ticked), written, errors)
-        if self.record is not None:
-            written.append(self.record)
+        """Print the result, then write its files, and exit with the status of its outcome.
+
+        The result comes first: a full disk, or Ctrl-C while a picture is drawn, does not lose it.
+        """
         print_tracebacks(err, result.tracebacks)
         if self.as_json:
             print_json(result.as_json())
         else:
-            print_result(out, result, written)
+            print_result(out, result)
             if self.radio_table is not None:
                 print_radio_ledger(out, result.radio, self.radio_table)
             if self.draws_by_default and self._lacks_matplotlib:
                 err.print(NO_PICTURE, highlight=False, markup=False, soft_wrap=True)
-        if errors:
-            raise PictureError("\n".join(errors))
         if result.reason:
             err.print(f"zwerm: {result.reason}", style="red", markup=False, highlight=False, soft_wrap=True)
+        errors = [*result.problems, *self._write_files(result)]
+        if errors:
+            raise PictureError("\n".join(errors))
         if result.outcome == "interrupted":
             raise typer.Exit(EXIT_INTERRUPTED)
         raise typer.Exit(0 if result.ok else EXIT_FAILED)
@@ -95,24 +90,33 @@ class RunOutput:
     def _lacks_matplotlib(self) -> bool:
         return find_spec("matplotlib") is None
 
-    def _draw_stills(self, result: RunResult) -> tuple[list[Path], list[str]]:
-        """Return the pictures drawn, and the errors of those that were not; the result is still printed."""
-        drawn: list[Path] = []
-        errors: list[str] = []
+    def _write_files(self, result: RunResult) -> list[str]:
+        """Write pictures, faults and animation, and print the path of each. Return why some cannot be written."""
         path = self.picture or Path("runs") / f"{_stem(result)}.png"
+        files: list[Callable[[], Path]] = []
+        if self.record is not None and not result.problems:
+            files.append(partial(Path, self.record))
         if self.picture is not None or (self.draws_by_default and not self._lacks_matplotlib):
-            _attempt(lambda: result.picture(path), drawn, errors)
-        for moment in self.moments:
-            _attempt(partial(_draw_moment, result, path, moment), drawn, errors)
-        return drawn, errors
+            files.append(lambda: result.picture(path))
+        files += [partial(_draw_moment, result, path, moment) for moment in self.moments]
+        if result.scenario.random_faults is not None and not self.as_json:
+            files.append(lambda: _write_faults(result))
+        if self.animation is not None:
+            files.append(partial(self._animate, result, self.animation))
+        errors: list[str] = []
+        for write in files:
+            try:
+                written = write()
+            except (ZwermError, OSError) as error:
+                errors.append(str(error))
+            else:
+                if not self.as_json:
+                    print_file(out, written)
+        return errors
 
-
-def _attempt(write: Callable[[], Path], written: list[Path], errors: list[str]) -> None:
-    """Add the file that `write` writes to `written`, or the line that says why it could not."""
-    try:
-        written.append(write())
-    except (ZwermError, OSError) as error:
-        errors.append(str(error))
+    def _animate(self, result: RunResult, path: Path) -> Path:
+        with RunProgress(err, "animation", quiet=self.as_json) as progress:
+            return result.animate(path, progress.ticked)
 
 
 def _stem(result: RunResult) -> str:
