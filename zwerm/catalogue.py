@@ -162,7 +162,14 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         title="Sensor-based coverage by robot teams",
         paper="Latimer, Srinivasa, Lee-Shue, Sonne, Choset, Hurst 2002",
         page="papers/robot-teams.md",
-        controllers={ROBOT: {"robot-teams": "zwerm.agents.robot_teams:TeamRobot"}},
+        controllers={
+            ROBOT: {"robot-teams": "zwerm.agents.robot_teams:TeamRobot"},
+            COORDINATOR: {"robot-teams": "zwerm.coordinator.robot_teams:TeamCoordinator"},
+        },
+        variants=(
+            Variant({"cells": "team"}, decides=ROBOT, coordinator=False),
+            Variant({"cells": "coordinator"}, decides=COORDINATOR),
+        ),
         metrics=("zwerm.world.metrics.robot_teams:TeamCoverage",),
         layers=("zwerm.view.robot_teams:CellsLayer",),
         scenarios=("robot-teams*",),
@@ -178,6 +185,8 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
 # Commands of the command line, in the order of `zwerm --help`, as `module:function`.
 COMMANDS: Final = {
     "list": "zwerm.cli.commands.list_command:list_catalogue",
+    "show": "zwerm.cli.commands.show_command:show",
+    "new": "zwerm.cli.commands.new_command:new",
     "check": "zwerm.cli.commands.check_command:check",
     "run": "zwerm.cli.commands.run_command:run",
     "world": "zwerm.cli.commands.world_command:world",

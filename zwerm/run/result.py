@@ -56,7 +56,11 @@ class RunResult:
     missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
     series: dict[str, Floats] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)  # what could not be written during the run
     tracebacks: dict[int, str] = field(default_factory=dict)
+    crash_reasons: dict[int, str] = field(
+        default_factory=dict
+    )  # "tick 5: ..." by node, of programs that ended on their own
     telemetry: TelemetryArrays = field(default_factory=TelemetryArrays.empty)
     snapshots: list[TelemetryRecord] = field(default_factory=list)
 
@@ -99,7 +103,12 @@ class RunResult:
             "metrics": self.metrics,
             "radio": self.radio,
             "middleware_lost": self.middleware_lost,
-            "nodes": {"crashed": self.crashed, "restarted": self.restarted, **self.hindered},
+            "nodes": {
+                "crashed": self.crashed,
+                "restarted": self.restarted,
+                **self.hindered,
+                "reasons": {str(node): reason for node, reason in sorted(self.crash_reasons.items())},
+            },
             "faults": self.faults,
         }
 

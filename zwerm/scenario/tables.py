@@ -53,9 +53,10 @@ class TimeTable(Table):
 class ArenaTable(Table):
     """The space robots live in: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
 
-    `map` is a ROS map_server YAML, or a bitmap (dark is wall) with `resolution_m` or `size_m`; `start` is a place [m] in the
-    part to keep, else the largest is. Paths are relative to the scenario. `scale` multiplies all lengths, or `free_area_m2`
-    is the free space after scaling. Then gaps narrower than `passage_m` are closed, and what lies behind them is left out."""
+    `map` is a ROS map_server YAML, a bitmap (dark is wall) with `resolution_m` or `size_m`, or a grid map (MovingAI `.map`, or
+    `.mcpp`) with `resolution_m`; `start` is a place [m] in the part to keep, else the largest is. Paths are relative to the
+    scenario. `scale` multiplies all lengths, or `free_area_m2` is the free space after scaling. Then gaps narrower than
+    `passage_m` are closed, and what lies behind them is left out."""
 
     size_m: Size | None = None
     polygon: list[Point] | None = Field(default=None, min_length=3)
@@ -91,13 +92,14 @@ class BodyTable(Table):
 
 
 class PlacementTable(Table):
-    """Where robots start: `uniform` in the arena, within a `disc`, in a random `cell` of a grid, or at given `poses`.
+    """Where robots start: `uniform` in the arena, in a `disc`, in a random `cell` of a grid, at `poses`, or at `roots`.
 
     `disc` takes `radius_m` and optionally `center_m` (else a random one that fits); `cell` takes `grid` and `radius_m`
-    about the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad].
+    about the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad]; `roots` are the start
+    cells of a `.mcpp` map.
     """
 
-    kind: Literal["uniform", "disc", "cell", "poses"] = "uniform"
+    kind: Literal["uniform", "disc", "cell", "poses", "roots"] = "uniform"
     radius_m: Positive | None = None
     center_m: Point | None = None
     grid: Grid | None = None

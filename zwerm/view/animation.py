@@ -23,7 +23,7 @@ try:
     from zwerm.view.output import prepare
     from zwerm.view.run_view import RunView
 except ImportError as missing:
-    raise PictureError(f"pictures need matplotlib ({missing}): pip install 'zwerm[study]'") from None
+    raise PictureError(f"pictures need matplotlib ({missing}): pip install matplotlib") from None
 
 Progress = Callable[[int, int], None]
 

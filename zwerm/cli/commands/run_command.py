@@ -57,7 +57,7 @@ def run(
     from zwerm.scenario.load import load
 
     with errors_as_lines():
-        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json)
+        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json, record)
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json or quiet) as progress, breakpoints(progress.suspend):
             result = run_scenario(

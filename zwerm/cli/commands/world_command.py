@@ -49,7 +49,7 @@ def world(
     with errors_as_lines():
         for endpoint in listen:
             check_endpoint("--listen", endpoint)
-        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json)
+        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json, record)
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
             result = serve(loaded, seed, listen, credentials, realtime=realtime, watcher=progress, record=record)

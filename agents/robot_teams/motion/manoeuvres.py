@@ -9,9 +9,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
-from zwerm.agents.robot_teams.facts import Arc, End
-from zwerm.agents.robot_teams.senses import Senses, Vector
-from zwerm.agents.robot_teams.wall_following import INTO, LEFT_HAND, RIGHT_HAND, WallFollower
+from zwerm.agents.robot_teams.mapping.facts import Arc, End, Wreck
+from zwerm.agents.robot_teams.motion.senses import Senses
+from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGHT_HAND, Vector, WallFollower
 
 # A contact blocks a sweep if this much of its normal lies along the motion.
 BLOCKS: Final = 0.02
@@ -110,12 +110,14 @@ class Sweep:
         self._last_y_m: float | None = None
         self._around: Around | None = None
         self.around_ticks = 0
+        self.wrecks: dict[Wreck, None] = {}
         self.end: End | None = None
 
     def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
         """Return where to go, or None once the boundary is reached: then `end` is where."""
         off = self._x_m - senses.x_m
         side = self.side
+        self.wrecks.update(dict.fromkeys(senses.wrecks))
         if self._around is not None:
             self.around_ticks += 1
             if self.around_ticks > AROUND_TICKS_MAX or abs(off) > AROUND_M:
@@ -156,12 +158,14 @@ class Trace:
         self._length_m = 0.0
         self._extreme: Vector = (-math.inf, 0.0)
         self._wall_tick = -10
+        self.wrecks: dict[Wreck, None] = {}
         self.arc: Arc | None = None
         self.end: End | None = None
 
     def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
         """Return where to go, or None at a crossing: then `end` is where, and `arc` the fact unless a robot hid it."""
         x, y, d = senses.x_m, senses.y_m, self.direction
+        self.wrecks.update(dict.fromkeys(senses.wrecks))
         if senses.walls:
             self._wall_tick = senses.tick
         last = self._last
@@ -212,7 +216,9 @@ class Trace:
         depth, extreme_y = self._extreme
         extreme_x = self._x_m + self.direction * max(depth, 0.0)
         self.end = end
-        self.arc = Arc(self.start, self.direction, end, mm(self._length_m), mm(extreme_x), mm(extreme_y))
+        self.arc = Arc(
+            self.start, self.direction, end, mm(self._length_m), mm(extreme_x), mm(extreme_y), tuple(self.wrecks)
+        )
 
 
 class Seek:

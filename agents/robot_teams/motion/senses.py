@@ -1,9 +1,11 @@
 """What a robot senses at one tick, in the frame of the arena: its position, the walls it touches, the robots beside it."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
+from zwerm.agents.robot_teams.mapping.facts import Wreck
+from zwerm.agents.robot_teams.motion.wall_following import Vector
 from zwerm.wire.messages import Observation
 
 # The gap that robots keep between their bodies [m]: more than a touch switch reaches, so that what is touched is a wall.
@@ -15,11 +17,12 @@ STANDS_M: Final = 0.004
 # A wreck nearer than this, beyond the gap that is kept, is a wall [m].
 DEAD_M: Final = 0.04
 
-Vector = tuple[float, float]
-
 
 class Beside(NamedTuple):
-    """A robot in sight: where it is, the unit vector towards it, the gap to keep, and its motion in the last tick [m]."""
+    """A robot in sight: where it is, the unit vector towards it, the gap to keep, and its motion in the last tick [m].
+
+    `wreck` is set where it is dead and in contact: then it is a wall.
+    """
 
     node: int
     x_m: float
@@ -29,7 +32,7 @@ class Beside(NamedTuple):
     gap_m: float
     dx_m: float
     dy_m: float
-    dead: bool = False
+    wreck: Wreck | None = None
 
     @property
     def stands(self) -> bool:
@@ -46,6 +49,11 @@ class Senses(NamedTuple):
     walls: tuple[Vector, ...]
     robots: tuple[Beside, ...]
 
+    @property
+    def wrecks(self) -> tuple[Wreck, ...]:
+        """The wrecks that are touched."""
+        return tuple([other.wreck for other in self.robots if other.wreck is not None])
+
 
 class Sensing:
     """Turns observations into senses; remembers where the robots in sight were a tick ago."""
@@ -57,7 +65,7 @@ class Sensing:
         self._last: dict[int, Vector] = {}
         self.cos, self.sin = 1.0, 0.0
 
-    def read(self, observation: Observation, dead: Callable[[int], bool]) -> Senses:
+    def read(self, observation: Observation, dead: Mapping[int, Wreck]) -> Senses:
         """Return the senses of an observation with pose, touch and neighbours; a `dead` robot in contact is a wall."""
         pose, touch, neighbours = observation.pose, observation.touch, observation.neighbours
         assert pose is not None
@@ -75,8 +83,9 @@ class Sensing:
             was = self._last.get(each.node, (x, y))
             places[each.node] = x, y
             gap = apart - 2.0 * self._radius_m - GAP_M
-            wreck = gap < DEAD_M and abs(x - was[0]) + abs(y - was[1]) < STANDS_M and dead(each.node)
-            if wreck:
+            stands = abs(x - was[0]) + abs(y - was[1]) < STANDS_M
+            wreck = dead.get(each.node) if gap < DEAD_M and stands else None
+            if wreck is not None:
                 wrecks.append((dx / apart, dy / apart))
             robots.append(Beside(each.node, x, y, dx / apart, dy / apart, gap, x - was[0], y - was[1], wreck))
         self._last = places

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from zwerm.agents.robot_teams.team_membership import Membership
-from zwerm.agents.robot_teams.team_messages import HUNTS, READY, Plan, Status
+from zwerm.agents.robot_teams.protocols.team_membership import Membership
+from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, Plan, Status
 
 
 class CorridorMates:

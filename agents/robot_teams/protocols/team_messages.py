@@ -9,7 +9,7 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
-from zwerm.agents.robot_teams.facts import Arc, End, Segment, Void
+from zwerm.agents.robot_teams.mapping.facts import Arc, End, Return, Segment, Void
 
 # The phases of a robot's work on its slice, in order.
 READY: Final = 0  # has finished the plan
@@ -66,7 +66,7 @@ class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
 class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """What a robot broadcasts. `views` are its own team's, then those its lead has made of it, and teams that were met.
 
-    `digest` and `count` describe its facts, `segments`, `arcs` and `voids` are some of them.
+    `digest` and `count` describe its facts, `segments`, `arcs`, `voids` and `returns` are some of them.
     """
 
     sender: int
@@ -79,6 +79,7 @@ class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     segments: tuple[Segment, ...] = ()
     arcs: tuple[Arc, ...] = ()
     voids: tuple[Void, ...] = ()
+    returns: tuple[Return, ...] = ()
 
 
 class FoundSnapshot(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

@@ -10,7 +10,7 @@ when they meet. A wrong suspicion therefore costs time, and nothing else: facts 
 from collections.abc import Sequence
 from typing import Final
 
-from zwerm.agents.robot_teams.team_messages import Beacon, Status, View
+from zwerm.agents.robot_teams.protocols.team_messages import Beacon, Status, View
 
 # How long the lead repeats views that it made for others, and how long a meeting is remembered [s].
 REPEAT_S: Final = 10.0
@@ -74,9 +74,7 @@ class Membership:
 
     def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
         """Take in a beacon; `near` tells that its sender is close enough to be met."""
-        for status in beacon.statuses:
-            if status.node != self.node:
-                self.roster.receive(status, tick)
+        self._note_statuses(beacon, tick)
         theirs = beacon.views[0]
         for view in beacon.views:
             self._latest_epoch = max(self._latest_epoch, view.epoch)
@@ -92,6 +90,10 @@ class Membership:
             self._meet(theirs, tick)
         elif theirs.lead in self._met:
             self._met[theirs.lead] = theirs, self._met[theirs.lead][1]
+
+    def knows(self, sender: int) -> bool:
+        """Tell whether facts and plans of a sender are taken over: those of teammates are."""
+        return sender in self.view.members
 
     def muster(self, tick: int) -> None:
         """Found the first team: the smallest of all robots that hear each other at the start leads them."""
@@ -118,6 +120,11 @@ class Membership:
     def met(self) -> tuple[View, ...]:
         """Return the views of the teams that were met, by their leads."""
         return tuple([self._met[lead][0] for lead in sorted(self._met)])
+
+    def others(self) -> list[Status]:
+        """Return the newest statuses of the other members, to be passed on."""
+        statuses = self.roster.statuses
+        return [statuses[node] for node in self.view.members if node != self.node and node in statuses]
 
     def outgoing(self) -> tuple[View, ...]:
         """Return the views to broadcast: the own one first."""
@@ -149,6 +156,11 @@ class Membership:
     def merges_soon(self, tick: int, patience_ticks: int) -> bool:
         """Tell whether a team was met a short time ago: the lead with the smaller id unites the two when all are free."""
         return any(tick - since < patience_ticks for _, since in self._met.values())
+
+    def _note_statuses(self, beacon: Beacon, tick: int) -> None:
+        for status in beacon.statuses:
+            if status.node != self.node:
+                self.roster.receive(status, tick)
 
     def _meet(self, view: View, tick: int) -> None:
         if self.node in view.members or view.lead in self.view.members:

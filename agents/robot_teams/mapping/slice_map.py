@@ -6,17 +6,23 @@ two slices is bounded by swept segments and traced arcs only. That presumes that
 radius, and at most the sum of the footprint's radius and the body's diameter, so that an obstacle between two slices that
 no arc reaches hides nothing.
 
-A dead robot may hide ends for ever. They count for nothing: its own footprint covers what is there, and arcs lead around it.
+A wreck may hide ends. They count for nothing while it lies there: its own footprint covers what is there, and arcs lead around
+it. A wreck also blocks ways that were free. Ways therefore prefer segments and arcs that were observed beside the wreck. Where
+no way leads from an end to what is open, all that can be reached from that end is covered if and only if every end that
+ways from it reach has a mate and two arcs, none of them blocked.
+
+A slice may graze an obstacle: one robot stops there, and another sweeps past. An end that lies inside a swept segment
+is no end of anything that is left to cover, and counts for nothing either.
 
 Ends that two robots measured a little differently are one: those of one slice and side are joined where neighbours are at most
 `TOLERANCE_MM` apart. The joined ends are a function of the set of facts alone, so that merging maps needs no order.
 """
 
 import heapq
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Final, NamedTuple
 
-from zwerm.agents.robot_teams.facts import LEFT, RIGHT, Arc, End, Fact, FactSet, Segment, Void
+from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, Arc, End, Fact, FactSet, Segment, Void
 
 TOLERANCE_MM: Final = 120
 
@@ -55,6 +61,8 @@ class SliceMap:
         self._mates: dict[End, Step] = {}
         self._arcs: dict[Port, Step] = {}
         self._by_slice: dict[int, list[Segment]] = {}
+        self._voids: list[Void] = []
+        self._closed: dict[End, bool] = {}
         self._certificate = Certificate(0, (), ())
 
     def add(self, fact: Fact) -> bool:
@@ -76,7 +84,7 @@ class SliceMap:
         return nearest
 
     def mate(self, end: End) -> Step | None:
-        """Return the way along the swept segment of a known end, or None while it is not swept."""
+        """Return the way along the swept segment of a known end, or None while it is not swept, or blocked."""
         self._derive()
         return self._mates.get(end)
 
@@ -102,6 +110,33 @@ class SliceMap:
         """What is open, sorted."""
         self._derive()
         return self._certificate
+
+    @property
+    def voids(self) -> list[Void]:
+        """What wrecks hide."""
+        self._derive()
+        return self._voids
+
+    def complete_from(self, at: End | None) -> bool:
+        """Tell whether all is covered that a robot at the known end `at` can reach; None: it is somewhere else."""
+        certificate = self.certificate
+        return certificate.complete or (certificate.ends > 0 and at is not None and self._is_closed(at))
+
+    def openings(self, reached: Collection[End]) -> Certificate:
+        """Return which of the ends in `reached` lack a mate, or arcs, that nothing blocks."""
+        self._derive()
+        ends = sorted(reached)
+        return Certificate(
+            len(ends),
+            tuple([end for end in ends if end not in self._mates]),
+            tuple([(end, side) for end in ends for side in (LEFT, RIGHT) if (end, side) not in self._arcs]),
+        )
+
+    def _is_closed(self, at: End) -> bool:
+        if at not in self._closed:
+            reached = self.distances(at)
+            self._closed.update(dict.fromkeys(reached, self.openings(reached).complete))
+        return self._closed[at]
 
     def distances(self, start: End) -> dict[End, int]:
         """Return the length [mm] of the shortest known way from a known end to every end that can be reached."""
@@ -142,40 +177,69 @@ class SliceMap:
         if len(self.facts) == self._known:
             return
         self._known = len(self.facts)
-        segments, arcs = self.facts.segments, self.facts.arcs
-        ends_of_arcs = [end for arc in arcs for end in (arc.start, arc.stop)]
-        self._levels = _joined([end for segment in segments for end in segment.ends] + ends_of_arcs)
+        self._closed.clear()
+        segments, arcs, voids = self.facts.segments, self.facts.arcs, self.facts.voids
+        self._voids = voids
+        measured = [end for arc in arcs for end in (arc.start, arc.stop)]
+        measured += [end for segment in segments for end in segment.ends]
+        self._levels = _joined([end for end in measured if not any(_hides(void, end) for void in voids)])
         self._mates, self._arcs, self._by_slice = {}, {}, {}
-        for segment in segments:
-            self._by_slice.setdefault(segment.slice, []).append(segment)
-            self._mate(segment)
-        for arc in arcs:
-            self._join(arc)
         ends = sorted(end for level in self._levels.values() for _, _, end in level)
-        voids = self.facts.voids
-        reached = [end for end in ends if not any(_hides(void, end) for void in voids)]
+        mated: set[End] = set()
+        joined: set[Port] = set()
+        # What was observed beside a wreck comes first: it is the way that is free now.
+        for segment in sorted(segments, key=_wrecks_first):
+            self._by_slice.setdefault(segment.slice, []).append(segment)
+            mated.update([known for known in map(self._known_end, segment.ends) if known is not None])
+            if not any(_blocks(void, segment) for void in voids):
+                self._mate(segment)
+        for arc in sorted(arcs, key=_wrecks_first):
+            found = [(self._known_end(end), side) for end, side in arc.ports]
+            joined.update([(known, side) for known, side in found if known is not None])
+            self._join(arc)
+        counting = [end for end in ends if not self._is_passed(end)]
+        sides = [(end, side) for end in counting for side in (LEFT, RIGHT)]
         self._certificate = Certificate(
             len(ends),
-            tuple([end for end in reached if end not in self._mates]),
-            tuple([(end, side) for end in reached for side in (LEFT, RIGHT) if (end, side) not in self._arcs]),
+            tuple([end for end in counting if end not in mated]),
+            tuple([port for port in sides if port not in joined]),
         )
 
-    def _known_end(self, end: End) -> End:
-        for low, high, known in self._levels[end.slice, end.side]:
+    def _known_end(self, end: End) -> End | None:
+        """Return the name of a measured end; None where a wreck hides it."""
+        for low, high, known in self._levels.get((end.slice, end.side), ()):
             if low <= end.y_mm <= high:
                 return known
-        raise KeyError(end)
+        return None
+
+    def _is_passed(self, end: End) -> bool:
+        """Tell whether a robot swept past an end."""
+        low, high = end.y_mm - TOLERANCE_MM, end.y_mm + TOLERANCE_MM
+        return any(segment.bottom_mm < low and high < segment.top_mm for segment in self._by_slice.get(end.slice, ()))
 
     def _mate(self, segment: Segment) -> None:
         top, bottom = map(self._known_end, segment.ends)
+        if top is None or bottom is None:
+            return
         length = segment.top_mm - segment.bottom_mm
         self._mates.setdefault(top, Step(0, bottom, length))
         self._mates.setdefault(bottom, Step(0, top, length))
 
     def _join(self, arc: Arc) -> None:
         (start, there), (stop, back) = ((self._known_end(end), side) for end, side in arc.ports)
+        if start is None or stop is None:
+            return
         self._arcs.setdefault((start, there), Step(there, stop, arc.length_mm))
         self._arcs.setdefault((stop, back), Step(back, start, arc.length_mm))
+
+
+def _wrecks_first(fact: Segment | Arc) -> tuple[bool, int, Segment | Arc]:
+    """Return the rank of a way: beside a wreck before others, and of two segments the longer one."""
+    return not fact.wrecks, fact.bottom_mm - fact.top_mm if isinstance(fact, Segment) else 0, fact
+
+
+def _blocks(void: Void, segment: Segment) -> bool:
+    return void.slice == segment.slice and void.low_mm < segment.top_mm and segment.bottom_mm < void.high_mm
 
 
 def _hides(void: Void, end: End) -> bool:

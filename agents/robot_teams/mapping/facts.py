@@ -4,6 +4,9 @@ Slice `k` is the line x = origin + k * spacing. The configuration space of the b
 of a segment is a TOP end, the lower one a BOTTOM end. An arc is the part of the boundary between two consecutive crossings of
 slices. Two sets of facts merge by union, which is commutative, associative and idempotent, so that lost, late and copied
 messages can do no harm. Lengths are whole millimetres: equal facts are equal bytes on every robot.
+
+A dead robot is an obstacle. What a robot observed of such an obstacle names the `Wreck`. A sign of life of that robot is a fact
+too, and all facts that name one of its earlier wrecks are void from then on: no suspicion lasts longer than its proof.
 """
 
 from typing import Final, NamedTuple
@@ -20,6 +23,13 @@ CONVEX: Final = 1
 CONCAVE: Final = -1
 
 
+class Wreck(NamedTuple):
+    """Robot `node` was taken for dead at `tick`."""
+
+    node: int
+    tick: int
+
+
 class End(NamedTuple):
     """The end of a segment of slice `slice`: on its side TOP or BOTTOM, at height `y_mm`."""
 
@@ -29,11 +39,12 @@ class End(NamedTuple):
 
 
 class Segment(NamedTuple):
-    """A robot swept slice `slice` from `bottom_mm` to `top_mm`, wall to wall."""
+    """A robot swept slice `slice` from `bottom_mm` to `top_mm`, wall to wall, or to one of the `wrecks`."""
 
     slice: int
     bottom_mm: int
     top_mm: int
+    wrecks: tuple[Wreck, ...] = ()
 
     @property
     def ends(self) -> tuple[End, End]:
@@ -45,7 +56,7 @@ class Arc(NamedTuple):
     """A robot followed the boundary from one end into the slab on its side `direction`, until it came to another end.
 
     The arc is `length_mm` long. Its point farthest from the first slice is (`x_mm`, `y_mm`): where the arc returns, that is the
-    critical point.
+    critical point. The robot touched the `wrecks` on the way.
     """
 
     start: End
@@ -54,6 +65,7 @@ class Arc(NamedTuple):
     length_mm: int
     x_mm: int
     y_mm: int
+    wrecks: tuple[Wreck, ...] = ()
 
     @property
     def kind(self) -> int:
@@ -70,15 +82,28 @@ class Arc(NamedTuple):
 
 
 class Void(NamedTuple):
-    """A dead robot at `x_mm` hides the ends of slice `slice` between two heights: nobody can reach them any more."""
+    """A wreck at `x_mm` hides the ends of slice `slice` between two heights: nobody can reach them any more."""
 
     slice: int
     x_mm: int
     low_mm: int
     high_mm: int
+    wreck: Wreck
+
+    @property
+    def wrecks(self) -> tuple[Wreck, ...]:
+        """The wreck, as other facts name theirs."""
+        return (self.wreck,)
 
 
-Fact = Segment | Arc | Void
+class Return(NamedTuple):
+    """Robot `node` lived at `tick`: it was no wreck before."""
+
+    node: int
+    tick: int
+
+
+Fact = Segment | Arc | Void | Return
 
 
 class FactSet:
@@ -107,16 +132,32 @@ class FactSet:
         return list(self._facts)[count:]
 
     @property
+    def alive_ticks(self) -> dict[int, int]:
+        """The newest proof of life of every robot that was ever taken for dead wrongly."""
+        found: dict[int, int] = {}
+        for fact in self._facts:
+            if isinstance(fact, Return):
+                found[fact.node] = max(fact.tick, found.get(fact.node, fact.tick))
+        return found
+
+    @property
     def segments(self) -> list[Segment]:
-        """The swept segments, sorted: the order of arrival has no influence."""
-        return sorted(fact for fact in self._facts if isinstance(fact, Segment))
+        """The swept segments that hold, sorted: the order of arrival has no influence."""
+        return sorted([fact for fact in self._facts if isinstance(fact, Segment) and self._holds(fact.wrecks)])
 
     @property
     def voids(self) -> list[Void]:
-        """What dead robots hide, sorted."""
-        return sorted(fact for fact in self._facts if isinstance(fact, Void))
+        """What wrecks hide, sorted."""
+        return sorted([fact for fact in self._facts if isinstance(fact, Void) and self._holds(fact.wrecks)])
 
     @property
     def arcs(self) -> list[Arc]:
-        """The traced arcs, sorted."""
-        return sorted(fact for fact in self._facts if isinstance(fact, Arc))
+        """The traced arcs that hold, sorted."""
+        return sorted([fact for fact in self._facts if isinstance(fact, Arc) and self._holds(fact.wrecks)])
+
+    def _holds(self, wrecks: tuple[Wreck, ...]) -> bool:
+        """Tell whether no robot that is named in `wrecks` was alive later."""
+        if not wrecks:
+            return True
+        alive = self.alive_ticks
+        return all(wreck.tick >= alive.get(wreck.node, wreck.tick) for wreck in wrecks)

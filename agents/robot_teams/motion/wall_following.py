@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from zwerm.agents.robot_teams.senses import Vector
+Vector = tuple[float, float]
 
 LEFT_HAND: Final = 1  # the wall is on the left
 RIGHT_HAND: Final = -1

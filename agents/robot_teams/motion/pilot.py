@@ -12,8 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from zwerm.agents.robot_teams.manoeuvres import Manoeuvre
-from zwerm.agents.robot_teams.senses import Beside, Senses, Vector
+from zwerm.agents.robot_teams.motion.manoeuvres import Manoeuvre
+from zwerm.agents.robot_teams.motion.senses import Beside, Senses
+from zwerm.agents.robot_teams.motion.wall_following import Vector
 
 # A robot nearer than this [m], beyond the gap that is kept, is in contact.
 CONTACT_M: Final = 0.04
@@ -120,6 +121,10 @@ class Pilot:
         """Have no manoeuvre: stand, and make way for others."""
         self._manoeuvre, self.state = None, IDLE
 
+    def give_up(self) -> None:
+        """Have failed the manoeuvre, if there was one."""
+        self._manoeuvre, self._retreat, self.state = None, None, FAILED
+
     def stand(self, senses: Senses) -> Vector:
         """Return the velocity of a robot that has nothing left to do: it makes way for others."""
         if self.state != IDLE:
@@ -201,7 +206,7 @@ class Pilot:
         touched: dict[int, int] = {}
         wx, wy = self._wanted
         for other in senses.robots:
-            if other.gap_m > CONTACT_M or other.dead:
+            if other.gap_m > CONTACT_M or other.wreck is not None:
                 continue  # a wreck is a wall
             ticks = touched[other.node] = self._contact_ticks.get(other.node, 0) + 1
             if wx * other.nx + wy * other.ny > 0.2:
@@ -222,7 +227,9 @@ class Pilot:
         return self._node < other.node and ticks * self._dt_s < MOVING_WAIT_S
 
     def _into(self, senses: Senses, way: Vector) -> bool:
-        return any(r.gap_m <= CONTACT_M and not r.dead and way[0] * r.nx + way[1] * r.ny > 0.2 for r in senses.robots)
+        return any(
+            r.gap_m <= CONTACT_M and r.wreck is None and way[0] * r.nx + way[1] * r.ny > 0.2 for r in senses.robots
+        )
 
     def _limited(self, senses: Senses, way: Vector) -> Vector:
         """Return the velocity along `way`, less what would close more than half of a gap in one tick."""
