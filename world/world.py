@@ -244,7 +244,7 @@ class World:
             if answer.wake is not None:
                 self._wakes.sleep(node, answer.wake, tick)
             if answer.telemetry or answer.snapshot:
-                self.telemetry.accept(self.scene, node, answer)
+                self.telemetry.accept(self.scene, node, answer, self.status.down)
             if answer.gave_up:
                 completion.give_up(node, answer.gave_up, self.status.dead)
             if answer.release:

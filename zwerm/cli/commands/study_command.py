@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from zwerm.cli.options import Json, Sets
+from zwerm.cli.options import Json, Sets, built_in_names
 from zwerm.cli.terminal import err, errors_as_lines, out, print_json
 from zwerm.cli.trials import (
     Jobs,
@@ -21,7 +21,14 @@ from zwerm.cli.trials import (
 
 
 def study(
-    study: Annotated[str, typer.Argument(metavar="STUDY", help="A built-in study (see `zwerm list`) or a TOML file.")],
+    study: Annotated[
+        str,
+        typer.Argument(
+            metavar="STUDY",
+            help="A built-in study (see `zwerm list`) or a TOML file.",
+            autocompletion=built_in_names("studies"),
+        ),
+    ],
     seeds: Seeds = None,
     jobs: Jobs = None,
     output: Out = None,

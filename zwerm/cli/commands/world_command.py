@@ -8,11 +8,15 @@ import typer
 from zwerm.cli.options import (
     OUTAGE_S,
     Animation,
+    Bare,
+    ColourBy,
     HostNames,
     Json,
+    Links,
     Outage,
     Picture,
     PictureAt,
+    PictureSize,
     RadioTable,
     RealTime,
     Record,
@@ -50,6 +54,10 @@ def world(
     picture: Picture = None,
     picture_at: PictureAt = None,
     animate: Animation = None,
+    size: PictureSize = None,
+    bare: Bare = False,
+    colour_by: ColourBy = None,
+    links: Links = None,
     radio_table: RadioTable = None,
     as_json: Json = False,
 ) -> None:
@@ -72,7 +80,8 @@ def world(
     with errors_as_lines():
         for endpoint in listen:
             check_endpoint("--listen", endpoint)
-        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json, record)
+        moments = tuple(picture_at or ())
+        output = RunOutput(picture, moments, animate, radio_table, as_json, record, size, bare, colour_by, links)
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
             result = serve(
