@@ -113,9 +113,9 @@ class CentralRobot(Controller):
                 return self._drive(cycle, correct(self.motion, anchors))
             case ToWall(cycle, bearing_rad, hop_m, feel_m, clear_m, hand):
                 return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, feel_m, clear_m, hand))
-            case FollowWall(cycle, length_m, hand, keep):
+            case FollowWall(cycle, length_m, hand, keep, meet):
                 margin_m = self.motion.parameters.margin_m
-                return self._walk(cycle, self.wall_walk.along(hand, length_m, keep, margin_m))
+                return self._walk(cycle, self.wall_walk.along(hand, length_m, keep, meet, margin_m))
             case Release() | NegotiateLeave():
                 return None
 

@@ -15,6 +15,7 @@ from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
 from zwerm.agents.sensor_coverage.messages.commands import (
     LOST,
+    MET,
     OPEN,
     SHUT,
     FollowWall,
@@ -37,8 +38,6 @@ LEG_M: Final = 3.0
 IDLE_LEGS_MAX: Final = 2
 # A leg closes something if the open arcs become smaller by this [rad].
 PROGRESS_RAD: Final = 0.1
-# The robot begins with the wall on its left, and turns round when all robots stand: so it passes its first slot.
-FIRST_HAND: Final = 1
 # Rays to a robot that must differ by this [rad] to determine its distance.
 RAYS_RAD_MIN: Final = 0.3
 
@@ -79,7 +78,7 @@ class WallWalks:
             leader = slots.occupant[plan.mover]
             yield from pushing.prepare(plan)
         heading = slots.heading[leader]
-        to_wall = ToWall(pushing.cycle, wrapped(plan.direction - heading), plan.hop_m, FEEL_M, CLEAR_M, FIRST_HAND)
+        to_wall = ToWall(pushing.cycle, wrapped(plan.direction - heading), plan.hop_m, FEEL_M, CLEAR_M, -plan.hand)
         walked = yield from self._order(leader, to_wall)
         if walked is None:
             return (leader,)
@@ -106,19 +105,20 @@ class WallWalks:
                 yield from pushing.correct(leader, [(slots.occupant[plan.mover], back)])
             return (*followers, leader)
         keep = (slots.occupant[plan.mover],) if plan.beside and plan.mover in slots.occupant else ()
-        yield from self._legs(leader, keep, scan)
+        meet = tuple(slots.occupant[each] for each in plan.meet if each in slots.occupant)
+        yield from self._legs(leader, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
         return (*followers, leader)
 
-    def _legs(self, leader: int, keep: tuple[int, ...], scan: ScanResult) -> Routine[None]:
-        """Follow the wall, leg by leg."""
+    def _legs(self, leader: int, leg: FollowWall, scan: ScanResult) -> Routine[None]:
+        """Follow the wall, leg by leg. The robot got clear with the wall at its other hand: so it passes its first slot."""
         slots, idle_legs = self._slots, 0
         left = self._open(scan)
-        while left > 0.0 and idle_legs < IDLE_LEGS_MAX:
-            walked = yield from self._order(leader, FollowWall(self._pushing.cycle, LEG_M, -FIRST_HAND, keep))
+        while (left > 0.0 or leg.meet) and idle_legs < IDLE_LEGS_MAX:
+            walked = yield from self._order(leader, leg)
             if walked is None:
                 return
-            slots.take_walk(leader, -FIRST_HAND, walked.waypoints)
-            if walked.end == LOST:
+            slots.take_walk(leader, leg.hand, walked.waypoints)
+            if walked.end in (LOST, MET):
                 self._measure(leader, walked.waypoints)
                 return
             before, left = left, self._open(scan)

@@ -18,11 +18,12 @@ from zwerm.wire.checksum import Sealed
 UPLINK: Final = "uplink"
 
 # Ends of drives to walls and along them. There is no wall; there is no way on; the drive has its length; no robot is in
-# sight further on.
+# sight further on; a robot to meet is in sight.
 OPEN: Final = "open"
 SHUT: Final = "shut"
 STRETCH: Final = "stretch"
 LOST: Final = "lost"
+MET: Final = "met"
 
 
 class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -132,12 +133,16 @@ class ToWall(_Message, frozen=True, tag="to-wall"):
 
 
 class FollowWall(_Message, frozen=True, tag="follow-wall"):
-    """Follow the wall in touch for `length_m`, in sight of a robot of `keep`, or of any robot if `keep` is empty."""
+    """Follow the wall in touch for `length_m`, in sight of a robot of `keep`, or of any robot if `keep` is empty.
+
+    Stop where a robot of `meet` is in sight, and one that is not of `meet`.
+    """
 
     cycle: int
     length_m: float
     hand: int
     keep: tuple[int, ...]
+    meet: tuple[int, ...]
 
 
 # --- from a robot ---------------------------------------------------------------------------------------------------
@@ -195,7 +200,7 @@ class Arrived(_Message, frozen=True, tag="arrived"):
 
 
 class Walked(_Message, frozen=True, tag="walked"):
-    """The end of a drive to a wall or along it, after `driven_m`; `end` is one of OPEN, SHUT, STRETCH and LOST.
+    """The end of a drive to a wall or along it, after `driven_m`; `end` is one of OPEN, SHUT, STRETCH, LOST and MET.
 
     `touched` are bearings [rad] of the wall that stopped a drive to it.
     """

@@ -9,7 +9,7 @@ import math
 from collections.abc import Collection, Generator, Iterable, Sequence
 from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, Sighting, Waypoint
+from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
@@ -93,11 +93,13 @@ class WallWalk:
             self._trail.append(motion.position)
         return WalkResult(STRETCH, done, touched)
 
-    def along(self, hand: int, length_m: float, keep: Collection[int], margin_m: float) -> DriveToWalk:
+    def along(
+        self, hand: int, length_m: float, keep: Collection[int], meet: Collection[int], margin_m: float
+    ) -> DriveToWalk:
         """Follow the wall for `length_m`, in sight of a robot of `keep`, or of any robot if `keep` is empty.
 
         Ends: STRETCH (`length_m` were followed), LOST (no such robot is in sight further on; the robot stands at the
-        last place with `margin_m` to spare), SHUT (no wall any more).
+        last place with `margin_m` to spare), MET (a robot of `meet` and another one are in sight), SHUT (no wall any more).
         """
         motion, frame = self._motion, self._motion.frame
         frame.forget()
@@ -110,6 +112,8 @@ class WallWalk:
         seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
         last, way = motion.position, 0.0
         while way < length_m:
+            if self._meets(meet):
+                return WalkResult(MET, way, (), tuple(points))
             if self._blind_rad > TURNS_RAD_MAX:
                 return WalkResult(SHUT, way, (), tuple(points))
             before, before_point = motion.position, self._waypoint()
@@ -161,6 +165,10 @@ class WallWalk:
     def _sees(self, keep: Collection[int]) -> bool:
         seen = self._motion.frame.seen
         return any(each in seen for each in keep) if keep else bool(seen)
+
+    def _meets(self, meet: Collection[int]) -> bool:
+        seen = self._motion.frame.seen
+        return any(each in seen for each in meet) and any(each not in meet for each in seen)
 
     def _back_into_sight(self, keep: Collection[int]) -> Generator[BodyVelocity, None, None]:
         """Drive back on the trail until a robot is in sight."""
