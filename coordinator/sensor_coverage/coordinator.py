@@ -156,7 +156,7 @@ class SensorCoverageCoordinator:
             self._update_fence(scan)  # 4: [F, O] := FenceSubcomplex(R, {theta})
             plans: Sequence[Plan] = ()
             if stations := self._stations_without_robots():
-                pushes = [self.pushing.deploy_first(base) for base in stations]  # 1: deploy robot 1
+                pushes = [self._deploy_first(base) for base in stations]  # 1: deploy robot 1
             else:
                 if self._redundancy_is_due():
                     yield from self._find_redundant()  # 5: (periodically) identify redundant robots
@@ -169,6 +169,13 @@ class SensorCoverageCoordinator:
 
     def _carry_out(self, plan: Plan) -> Routine[Moved]:
         return self.walking.walk(plan, self.scan) if plan.walk else self.pushing.push(plan)
+
+    def _deploy_first(self, base: int) -> Routine[Moved]:
+        """Deploy a station's first robot; where walls stop it in every direction, let it follow them."""
+        moved = yield from self.pushing.deploy_first(base)
+        if self.parameters.walls == "followed" and base in self.sources.blocked:
+            moved = yield from self.walking.first(base)
+        return moved
 
     def _run(self) -> Routine[None]:
         """Call the roll, carry out the algorithm, and report the numbers."""

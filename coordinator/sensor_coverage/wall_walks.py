@@ -24,6 +24,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Walked,
     Waypoint,
 )
+from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
 from zwerm.coordinator.sensor_coverage.sources import Sources
@@ -38,6 +39,8 @@ LEG_M: Final = 3.0
 IDLE_LEGS_MAX: Final = 2
 # A leg closes something if the open arcs become smaller by this [rad].
 PROGRESS_RAD: Final = 0.1
+# Longest way [m] of a station's first robot to a wall.
+FIRST_HOP_M: Final = 0.95
 # Rays to a robot that must differ by this [rad] to determine its distance.
 RAYS_RAD_MIN: Final = 0.3
 
@@ -108,6 +111,25 @@ class WallWalks:
         meet = tuple(slots.occupant[each] for each in plan.meet if each in slots.occupant)
         yield from self._legs(leader, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
         return (*followers, leader)
+
+    def first(self, base: int) -> Routine[Moved]:
+        """Let the robot that waits at a station follow walls, as far as the station sees it. Its heading is unknown."""
+        robot = self._sources.waiting[base]
+        cycle, station = self._pushing.cycle, self._slots.occupant[base]
+        for bearing in FIRST_BEARINGS_RAD:
+            to_wall = ToWall(cycle, bearing, FIRST_HOP_M, 0.0, 0.0, -1)
+            walked = yield from self._order(robot, to_wall)
+            if walked is None:
+                break
+            for hand in (1, -1):
+                walked = yield from self._order(robot, FollowWall(cycle, LEG_M, hand, (station,), ()))
+                if walked is None or walked.end == LOST:
+                    break
+            if walked is not None and walked.driven_m > CLEAR_M:
+                del self._sources.waiting[base], self._sources.blocked[base]
+                self._slots.add(robot)
+                return (robot,)
+        return ()
 
     def _legs(self, leader: int, leg: FollowWall, scan: ScanResult) -> Routine[None]:
         """Follow the wall, leg by leg. The robot got clear with the wall at its other hand: so it passes its first slot."""
