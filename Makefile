@@ -27,7 +27,7 @@ dev: $(DEV_READY)  ## add what tests, linters and documentation need
 
 compile: dev  ## make a C extension of the inner loop of Voronoi coverage (needs a C compiler)
 	ZWERM_COMPILE=1 $(BIN)/python setup.py -q build_ext --inplace
-	@echo "compile: done; what is changed in zwerm/maths/kept_cell.py from now on counts after the next make compile or make clean"
+	@echo "compile: done; what is changed in zwerm/maths/cached_voronoi_cell.py from now on counts after the next make compile or make clean"
 
 tools:  ## install what the twin on a real network and MP4 need (as root, where there is apt-get; else say so)
 	@if command -v ip >/dev/null && command -v tc >/dev/null && command -v nft >/dev/null && command -v ffmpeg >/dev/null; then echo "tools: all there"; \

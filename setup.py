@@ -8,7 +8,7 @@ import os
 
 from setuptools import setup
 
-COMPILED = ["zwerm/maths/kept_cell.py"]
+COMPILED = ["zwerm/maths/cached_voronoi_cell.py"]
 
 extensions = []
 if os.environ.get("ZWERM_COMPILE") == "1":

@@ -1,8 +1,8 @@
 """Rate of convergence of Voronoi coverage near the optimum, compared with the times of Table I.
 
-Near its optimum a swarm is a linear system: dp/dt = k J (p - p*), where J is the derivative of the vectors to the estimated
-centroids by the positions. Its slowest mode decays as exp(-rate t), for any integrator and start. Prints that rate, the rate
-measured over the last factor of 100 of the mean error, and the rate that the paper's time needs.
+Near its optimum a swarm is a linear system: dp/dt = k J (p - p*). J is the derivative of the vectors to the estimated
+centroids by the positions. Its slowest mode decays as exp(-rate t), for any integrator and start. Prints that rate, the
+rate measured over the last factor of 100 of the mean error, and the rate that the paper's time needs.
 """
 
 import argparse

@@ -1,8 +1,8 @@
 """Processor time to find redundant robots by relative H2, and correctness of the certificates.
 
-Random swarms in a square whose border is the fence, about 1.6 robots per cell of 0.4 r_v. Prints the processor time to build
-the complex and to find the redundant robots with their certificate, and the time of gudhi for the Betti numbers of the same
-pair. Then checks the certificates of random complexes against gudhi.
+Random swarms in a square whose border is the fence, about 1.6 robots per cell of 0.4 r_v. Prints the processor time to
+build the complex and to find the redundant robots with their certificate. Beside it stands the time of gudhi for the
+Betti numbers of the same pair. Then checks the certificates of random complexes against gudhi.
 """
 
 import argparse
@@ -15,7 +15,7 @@ import gudhi
 import numpy as np
 from csv_rows import add_csv_option, write_csv
 
-from zwerm.maths.simplicial import Edge, FlagComplex, Sparing, edge, relative_cycles, sparing
+from zwerm.maths.simplicial import Edge, FlagComplex, RedundantVertices, edge, find_redundant, relative_cycles
 
 TARGET_S = 1.0
 CELL = 0.4
@@ -64,7 +64,7 @@ def timed(make: Callable[[], object], repeats: int) -> float:
     return statistics.median(spent)
 
 
-def holds(complex_: FlagComplex, fence: Sequence[Edge], found: Sparing) -> bool:
+def holds(complex_: FlagComplex, fence: Sequence[Edge], found: RedundantVertices) -> bool:
     """Return whether a certificate is valid, and gudhi confirms that b0 and b1 stay without the redundant robots."""
     odd: dict[Edge, int] = {}
     for i, j, k in found.cycle:
@@ -86,17 +86,17 @@ def main() -> None:
     rows = []
     print(f"median of {arguments.repeats}, processor time")
     print(
-        f"{'robots':>6} {'triangles':>9} {'complex s':>10} {'spared':>7} {'relative H2 s':>14} {'target':>7} {'gudhi s':>8}"
+        f"{'robots':>6} {'triangles':>9} {'complex s':>10} {'redundant':>7} {'relative H2 s':>14} {'target':>7} {'gudhi s':>8}"
     )
     for cells in () if arguments.certificates else (15, 21, 31, 44):
         lists, fence = swarm(cells, 1)
         complex_ = FlagComplex(lists)
         build_s = timed(lambda lists=lists: FlagComplex(lists), arguments.repeats)
-        spent_s = timed(lambda pair=(complex_, fence): sparing(*pair), arguments.repeats)
+        spent_s = timed(lambda pair=(complex_, fence): find_redundant(*pair), arguments.repeats)
         gudhi_s = timed(lambda pair=(complex_, fence): by_gudhi(*pair), arguments.repeats)
-        spared, target = len(sparing(complex_, fence).redundant), f"{TARGET_S:g}" if cells == 31 else ""
+        redundant, target = len(find_redundant(complex_, fence).redundant), f"{TARGET_S:g}" if cells == 31 else ""
         print(
-            f"{len(lists):>6} {len(complex_.triangles):>9} {build_s:>10.3f} {spared:>7} {spent_s:>14.3f} {target:>7} "
+            f"{len(lists):>6} {len(complex_.triangles):>9} {build_s:>10.3f} {redundant:>7} {spent_s:>14.3f} {target:>7} "
             f"{gudhi_s:>8.3f}"
         )
         rows.append(
@@ -104,25 +104,25 @@ def main() -> None:
                 "robots": f"{len(lists)}",
                 "triangles": f"{len(complex_.triangles)}",
                 "build the complex [s]": f"{build_s:.3f}",
-                "redundant": f"{spared}",
+                "redundant": f"{redundant}",
                 "relative H2 [s]": f"{spent_s:.3f}",
                 "at most [s]": target,
                 "gudhi, same run [s]": f"{gudhi_s:.3f}",
             }
         )
-    good = certified = spared = 0
+    good = certified = redundant = 0
     for seed in range(arguments.complexes):
         lists, fence = swarm(3 + seed % 4, seed, blind_fraction=0.1 * (seed % 3))
         complex_ = FlagComplex(lists)
-        found = sparing(complex_, fence)
+        found = find_redundant(complex_, fence)
         certified += bool(found.cycle)
-        spared += len(found.redundant)
+        redundant += len(found.redundant)
         good += holds(complex_, fence, found)
     print(
-        f"certificates: {certified} of {arguments.complexes} complexes have one, {spared} robots spared; gudhi agrees on {good}"
+        f"certificates: {certified} of {arguments.complexes} complexes, {redundant} redundant robots; gudhi agrees on {good}"
     )
     if arguments.certificates:
-        counts = {"complexes": arguments.complexes, "with a certificate": certified, "redundant robots": spared}
+        counts = {"complexes": arguments.complexes, "with a certificate": certified, "redundant robots": redundant}
         rows = [{name: f"{count}" for name, count in (counts | {"gudhi agrees": good}).items()}]
     write_csv(arguments.csv, rows)
 

@@ -1,7 +1,7 @@
 """Speed of the inline runner on one core, compared with the physics engine alone.
 
-Prints robot-ticks per second of processor time: the whole emulator (e-pucks with the line-of-sight sensor, 10 substeps,
-wire format and trace included), and pymunk alone stepping the same bodies between the same walls.
+Prints robot-ticks per second of processor time. It compares the whole emulator (e-pucks with the line-of-sight sensor,
+10 substeps, wire format, trace) with pymunk alone, which steps the same bodies between the same walls.
 """
 
 import argparse

@@ -19,7 +19,7 @@ from csv_rows import add_csv_option, write_csv
 from zwerm.agents.sensor_coverage.messages.locks import LockProtocolMessage
 from zwerm.agents.sensor_coverage.protocols.component import Outgoing
 from zwerm.agents.sensor_coverage.protocols.leave_lock import LeaveLock
-from zwerm.maths.simplicial import FlagComplex, betti, sparing
+from zwerm.maths.simplicial import FlagComplex, betti, find_redundant
 
 TICK_S = 0.5
 LEASE_S = 40.0
@@ -226,10 +226,10 @@ def compare(cells: int, seeds: range) -> Iterator[tuple[str, float, float, float
         complex_ = FlagComplex(lists)
         before = betti(complex_)
         start = time.process_time()
-        spared = sparing(complex_, fence).redundant
+        redundant = find_redundant(complex_, fence).redundant
         spent_s = time.process_time() - start
         reported = sum(len(msgspec.msgpack.encode((each, *listed))) for each, listed in lists.items())
-        rows.setdefault("relative H2", []).append((len(spared), 1.0, reported / len(lists), spent_s))
+        rows.setdefault("relative H2", []).append((len(redundant), 1.0, reported / len(lists), spent_s))
         for loss in (0.0, 0.3, 0.5):
             left, radio, end_s = freed_by_neighbours(lists, {v: None for each in fence for v in each}, seed, loss)
             assert betti(complex_.without(left)) == before

@@ -1,7 +1,7 @@
 """A thousand robot processes on one machine: time to start, memory of each process, and speed.
 
-With `--table1` the robots run Voronoi coverage until each is within 1e-7 m of its centroid (Table I of Schwager, McLurkin,
-Rus 2006); then the same run is repeated inline, and must have the same trace.
+With `--table1` the robots run Voronoi coverage until each is within 1e-7 m of its centroid (Table I of Schwager,
+McLurkin, Rus 2006). The same run is repeated inline, and must have the same trace.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """Speed of Voronoi coverage inline on one core: robots with a control period of 0.02 s.
 
-Prints the factor over real time, and the processor time of one robot's tick [us]: of the whole emulator, and of the controller
-alone with the same observations.
+Prints the factor over real time, and the processor time of one robot's tick [us]. This time is given for the whole
+emulator, and for the controller alone with the same observations.
 """
 
 import argparse
@@ -11,7 +11,7 @@ from csv_rows import add_csv_option, write_csv
 
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs
-from zwerm.maths import kept_cell
+from zwerm.maths import cached_voronoi_cell
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import run
 from zwerm.scenario.load import load
@@ -50,7 +50,7 @@ def main() -> None:
     parser.add_argument("--code", choices=("interpreted", "compiled"), help="end with an error where it is the other")
     add_csv_option(parser)
     arguments = parser.parse_args()
-    code = "interpreted" if kept_cell.__file__.endswith(".py") else "compiled"
+    code = "interpreted" if cached_voronoi_cell.__file__.endswith(".py") else "compiled"
     if arguments.code not in (None, code):
         parser.error(f"the cell is {code}; for the other run `make compile`, or remove zwerm/maths/*.so")
     rows = []

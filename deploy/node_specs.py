@@ -53,7 +53,7 @@ def restart_spec(scenario: Scenario, seed: int, node: int, incarnation: int) -> 
 def node_specs(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
     """Return (controller, setup) by node id.
 
-    A node gets the key of its own random stream and no other: from it the run's other draws cannot be told.
+    A node gets the key of its own random stream and no other. So it cannot compute other random numbers of the run.
     """
     draws, robots = Draws(seed), scenario.robots
     body = Body(

@@ -1,8 +1,9 @@
-"""What the server that robots are forked from loads first: importing this module prepares the calling process for it.
+"""Modules that the fork server of the robots loads first. Importing this module prepares the calling process for
+forking.
 
-Robots share the server's memory as long as nobody writes to it. So whatever a robot imports is imported here, once,
-and the garbage collector, which writes to all it looks at, is told to leave that alone. For the server only, never for
-the world.
+Robots share the server's memory as long as nobody writes to it. So all modules that a robot imports are imported here,
+once. They are also exempt from garbage collection, which would write to their pages. For the server only, never for the
+world.
 """
 
 import gc
@@ -11,10 +12,11 @@ import msgspec  # noqa: F401
 import numpy  # noqa: F401
 import zenoh  # noqa: F401
 
-from zwerm.agents.runtime.process import die_with_parent
+from zwerm.agents.runtime.process import die_with_parent, serve_robots
 from zwerm.catalogue import controller_classes
 
 die_with_parent()
+serve_robots()
 for path in controller_classes():
     __import__(path.partition(":")[0])
 gc.collect()

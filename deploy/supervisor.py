@@ -42,9 +42,9 @@ Progress = Callable[[int, int], object]
 def prepare(robots: int) -> None:
     """Start the forkserver, and raise the limit of open files for `robots` robots.
 
-    Call it from the main thread, before the first Zenoh session is opened: on Linux the server ends with the thread that
-    started it, and a process must not fork after it has a session. The server lives as long as this process and serves
-    later swarms too. Raises LinkError if the limit cannot be raised far enough.
+    Call it from the main thread, before the first Zenoh session is opened. On Linux the server ends with the thread
+    that started it. A process with a session must not fork. The server runs as long as this process, and also serves
+    later swarms. Raises LinkError if the limit cannot be raised far enough.
     """
     _raise_file_limit(robots * _FILES_PER_ROBOT + 200)
     multiprocessing.set_forkserver_preload(["zwerm.deploy.preload"])
@@ -129,6 +129,17 @@ class LocalSupervisor:
         process = self._processes[node]
         process.kill()
         process.join()
+
+    def end_of(self, node: int, wait_s: float) -> str:
+        """Return how a robot's process ended, waiting at most `wait_s` for it: its signal or exit code; "" while it runs."""
+        process = self._processes[node]
+        process.join(wait_s)
+        code = process.exitcode
+        if code is None:
+            return ""
+        if code < 0:
+            return f"its process was ended by signal {-code} ({signal.Signals(-code).name})"
+        return f"its process ended with exit code {code}"
 
     def send_signal(self, node: int, number: signal.Signals) -> None:
         """Send a signal to one robot, such as SIGSTOP and SIGCONT."""

@@ -129,7 +129,7 @@ def versions() -> str:
 
 def study(name: str, plan: Mapping[str, Any], seeds: str | None, jobs: int | None, commit: str) -> list[dict[str, Any]]:
     """Run `zwerm study` or `zwerm compare`, and return one row for each point and metric; none where it failed."""
-    # Rows are reused within a commit only: the fingerprint of a trial holds Zwerm's release, and not its commit.
+    # Rows are reused within a commit only, so that a table names the commit of all its rows.
     parquet = RUNS / f"{name}-{commit}.parquet"
     options = [*(["--seeds", seeds] if seeds else []), *(["--jobs", str(jobs)] if jobs else [])]
     command = [sys.executable, "-m", "zwerm", *plan["command"], *options, "--out", str(parquet), "--json"]

@@ -1,8 +1,8 @@
 """Zwerm emulates robot swarms as what they are: many processes that pass messages, with bit-identical runs.
 
-This is the public API: every name that documentation uses is imported from here. A name is imported from its module when it is
-first asked for, so that `from zwerm import Controller` in a robot's process imports neither the world nor its libraries.
-Names that are not in `__all__`, and all modules below this one, may change without notice: see CONTRIBUTING.md.
+This is the public API: every name that documentation uses is imported from here. A name is imported from its module at
+its first use. So `from zwerm import Controller` in a robot's process imports neither the world nor its libraries. Names
+that are not in `__all__`, and all modules below this one, may change without notice: see CONTRIBUTING.md.
 """
 
 from importlib import import_module

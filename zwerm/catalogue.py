@@ -68,6 +68,13 @@ _DECENTRALISED: Final[Controllers] = {
     COORDINATOR: {"sensor-coverage": f"{_SENSOR_COVERAGE_COORDINATOR}.redundancy_advisor:RedundancyAdvisor"},
 }
 
+
+def _decentralised(redundancy: str, coordinator: bool = False) -> Variant:
+    """Return the variant of sensor coverage in which neighbours find the path, and `redundancy` the redundant robots."""
+    services = {"path": "gradient", "redundancy": redundancy}
+    return Variant(services, BASE, _DECENTRALISED, coordinator, radio=True, stations_max=1)
+
+
 ALGORITHMS: Final[Sequence[Algorithm]] = (
     Algorithm(
         name="sensor_coverage",
@@ -85,29 +92,9 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             Variant(
                 {"path": "coordinator", "redundancy": "link"}, decides=COORDINATOR, radio=True, controllers=_NEGOTIATING
             ),
-            Variant(
-                {"path": "gradient", "redundancy": "none"},
-                decides=BASE,
-                coordinator=False,
-                radio=True,
-                stations_max=1,
-                controllers=_DECENTRALISED,
-            ),
-            Variant(
-                {"path": "gradient", "redundancy": "link"},
-                decides=BASE,
-                coordinator=False,
-                radio=True,
-                stations_max=1,
-                controllers=_DECENTRALISED,
-            ),
-            Variant(
-                {"path": "gradient", "redundancy": "coordinator"},
-                decides=BASE,
-                radio=True,
-                stations_max=1,
-                controllers=_DECENTRALISED,
-            ),
+            _decentralised("none"),
+            _decentralised("link"),
+            _decentralised("coordinator", coordinator=True),
         ),
         metrics=(
             f"{_SENSOR_COVERAGE_METRICS}:Deployment",
@@ -175,7 +162,14 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         title="Sensor-based coverage by robot teams",
         paper="Latimer, Srinivasa, Lee-Shue, Sonne, Choset, Hurst 2002",
         page="papers/robot-teams.md",
-        controllers={ROBOT: {"robot-teams": "zwerm.agents.robot_teams:TeamRobot"}},
+        controllers={
+            ROBOT: {"robot-teams": "zwerm.agents.robot_teams:TeamRobot"},
+            COORDINATOR: {"robot-teams": "zwerm.coordinator.robot_teams:TeamCoordinator"},
+        },
+        variants=(
+            Variant({"cells": "team"}, decides=ROBOT, coordinator=False),
+            Variant({"cells": "coordinator"}, decides=COORDINATOR),
+        ),
         metrics=("zwerm.world.metrics.robot_teams:TeamCoverage",),
         layers=("zwerm.view.robot_teams:CellsLayer",),
         scenarios=("robot-teams*",),
@@ -191,6 +185,8 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
 # Commands of the command line, in the order of `zwerm --help`, as `module:function`.
 COMMANDS: Final = {
     "list": "zwerm.cli.commands.list_command:list_catalogue",
+    "show": "zwerm.cli.commands.show_command:show",
+    "new": "zwerm.cli.commands.new_command:new",
     "check": "zwerm.cli.commands.check_command:check",
     "run": "zwerm.cli.commands.run_command:run",
     "world": "zwerm.cli.commands.world_command:world",
@@ -261,9 +257,6 @@ FAULTS: Final = {
     "sensor_noise": "zwerm.world.faults.sensing.sensor_noise:SensorNoise",
     "heal": "zwerm.world.faults.heal:Heal",
 }
-
-# Former names of radio models, which scenarios may still use, and the current names.
-RENAMED_RADIO_MODELS: Final = {"bursts": "gilbert_elliott", "walls": "wall_attenuation"}
 
 # Metrics by the key of `[metrics]` that switches them on; the value of the key is validated by the class's `Parameters`.
 METRICS: Final = {

@@ -1,9 +1,10 @@
 """Test whether a controller fulfils the contract: `check(MyController)`, from any test suite.
 
-The kit makes and steps the controller as a runner does, with ordinary and unusual observations: empty readings, many
+The kit makes and steps the controller as a runner does. The observations are ordinary and unusual: empty readings, many
 readings, malformed packets, a very late tick. The controller must answer each observation with a command that the world
 accepts. Its answers must not depend on other controllers in the process, and it must not do what `purity` detects. All
-violations are reported at once. A controller without violations is not proven correct: the kit uses a few hundred observations.
+violations are reported at once. A controller without violations is not proven correct: the kit uses a few hundred
+observations.
 """
 
 import importlib
@@ -38,7 +39,6 @@ _BODIES: Final = (
     Body("differential", radius_m=0.037, max_speed_m_s=0.128, max_turn_rad_s=6.0, wheel_base_m=0.051),
     Body("holonomic", radius_m=0.1, max_speed_m_s=0.5, max_turn_rad_s=3.0),
 )
-_DRIVE_OF: Final = {"differential": WheelSpeeds, "holonomic": BodyVelocity}
 _DT_S: Final = 0.1
 _HASH_SEEDS: Final = ("1", "2")
 _CHILD_S: Final = 120.0
@@ -80,6 +80,15 @@ def check(
         raise ConformanceError(name, found)
 
 
+def setup_violations(controller: type[Any], setup: Setup) -> list[str]:
+    """Return the violations of the contract by `controller` on a node with exactly this Setup, in this process.
+
+    The answers are checked against the body and the channels of the Setup. A node without a body must not drive.
+    """
+    examination = _Examination(controller, setup, None)
+    return [*_declarations(controller, setup.sensors, None), *examination.violations]
+
+
 def controller_sensors(controller: type[Any]) -> tuple[str, ...]:
     """Return the sensors that a controller declares."""
     return tuple(getattr(controller, "sensors", ()))
@@ -95,12 +104,14 @@ def _declarations(
     if not callable(getattr(controller, "step", None)):
         found.append("it has no method step(observation)")
     declared = getattr(controller, "sensors", ())
+    given = () if sensors is None else sensors
+    fields = [kind.field for each in given if (kind := sensor_class(each)) is not None]
     if not isinstance(declared, tuple | list) or not all(isinstance(each, str) for each in declared):
         return [*found, f"sensors: expected a tuple of names, got {declared!r}"]
     for sensor in declared:
-        if sensor_class(sensor) is None and not extra:
+        if sensor_class(sensor) is None and sensor not in fields and not extra:
             found.append(f"sensors: {sensor!r} is none that Zwerm knows; give a reading of your own with extra=")
-        if sensors is not None and sensor not in sensors:
+        if sensors is not None and sensor not in (*given, *fields):
             found.append(f"sensors: it declares {sensor!r}, which check() does not give")
     kind = getattr(controller, "Parameters", NoParameters)
     if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct)):
@@ -183,9 +194,14 @@ class _Examination:
             self._note(f"step() returned what the world refuses: {error}, on {when}")
             return None
         body = self._setup.body
-        if command.drive is not None and body is not None and type(command.drive) is not _DRIVE_OF[body.kind]:
+        if command.drive is not None and body is None:
+            self._note(f"step() drives with {type(command.drive).__name__}, but its Setup names no body, on {when}")
+        if command.drive is not None and body is not None and type(command.drive) is not _drive_of(body):
             self.fits = False
-            self._note(f"step() drives a {body.kind} body with {type(command.drive).__name__}, on {when}")
+            expected = f"takes {_drive_of(body).__name__}"
+            self._note(
+                f"step() drives a {body.kind} body with {type(command.drive).__name__}; it {expected}, on {when}"
+            )
         for message in command.outbox:
             if message.channel not in self._setup.channels:
                 known = ", ".join(self._setup.channels) or "none"
@@ -338,6 +354,11 @@ def _in_one_line(error: Exception) -> str:
     while trace.tb_next is not None:
         trace = trace.tb_next
     return f"{line} at {trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}"
+
+
+def _drive_of(body: Body) -> type[Any]:
+    """Return the command type that drives a body: a body with wheels takes their speeds."""
+    return WheelSpeeds if body.wheel_base_m > 0 else BodyVelocity
 
 
 def _short(value: object) -> str:

@@ -1,7 +1,7 @@
-"""Gossip: every robot learns the largest id in the swarm by telling its neighbours the largest it has heard of.
+"""Gossip: every robot learns the largest id in the swarm. It broadcasts the largest id that it knows.
 
-The maximum is idempotent, commutative and associative, so lost, copied, late and reordered packets cost time and never the
-result; damaged ones are refused by their checksum. A restarted robot knows only its own id again, and learns anew.
+The maximum is idempotent, commutative and associative. So lost, copied, late and reordered packets cost time and never
+change the result. A checksum refuses damaged packets. A restarted robot knows only its own id again, and learns anew.
 """
 
 from struct import Struct as Layout
@@ -25,7 +25,7 @@ class GossipTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GossipMax(Controller):
-    """Broadcasts the largest id heard of, its own at first."""
+    """Broadcasts the largest id that it knows, at first its own."""
 
     Parameters: ClassVar[type[Struct]] = GossipTable
 

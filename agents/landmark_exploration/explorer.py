@@ -1,13 +1,14 @@
 """The robot of landmark-based exploration (Ramaithitima and Bhattacharya 2018), with a coordinator or without.
 
-It knows bearings to the landmarks it sees, contact, its compass and its radio. At every tick it takes its observation into
-its map and writes what is news into its log; the log goes to the coordinator, or to the other robots by gossip. Its tasks,
-a frontier and the way there, come from the coordinator, or it chooses and claims them by itself. `services` says which.
+It knows bearings to the landmarks it sees, contact, its compass and its radio. At every tick it adds its observation to
+its map, and writes new entries into its log. The log goes to the coordinator, or by gossip to the other robots. Its
+tasks, a frontier and the way there, come from the coordinator, or it chooses and claims them by itself. `services` says
+which.
 """
 
 from typing import ClassVar, Final
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.boundary_trace import inconsistent
 from zwerm.agents.landmark_exploration.mapping.cost_utility import Offer, Policy, cost_utility, nearest_frontier
 from zwerm.agents.landmark_exploration.mapping.frontier_status import (
@@ -19,23 +20,23 @@ from zwerm.agents.landmark_exploration.mapping.frontier_status import (
     pair_of,
 )
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, columns, write_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, columns, write_report
 from zwerm.agents.landmark_exploration.motion import Drive, Outcome, explore, roam, travel, wander
 from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, Parameters
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
-from zwerm.agents.landmark_exploration.sharing.landmark_messages import Message, Order, Register, Report, Vector
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Message, Register, TaskPart, TaskReport, Vector
 from zwerm.agents.landmark_exploration.sharing.log_entries import observation_entries, status_entries
 from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
-from zwerm.agents.landmark_exploration.sharing.orders import OrderIntake, Task, landmark_bytes
+from zwerm.agents.landmark_exploration.sharing.orders import ExplorationTask, OrderIntake, landmark_bytes
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 from zwerm.agents.landmark_exploration.sharing.upload import Upload
-from zwerm.agents.landmark_exploration.view import Slide, View
+from zwerm.agents.landmark_exploration.view import ExplorerView, Slide
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError
 from zwerm.wire.messages import Command, Observation, Packet, Transmission
 
-# Ticks between reports of a free robot, and of a busy one: what tells the coordinator that it lives.
+# Ticks between reports of a free robot, and of a busy robot. Reports show the coordinator that the robot works.
 FREE_REPORT_TICKS: Final = 5
 BUSY_REPORT_TICKS: Final = 50
 # Ticks after which a robot that found no frontier to explore looks for one again: at first, and at most.
@@ -66,7 +67,7 @@ class Explorer(Controller):
         assert setup.body is not None
         self._speed_m_s = setup.body.max_speed_m_s
         self._bytes_max = rules.message_bytes_max
-        self.view = View()
+        self.view = ExplorerView()
         self.map = LandmarkMap(rules.presence_only)
         self.replica = Replica()
         self._origin = origin_of(setup.node, setup.incarnation)
@@ -85,7 +86,7 @@ class Explorer(Controller):
         if not self._claims and UPLINK in setup.channels:
             self._upload = Upload(self.replica, self._origin, rules.message_bytes_max)
         self._intake = OrderIntake(setup.incarnation % 256)
-        self._task: Task | None = None
+        self._task: ExplorationTask | None = None
         self._halted = False
         self._reached = True
         self._report_at = 0
@@ -101,7 +102,7 @@ class Explorer(Controller):
         self._failures: dict[int, int] = {}
         self._avoid_until: dict[int, int] = {}
         self._outbox: list[Transmission] = []
-        self._seen: list[Snapshot] = []
+        self._seen: list[BearingSnapshot] = []
         self._told_status = (False, False)
         self._drive: Drive = self._live()
         self.done = False
@@ -180,7 +181,7 @@ class Explorer(Controller):
                 self._conclude(task, outcome)
                 self._task = None
 
-    def _carry_out(self, task: Task) -> Drive:
+    def _carry_out(self, task: ExplorationTask) -> Drive:
         """Navigate to the frontier, then explore it; end early where there is another task."""
         assert task.key is not None
         (a, b), rules = pair_of(task.key), self.parameters
@@ -199,7 +200,7 @@ class Explorer(Controller):
             return "unreached"
         return (yield from explore(self.view, a, b, self.random, is_clear, rules.cross_ticks, rules.search_ticks))
 
-    def _conclude(self, task: Task, outcome: Outcome) -> None:
+    def _conclude(self, task: ExplorationTask, outcome: Outcome) -> None:
         """Note how a task ended."""
         assert task.key is not None
         self._reached = outcome != "unreached"
@@ -243,7 +244,7 @@ class Explorer(Controller):
         self._patience_ticks = RETRY_TICKS
         self._no_way_since, self._cut_off = None, False
         status = ABANDONED if frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
-        self._task = Task(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status)
+        self._task = ExplorationTask(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status)
         self._claim = choice.key + 1
         if self._gossip is not None:
             self._gossip.hurry()
@@ -273,14 +274,14 @@ class Explorer(Controller):
         message = messages.read(packet.payload)
         if message is None or packet.sender is None:
             return
-        if packet.channel == UPLINK and isinstance(message, Order):
+        if packet.channel == UPLINK and isinstance(message, TaskPart):
             self._obey(message)
         elif packet.channel == UPLINK and self._upload is not None and isinstance(message, Vector):
             self._upload.acknowledge(message)
         elif packet.channel == self._channel and self._gossip is not None:
             self._gossip.hear(packet.sender, message, self.view.tick)
 
-    def _obey(self, order: Order) -> None:
+    def _obey(self, order: TaskPart) -> None:
         task = None if self._claims else self._intake.accept(order)
         if task is None:
             return
@@ -302,10 +303,10 @@ class Explorer(Controller):
                 self._send(UPLINK, [Said(None, self._report(free))])
 
     def _report(self, free: bool) -> Message:
-        life, order = self._intake.newest
+        incarnation, order = self._intake.newest
         landmarks = landmark_bytes(self.view.snapshot.landmarks)
         entries = self.replica.vector.get(self._origin, 0)
-        return Report(self.setup.incarnation % 256, life, order, free, self._reached, entries, landmarks)
+        return TaskReport(self.setup.incarnation % 256, incarnation, order, free, self._reached, entries, landmarks)
 
     def _register(self) -> Register:
         self._stamp += 1
@@ -326,4 +327,4 @@ class Explorer(Controller):
         seen, self._seen = self._seen, []
         claim = () if not self._claim else ((self.setup.node, *pair_of(self._claim - 1)),)
         count = len(self.map.frontiers.open)
-        return write_told(MapTold(*columns(seen), open=count, done=self.done, of_robot=True, assigned=claim))
+        return write_report(MapReport(*columns(seen), open=count, done=self.done, of_robot=True, assigned=claim))

@@ -1,4 +1,4 @@
-"""How a robot carries out a task: both phases of section IV-D of Ramaithitima and Bhattacharya 2018, as generators.
+"""Execution of a task by a robot: both phases of section IV-D of Ramaithitima and Bhattacharya 2018, as generators.
 
 A generator is asked once a tick for the direction to drive in, in the compass frame (None: stand still), and returns how it
 ended. Phase 1 follows a path of observations by bearings alone (the controller of section II-B). Phase 2 crosses the line
@@ -11,9 +11,9 @@ from typing import Final, Literal
 
 import numpy as np
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot, to_rad
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot, to_rad
 from zwerm.agents.landmark_exploration.mapping.landmark_complex import SHARED_MIN
-from zwerm.agents.landmark_exploration.view import View, apart_rad
+from zwerm.agents.landmark_exploration.view import ExplorerView, apart_rad
 
 Direction = float | None
 Outcome = Literal["cleared", "boundary", "timed-out", "unreached", "arrived"]
@@ -50,8 +50,8 @@ NEWS_TICKS: Final = 10
 def homing(bearing: dict[int, float], target: dict[int, float]) -> tuple[float, float]:
     """Return the control input u of section II-B as (length, direction [rad]) for the best pair of common landmarks.
 
-    Of the pairs of landmarks that are both seen and in the target, the one whose relative bearing at the target is nearest to
-    a right angle is used. Needs two common landmarks.
+    Of all pairs of landmarks that are both seen and in the target, one is used: that whose relative bearing at the
+    target is nearest to a right angle. Needs two common landmarks.
     """
     common = [landmark for landmark in target if landmark in bearing]
     best, pair = -1.0, (common[0], common[1])
@@ -71,8 +71,8 @@ def homing(bearing: dict[int, float], target: dict[int, float]) -> tuple[float, 
 
 
 def travel(
-    view: View,
-    path: Sequence[Snapshot],
+    view: ExplorerView,
+    path: Sequence[BearingSnapshot],
     random: np.random.Generator,
     arrived: Callable[[], bool],
 ) -> Drive:
@@ -105,7 +105,7 @@ def _farthest(bearing: dict[int, float], targets: Sequence[dict[int, float]]) ->
 
 
 def explore(
-    view: View,
+    view: ExplorerView,
     a: int,
     b: int,
     random: np.random.Generator,
@@ -155,7 +155,7 @@ def explore(
     return "cleared"
 
 
-def wander(view: View, random: np.random.Generator, turn_sd_rad: float = WANDER_SD_RAD) -> Drive:
+def wander(view: ExplorerView, random: np.random.Generator, turn_sd_rad: float = WANDER_SD_RAD) -> Drive:
     """Walk at random for ever, and turn away from what is touched."""
     direction = float(random.uniform(-math.pi, math.pi))
     while True:
@@ -169,7 +169,7 @@ def wander(view: View, random: np.random.Generator, turn_sd_rad: float = WANDER_
         yield direction
 
 
-def roam(view: View, random: np.random.Generator, is_new: Callable[[], bool]) -> Drive:
+def roam(view: ExplorerView, random: np.random.Generator, is_new: Callable[[], bool]) -> Drive:
     """Explore without bearings, for ever: go straight on while that shows anything new, and else turn at random.
 
     `is_new` tells whether what is seen now was new to the map. The direction is kept for `NEWS_TICKS` after the last news.

@@ -13,9 +13,9 @@ from msgspec import Meta, Struct
 from zwerm.agents.landmark_exploration.mapping.cost_utility import path_to, reach
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.mapping.map_file import read_map
-from zwerm.agents.landmark_exploration.mapping.map_reports import GoalTold, write_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import GoalReport, write_report
 from zwerm.agents.landmark_exploration.motion import Drive, travel, wander
-from zwerm.agents.landmark_exploration.view import Slide, View
+from zwerm.agents.landmark_exploration.view import ExplorerView, Slide
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError
 from zwerm.wire.messages import Command, Observation
@@ -26,7 +26,7 @@ TRIES_MAX: Final = 30
 ASTRAY_TICKS: Final = 15
 
 
-def navigate(view: View, map_: LandmarkMap, goal: Sequence[int], random: np.random.Generator) -> Drive:
+def navigate(view: ExplorerView, map_: LandmarkMap, goal: Sequence[int], random: np.random.Generator) -> Drive:
     """Go to where all landmarks of `goal` are seen, or as many as the map has ever seen together."""
 
     def arrived() -> bool:
@@ -91,9 +91,9 @@ class Navigator(Controller):
         assert setup.body is not None
         self._speed_m_s = setup.body.max_speed_m_s
         self._goals = rules.goals or self._draw(rules.random_goals)
-        self.view = View()
+        self.view = ExplorerView()
         self._slide = Slide(self.random)
-        self._told = b""
+        self._report = b""
         self._drive = self._live()
         self._done = False
 
@@ -107,14 +107,14 @@ class Navigator(Controller):
         """Perceive and go on."""
         self.view.take(observation)
         direction = self._slide.along(next(self._drive), self.view)
-        told, self._told = self._told, b""
-        return Command(drive=self.view.drive(direction, self._speed_m_s), done=self._done, snapshot=told)
+        report, self._report = self._report, b""
+        return Command(drive=self.view.drive(direction, self._speed_m_s), done=self._done, snapshot=report)
 
     def _live(self) -> Drive:
         for goal in self._goals:
             began = self.view.tick
             outcome = yield from navigate(self.view, self.map, goal, self.random)
-            self._told = write_told(GoalTold(tuple(goal), outcome == "arrived", self.view.tick - began))
+            self._report = write_report(GoalReport(tuple(goal), outcome == "arrived", self.view.tick - began))
             yield None
         self._done = True
         while True:

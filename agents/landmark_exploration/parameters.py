@@ -1,4 +1,4 @@
-"""What a scenario may set of landmark-based exploration."""
+"""Parameters of landmark-based exploration."""
 
 from typing import Annotated, Final, Literal
 
@@ -23,8 +23,9 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
     `beta` weighs the cost against the utility. A robot has `cross_ticks` to cross the line of a frontier, and `search_ticks` to
     search behind it (minimal effort: 1). `message_bytes_max` caps every radio message. A claim is void when its robot has
     been silent for `lease_ticks`; a robot silent for `dead_ticks` is presumed dead. A robot that has found nothing left to
-    explore for `freeze_ticks` adds nothing to the map any more. `robots_expected` is how many robots must agree that all is
-    explored; one that was never heard of counts as silent from the start. `turn_sd_rad` is the random walk's turn a tick.
+    explore for `freeze_ticks` adds nothing to the map any more. `robots_expected` is the number of robots that must
+    agree that all is explored. A robot without any message counts as silent from the start. `turn_sd_rad` is the random
+    walk's turn a tick.
     With `presence_only` no bearing is used: robots know which landmarks they see, and stop when nothing was new for
     `stagnation_ticks`.
     """

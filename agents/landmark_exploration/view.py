@@ -1,18 +1,18 @@
-"""What a robot perceives at one tick, in the frame of its compass: directions are the same for all robots, places unknown."""
+"""The perception of a robot at one tick, in the frame of its compass, in which all robots have the same directions."""
 
 import math
 from typing import Final
 
 import numpy as np
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot, to_steps
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot, to_steps
 from zwerm.agents.landmark_exploration.mapping.frontier_status import LANDMARKS_MAX
 from zwerm.wire.messages import BodyVelocity, Observation
 
 _FULL: Final = 2.0 * math.pi
 
 
-class View:
+class ExplorerView:
     """Landmarks by bearing [rad], the directions of contacts [rad], and the time in ticks since the robot began."""
 
     def __init__(self) -> None:
@@ -20,7 +20,7 @@ class View:
         self.heading_rad = 0.0
         self.bearing: dict[int, float] = {}
         self.contacts: tuple[float, ...] = ()
-        self.snapshot = Snapshot((), ())
+        self.snapshot = BearingSnapshot((), ())
 
     def take(self, observation: Observation) -> None:
         """Take in an observation. Landmarks with ids of LANDMARKS_MAX or more are left out: an entry of a log has no room."""
@@ -29,7 +29,7 @@ class View:
         seen = observation.landmarks or ()
         known = [each for each in seen if each.landmark < LANDMARKS_MAX]
         self.bearing = {each.landmark: each.bearing_rad + heading for each in known}
-        self.snapshot = Snapshot(
+        self.snapshot = BearingSnapshot(
             tuple(self.bearing), tuple([to_steps(bearing_rad) for bearing_rad in self.bearing.values()])
         )
         self.contacts = tuple([each.bearing_rad + heading for each in observation.touch or ()])
@@ -61,7 +61,7 @@ class Slide:
         self._hand = 0
         self._until = 0
 
-    def along(self, direction_rad: float | None, view: View) -> float | None:
+    def along(self, direction_rad: float | None, view: ExplorerView) -> float | None:
         """Return the direction to drive in; None where every direction is blocked."""
         if direction_rad is None or not view.contacts:
             return direction_rad
@@ -80,7 +80,7 @@ class Slide:
             )
         return self._turned(direction_rad, view, self._hand)
 
-    def _turned(self, direction_rad: float, view: View, hand: int) -> float | None:
+    def _turned(self, direction_rad: float, view: ExplorerView, hand: int) -> float | None:
         for step in range(1, 30):
             turned = direction_rad + hand * step * self._TURN_RAD
             if self._is_free(turned, view):
@@ -88,5 +88,5 @@ class Slide:
         return None
 
     @staticmethod
-    def _is_free(direction_rad: float, view: View) -> bool:
+    def _is_free(direction_rad: float, view: ExplorerView) -> bool:
         return all(math.cos(direction_rad - contact) <= 0.05 for contact in view.contacts)

@@ -8,9 +8,9 @@ a reverse critical point lies between it and its predecessor. Then the team divi
 from collections.abc import Collection, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from zwerm.agents.robot_teams.facts import LEFT, RIGHT, TOP, End
-from zwerm.agents.robot_teams.slice_map import SliceMap
-from zwerm.agents.robot_teams.team_messages import READY, Plan, Status, View
+from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, TOP, End
+from zwerm.agents.robot_teams.mapping.slice_map import Certificate, SliceMap
+from zwerm.agents.robot_teams.protocols.team_messages import READY, Plan, Status, View
 
 FAR: Final = 10**9
 # The side of the anchor of a plan that only joins the maps of robots that began apart.
@@ -45,7 +45,10 @@ class Reservation(NamedTuple):
 
 def open_tasks(slice_map: SliceMap) -> list[Task]:
     """Return everything that is open: ends without mate with the direction in which to go on, and ports of swept ends."""
-    certificate = slice_map.certificate
+    return _tasks(slice_map, slice_map.certificate)
+
+
+def _tasks(slice_map: SliceMap, certificate: Certificate) -> list[Task]:
     unswept = dict.fromkeys(certificate.ends_without_mate)
     tasks = []
     for end in unswept:
@@ -162,7 +165,11 @@ def assign(
     distances = {node: slice_map.distances(at) for node, at in places.items() if at is not None}
     members = [statuses[node] for node in view.members if node in statuses]
     swept = {status.sweeping for status in members if status.phase != READY}
-    tasks = [task for task in open_tasks(slice_map) if task not in skip]
+    tasks = open_tasks(slice_map)
+    # From where nothing open can be reached, what blocks the way is explored: a wreck, or a wrong measurement.
+    for node in [node for node in distances if tasks and not any(task.end in distances[node] for task in tasks)]:
+        tasks += _tasks(slice_map, slice_map.openings(distances[node]))
+    tasks = [task for task in dict.fromkeys(tasks) if task not in skip]
     tasks = [task for task in tasks if not (task.own_slice and task.end.slice in swept)]
     made: list[Plan] = []
     limit = join_mm if active else FAR - 1

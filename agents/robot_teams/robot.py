@@ -7,35 +7,27 @@ from typing import Annotated, ClassVar, Final
 import msgspec
 from msgspec import Meta, Struct
 
-from zwerm.agents.robot_teams.corridor_mates import CorridorMates
-from zwerm.agents.robot_teams.fact_exchange import FactExchange
-from zwerm.agents.robot_teams.facts import BOTTOM, PASSES, TOP, Arc, End, Segment, Void
-from zwerm.agents.robot_teams.manoeuvres import Grid, Manoeuvre, mm
-from zwerm.agents.robot_teams.pilot import FAILED, IDLE, RUNNING, Pilot
-from zwerm.agents.robot_teams.planning import (
-    FAR,
-    LINK,
-    Task,
-    assign,
-    division,
-    finder,
-    free_members,
-    latest_plans,
-    without_busy,
-)
-from zwerm.agents.robot_teams.senses import Senses, Sensing
-from zwerm.agents.robot_teams.slice_map import SliceMap
-from zwerm.agents.robot_teams.team_membership import Membership
-from zwerm.agents.robot_teams.team_messages import (
+from zwerm.agents.robot_teams.mapping.facts import BOTTOM, PASSES, TOP, Arc, End, Return, Segment, Void, Wreck
+from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
+from zwerm.agents.robot_teams.motion.manoeuvres import Grid, Manoeuvre, mm
+from zwerm.agents.robot_teams.motion.pilot import FAILED, IDLE, RUNNING, Pilot
+from zwerm.agents.robot_teams.motion.senses import GAP_M, Senses, Sensing
+from zwerm.agents.robot_teams.motion.wrecks import WreckWatch
+from zwerm.agents.robot_teams.planning import LINK, latest_plans
+from zwerm.agents.robot_teams.protocols.central_membership import CoordinatedMembership
+from zwerm.agents.robot_teams.protocols.corridor_mates import CorridorMates
+from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
+from zwerm.agents.robot_teams.protocols.team_membership import Membership
+from zwerm.agents.robot_teams.protocols.team_messages import (
     READY,
     Beacon,
     FoundSnapshot,
-    Plan,
     Status,
     decode_beacon,
     encode_beacon,
     encode_snapshot,
 )
+from zwerm.agents.robot_teams.team_lead import TeamLead, findings
 from zwerm.agents.robot_teams.work import Lost, NoWay, Work
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError, ProtocolError
@@ -44,15 +36,12 @@ from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 
 # In the first second every robot that is heard is met: the robots start together, as one team.
 MUSTER_S: Final = 1.0
-# How long a team waits for one with a smaller lead to unite them [s].
-MERGE_PATIENCE_S: Final = 30.0
 # A robot this near to an end, or to one that stands there, stands at it [m].
 PARKED_M: Final = 0.75
-# For how long a task that brought nothing new is passed over [s].
-SKIP_S: Final = 30.0
-# After so long without a new corridor free robots take tasks however far, and then in cells where others work [s].
-FAR_AFTER_S: Final = 20.0
-ANY_AFTER_S: Final = 60.0
+# A wreck hides what is nearer to it than this, beyond two bodies' radii [m].
+HIDDEN_M: Final = GAP_M - 0.005
+# The channel to the coordinator.
+UPLINK: Final = "uplink"
 # The lead decides every so many ticks.
 DECIDE_TICKS: Final = 4
 
@@ -91,13 +80,25 @@ class TeamRobot(Controller):
             )
         self.map = SliceMap()
         self.pilot = Pilot(setup.node, body.max_speed_m_s, setup.dt_s, self.random)
-        self.membership = Membership(setup.node, setup.dt_s, table.silence_s)
+        # All cells are planned by the coordinator, or by the leads of teams.
+        self._central = setup.services.get("cells") == "coordinator"
+        membership = CoordinatedMembership if self._central else Membership
+        self.membership: Membership = membership(setup.node, setup.dt_s, table.silence_s)
+        self._channels = tuple([each for each in setup.channels if (each == UPLINK) == self._central])
         self._view = self.membership.view
         self.exchange = FactExchange(self.map, setup.dt_s)
-        self.plans: tuple[Plan, ...] = ()
+        self.lead = TeamLead(
+            self.map,
+            self.membership,
+            setup.dt_s,
+            divide=table.divide,
+            merge=table.merge,
+            one_corridor=table.one_corridor,
+            join_m=table.join_m,
+        )
         self.refused = 0
         self._radius_m = body.radius_m
-        self._wrecks: dict[int, int] = {}
+        self._wrecks = WreckWatch(setup.dt_s, table.silence_s, self.membership.roster.silent_ticks)
         self._sensing = Sensing(body.radius_m)
         self._senses: Senses | None = None
         self._grid = Grid(table.origin_m, table.spacing_m)
@@ -112,39 +113,33 @@ class TeamRobot(Controller):
         self._waits = True
         self._number = 0
         self._epoch = 0
-        self._skip: dict[Task, int] = {}
-        self._judged: dict[int, Plan] = {}
-        self._digests: dict[int, int] = {}
-        self._made_tick = 0
         self._every = max(1, round(table.beacon_s / setup.dt_s))
         self._urgent = False
-        self._told_count = -1
+        self._told = -1, False
         self._done = False
+        self._left_off = False
 
     def step(self, observation: Observation) -> Command:
         """Hear, decide, move, and say."""
         tick = observation.tick
-        senses = self._senses = self._sensing.read(observation, self._is_dead)
-        for other in senses.robots:
-            if other.dead and other.node not in self._wrecks:
-                self._wrecks[other.node] = tick
-                self._note_wreck(other.x_m, other.y_m)
+        senses = self._senses = self._sensing.read(observation, self._wrecks.wrecks)
         if observation.inbox:
             self._hear(observation, senses)
+        self._watch(senses)
+        membership = self.membership
         if tick == round(MUSTER_S / self.setup.dt_s):
-            self.membership.muster(tick)
-        self.membership.poll(tick)
-        if self.membership.view != self._view:
-            self._view = self.membership.view
-            self._judged.clear()
-            self._digests.clear()
-            self._made_tick = tick
+            membership.muster(tick)
+        membership.poll(tick)
+        if membership.view != self._view:
+            self._view = membership.view
+            self.lead.begin(tick)
             self._urgent = True
-            self.plans = tuple([plan for plan in self.plans if plan.epoch == self.membership.view.epoch])
-        self._done = self.map.certificate.complete
-        vx, vy = self.pilot.stand(senses) if self._done else self._move(senses)
-        if self.membership.leads:
-            self._decide(tick)
+        self._done = self.map.complete_from(self.work.here)
+        vx, vy = self._stand(senses) if self._done else self._move(senses)
+        if membership.leads and tick % DECIDE_TICKS == 0 and tick * self.setup.dt_s >= MUSTER_S:
+            membership.roster.statuses[self.setup.node] = self._status(senses, tick)
+            membership.roster.news_tick[self.setup.node] = tick
+            self._urgent = self.lead.decide(tick) or self._urgent
         outbox = self._say(observation, senses)
         sensing = self._sensing
         drive = BodyVelocity(sensing.cos * vx + sensing.sin * vy, sensing.cos * vy - sensing.sin * vx, 0.0)
@@ -153,8 +148,17 @@ class TeamRobot(Controller):
 
     # --- moving -------------------------------------------------------------------------------------------------------
 
+    def _stand(self, senses: Senses) -> tuple[float, float]:
+        """Leave off work, and make way for others."""
+        self._left_off = True
+        return self.pilot.stand(senses)
+
     def _move(self, senses: Senses) -> tuple[float, float]:
         pilot = self.pilot
+        if self._left_off:
+            # There is more to do after all: work goes on from wherever the robot is now.
+            self._left_off = False
+            pilot.give_up()
         velocity = pilot.step(senses)
         if pilot.state == RUNNING or (pilot.state == IDLE and not self._waits):
             return velocity
@@ -180,7 +184,7 @@ class TeamRobot(Controller):
                 if self.work.at is None:
                     side = TOP if self.work.failures == 0 or self.random.random() < 0.5 else BOTTOM
                     yield from self.work.localise(side, self._swept_by_others)
-                plan = latest_plans(self.plans, self.membership.view).get(self.setup.node)
+                plan = latest_plans(self.lead.plans, self.membership.view).get(self.setup.node)
                 if plan is not None and (plan.epoch, plan.number) != (self._epoch, self._number):
                     self._epoch, self._number = plan.epoch, plan.number
                     if plan.anchor.side == LINK:
@@ -196,7 +200,6 @@ class TeamRobot(Controller):
             except (Lost, NoWay):
                 self.work.failures += 1
                 self.work.at = self.work.sweeping = None
-                yield None
 
     def _swept_by_others(self, k: int) -> bool:
         """Tell whether another robot is sweeping slice k now, by its own word."""
@@ -221,79 +224,39 @@ class TeamRobot(Controller):
                 found.append(status.at)
         return found
 
-    def _note_wreck(self, x_m: float, y_m: float) -> None:
-        """Add to the map which ends a dead robot hides: those nearer to it than another body can come."""
-        radius_m = 2.0 * self._radius_m
+    def _watch(self, senses: Senses) -> None:
+        """Look for wrecks, tell what they hide, and whether robots that were taken for dead live."""
+        tick, roster, voids = senses.tick, self.membership.roster, self.map.voids
+        if self._channels:
+            for node in self._wrecks.watch(senses, voids):
+                place = next(other for other in senses.robots if other.node == node)
+                self._note_wreck(self._wrecks.wrecks[node], place.x_m, place.y_m)
+        for void in voids:
+            node = void.wreck.node
+            status = roster.statuses.get(node)
+            if node == self.setup.node:
+                self.map.add(Return(node, tick))
+            elif status is not None and status.beat > void.wreck.tick:
+                self.map.add(Return(node, status.beat))
+        for node in self._wrecks.moved:
+            self.map.add(Return(node, tick))
+        for node in list(self._wrecks.wrecks):
+            status = roster.statuses.get(node)
+            if status is not None:
+                self._wrecks.lives(node, status.beat)
+
+    def _note_wreck(self, wreck: Wreck, x_m: float, y_m: float) -> None:
+        """Add to the map which ends a wreck hides: those nearer to it than another body can come."""
+        radius_m = 2.0 * self._radius_m + HIDDEN_M
         for k in (self._grid.nearest(x_m) + step for step in (-1, 0, 1)):
             half_m2 = radius_m**2 - (self._grid.x_m(k) - x_m) ** 2
             if half_m2 > 0.0:
                 half_m = math.sqrt(half_m2)
-                self.map.add(Void(k, mm(x_m), mm(y_m - half_m), mm(y_m + half_m)))
-
-    def _is_dead(self, node: int) -> bool:
-        """Tell whether a robot in sight has been silent for too long to be alive."""
-        tick = 0 if self._senses is None else self._senses.tick
-        silent = self.membership.roster.silent_ticks(node, tick)
-        if node in self._wrecks:
-            return bool(silent * self.setup.dt_s > self.parameters.silence_s)
-        return bool(self.setup.channels) and silent * self.setup.dt_s > 2.0 * self.parameters.silence_s
+                self.map.add(Void(k, mm(x_m), mm(y_m - half_m), mm(y_m + half_m), wreck))
 
     def _newest_senses(self) -> Senses:
         assert self._senses is not None
         return self._senses
-
-    # --- deciding -----------------------------------------------------------------------------------------------------
-
-    def _decide(self, tick: int) -> None:
-        """As the lead, unite with teams that were met, divide, or give the free members something to do."""
-        membership, dt_s = self.membership, self.setup.dt_s
-        if tick % DECIDE_TICKS or tick * dt_s < MUSTER_S:
-            return
-        view, statuses = membership.view, membership.roster.statuses
-        statuses[self.setup.node] = self._status(self._newest_senses(), tick)
-        membership.roster.news_tick[self.setup.node] = tick
-        free = free_members(view, self.plans, statuses)
-        if not free:
-            return
-        table: TeamTable = self.parameters
-        everybody = len(free) == len(view.members)
-        if table.merge and membership.met():
-            if everybody and membership.merge(tick):
-                self._urgent = True
-                return
-            if membership.merges_soon(tick, round(MERGE_PATIENCE_S / dt_s)):
-                return
-        if self.map.certificate.complete:
-            return
-        for plan in dict.fromkeys(latest_plans(self.plans, view).values()):
-            if plan.number not in self._judged and all(node in free for node in plan.order):
-                self._judged[plan.number] = plan
-                if self._digests.pop(plan.number, None) == self.map.facts.digest:
-                    self._skip[Task(plan.anchor, plan.direction, plan.own_slice)] = tick
-                index = finder(plan.order, statuses) if table.divide and plan.anchor.side != LINK else None
-                groups = None if index is None else division(view, plan.order, index)
-                if groups is not None:
-                    membership.divide(groups, tick)
-                    self._forget_plans()
-                    return
-        self._skip = {task: since for task, since in self._skip.items() if (tick - since) * dt_s < SKIP_S}
-        # Where nothing could be assigned for some time, far tasks are taken too, and then those in reserved cells.
-        idle_s = (tick - self._made_tick) * dt_s
-        join_mm = mm(table.join_m) if idle_s < FAR_AFTER_S else FAR
-        plans = self.plans if idle_s < ANY_AFTER_S else without_busy(self.plans, free)
-        made = assign(self.map, view, self.plans, plans, statuses, self._skip, table.one_corridor, join_mm)
-        if made:
-            self._made_tick = tick
-            self.plans = (*dict.fromkeys(latest_plans(self.plans, view).values()), *made)
-            for plan in made:
-                self._digests[plan.number] = self.map.facts.digest
-            self._urgent = True
-
-    def _forget_plans(self) -> None:
-        self.plans = ()
-        self._judged.clear()
-        self._digests.clear()
-        self._urgent = True
 
     # --- hearing and saying -------------------------------------------------------------------------------------------
 
@@ -312,14 +275,12 @@ class TeamRobot(Controller):
                     apart = math.hypot(status.x_mm / 1000.0 - senses.x_m, status.y_mm / 1000.0 - senses.y_m)
                     near = apart <= table.meeting_m
             self.membership.receive(beacon, tick, near)
-            if beacon.sender in self.membership.view.members or near:
+            if self.membership.knows(beacon.sender) or near:
                 self.exchange.receive(beacon, tick)
             else:
                 self.exchange.forget(beacon.sender)
-            view = self.membership.view
-            if beacon.sender in view.members and not self.membership.leads:
-                known = dict.fromkeys((*self.plans, *[plan for plan in beacon.plans if plan.epoch == view.epoch]))
-                self.plans = tuple(dict.fromkeys(latest_plans(tuple(known), view).values()))
+            if self.membership.knows(beacon.sender) and not self.membership.leads:
+                self.lead.follow(beacon.plans)
 
     def _status(self, senses: Senses, tick: int) -> Status:
         work, view = self.work, self.membership.view
@@ -345,43 +306,33 @@ class TeamRobot(Controller):
 
     def _say(self, observation: Observation, senses: Senses) -> tuple[Transmission, ...]:
         tick = observation.tick
-        if not self.setup.channels or not (self._urgent or (tick + self.setup.node) % self._every == 0):
+        if not self._channels or not (self._urgent or (tick + self.setup.node) % self._every == 0):
             return ()
         self._urgent = False
         membership = self.membership
         parcel = self.exchange.outgoing(tick)
         mine = self._status(senses, tick)
-        others = [status for node, status in sorted(membership.roster.statuses.items()) if node != self.setup.node]
-        others = [status for status in others if status.node in membership.view.members]
+        others = [] if self._central else membership.others()
         beacon = Beacon(
             self.setup.node,
             membership.outgoing(),
             membership.met(),
-            self.plans,
+            self.lead.plans,
             (mine, *others),
             self.map.facts.digest,
             len(self.map.facts),
             *parcel,
         )
         frame = seal(encode_beacon(beacon))
-        return tuple([Transmission(channel, frame) for channel in self.setup.channels])
+        return tuple([Transmission(channel, frame) for channel in self._channels])
 
     def _telemetry(self) -> dict[str, float | bool]:
         """Return the certificate and what the team came to, whenever the map has grown."""
         facts = self.map.facts
-        if len(facts) == self._told_count:
+        if (len(facts), self._done) == self._told:
             return {}
-        self._told_count = len(facts)
-        certificate, membership = self.map.certificate, self.membership
-        return {
-            "certificate_satisfied": certificate.complete,
-            "ends": certificate.ends,
-            "ends_without_mate": len(certificate.ends_without_mate),
-            "open_ports": len(certificate.open_ports),
-            "critical_points": len({arc.ports for arc in facts.arcs if arc.kind != PASSES}),
-            "divisions": membership.divisions,
-            "merges": membership.merges,
-        }
+        self._told = len(facts), self._done
+        return {"certificate_satisfied": self._done, **findings(self.map, self.membership)}
 
     def _snapshot(self) -> bytes:
         """Return what this robot has found since the last tick, encoded; empty where it found nothing."""

@@ -7,11 +7,11 @@ They add what they find to the map, and keep `at`, the end where the robot stand
 from collections.abc import Callable, Generator
 from typing import Final, Protocol
 
-from zwerm.agents.robot_teams.facts import LEFT, RIGHT, End, Fact, Segment
-from zwerm.agents.robot_teams.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
-from zwerm.agents.robot_teams.senses import Senses
-from zwerm.agents.robot_teams.slice_map import SliceMap
-from zwerm.agents.robot_teams.team_messages import HUNTS, SWEEPS, TRAVELS, Plan
+from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, End, Fact, Segment
+from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
+from zwerm.agents.robot_teams.motion.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
+from zwerm.agents.robot_teams.motion.senses import Senses
+from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, SWEEPS, TRAVELS, Plan
 
 Story = Generator[Manoeuvre | None, None, None]
 
@@ -116,9 +116,8 @@ class Work:
         if end is None:
             raise Lost
         low, high = sorted((start.y_mm, end.y_mm))
-        known = self.map.end(start)
-        if known is None or self.map.mate(known) is None or self.map.end(end) is None:
-            self._note(Segment(start.slice, low, high))
+        if self._is_new(start, 0, end, bool(sweep.wrecks)):
+            self._note(Segment(start.slice, low, high, tuple(sweep.wrecks)))
         self.at = self.map.end(end)
 
     def trace(self, direction: int) -> Generator[Manoeuvre | None, None, bool]:
@@ -136,8 +135,7 @@ class Work:
         if end is None:
             raise Lost
         # Where a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known.
-        known = self.map.end(start)
-        if arc is not None and (known is None or self.map.arc(known, direction) is None):
+        if arc is not None and self._is_new(start, direction, end, bool(arc.wrecks)):
             self._note(arc)
         self.at = self.map.end(end)
         if self.at is None:
@@ -148,7 +146,7 @@ class Work:
         """Go to a known end by the shortest known way."""
         astray = 0
         for _ in range(STEPS_MAX):
-            start = self._here()
+            start = self.here
             goal = self.map.end(stop)
             if start is None or goal is None:
                 raise Lost
@@ -163,18 +161,28 @@ class Work:
                 yield from self.sweep()
             else:
                 yield from self.trace(step.direction)
-            if self._here() != self.map.end(step.stop):
+            if self.here != self.map.end(step.stop):
                 astray += 1
                 if astray > ASTRAY_MAX:
                     raise NoWay
         raise NoWay
 
+    def _is_new(self, start: End, direction: int, stop: End, beside_wreck: bool) -> bool:
+        """Tell whether no such way is known, or, beside a wreck, none that leads to `stop`."""
+        known = self.map.end(start)
+        if known is None:
+            return True
+        way = self.map.arc(known, direction) if direction else self.map.mate(known)
+        found = self.map.end(stop)
+        return way is None or (not direction and found is None) or (beside_wreck and way.stop != found)
+
     def _note(self, fact: Fact) -> None:
         if self.map.add(fact):
             self.found_facts.append(fact)
 
-    def _here(self) -> End | None:
-        """Return the known end at which the robot stands, if it stands at one."""
+    @property
+    def here(self) -> End | None:
+        """The known end at which the robot stands, or from which it set out; None where it does not know."""
         return None if self.at is None else self.map.end(self.at)
 
     def _approach(self, end: End) -> Story:

@@ -1,7 +1,7 @@
 """The contract between a controller and whatever runs it: observation in, command out.
 
-A controller is a plain object. It does no I/O, reads no clock and imports no global randomness; what it may know of
-itself arrives in its `Setup`, what it may know of its surroundings arrives in each `Observation`. `Controller` is a
+A controller is a plain object. It does no I/O, reads no clock and imports no global randomness. Its `Setup` holds all
+that it may know of itself. Each `Observation` holds all that it may know of its surroundings. `Controller` is a
 convenience: any class with the same constructor and `step` will do.
 """
 
@@ -20,7 +20,7 @@ class NoParameters(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Body(Struct, frozen=True, forbid_unknown_fields=True):
-    """What a robot knows of its own body."""
+    """The body of a robot, as the robot knows it."""
 
     kind: str
     radius_m: float
@@ -50,7 +50,7 @@ class Setup(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Stepper(Protocol):
-    """What a runner needs of a controller."""
+    """The interface that a runner needs of a controller."""
 
     def step(self, observation: Observation) -> Command:
         """Return the answer to one observation."""

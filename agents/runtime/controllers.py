@@ -1,5 +1,8 @@
 """Controllers by name: those of the catalogue, and `module:Class` for any other."""
 
+import inspect
+import traceback
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -23,6 +26,13 @@ def find(name: str) -> type[Any]:
         raise ControllerError(str(error)) from error
     if not callable(getattr(found, "step", None)):
         raise ControllerError(f"{name}: a controller needs a method step(observation) -> Command")
+    try:
+        inspect.signature(found).bind(None)
+    except (TypeError, ValueError):
+        raise ControllerError(f"{name}: a controller's constructor takes its Setup: __init__(self, setup)") from None
+    kind: Any = parameters_of(found)
+    if not isinstance(kind, type) or not issubclass(kind, msgspec.Struct):
+        raise ControllerError(f"{name}: its Parameters must be a subclass of msgspec.Struct, got {kind!r}")
     return found
 
 
@@ -36,7 +46,19 @@ def make(name: str, setup: Setup) -> Stepper:
         controller: Stepper = found(setup)
     except msgspec.ValidationError as error:
         raise ControllerError(f"{name}: {error}") from None
+    except ControllerError:
+        raise
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{last.filename}:{last.lineno}"
+        raise ControllerError(f"{name}: its constructor raised {type(error).__name__}: {error} ({where})") from error
     return controller
+
+
+def step_place(found: type[Any]) -> str:
+    """Return where a controller answers, such as " (mine.py:12, in Mine.step)", or "" where that is not known."""
+    code = getattr(inspect.unwrap(found.step), "__code__", None)
+    return "" if code is None else f" ({Path(code.co_filename).name}:{code.co_firstlineno}, in {found.__name__}.step)"
 
 
 def parameters_of(found: type[Any]) -> type[Any]:

@@ -3,14 +3,16 @@
 The memory link and the robot process run the same object, so both return the same bytes.
 """
 
+import inspect
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import msgspec
 
 from zwerm.agents.runtime.contract import Setup, Stepper
-from zwerm.agents.runtime.controllers import make
+from zwerm.agents.runtime.controllers import make, step_place
 from zwerm.link import Answer
 from zwerm.wire.messages import (
     MESSAGE_BYTES_MAX,
@@ -38,8 +40,8 @@ class Node:
     """One node: its controller and the wire format around it.
 
     `answer` returns the encoded command for one encoded observation. If the controller raises, it calls `on_failure` and
-    returns the encoded Failure. `answer` is a closure over local names, because attribute look-ups cost most of an answer: in
-    a large swarm the robot's objects leave the processor's cache between two ticks.
+    returns the encoded Failure. `answer` is a closure over local names, because attribute look-ups cost most of an
+    answer. In a large swarm the objects of a robot leave the processor's cache between two ticks.
     """
 
     def __init__(self, controller: str, setup: Setup, on_failure: Callable[[], object] = _nothing) -> None:
@@ -70,6 +72,8 @@ class Node:
             tick = observation.tick
             try:
                 command = step(observation)
+                if command.__class__ is not Command:
+                    raise TypeError(f"step() returned {command!r:.80}, expected a Command")
                 command.tick = tick
                 payload_out = write(command)
                 if len(payload_out) > MESSAGE_BYTES_MAX:
@@ -89,10 +93,26 @@ class Node:
         return encode(
             Failure(
                 tick,
-                _printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX],
-                _printable(traceback.format_exc())[-TRACEBACK_CHARS_MAX:],
+                _printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX] + self._place(error),
+                _printable("".join(_formatted(error)))[-TRACEBACK_CHARS_MAX:],
             )
         )
+
+    def _place(self, error: BaseException) -> str:
+        """Return the last line of the controller's own file that led to `error`, or the place of its `step`."""
+        own = inspect.unwrap(type(self._controller).step).__code__.co_filename
+        frames = [each for each in traceback.extract_tb(error.__traceback__) if each.filename == own]
+        if not frames:
+            return step_place(type(self._controller))
+        return f" ({Path(own).name}:{frames[-1].lineno}, in {frames[-1].name})"
+
+
+def _formatted(error: BaseException) -> list[str]:
+    """Return the traceback of an error without the frame of this file, which tells nothing of the controller."""
+    trace = error.__traceback__
+    if trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return traceback.format_exception(type(error), error, trace)
 
 
 def _printable(text: str) -> str:

@@ -4,15 +4,16 @@ The process answers each observation with one command, in order. It exits when t
 and with the process that started it. After a failure of its controller it exits once the world has confirmed the failure, so
 the world always knows the reason first. It ignores SIGINT: the process that started it handles Ctrl-C.
 
-The loop joins, waits and ends. Zenoh's thread answers observations where it delivers them. Passing each observation to the
-loop's thread costs more than all other work together (measured, one robot tick: 160 us of processor time instead of 106).
-In real time observations are passed to the loop all the same: a slow controller gets a backlog there, and a backlog that is
-answered in the sending thread can block that thread.
+The loop joins, waits and ends. Zenoh's thread answers observations where it delivers them. Passing each observation to
+the loop's thread costs more than all other work together (measured for one robot tick: 160 us of processor time instead
+of 106). In real time observations are passed to the loop nevertheless. The backlog of a slow controller collects there.
+If the sending thread answered it, the backlog could block that thread.
 """
 
 import asyncio
 import contextlib
 import ctypes
+import io
 import os
 import signal
 import sys
@@ -20,7 +21,7 @@ from collections.abc import Callable
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import msgspec
 import uvloop
@@ -37,8 +38,8 @@ EXIT_FAILED: Final = 1
 EXIT_REFUSED: Final = 2
 EXIT_LOST: Final = 3
 
-# All robots wait for the world, so the world has priority if there are more processes than cores (measured: a few per cent
-# more ticks with 100 robots on two cores). The largest niceness would starve robots beside other programs.
+# All robots wait for the world. So the world has priority if there are more processes than cores (measured: a few per
+# cent more ticks with 100 robots on two cores). The largest niceness would starve robots beside other programs.
 NICENESS: Final = 5
 
 _PR_SET_PDEATHSIG: Final = 1
@@ -57,13 +58,16 @@ def main(
 
     With a `station` the process moves into its network namespace and sends packets over that network.
     """
+    die_with_parent(_server)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)
-    die_with_parent()
     parent = parent_process()
-    if parent is not None and not parent.is_alive():  # it died before die_with_parent took effect
-        sys.exit(EXIT_LOST)
+    if parent is not None and not parent.is_alive():  # where the kernel has no die_with_parent
+        os._exit(EXIT_LOST)
+    os.dup2(2, 1)  # standard output is for the results of the run
+    sys.stdout = _Prefixed(sys.stderr, f"node {credential.node}: ")
     set_threads(ONE_THREAD if is_local(endpoint) and station is None else TWO_THREADS)
+    sys.breakpointhook = _no_terminal
     here = str(Path.cwd())
     if here not in sys.path:
         sys.path.append(here)  # the place of a user's own controllers
@@ -79,6 +83,29 @@ def main(
         sys.stderr.flush()
         os._exit(code)  # closing the radio's session waits for messages that the network loses
     sys.exit(code)
+
+
+class _Prefixed(io.TextIOBase):
+    """A text stream that writes whole lines to `stream`, each after `prefix`."""
+
+    def __init__(self, stream: TextIO, prefix: str) -> None:
+        self._stream, self._prefix, self._line = stream, prefix, ""
+
+    def writable(self) -> bool:
+        """Tell that the stream can be written to."""
+        return True
+
+    def write(self, text: str) -> int:
+        """Write the lines that `text` completes."""
+        *whole, self._line = (self._line + text).split("\n")
+        if whole:
+            self._stream.write("".join(f"{self._prefix}{line}\n" for line in whole))
+            self._stream.flush()
+        return len(text)
+
+
+def _no_terminal(*_: object, **__: object) -> None:
+    raise RuntimeError("breakpoint() needs a terminal, and a robot process has none: run with --inline")
 
 
 async def run_node(
@@ -193,7 +220,21 @@ def _is_goodbye(payload: bytes) -> bool:
         return False
 
 
-def die_with_parent() -> None:
-    """Tell the kernel to kill this process when its parent dies (Linux only)."""
+def die_with_parent(parent: int | None = None) -> None:
+    """Tell the kernel to kill this process when its parent dies (Linux only).
+
+    Exits at once if `parent` is not the parent any more: it died before the kernel was told, and the kernel says nothing then.
+    """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if parent is not None and os.getppid() != parent:
+            os._exit(EXIT_LOST)
+
+
+_server: int | None = None
+
+
+def serve_robots() -> None:
+    """Note that this process is the server that robots are forked from: a robot ends when it is not their parent any more."""
+    global _server
+    _server = os.getpid()

@@ -1,14 +1,10 @@
-"""The coverage control algorithm as printed: move towards the estimated centroid of one's own Voronoi cell.
+"""The coverage control algorithm as printed: a robot moves towards the estimated centroid of its own Voronoi cell.
 
 The robot knows the positions of its neighbours relative to itself, the corners of the region, and the field's value and
-gradient where it stands; all in its body frame, so that it needs no compass. What it keeps from one
-observation to the next makes it quicker and changes no answer.
+gradient at its place. All are in its body frame, so it needs no compass. The cache between two observations saves time
+and changes no answer.
 
-Where the paper says nothing:
-- a robot at the same place as another has the same cell, and both move as one until something parts them;
-- a robot outside the region whose cell is empty heads for the nearest place of the region;
-- where no neighbour is sensed the cell is the whole region, which is what the definition gives;
-- where the field is zero or negative all over the cell, its centroid is that of a constant field.
+Rules for cases that the paper leaves open:
 """
 
 from typing import Annotated, Any, ClassVar
@@ -16,7 +12,7 @@ from typing import Annotated, Any, ClassVar
 from msgspec import Meta, Struct
 
 from zwerm.agents.runtime.contract import Controller, Setup
-from zwerm.maths.kept_cell import KeptCell
+from zwerm.maths.cached_voronoi_cell import CachedVoronoiCell
 from zwerm.wire.messages import BodyVelocity, Command, Observation
 
 
@@ -36,7 +32,7 @@ class VoronoiCoverage(Controller):
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
         table: Any = self.parameters
-        self._cell = KeptCell()
+        self._cell = CachedVoronoiCell()
         self._gain_per_s = table.gain_per_s
         self._tolerance2 = table.tolerance_m**2
 

@@ -13,7 +13,7 @@ from zwerm.maths.polygons import Point, Polygon, estimated_centroid, moments
 # A determinant of the normal equations this small, relative to what it could be, leaves the curvature open.
 _SINGULAR: Final = 1e-9
 
-# How nearly equal to a bisector's distance a corner's must be for the bisector to be a side of the cell.
+# Tolerance, as a factor: a bisector is a side of the cell if a corner's distance equals its own up to this.
 _ON_SIDE: Final = 1e-9
 
 

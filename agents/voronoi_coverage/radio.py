@@ -1,10 +1,10 @@
 """Voronoi coverage with neighbours learned by radio instead of sensed, so that lost and late packets matter.
 
-Every robot knows its own pose, tells it and the field's value there to whoever hears, and takes the others to be where they
-last said they were. What it has not heard of for `memory_s` it forgets. It listens for one period before it first moves,
-and a robot that knows of nobody stays where it is, as the SwarmBots did: alone, its cell would be the whole region. A packet
-carries a checksum; one that is not ours, or is damaged, is passed over. With `estimate = "quadratic"` the values heard bend
-the estimate of the field.
+Every robot knows its own pose, and broadcasts it with the field's value there. It assumes that the other robots are at
+the places of their latest packets. It forgets a robot from which no packet came for `memory_s`. It listens for one
+period before it first moves. A robot that knows no other robot stays at its place, as the SwarmBots did: its cell would
+be the whole region. A packet carries a checksum; one that is not ours, or is damaged, is passed over. With `estimate =
+"quadratic"` the values heard bend the estimate of the field.
 """
 
 import math
@@ -27,7 +27,7 @@ _SUM: Final = struct.Struct("<I")
 
 
 class NeighbourReport(NamedTuple):
-    """What a robot last said: when [s], where it was [m] in the frame of the arena, and the field's value there."""
+    """The latest packet of a robot: its time [s], the position [m] in the frame of the arena, and the field's value there."""
 
     time_s: float
     x_m: float
@@ -53,7 +53,8 @@ def unpack(payload: bytes) -> tuple[int, NeighbourReport] | None:
 
 
 class RadioCoverageTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """The gain k, how often the robot speaks and for how long it remembers [s], how it estimates the field.
+    """The gain k, the period of broadcasts [s], the time for which packets are remembered [s], and how the field is
+    estimated.
 
     It is done while its own error is below `tolerance_m`.
     """
@@ -78,7 +79,7 @@ class RadioCoverage(Controller):
         self._heard: dict[int, NeighbourReport] = {}
 
     def step(self, observation: Observation) -> Command:
-        """Return the velocity u = k (C_hat - p) for where the others were heard to be, and speak if it is time to."""
+        """Return the velocity u = k (C_hat - p) for the latest known positions of the others, and broadcast if it is due."""
         table, pose, here = self._table, observation.pose, observation.field
         assert pose is not None
         assert observation.boundary is not None
@@ -97,7 +98,7 @@ class RadioCoverage(Controller):
             centroid = estimated_centroid(cell, *field)
         x, y = centroid or nearest_point(observation.boundary)
         moves = bool(samples) and observation.tick > self._every_ticks
-        # Robots take turns, so that not all speak at once.
+        # Robots take turns, so that not all broadcast at once.
         speaks = (observation.tick + self.setup.node) % self._every_ticks == 0
         say = NeighbourReport(observation.time_s, pose.x_m, pose.y_m, here.value)
         return Command(

@@ -1,9 +1,6 @@
 """Voronoi coverage as the paper's robots ran it: neighbours within a radius only, no sense of the boundary, a noisy light.
 
-What differs from the algorithm as printed (section V-B and figures 6, 7 and 9):
-- the cell is made of the neighbours within range; where that leaves it unbounded, three rules close it;
-- the light sensors tell the direction of the light and its strength, so the gradient has a fixed magnitude;
-- an offset Phi added to the light moderates it: Phi_offset + light is the field;
+Differences from the algorithm as printed (section V-B and figures 6, 7 and 9): Phi_offset + light is the field;
 - a robot whose target is within a threshold of where it stands remains there.
 
 The lengths of the rules and the magnitude of the gradient are not in the paper; those here are our choice. So is that no

@@ -3,8 +3,8 @@
 Algorithm 1 of Ramaithitima and Bhattacharya 2018. It knows what robots wrote into their logs, and the landmarks that a free
 robot sees. Where robots choose by themselves it is a hub only, over which they gossip.
 
-It ends when no frontier is open, every robot has been halted, and it holds all that any of them wrote: a halted robot adds
-nothing to its log. A robot that is silent for `dead_ticks` is presumed dead: its frontier is free again.
+It ends when no frontier is open, every robot has been halted, and it has all entries that robots wrote. A halted robot
+adds nothing to its log. A robot that is silent for `dead_ticks` is presumed dead: its frontier is free again.
 """
 
 from collections.abc import Sequence
@@ -28,12 +28,12 @@ from zwerm.agents.landmark_exploration.mapping.cost_utility import (
 )
 from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, REOPENED, TIMED_OUT, pair_of
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, columns, write_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, columns, write_report
 from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, CentralStrategy, NonNegative, Ticks
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
-from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BYTES, Entries, Report, Vector
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BYTES, Entries, TaskReport, Vector
 from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
-from zwerm.agents.landmark_exploration.sharing.orders import Task, cut, landmarks_in, write_task
+from zwerm.agents.landmark_exploration.sharing.orders import ExplorationTask, cut, landmarks_in, write_task
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 from zwerm.wire.messages import Command, Observation, Transmission
@@ -63,8 +63,8 @@ class CoordinatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
     message_bytes_max: int = LARGE_BYTES
 
 
-class Setup(Protocol):
-    """What the coordinator needs of its setup."""
+class CoordinatorSetup(Protocol):
+    """The setup of the coordinator."""
 
     @property
     def node(self) -> int:
@@ -72,25 +72,28 @@ class Setup(Protocol):
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """What the scenario set."""
+        """Parameters of the scenario."""
 
     @property
     def services(self) -> dict[str, str]:
-        """Who provides which service."""
+        """Provider of each service."""
 
     @property
     def incarnation(self) -> int:
-        """How often it has begun."""
+        """Number of its starts."""
 
 
 @dataclass
 class _Robot:
-    """What is known of one robot. `order` numbers the last order, and `task` is what it says; None: none yet."""
+    """The state of one robot, as far as it is known.
+
+    `order` numbers the last order, and `task` is what it says; None: none yet.
+    """
 
     incarnation: int = -1
     heard_at: int = 0
     order: int = 0
-    task: Task | None = None
+    task: ExplorationTask | None = None
     said_at: int = -1_000
     free: bool = False
     landmarks: tuple[int, ...] = ()
@@ -104,12 +107,12 @@ class LandmarkCoordinator:
 
     Parameters = CoordinatorParameters
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: CoordinatorSetup) -> None:
         rules = msgspec.convert(setup.parameters, CoordinatorParameters)
         self.map = LandmarkMap()
         self.replica = Replica()
         self._rules = rules
-        self._life = setup.incarnation
+        self._incarnation = setup.incarnation
         self._origin = origin_of(setup.node, setup.incarnation)
         self._tick = 0
         self._robots = {node: _Robot() for node in range(setup.node)}
@@ -139,7 +142,7 @@ class LandmarkCoordinator:
                 self._gossip.hear(packet.sender, message, self._tick)
             elif isinstance(message, Entries):
                 self._take(packet.sender, message)
-            elif isinstance(message, Report) and packet.sender in self._robots:
+            elif isinstance(message, TaskReport) and packet.sender in self._robots:
                 self._hear(packet.sender, message)
         if self._gossip is None:
             self._acknowledge_all()
@@ -174,7 +177,7 @@ class LandmarkCoordinator:
             self._send([Said(node, Vector(origin, origin + 1, counts, ask=False))])
         self._acknowledge.clear()
 
-    def _hear(self, node: int, report: Report) -> None:
+    def _hear(self, node: int, report: TaskReport) -> None:
         robot = self._robots[node]
         if report.incarnation < robot.incarnation:
             return
@@ -188,10 +191,10 @@ class LandmarkCoordinator:
             robot.landmarks = landmarks_in(report.landmarks)
         except ValueError:
             return
-        has_newest = report.life == self._life and report.order == robot.order
+        has_newest = report.coordinator_incarnation == self._incarnation and report.order == robot.order
         if robot.task is None:
             robot.free = report.free
-            robot.order = max(robot.order, report.order if report.life == self._life else 0)
+            robot.order = max(robot.order, report.order if report.coordinator_incarnation == self._incarnation else 0)
         elif has_newest and report.free and robot.task.key is not None:
             if not report.reached:
                 self._failed(robot.task)
@@ -201,7 +204,7 @@ class LandmarkCoordinator:
         elif self._tick - robot.said_at >= SAY_AGAIN_TICKS:
             self._say(node, robot)
 
-    def _failed(self, task: Task) -> None:
+    def _failed(self, task: ExplorationTask) -> None:
         """Note that a robot did not get to its frontier; after a while that counts as a time-out."""
         assert task.key is not None
         failures = self._failures[task.key] = self._failures.get(task.key, 0) + 1
@@ -268,10 +271,10 @@ class LandmarkCoordinator:
             robot.consider_at = self._tick + robot.patience_ticks
             robot.patience_ticks = min(2 * robot.patience_ticks, RETRY_TICKS_MAX)
             if cut_off and (robot.task is None or (robot.task.key is None and not robot.task.walk)):
-                self._order(node, Task(None, walk=True), patience=robot.patience_ticks)
+                self._order(node, ExplorationTask(None, walk=True), patience=robot.patience_ticks)
             return
         status = ABANDONED if self.map.frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
-        self._order(node, Task(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status))
+        self._order(node, ExplorationTask(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status))
 
     def _uncoordinated(self, node: int, living: Sequence[int]) -> Choice | None:
         """Return the choice of a baseline, which is free to send several robots to one frontier."""
@@ -310,7 +313,7 @@ class LandmarkCoordinator:
             return False
         for node, robot in robots.items():
             if robot.free and (robot.task is None or robot.task.walk):
-                self._order(node, Task(None))
+                self._order(node, ExplorationTask(None))
         return all(
             robot.task is not None
             and robot.task.key is None
@@ -320,7 +323,7 @@ class LandmarkCoordinator:
             for node, robot in robots.items()
         )
 
-    def _order(self, node: int, task: Task, patience: int = RETRY_TICKS) -> None:
+    def _order(self, node: int, task: ExplorationTask, patience: int = RETRY_TICKS) -> None:
         robot = self._robots[node]
         robot.order += 1
         robot.task, robot.free, robot.patience_ticks = task, False, patience
@@ -329,7 +332,9 @@ class LandmarkCoordinator:
     def _say(self, node: int, robot: _Robot) -> None:
         assert robot.task is not None
         robot.said_at = self._tick
-        parts = cut(write_task(robot.task), self._life, robot.incarnation, robot.order, self._rules.message_bytes_max)
+        parts = cut(
+            write_task(robot.task), self._incarnation, robot.incarnation, robot.order, self._rules.message_bytes_max
+        )
         self._send([Said(node, part) for part in parts])
 
     def _send(self, said: list[Said]) -> None:
@@ -351,4 +356,6 @@ class LandmarkCoordinator:
         assigned = tuple((node, *pair_of(task.key)) for node, task in tasks.items() if task and task.key is not None)
         frontiers = tuple(pair_of(key) for key in list(self.map.frontiers.open)[:FRONTIERS_TOLD_MAX])
         count = len(self.map.frontiers.open)
-        return write_told(MapTold(*columns(seen), open=count, done=self._done, frontiers=frontiers, assigned=assigned))
+        return write_report(
+            MapReport(*columns(seen), open=count, done=self._done, frontiers=frontiers, assigned=assigned)
+        )

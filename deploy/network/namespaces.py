@@ -1,7 +1,7 @@
 """Network namespaces of a run: one for each node, connected by veth pairs to a bridge in one more namespace.
 
-No namespace outlives this process. It has no name and no file: the kernel removes it, with its interfaces, addresses and
-rules, when no process holds its descriptor or runs in it. The namespace of this process itself is never changed.
+No namespace outlives this process. It has no name and no file. When no process holds its descriptor or runs in it, the
+kernel removes it, with its interfaces, addresses and rules. The namespace of this process itself is never changed.
 """
 
 import contextlib

@@ -8,6 +8,7 @@ from command_line import zwerm
 
 from zwerm import __version__
 from zwerm.catalogue import ALGORITHMS, COMMANDS, plugins
+from zwerm.cli.output_files import run_stem
 from zwerm.scenario.load import built_in
 
 
@@ -15,7 +16,7 @@ def test_list_names_every_scenario() -> None:
     ran = zwerm("list")
     assert ran.returncode == 0
     for name in built_in():
-        assert f"{name} " in ran.stdout
+        assert name in ran.stdout.split()
 
 
 def test_list_groups_scenarios_and_studies_by_algorithm_and_filters_them() -> None:
@@ -73,8 +74,12 @@ def test_check_reports_an_unknown_controller_and_an_unknown_sensor_beside_errors
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["run", "no-such"], "zwerm: no-such: expected a scenario file or the name of a built-in one; built in are "),
-        (["run", "computation-free", "--set", "robots.count=none"], "robots.count: "),
+        (["run", "no-such"], "zwerm: no-such: expected a scenario file or the name of a built-in one; nearest are "),
+        (["run", "computation-free", "--set", "robots.count=none"], "zwerm: --set robots.count=none: robots.count: "),
+        (["run", "computation-free", "--set", "robots.cuont=4"], "robots.cuont: unknown key; did you mean count?"),
+        (["run", "computation-free-comparison"], "run it with: zwerm study computation-free-comparison"),
+        (["study", "computation-free"], "run it with: zwerm run computation-free"),
+        (["run", "computation-free", "--set", "robots.controller=zoo:Robot:x"], "cannot import 'zoo': "),
         (["run", "computation-free", "--set", "robots"], "zwerm: --set robots: expected path=value"),
         (
             ["run", "computation-free", "--set", "robots.controller=nobody"],
@@ -82,6 +87,10 @@ def test_check_reports_an_unknown_controller_and_an_unknown_sensor_beside_errors
         ),
         (["run", "computation-free", "--set", "robots.controller=no_such_file:Robot"], "cannot import 'no_such_file'"),
         (["run", "computation-free", "--set", "robots.count=2000"], "robots.placement: no room for robot"),
+        (
+            ["world", "computation-free", "--listen", "foo", "--credentials", "k"],
+            "zwerm: --listen: expected an endpoint such as tcp/0.0.0.0:7447, got 'foo'",
+        ),
         (["run", "computation-free", "--inline", "--realtime", "0"], "zwerm: realtime: expected a factor > 0, got 0.0"),
         (
             ["robot", "--connect", "tcp/127.0.0.1:1", "--credentials", "none.key"],
@@ -130,11 +139,11 @@ def test_run_without_json_prints_the_outcome_and_the_paths_of_the_pictures(tmp_p
         "cell_coverage_fraction",
         "robot-ticks/s",
         "trace",
-        "runs/computation-free-seed1.png",
+        "runs/computation-free-seed1-time.duration_s=2.png",
         "run.gif",
     ):
         assert word in ran.stdout
-    assert (tmp_path / "runs/computation-free-seed1.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "runs/computation-free-seed1-time.duration_s=2.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
 
 
@@ -166,7 +175,8 @@ def test_picture_at_draws_each_moment_and_an_unknown_cycle_keeps_the_result(tmp_
     assert "zwerm: cycle 999: expected one that the run reported, which are " in ran.stderr
     assert "trace" in ran.stdout
     drawn = sorted(path.name for path in (tmp_path / "runs").iterdir())
-    assert drawn == [f"sensor-coverage-seed1{each}.png" for each in ("-1.5s", "-cycle2", "")]
+    stem = run_stem("sensor-coverage", 1, hall[1::2])
+    assert drawn == [f"{stem}{each}.png" for each in ("-1.5s", "-cycle2", "")]
     wrong = zwerm("run", "sensor-coverage", "--picture-at", "soon", cwd=tmp_path)
     assert wrong.returncode == 2
     assert wrong.stderr == "zwerm: --picture-at: expected a cycle such as 40 or a time such as 120s, got 'soon'\n"

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from comparisons import VARIANTS, planned
+from matplotlib.figure import Figure
 from rich.console import Console
 from support import ROOT, ZWERM
 
@@ -55,6 +56,21 @@ def test_a_line_connects_values_in_ascending_order(gossip: Path, tmp_path: Path)
         result = run_study(planned(gossip, (sweep,)), tmp_path / "out.parquet", seeds=[1], jobs=1)
         drawn += draw_comparison(tmp_path / f"{len(drawn)}.png", Comparison(result.results))
     assert drawn[0].read_bytes() == drawn[1].read_bytes()
+
+
+def marker_places(gossip: Path, tmp_path: Path, sweep: str, monkeypatch: pytest.MonkeyPatch) -> list[list[float]]:
+    """Draw a comparison over `sweep`, and return the x of every variant's markers in the first panel."""
+    figures: list[Figure] = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
+    result = run_study(planned(gossip, (sweep,)), tmp_path / "out.parquet", seeds=[1], jobs=1)
+    draw_comparison(tmp_path / "figure.png", Comparison(result.results))
+    return [list(map(float, each[0].get_xdata())) for each in figures[0].axes[0].containers]
+
+
+def test_markers_stand_at_the_values_of_a_sweep(gossip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert marker_places(gossip, tmp_path, "radio.loss=0.0,0.5", monkeypatch) == [[0.0, 0.5], [0.0, 0.5]]
+    named = marker_places(gossip, tmp_path, "radio.models=few:[],many:[{kind='loss',fraction=0.5}]", monkeypatch)
+    assert named[0] != named[1]
 
 
 @pytest.mark.parametrize("width", [80, 140])

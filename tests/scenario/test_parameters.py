@@ -10,11 +10,19 @@ from zwerm.scenario.load import load
 @pytest.mark.parametrize(
     ("assignment", "start", "end"),
     [
-        ("robots.parameters.link=2", "robots.parameters.link: unknown key; known are link_m, ", "drive_ticks_max"),
-        ("base.parameters.link=2", "base.parameters.link: unknown key; known are link_m, ", "drive_ticks_max"),
+        (
+            "robots.parameters.link=2",
+            "robots.parameters.link: unknown key; did you mean link_m?; known are link_m, ",
+            "drive_ticks_max",
+        ),
+        (
+            "base.parameters.link=2",
+            "base.parameters.link: unknown key; did you mean link_m?; known are link_m, ",
+            "drive_ticks_max",
+        ),
         (
             "coordinator.parameters.link=2",
-            "coordinator.parameters.link: unknown key; known are link_m, ",
+            "coordinator.parameters.link: unknown key; did you mean link_m?; known are link_m, ",
             "watch_until_s",
         ),
         ("robots.parameters.samples=0", "robots.parameters.samples: expected >= 1, got 0", ""),
@@ -22,7 +30,11 @@ from zwerm.scenario.load import load
         ("coordinator.parameters.link_m=far", 'coordinator.parameters.link_m: expected a number, got "far"', ""),
         ("coordinator.parameters.link_m=nan", "coordinator.parameters.link_m: expected > 0.0, got NaN", ""),
         ("coordinator.parameters.margin_m=2", "coordinator.parameters: expected margin_m < link_m, got ", "2}"),
-        ("base.controller=beacons", "base.controller: expected a built-in controller (", "got 'beacons'"),
+        (
+            "base.controller=beacons",
+            "base.controller: expected a built-in controller (",
+            "got 'beacons'; did you mean beacon?",
+        ),
         (
             "coordinator.controller=beacon",
             "coordinator.controller: expected a built-in coordinator (sensor-coverage, "
@@ -39,7 +51,8 @@ def test_a_wrong_parameter_is_one_line_with_its_place_the_rule_and_the_value(
     with pytest.raises(ScenarioError) as caught:
         prepare(scenario)
     (line,) = caught.value.mistakes
-    assert line.removeprefix(f"{scenario.place}: ").startswith(start)
+    place = f"--set {assignment}" if start.startswith(assignment.partition("=")[0]) else scenario.place
+    assert line.startswith(f"{place}: {start}")
     assert line.endswith(end)
 
 

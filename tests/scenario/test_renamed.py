@@ -57,7 +57,7 @@ def test_the_old_and_the_new_key_together_are_a_mistake() -> None:
 
 
 def test_a_renamed_kind_is_replaced_wherever_it_stands_in_its_array(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(renamed, "KINDS", {("radio.models", "old"): "new"})
+    monkeypatch.setattr(renamed, "KINDS", {"radio.models": {"old": "new"}})
     warnings: list[str] = []
     given: dict[str, Any] = {"radio": {"models": [{"kind": "loss"}, {"kind": "old"}]}}
     renamed.rename(given, "small.toml", warnings.append)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from zwerm.errors import ScenarioError
+from zwerm.run.validation import scenario_mistakes
 from zwerm.scenario.load import built_in, load, locate
 
 GOOD = """
@@ -31,7 +32,9 @@ def mistakes_of(path: str, *overrides: str) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
         load(path, overrides)
     assert str(caught.value) == "\n".join(caught.value.mistakes)
-    return [line.removeprefix(f"{path}: ") for line in caught.value.mistakes]
+    places = [f"{path}: ", *(f"--set {each}: " for each in overrides)]
+    assert all(line.startswith(tuple(places)) for line in caught.value.mistakes)
+    return [line.removeprefix(place) for line in caught.value.mistakes for place in places if line.startswith(place)]
 
 
 def test_a_scenario_is_named_after_its_file_and_its_paths_start_there(tmp_path: Path) -> None:
@@ -70,7 +73,9 @@ def test_every_built_in_scenario_is_without_mistake_and_says_what_it_is(name: st
         ("robots.count=2.0", "robots.count: expected an integer, got 2.0"),
         ("robots.count=0", "robots.count: expected >= 1, got 0"),
         ("robots.count=200000", "robots.count: expected <= 100000, got 200000"),
-        ("robots.cuont=3", "robots.cuont: unknown key"),
+        ("robots.cuont=3", "robots.cuont: unknown key; did you mean count?"),
+        ("robots.placement.radus_m=3", "robots.placement.radus_m: unknown key; did you mean radius_m?"),
+        ("uplnk.loss=0.1", "uplnk: unknown key; did you mean uplink?"),
         ("robots.on_crash=explode", 'robots.on_crash: expected "fail" or "continue", got "explode"'),
         ("robots.body.radius_m=-0.1", "robots.body.radius_m: expected > 0, got -0.1"),
         ("robots.body.collide=1", "robots.body.collide: expected true or false, got 1"),
@@ -138,11 +143,37 @@ def test_an_unknown_scenario_is_one_line_with_the_known_ones() -> None:
     with pytest.raises(ScenarioError) as caught:
         locate("computation-fee")
     (line,) = caught.value.mistakes
-    assert line.startswith("computation-fee: expected a scenario file or the name of a built-in one; built in are ")
-    assert "computation-free" in line
+    start = "computation-fee: expected a scenario file or the name of a built-in one; nearest are computation-free, "
+    assert line.startswith(start)
+    assert line.endswith("; `zwerm list` names all")
+    assert line.count(", ") == 2
+    with pytest.raises(ScenarioError) as caught:
+        locate("computation-free-comparison")
+    assert caught.value.mistakes == [
+        "computation-free-comparison: is a study and no scenario; run it with: zwerm study computation-free-comparison"
+    ]
     with pytest.raises(ScenarioError) as caught:
         locate("gone.toml")
     assert caught.value.mistakes == ["gone.toml: expected a scenario file or the name of a built-in one"]
+
+
+def test_a_mistake_of_an_override_is_blamed_on_the_command_line_and_another_on_the_file(tmp_path: Path) -> None:
+    path = written(tmp_path, GOOD + "cuont = 3\n")
+    with pytest.raises(ScenarioError) as caught:
+        load(path, ("robots.body.radius_m=0", "robots.count=-4"))
+    assert caught.value.mistakes == [
+        "--set robots.count=-4: robots.count: expected >= 1, got -4",
+        "--set robots.body.radius_m=0: robots.body.radius_m: expected > 0, got 0",
+    ]
+    assert scenario_mistakes(path, ("robots.body.radius_m=0",)) == [
+        "--set robots.body.radius_m=0: robots.body.radius_m: expected > 0, got 0",
+        f"{path}: robots.sensors.0.cuont: unknown key",
+    ]
+    (line, other) = scenario_mistakes(path, ("robots.parameters={speed=1}",))
+    assert line.startswith(
+        "--set robots.parameters={speed=1}: robots.parameters.speed: unknown key; known are left_0, "
+    )
+    assert other == f"{path}: robots.sensors.0.cuont: unknown key"
 
 
 # --- overrides ------------------------------------------------------------------------------------------------------

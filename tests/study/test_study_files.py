@@ -15,7 +15,7 @@ from zwerm.study.trial_plan import make_points, make_trials
     ("text", "mistake"),
     [
         ("seeds = 1\nmetrics = ['m']", "scenario: required, and missing"),
-        (TINY + "sceds = 3", "sceds: unknown key"),
+        (TINY + "sceds = 3", "sceds: unknown key; did you mean seeds?"),
         (
             TINY.replace("seeds = 3", "seeds = 0"),
             "seeds: expected a count >= 1, an array of seeds, or first and last, got 0",
@@ -64,9 +64,7 @@ def test_an_error_in_a_scenario_names_the_point_of_the_grid_once(write: Callable
 
 
 def test_an_unknown_study_is_an_error_of_one_line_with_the_known_names() -> None:
-    with pytest.raises(
-        ScenarioError, match=r"^nope: expected a study's file .* built in are computation-free-comparison,"
-    ):
+    with pytest.raises(ScenarioError, match=r"^nope: expected a study's file .* `zwerm list` names all"):
         load_study("nope")
 
 

@@ -425,7 +425,7 @@ def test_an_mp4_is_written_where_there_is_ffmpeg(tmp_path: Path) -> None:
 def test_without_matplotlib_the_reason_is_one_line() -> None:
     hidden = "import sys; sys.modules['matplotlib'] = None; import zwerm.view.stills"
     run = subprocess.run([sys.executable, "-c", hidden], capture_output=True, text=True, check=False)
-    assert run.stderr.strip().splitlines()[-1].endswith("pip install 'zwerm[study]'")
+    assert run.stderr.strip().splitlines()[-1].endswith("pip install matplotlib")
     assert "PictureError: pictures need matplotlib" in run.stderr
 
 

@@ -1,9 +1,9 @@
 """Start positions: robots are drawn one after the other, each until it is clear of walls and of the robots before it.
 
-The tries of robot i are keyed by its id and the number of the try. So one robot more moves no robot with a lower id, and none
-whose place it does not take. Robots start only where they can move: in the largest part of each polygon of free space that a
-disc of their radius can reach, and not in a pocket behind a narrow gap. Given poses may be anywhere in free space. Walls
-without thickness close off nothing here.
+The tries of robot i are keyed by its id and the number of the try. So one robot more moves no robot with a lower id,
+and none whose place it does not take. Robots start only where they can move, not in a pocket behind a narrow gap. This
+is the largest part of each polygon of free space that a disc of their radius can reach. Given poses may be anywhere in
+free space. Walls without thickness close off nothing here.
 """
 
 from collections.abc import Callable, Sequence

@@ -17,6 +17,7 @@ from shapely.geometry import LineString, MultiPolygon, Polygon, box
 from zwerm.errors import ScenarioError
 from zwerm.scenario.tables import ArenaTable
 from zwerm.scenario.types import Point
+from zwerm.world.arena.grid_maps import SUFFIXES, grid_space
 from zwerm.world.arena.maps import read_map
 
 Space: TypeAlias = Polygon | MultiPolygon
@@ -84,7 +85,8 @@ def _space(table: ArenaTable, folder: Path) -> Space:
         got = " and ".join(given) or "none"
         raise ScenarioError([f"arena: expected exactly one of {', '.join(_SOURCES)}, got {got}"])
     if table.map is not None:
-        return read_map(_find(table.map, folder, "arena.map"), table)
+        path = _find(table.map, folder, "arena.map")
+        return grid_space(path, table) if path.suffix.lower() in SUFFIXES else read_map(path, table)
     stray = [key for key in ("resolution_m", "start") if getattr(table, key) is not None]
     if stray:
         raise ScenarioError([f"arena.{key}: goes with a map only, got {getattr(table, key)}" for key in stray])

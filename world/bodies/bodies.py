@@ -14,6 +14,7 @@ from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import BodyVelocity, WheelSpeeds
 from zwerm.world.arena.arena import Arena
 from zwerm.world.arena.entrance import Depots, EntrySchedule
+from zwerm.world.arena.grid_maps import root_placement
 from zwerm.world.arena.placement import place
 from zwerm.world.bodies.drives import Drives
 from zwerm.world.bodies.physics import Physics
@@ -50,7 +51,10 @@ class Bodies:
                 self.physics.fix(base, self.depots.position[base], float(self.depots.heading[base]))
                 self._set_present(base, True)
         elif self._entry is None:
-            positions, headings = place(scenario.robots.placement, arena, count, body.radius_m, draws)
+            placement = scenario.robots.placement
+            if placement.kind == "roots":
+                placement = root_placement(placement, scenario.arena, scenario.folder, count)
+            positions, headings = place(placement, arena, count, body.radius_m, draws)
             for robot in range(count):
                 self._add(robot, positions[robot], float(headings[robot]))
         self.scene = self._scene(np.ones(count, dtype=np.bool_), 0)

@@ -1,9 +1,9 @@
 """Process control: carries out on nodes' programs the actions that faults demand.
 
-In lock-step `ProcessController` does, and virtual time stands still meanwhile. When an action has been carried out, the node
-is dead and its end has been reported, or it has joined: what its former incarnation still sends is refused as stale, and
-cannot be taken for a message of its successor. In real time the world cannot wait for a program to end or to start:
-`ActionThread` carries out actions in a thread of its own.
+In lock-step `ProcessController` does, and virtual time stands still meanwhile. After an action the node is dead and its
+end has been reported, or it has joined. Messages of its former incarnation are refused as stale, and cannot be taken
+for messages of its successor. In real time the world cannot wait for a program to end or to start: `ActionThread`
+carries out actions in a thread of its own.
 """
 
 import queue

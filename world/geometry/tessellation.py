@@ -1,9 +1,10 @@
-"""Voronoi neighbours: the Delaunay triangulation of a swarm, kept from scene to scene.
+"""Voronoi neighbours: the Delaunay triangulation of a swarm, stored from scene to scene.
 
-The triangulation of slowly moving robots seldom changes, so the previous one is tested first. It is the Delaunay triangulation
-of the new positions if its triangles still turn counter-clockwise, its rim is still convex, and no edge has to be flipped
-(Delaunay's lemma). This test is much faster than a new triangulation. A few edges are flipped in place (Lawson 1977).
-`Tessellation.pairs` states the result for robots at one place and swarms on one line. Ranges, walls and noise play no part.
+The triangulation of slowly moving robots seldom changes, so the previous one is tested first. It is the Delaunay
+triangulation of the new positions if its triangles still turn counter-clockwise, its hull is convex, and no edge must
+be flipped (Delaunay's lemma). This test is much faster than a new triangulation. A few edges are flipped in place
+(Lawson 1977). `Tessellation.pairs` states the result for robots at one place and swarms on one line. Ranges, walls and
+noise play no part.
 """
 
 from typing import Final, NamedTuple
@@ -22,41 +23,43 @@ _FLIPS_AT_ONCE: Final = 12  # or _FLIPS_SHARE of the points, if that is more
 _FLIPS_SHARE: Final = 0.06
 _ROUNDS: Final = 8
 
-# The rows of a mesh's edges, and of its rim.
+# The rows of the edges of a mesh, and of its hull.
 _A, _B, _C, _D, _LEFT, _RIGHT = range(6)
 _BEFORE, _CORNER, _AFTER, _APEX, _WITHIN = range(5)
 
 
 class _Mesh(NamedTuple):
-    """A triangulation: its inner edges and its rim."""
+    """A triangulation: its inner edges, and the edges of its convex hull."""
 
-    # (6, e) for every inner edge a -> b: a, b, the corner c left of it, d right of it, and the triangles on either side.
+    # (6, e) for every inner edge a -> b: a, b, the corner c to its left, the corner d to its right, and the triangles on its
+    # left and right.
     edges: Ints
-    # (5, h) the hull's corners: the one before, the corner, the one after; and the triangle on the side to that, by the
-    # corner across from the side and by its number.
-    rim: Ints
+    # (5, h) for every corner of the hull: the corner before, the corner, the corner after. Then the triangle at the side to
+    # the corner after: its corner opposite to that side, and its number.
+    hull: Ints
 
 
 class Tessellation:
-    """The Delaunay pairs of points that move."""
+    """The Delaunay pairs of moving points."""
 
     def __init__(self) -> None:
         self._mesh: _Mesh | None = None
         self._rows: dict[
             tuple[int, int], int
-        ] = {}  # the mesh's edges, by their ends in order; empty until it is needed
+        ] = {}  # row of each edge by its ends, the smaller first; empty until it is needed
         self._position: Floats = np.empty((0, 2))
         self._pairs: Ints = np.empty((0, 2), dtype=np.int64)
 
     def pairs(self, position: Floats) -> Ints:
         """Return (k, 2) rows i < j of position (n, 2) that are Voronoi neighbours in the plane, ascending.
 
-        Of points at one place, one has the neighbours, and the others are neighbours of it, of its neighbours and of one
-        another. Points on one line, and fewer than four, are all neighbours: too many do no harm to who clips a cell.
+        Of several points at one place, one has the neighbours. The others are neighbours of it, of its neighbours and of each
+        other. Points on one line are all neighbours, and so are fewer than four points. Additional neighbours do not change a
+        cell that is clipped by bisectors.
         """
         position = np.ascontiguousarray(position)
         if position.shape == self._position.shape and (
-            (position == self._position).all() if self._mesh is None else self._mended(position)
+            (position == self._position).all() if self._mesh is None else self._repair(position)
         ):
             return self._pairs
         self._position = position.copy()
@@ -65,13 +68,13 @@ class Tessellation:
         self._pairs.flags.writeable = False
         return self._pairs
 
-    def _mended(self, position: Floats) -> bool:
-        """Make the mesh the Delaunay triangulation of these positions by flipping edges, and return whether it is."""
+    def _repair(self, position: Floats) -> bool:
+        """Flip edges until the mesh is the Delaunay triangulation of these positions; return whether that succeeded."""
         assert self._mesh is not None
         for changes in range(_ROUNDS):
             wrong = _wrong_edges(self._mesh, position)
             if wrong is None:
-                if not self._rim_mended(position):
+                if not self._repair_hull(position):
                     return False
             elif len(wrong) > max(_FLIPS_AT_ONCE, _FLIPS_SHARE * len(position)):
                 return False
@@ -84,12 +87,12 @@ class Tessellation:
                 return True
         return False
 
-    def _rim_mended(self, position: Floats) -> bool:
-        """Fill a dent in the rim with a triangle, or take one away whose inner corner is beyond it; tell whether one was."""
+    def _repair_hull(self, position: Floats) -> bool:
+        """Fill a dent of the hull, or remove a triangle whose inner corner is outside; return whether either was done."""
         assert self._mesh is not None
-        rim = self._mesh.rim
+        hull = self._mesh.hull
         place = position.view(np.complex128)[:, 0]
-        before, corner, after, apex = place.take(rim[:_WITHIN])
+        before, corner, after, apex = place.take(hull[:_WITHIN])
         dented = np.flatnonzero(_turn(corner - before, after - before) < 0.0)
         if len(dented):
             return self._fill(int(dented[0]))
@@ -97,29 +100,29 @@ class Tessellation:
         return len(turned) > 0 and self._uncover(int(turned[0]))
 
     def _fill(self, at: int) -> bool:
-        """Add the triangle outside the dent at this column of the rim, and tell whether that leaves a rim."""
+        """Add the triangle that fills the dent at this column of the hull; return False if it then has no triangle."""
         assert self._mesh is not None
-        edges, rim = self._mesh
-        p, q, r, far, beyond = rim[:, at].tolist()
-        (first,), (last,) = np.flatnonzero(rim[_CORNER] == p), np.flatnonzero(rim[_CORNER] == r)
-        if rim.shape[1] <= 3:
+        edges, hull = self._mesh
+        p, q, r, far, beyond = hull[:, at].tolist()
+        (first,), (last,) = np.flatnonzero(hull[_CORNER] == p), np.flatnonzero(hull[_CORNER] == r)
+        if hull.shape[1] <= 3:
             return False
-        new = int(max(edges[_LEFT:].max(), rim[_WITHIN].max())) + 1
-        inner = [[p, q], [q, r], [rim[_APEX, first], far], [r, p], [rim[_WITHIN, first], beyond], [new, new]]
-        rim[_AFTER:, first] = r, q, new
-        rim[_BEFORE, last] = p
-        self._mesh = _Mesh(np.concatenate([edges, np.array(inner)], axis=1), np.delete(rim, at, axis=1))
+        new = int(max(edges[_LEFT:].max(), hull[_WITHIN].max())) + 1
+        inner = [[p, q], [q, r], [hull[_APEX, first], far], [r, p], [hull[_WITHIN, first], beyond], [new, new]]
+        hull[_AFTER:, first] = r, q, new
+        hull[_BEFORE, last] = p
+        self._mesh = _Mesh(np.concatenate([edges, np.array(inner)], axis=1), np.delete(hull, at, axis=1))
         self._rows = {}
         return True
 
     def _uncover(self, at: int) -> bool:
-        """Take away the triangle on the side after this corner of the rim, and tell whether its inner corner was no other's."""
+        """Remove the triangle at the side after this corner of the hull; return False if its inner corner is on the hull."""
         assert self._mesh is not None
-        edges, rim = self._mesh
-        _, q, r, s, gone = rim[:, at].tolist()
-        if (rim[_CORNER] == s).any():
+        edges, hull = self._mesh
+        _, q, r, s, gone = hull[:, at].tolist()
+        if (hull[_CORNER] == s).any():
             return False
-        # Its two inner sides, q s and s r, become sides of the rim, with the triangles across from them.
+        # Its two inner sides, q s and s r, become sides of the hull. The triangles behind them are now at the hull.
         rows, sides = [], []
         for p in (q, r):
             (row,) = np.flatnonzero(
@@ -128,18 +131,18 @@ class Tessellation:
             across = 1 if edges[_LEFT, row] == gone else 0
             rows.append(row)
             sides.append((int(edges[_C + across, row]), int(edges[_LEFT + across, row])))
-        (last,) = np.flatnonzero(rim[_CORNER] == r)
-        rim[_AFTER:, at] = s, *sides[0]
-        rim[_BEFORE, last] = s
-        rim = np.concatenate([rim, np.array([[q], [s], [r], [sides[1][0]], [sides[1][1]]])], axis=1)
-        self._mesh = _Mesh(np.delete(edges, rows, axis=1), rim)
+        (last,) = np.flatnonzero(hull[_CORNER] == r)
+        hull[_AFTER:, at] = s, *sides[0]
+        hull[_BEFORE, last] = s
+        hull = np.concatenate([hull, np.array([[q], [s], [r], [sides[1][0]], [sides[1][1]]])], axis=1)
+        self._mesh = _Mesh(np.delete(edges, rows, axis=1), hull)
         self._rows = {}
         return True
 
     def _flip(self, wrong: Ints) -> None:
         """Flip these edges, but for those that another flip has changed."""
         assert self._mesh is not None
-        edges, rim = self._mesh
+        edges, hull = self._mesh
         if not self._rows:
             low, high = np.minimum(edges[_A], edges[_B]).tolist(), np.maximum(edges[_A], edges[_B]).tolist()
             self._rows = {ends: row for row, ends in enumerate(zip(low, high, strict=True))}
@@ -161,7 +164,7 @@ class Tessellation:
             ):
                 around = self._rows.get(_ends(p, q))
                 if around is None:
-                    rim[_APEX:, rim[_CORNER] == p] = [[now], [new]]
+                    hull[_APEX:, hull[_CORNER] == p] = [[now], [new]]
                 else:
                     side = 0 if edges[_C, around] == was and edges[_LEFT, around] == old else 1
                     edges[_C + side, around] = now
@@ -214,7 +217,7 @@ def _rim(triangles: Ints, starts: Ints, ends: Ints, across: Ints) -> Ints:
 
 def _pairs_of(mesh: _Mesh, count: int) -> Ints:
     """Return (k, 2) the ends of every edge, in order, ascending."""
-    p, q = np.concatenate([mesh.edges[:2], mesh.rim[:2]], axis=1)
+    p, q = np.concatenate([mesh.edges[:2], mesh.hull[:2]], axis=1)
     keys = np.sort(np.minimum(p, q) * count + np.maximum(p, q))
     return np.column_stack([keys // count, keys % count])
 
@@ -235,7 +238,7 @@ def _with_coincident(pairs: Ints, twins: Ints, count: int) -> Ints:
 def _wrong_edges(mesh: _Mesh, position: Floats) -> Ints | None:
     """Return the edges that are to be flipped; None where the triangles do not cover the hull, each place once."""
     place = position.view(np.complex128)[:, 0]  # one lookup for x and y
-    before, corner, after = place.take(mesh.rim[:_APEX])
+    before, corner, after = place.take(mesh.hull[:_APEX])
     if _turn(corner - before, after - before).min() < 0.0:
         return None
     # a, b, c, a, b, with the corner d for the origin.

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import shapely
 
-from zwerm.maths.kept_cell import KeptCell
+from zwerm.maths.cached_voronoi_cell import CachedVoronoiCell
 from zwerm.maths.polygons import Point as Place
 from zwerm.maths.polygons import Polygon, voronoi_cell
 from zwerm.wire.messages import Neighbour
@@ -33,7 +33,7 @@ class VoronoiCells:
     def __init__(self, arena: Arena, field: Field) -> None:
         self._outline, self._field = outline_of(arena), field
         self._tessellation = Tessellation()
-        self._kept: list[KeptCell] = []
+        self._cells: list[CachedVoronoiCell] = []
 
     def cells(self, position: Floats) -> list[Polygon]:
         """Return for each of position (n, 2) its cell's corners relative to it [m]; empty for one that has none."""
@@ -44,14 +44,14 @@ class VoronoiCells:
 
     def targets(self, position: Floats) -> Floats:
         """Return (n, 2) the way of each of position (n, 2) to where an undisturbed robot there would go [m]."""
-        if len(self._kept) != len(position):
-            self._kept = [KeptCell() for _ in position]
+        if len(self._cells) != len(position):
+            self._cells = [CachedVoronoiCell() for _ in position]
         value, gradient = self._field.value(position).tolist(), self._field.gradient(position).tolist()
         return np.array(
             [
                 cell.target(outline, others, phi, gx, gy)
                 for cell, outline, others, phi, (gx, gy) in zip(
-                    self._kept, *self._seen(position), value, gradient, strict=True
+                    self._cells, *self._seen(position), value, gradient, strict=True
                 )
             ]
         )

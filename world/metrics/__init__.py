@@ -1,8 +1,9 @@
 """Metrics: measurements of a run that change nothing in it. The trace is the same with and without them.
 
-A metric is one class, a subclass of `Metric`, and one row of the catalogue: in `METRICS`, where a key of `[metrics]` in the
-scenario switches it on with that key's value as parameters; or in `Algorithm.metrics`, where it is attached to every run of the
-algorithm's controllers. A scenario adds a class or a function of the user's own by `[metrics] own = ["module:name"]`.
+A metric is one class, a subclass of `Metric`, and one row of the catalogue. A row of `METRICS` is switched on by its
+key of `[metrics]` in the scenario; the key's value holds the parameters. A row of `Algorithm.metrics` is measured in
+every run of the algorithm's controllers. A scenario adds a class or a function of the user's own by `[metrics] own =
+["module:name"]`.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from zwerm.world.tick.telemetry import TelemetrySink
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MetricContext:
-    """What a metric may know of the run before it starts. `field` is None where the scenario has none."""
+    """The data of a run that a metric may use before the run starts. `field` is None where the scenario has none."""
 
     arena: Arena
     field: Field | None

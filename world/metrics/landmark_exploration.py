@@ -1,8 +1,8 @@
-"""How complete a landmark complex is, and whether its topology is that of the arena.
+"""Completeness of a landmark complex, and whether its topology is that of the arena.
 
-A place is covered if the set of all landmarks that are visible there is a face of the complex. The completion is the covered
-fraction of a grid of places in free space (the union of the simplices' hulls would do for a picture, but saturates below 1:
-hulls do not reach the walls). Truth is used here, and only here: robots know no place.
+A place is covered if the set of all landmarks that are visible there is a face of the complex. The completion is the
+covered fraction of a grid of points in free space. The union of the simplices' hulls saturates below 1, because hulls
+do not reach the walls. Truth is used here, and only here: robots know no place.
 """
 
 import math
@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from scipy.spatial import cKDTree
 
-from zwerm.agents.landmark_exploration.mapping.map_reports import GoalTold, MapTold, read_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import GoalReport, MapReport, read_report
 from zwerm.maths.strong_collapse import betti
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
@@ -35,7 +35,7 @@ def milestone(percent: float) -> str:
     return f"iterations_to_{percent:g}_percent_completion".replace(".", "_")
 
 
-class Completion:
+class MapCompletion:
     """The places that the complex does not cover yet; simplices only ever cover more."""
 
     def __init__(self, arena: Arena, landmarks: Floats, range_m: float) -> None:
@@ -110,7 +110,7 @@ def maximal(simplices: Iterable[Sequence[int]]) -> list[tuple[int, ...]]:
 
 
 class Exploration(Metric):
-    """How complete the map is that the coordinator has, or all robots together, and how far it was when."""
+    """Completeness of the coordinator's map, or of the robots' maps together, over time."""
 
     names: ClassVar[Sequence[str]] = (
         "completion_fraction", "iterations", "landmarks", "free_simplices", "landmark_complex_pieces",
@@ -120,33 +120,33 @@ class Exploration(Metric):
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         self._context = context
-        self._reports: list[tuple[int, int, MapTold]] = []
+        self._reports: list[tuple[int, int, MapReport]] = []
         self._truth: Truth | None = None
 
     def report(self, record: TelemetryRecord) -> None:
         """Take what a node says of its map."""
-        told = read_told(record.snapshot) if record.snapshot else None
-        if isinstance(told, MapTold):
-            self._reports.append((record.tick, record.node, told))
+        report = read_report(record.snapshot) if record.snapshot else None
+        if isinstance(report, MapReport):
+            self._reports.append((record.tick, record.node, report))
 
     def sample(self, truth: Truth) -> None:
         """Take the tick, and who is dead."""
         self._truth = truth
 
     def metrics(self) -> dict[str, float]:
-        """Return the metrics, or nothing where nobody told of a map."""
+        """Return the metrics, or nothing if no node reported a map."""
         range_m, truth = landmark_range_m(self._context.scenario), self._truth
         if range_m is None or truth is None or not self._reports:
             return {}
         arena, landmarks = self._context.arena, landmarks_of(self._context.scenario, truth)
-        completion = Completion(arena, landmarks, range_m)
+        completion = MapCompletion(arena, landmarks, range_m)
         reached: dict[str, float] = {}
-        for tick, _, told in self._reports:
-            completion.add(told.simplices)
+        for tick, _, report in self._reports:
+            completion.add(report.simplices)
             for percent in MILESTONES:
                 if completion.fraction >= percent / 100.0:
                     reached.setdefault(milestone(percent), float(tick))
-        complex_ = maximal(simplex for _, _, told in self._reports for simplex in told.simplices)
+        complex_ = maximal(simplex for _, _, report in self._reports for simplex in report.simplices)
         pieces, holes = betti(complex_)
         return {
             "completion_fraction": completion.fraction,
@@ -164,10 +164,14 @@ class Exploration(Metric):
         """Return the frontiers left open; and 1 where a robot concluded while a living one knew an open frontier, else 0."""
         newest: dict[int, int] = {}
         early = robots = 0.0
-        for _, node, told in self._reports:
-            newest[node] = told.open
-            robots = max(robots, float(told.of_robot))
-            if told.of_robot and told.done and any(count for each, count in newest.items() if each not in truth.dead):
+        for _, node, report in self._reports:
+            newest[node] = report.open
+            robots = max(robots, float(report.of_robot))
+            if (
+                report.of_robot
+                and report.done
+                and any(count for each, count in newest.items() if each not in truth.dead)
+            ):
                 early = 1.0
         living = [count for node, count in newest.items() if node not in truth.dead]
         found = {"open_frontiers": float(max(living, default=0))}
@@ -184,14 +188,14 @@ class Navigation(Metric):
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         self._context = context
-        self._ends: list[tuple[Floats, GoalTold]] = []
+        self._ends: list[tuple[Floats, GoalReport]] = []
         self._truth: Truth | None = None
 
     def report(self, record: TelemetryRecord) -> None:
         """Take the end of a way."""
-        told = read_told(record.snapshot) if record.snapshot else None
-        if isinstance(told, GoalTold):
-            self._ends.append((record.position[record.node].copy(), told))
+        report = read_report(record.snapshot) if record.snapshot else None
+        if isinstance(report, GoalReport):
+            self._ends.append((record.position[record.node].copy(), report))
 
     def sample(self, truth: Truth) -> None:
         """Take the truth at the end."""

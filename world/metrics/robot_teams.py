@@ -1,8 +1,8 @@
-"""What a team of robots covered, by exact polygons: the area that footprints swept, of the area that they can sweep.
+"""Coverage by a team of robots, by exact polygons: the fraction of the area that footprints can sweep and have swept.
 
-The robots' centres can be where their bodies fit, in the part of that space in which they started: the free space eroded by the
-body's radius. Their footprints can sweep the free space within the footprint's radius of it. A circle is a polygon of 4 * 32
-sides inside it; the same in both areas.
+The centre of a robot can be where its body fits, in the part of that space in which it started: the free space eroded
+by the body's radius. Their footprints can sweep the free space within the footprint's radius of it. A circle is a
+polygon of 4 * 32 sides inside it; the same in both areas.
 """
 
 import math
@@ -82,6 +82,7 @@ class TeamCoverage(Metric):
 
     names: ClassVar[Sequence[str]] = (
         *("coverage_fraction", "repeat_coverage_fraction", "path_length_m", "sweepable_area_m2", "completion_time_s"),
+        *("lower_bound_s", "time_over_lower_bound"),
         *("certificate_satisfied", "critical_points", "divisions", "merges"),
     )
     every_s: ClassVar[float | None] = 0.05
@@ -91,6 +92,8 @@ class TeamCoverage(Metric):
         self._free = context.arena.free
         self._radius_m = robots.body.radius_m
         self._footprint_m = float(robots.parameters.get("footprint_m", 0.5))
+        self._coordinator = context.coordinator
+        self._width_m_s = 2.0 * self._footprint_m * robots.body.max_speed_m_s
         self._paths: list[Floats] = []
         self._numbers: dict[int, dict[str, float]] = {}
         self._truth: Truth | None = None
@@ -105,15 +108,22 @@ class TeamCoverage(Metric):
         self._truth = truth
 
     def metrics(self) -> dict[str, float]:
-        """Return the coverage by exact polygons, and the reports of the robots that live."""
+        """Return the coverage by exact polygons, and the reports of the robots that live, or of the coordinator."""
         if self._truth is None:
             return {}
         paths = np.array(self._paths)
         tracks = [paths[:, robot] for robot in range(paths.shape[1])]
         living = [numbers for node, numbers in self._numbers.items() if node not in self._truth.dead]
+        if self._coordinator in self._numbers:
+            living = [self._numbers[self._coordinator]]
+        covered = coverage(self._free, tracks, self._radius_m, self._footprint_m)
+        time_s = self._truth.time_s if self._truth.completed else math.nan
+        bound_s = covered["sweepable_area_m2"] / (len(tracks) * self._width_m_s)
         return {
-            **coverage(self._free, tracks, self._radius_m, self._footprint_m),
-            "completion_time_s": self._truth.time_s if self._truth.completed else math.nan,
+            **covered,
+            "completion_time_s": time_s,
+            "lower_bound_s": bound_s,
+            "time_over_lower_bound": time_s / bound_s,
             "certificate_satisfied": float(bool(living) and all(n.get("certificate_satisfied") for n in living)),
             "critical_points": max([numbers.get("critical_points", 0.0) for numbers in living], default=0.0),
             "divisions": sum([numbers.get("divisions", 0.0) for numbers in self._numbers.values()]),

@@ -1,9 +1,9 @@
-"""What a swarm sees of its arena, and how few robots might have done: the measures of sensor coverage.
+"""The part of the arena that a swarm sees, and the least number of robots that could: the measures of sensor coverage.
 
 A robot covers what is within its range and not behind a wall, as exact polygons but for the disc, which has 256 sides.
-The ideal to compare with is that of Ramaithitima et al. 2015, section V: a hexagonal packing overlaid on the free space,
-its points the range apart. How many of them fall into the free space depends on where the packing lies; the mean over
-all ways is the free area divided by that of a point's cell, and that is what is used here.
+The reference is that of Ramaithitima et al. 2015, section V: a hexagonal packing over the free space, whose points are
+one range apart. The number of its points in free space depends on the position of the packing. The mean over all
+positions is used here: the free area divided by the area of one cell.
 """
 
 import math
@@ -29,7 +29,7 @@ def hexagonal_packing_robots(arena: Arena, range_m: float) -> float:
 
 
 class SeenArea:
-    """What robots see of an arena. What is seen from a place is kept while a robot stands there."""
+    """The part of an arena that robots see. The visible polygon of a place is stored while a robot stands there."""
 
     def __init__(self, arena: Arena, range_m: float) -> None:
         self.arena, self.range_m = arena, range_m
@@ -51,7 +51,7 @@ class SeenArea:
 def reachable(arena: Arena, radius_m: float, position: Floats) -> shapely.Geometry:
     """Return the part of the free space that bodies of a radius can get into from any of position (n, 2).
 
-    What lies behind a crack that no body passes is not in it; corners are, though a round body does not fill them.
+    Space behind a gap that no body passes does not count. Corners count, though a round body does not fill them.
     """
     inner = shapely.buffer(arena.free, -_INSIDE * radius_m)
     if arena.walls:

@@ -1,8 +1,8 @@
-"""How well a swarm covers a field: errors, cost, convergence and density, by the robots' true Voronoi cells.
+"""Coverage of a field by a swarm: errors, cost, convergence and density, by the robots' true Voronoi cells.
 
-All is computed from the truth: where every robot is, the whole field. The error to the *estimated* centroid is that of an
-undisturbed robot at that place (eqs. 10 to 18); the one to the exact centroid (eq. 5) and the cost (eq. 1) are integrals
-of the true field. Source: Schwager, McLurkin, Rus 2006.
+All is computed from the truth: where every robot is, the whole field. The error to the *estimated* centroid is that of
+an undisturbed robot at that place (eqs. 10 to 18). The error to the exact centroid (eq. 5) and the cost (eq. 1) are
+integrals of the true field. Source: Schwager, McLurkin, Rus 2006.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Links: the pairs of nodes between which packets were ever sent, numbered in the order of their first packet.
 
-Every property of a link (its ledger, the state of a burst, the key of its random numbers) is an array with one row per link. Up
-to a few thousand nodes a dense table finds a link, beyond that a sorted one. The number of a link depends on the order of
+Every property of a link (its ledger, the state of a burst, the key of its random numbers) is one row of an array. Up to
+a few thousand nodes a dense table finds a link, beyond that a sorted one. The number of a link depends on the order of
 sending, so no outcome may depend on it.
 """
 

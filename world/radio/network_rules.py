@@ -1,6 +1,6 @@
 """Rules by which a real network reproduces a radio model. `zwerm.deploy.network.impairments` installs them.
 
-A network has four mechanisms, one class each: a set of blocked pairs, loss by chance, a rate at the sender, and a delay at the
+A network has four mechanisms, one class each: blocked pairs, random loss, a rate at the sender, and a delay at the
 receiver.
 """
 

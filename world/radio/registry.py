@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from zwerm.catalogue import RADIO_MODELS, RENAMED_RADIO_MODELS
+from zwerm.catalogue import RADIO_MODELS
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.plugin_names import class_named
-from zwerm.scenario.renamed import warn_once
 from zwerm.scenario.tables import ChannelTable, Scenario
 from zwerm.scenario.types import OpenTable
 from zwerm.world.arena.arena import Arena
@@ -42,6 +41,7 @@ class Selected:
     def __init__(self, model: RadioModel, senders: Bools, receivers: Bools) -> None:
         self.cause = model.cause
         self.out_of_reach = model.out_of_reach
+        self.memoryless = model.memoryless
         self._model = model
         self._senders = senders
         self._receivers = receivers
@@ -70,12 +70,11 @@ class Selected:
 
 
 def find(kind: str) -> type[RadioModel]:
-    """Return the model class that `kind` names, by a current or a former name.
+    """Return the model class that `kind` names.
 
     Raises ValueError, in one line, if there is none or it is no radio model.
     """
-    name = RENAMED_RADIO_MODELS.get(kind, kind)
-    found = class_named(RADIO_MODELS.get(name, name), "model", RADIO_MODELS)
+    found = class_named(RADIO_MODELS.get(kind, kind), "model", RADIO_MODELS)
     if not callable(getattr(found, "judge", None)):
         raise ValueError(f"{kind} is no radio model: it has no method judge(sent, packets)")
     parameters = getattr(found, "Parameters", RadioModelTable)
@@ -130,10 +129,6 @@ def make_model(
             raise ValueError(f"the coordinator has no position: no {table.kind} to it, got {table.kind!r}")
     except ValueError as error:
         raise ScenarioError([f"{path}.kind: {error}"]) from None
-    if table.kind in RENAMED_RADIO_MODELS:
-        warn_once(
-            f"{scenario.place}: {path}.kind: {table.kind!r} is deprecated, use {RENAMED_RADIO_MODELS[table.kind]!r}"
-        )
     key = kind.draw_key or table.kind
     counts[key] += 1
     try:

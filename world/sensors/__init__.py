@@ -27,7 +27,7 @@ Item = TypeVar("Item")
 
 @dataclasses.dataclass(frozen=True)
 class Surroundings:
-    """What stays the same all through a run and a sensor may need: given to its constructor.
+    """The constant data of a run that a sensor may need; its constructor gets them.
 
     `count` robots have ids below it; `visibility` is shared, so that no line of sight is looked along twice.
     """
@@ -42,8 +42,8 @@ class Surroundings:
 class Sensor(ABC):
     """A sensor that every robot of the swarm carries: the base class of the plug-in kind `sensor`.
 
-    `field` is the field of `Observation` that it fills; any other name is a key of the field `extra`. A subclass states here
-    all that other parts need to know about its readings: the wake event, what faults do to them, and stimuli for tests.
+    `field` is the field of `Observation` that it fills; any other name is a key of the field `extra`. A subclass states
+    all that other parts need to know about its readings: the wake event, the effects of faults, and stimuli for tests.
     """
 
     field: ClassVar[str]

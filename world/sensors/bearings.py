@@ -1,6 +1,6 @@
 """The omnidirectional camera: the ids of the robots in sight and the directions in which they are seen, without range.
 
-As in Ramaithitima et al. 2015: a robot sees every robot within `range_m` to whose centre no wall blocks the line; on
+As in Ramaithitima et al. 2015, a robot sees every robot within `range_m` if no wall blocks the line to its centre. On
 request robots hide each other. The noise is Gaussian and independent for each tick, observer and robot seen, plus one
 bias.
 """
@@ -19,7 +19,7 @@ from zwerm.world.sensors import Sensor, Surroundings, chosen, portions, random_a
 
 
 class BearingsTable(Table):
-    """Who is seen, and how well."""
+    """Range and noise of bearings, and which robots are visible."""
 
     range_m: Positive | None = None
     through_walls: bool = False

@@ -1,7 +1,7 @@
 """The outline of the arena: the corners of its outer boundary, counter-clockwise, in the body frame.
 
 For algorithms that presume to know their environment's boundary, such as Voronoi coverage (Schwager et al. 2006). Every
-robot is told all of it, through walls and at any distance; obstacles are no part of it. The noise is Gaussian and
+robot gets all corners, through walls and at any distance; obstacles are not included. The noise is Gaussian and
 independent for each tick, robot, corner and axis.
 """
 
@@ -18,7 +18,7 @@ _SQUARE: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
 
 class BoundaryTable(Table):
-    """How well the corners are known."""
+    """Noise of the corners."""
 
     sd_m: NonNegative = 0.0
 

@@ -15,7 +15,7 @@ from zwerm.world.sensors import Sensor, Surroundings
 
 
 class CompassTable(Table):
-    """How well the heading is known."""
+    """Noise of the heading."""
 
     sd_rad: NonNegative = 0.0
     bias_rad: Finite = 0.0

@@ -15,7 +15,7 @@ from zwerm.world.sensors import Sensor, Surroundings, in_body_frames
 
 
 class FieldTable(Table):
-    """How well the field is sensed."""
+    """Noise of the sensed field."""
 
     sd: NonNegative = 0.0
     gradient_sd_per_m: NonNegative = 0.0

@@ -1,7 +1,7 @@
 """Bearings to landmarks: points with an id that anybody can tell apart, and nobody knows the place of.
 
-As in Ramaithitima and Bhattacharya 2018: a robot sees every landmark within `range_m` to which no wall blocks the line;
-a landmark on a wall is seen from the side it faces. The noise is Gaussian and independent for each tick, robot and
+As in Ramaithitima and Bhattacharya 2018, a robot sees every landmark within `range_m` if no wall blocks the line. A
+landmark on a wall is seen from the side it faces. The noise is Gaussian and independent for each tick, robot and
 landmark. Robots do not hide landmarks. A robot that stands still asks the arena nothing.
 """
 

@@ -1,8 +1,8 @@
 """The one-bit sensor of Ozdemir et al. 2019: is there a robot straight ahead?
 
-A ray of no width leaves the robot's centre along its heading; the reading is True iff the ray meets the disc of another
-robot before it meets a wall, however far away unless there is a range. The noise is that of their section IV-B: with
-some probability the reading is replaced by a random bit. It is not the distance, nor which robot.
+A ray of no width leaves the robot's centre along its heading. The reading is True iff the ray meets the disc of another
+robot before it meets a wall. Without a range the distance does not matter. The noise is that of their section IV-B:
+with some probability the reading is replaced by a random bit. The reading contains no distance and no id.
 """
 
 from typing import Any, ClassVar
@@ -83,7 +83,7 @@ class LineOfSightSensor(Sensor):
             size = (last - first) * total
             across, on_line = self._across[:size], self._on_line[:size]
             grid, product = self._across_grid[: last - first], self._product_grid[: last - first]
-            # How far to the left of the ray each centre lies, squared: elementwise, so that every machine rounds alike.
+            # Squared distance of each centre from the ray: elementwise, so that every machine rounds alike.
             np.multiply(cos_column[first:last], y, out=grid)
             np.multiply(sin_column[first:last], x, out=product)
             np.subtract(grid, product, out=grid)

@@ -1,10 +1,11 @@
 """Where the robots in sight are: their positions in the body frame, as range-and-bearing hardware gives them.
 
-Who is in sight is settled as for `bearings`. The noise is Gaussian, alike and independent in x and y, for each tick,
-observer and robot seen. Headings of others are not sensed.
+Visibility is that of `bearings`. The noise is Gaussian, alike and independent in x and y, for each tick, observer and
+robot seen. Headings of others are not sensed.
 
-With `voronoi`, of those only the ones whose Voronoi cells border on the observer's in the plane: what Voronoi coverage
-presumes that a robot can measure (Schwager et al. 2006), and far less to say in a swarm without a range.
+With `voronoi` only those are reported whose Voronoi cells border on the observer's in the plane. Voronoi coverage
+assumes that a robot can measure these (Schwager et al. 2006). In a swarm without a range the reading is then much
+shorter.
 """
 
 import math
@@ -25,7 +26,7 @@ _PHANTOM_M: Final = 1.0
 
 
 class NeighboursTable(Table):
-    """Who is seen, and how well."""
+    """Range and noise of positions, and which robots are visible."""
 
     range_m: Positive | None = None
     through_walls: bool = False

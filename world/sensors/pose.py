@@ -17,7 +17,7 @@ from zwerm.world.sensors import Sensor, Surroundings
 
 
 class PoseTable(Table):
-    """How well the pose is known."""
+    """Noise of the pose."""
 
     sd_m: NonNegative = 0.0
     sd_rad: NonNegative = 0.0

@@ -53,7 +53,7 @@ def make_sensor(table: OpenTable, surroundings: Surroundings, path: str, place: 
         kind = find(table.kind)
         return kind(kind.Parameters.model_validate(table.parameters), surroundings)
     except ValidationError as error:
-        raise ScenarioError(mistakes(error, place, f"{path}.")) from None
+        raise ScenarioError(mistakes(error, place, f"{path}.", kind.Parameters)) from None
     except ValueError as error:
         raise ScenarioError([f"{place}: {path}.kind: {error}"]) from None
 

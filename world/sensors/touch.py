@@ -1,10 +1,10 @@
 """A ring of touch switches: which of them are closed, and so roughly in which directions the robot is touched.
 
 As in Ramaithitima et al. 2015: `switches` of them, evenly spaced from straight ahead, each good for half its sector to
-either side. A wall or a robot within `reach_m` of the body's surface closes the switch that faces its nearest point; so
-a wall closes one switch for each straight piece of it, not every switch whose sector it grazes. Each tick a closed
-switch reads open with probability `false_negative`, an open one closed with `false_positive`. What touches, and how
-hard, is not sensed.
+either side. A wall or a robot within `reach_m` of the body's surface closes the switch that faces its nearest point. So
+a wall closes one switch for each of its straight pieces, not every switch whose sector it touches. Each tick a closed
+switch reads open with probability `false_negative`, an open one closed with `false_positive`. The reading contains no
+force, and does not say whether a wall or a robot is touched.
 """
 
 import math

@@ -1,7 +1,8 @@
 """Completion: the one rule that decides when a run ends, and with which outcome.
 
-A run ends, in this order of precedence, when a node crashed and the scenario says `robots.on_crash = "fail"`; when a deciding
-node gave up; when the task is done; or at the time limit. Both drivers ask the same rule after every tick.
+A run ends for one of these reasons, in this order of precedence: a node crashed and the scenario says `robots.on_crash
+= "fail"`; a deciding node gave up; the task is done; every robot is lost for good; the time limit is reached. Both drivers
+ask the same rule after every tick.
 """
 
 from collections.abc import Collection, Mapping
@@ -71,11 +72,11 @@ class Completion:
         return float(self._done[: self._robots].mean())
 
     def crash_ending(self, tick: int, crashed: Mapping[int, str]) -> Ending | None:
-        """Return the ending that the first of the `crashed` nodes causes at `tick`, or None."""
+        """Return the ending that the `crashed` node of the smallest id causes at `tick`, or None."""
         if not crashed or not self._fails_on_crash:
             return None
-        node, reason = next(iter(crashed.items()))
-        return Ending(FAILED, f"node {node} crashed at tick {tick}: {reason}")
+        node = min(crashed)
+        return Ending(FAILED, f"node {node} crashed at tick {tick}: {crashed[node]}")
 
     def completed(self, exited: Collection[int], dead: Collection[int]) -> bool:
         """Tell whether the task is done; `exited` are the robots that left, `dead` the nodes that never return."""
@@ -99,4 +100,6 @@ class Completion:
             return Ending(FAILED, self._gave_up)
         if self.completed(exited, dead):
             return Ending(COMPLETED)
+        if len(dead) >= self._robots and all(robot in dead for robot in range(self._robots)):
+            return Ending(FAILED, "every robot was lost")
         return Ending(TIME_LIMIT) if tick >= self._last_tick else None

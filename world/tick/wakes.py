@@ -1,9 +1,9 @@
 """Wake rule: which nodes are observed at a tick. It is the same in every runner, and a sleeping robot costs nothing.
 
 A node that gave no wake is observed at every tick. A node with a wake sleeps until its time comes or one of its events
-happens: a packet waits for it, or the reading of a sensor differs from the one it observed last. A sensor states its event
-(`Sensor.wake_event`, `Sensor.signature`): touch, a change of the closed switches; bearings, of the ids in sight. Readings are
-compared after every tick at which any robot moved, entered or left.
+happens. Events are a packet for it, and a sensor reading that differs from the last one it observed. A sensor states
+its event (`Sensor.wake_event`, `Sensor.signature`): touch, a change of the closed switches; bearings, of the ids in
+sight. Readings are compared after every tick at which any robot moved, entered or left.
 """
 
 import math

@@ -1,9 +1,8 @@
 """Progress bars of a run, and the tables printed at its end."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
@@ -30,13 +29,17 @@ class RunProgress:
         self._tasks: dict[str, TaskID] = {}
 
     def __enter__(self) -> Self:
-        self._progress.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._progress.stop()
+        self.suspend()
+
+    def suspend(self) -> None:
+        """Remove the display for good: a debugger needs the terminal."""
+        if self._tasks:
+            self._progress.stop()
 
     def joined(self, count: int, total: int) -> None:
         """Show that `count` of `total` robots have joined."""
@@ -56,13 +59,29 @@ class RunProgress:
 
     def _show(self, title: str, unit: str, done: float, total: int | None) -> None:
         task = self._tasks.get(title)
+        if not self._tasks:  # an error before it leaves no empty line
+            self._progress.start()
         if task is None:
             task = self._tasks[title] = self._progress.add_task(title, total=total, unit=unit)
         self._progress.update(task, completed=done, unit=unit)
 
 
-def print_result(console: Console, result: "RunResult", drawn: Sequence[Path]) -> None:
-    """Print the outcome of a run, its metrics, its packet counts, and the paths of its pictures."""
+# What a file is, by its suffix.
+FILE_KINDS: Final = {
+    **dict.fromkeys((".png", ".pdf", ".svg"), "picture"),
+    **dict.fromkeys((".gif", ".mp4"), "animation"),
+    ".toml": "faults drawn",
+    ".mcap": "recording",
+}
+
+
+def print_file(console: Console, path: Path) -> None:
+    """Print the path of a file that a run has written, and what it is."""
+    console.print(f"{FILE_KINDS[path.suffix.lower()]}: {path}", markup=False, highlight=False, soft_wrap=True)
+
+
+def print_result(console: Console, result: "RunResult") -> None:
+    """Print the outcome of a run, its metrics and its packet counts."""
     table = Table(title=result.title, title_justify="left", show_header=False, box=None, padding=(0, 2, 0, 0))
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
@@ -91,6 +110,4 @@ def print_result(console: Console, result: "RunResult", drawn: Sequence[Path]) -
         table.add_row("faults that never came", ", ".join(result.missed_faults))
     table.add_row("wall time", f"{result.wall_s:.1f} s, {rate:,.0f} robot-ticks/s, {result.runner}")
     table.add_row("trace", result.trace)
-    for path in drawn:
-        table.add_row({".png": "picture", ".toml": "faults drawn"}.get(path.suffix, "animation"), str(path))
     console.print(table)

@@ -1,20 +1,55 @@
 """Arguments and options that several commands share, with their help texts."""
 
+import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, Final, Optional
 
 import typer
 
-ScenarioName = Annotated[str, typer.Argument(help="A built-in scenario (see `zwerm list`) or a TOML file.")]
+from zwerm.errors import ScenarioError
+
+_ENDPOINT: Final = re.compile(r"[a-z][a-z-]*/\S+")
+
+
+def check_endpoint(option: str, endpoint: str) -> None:
+    """Raise ScenarioError, in one line, where an option is given what is no Zenoh endpoint."""
+    if not _ENDPOINT.fullmatch(endpoint):
+        raise ScenarioError([f"{option}: expected an endpoint such as tcp/0.0.0.0:7447, got {endpoint!r}"])
+
+
+def built_in_names(*folders: str) -> Callable[[str], list[str]]:
+    """Return the function by which the shell completes the names of built-in files, and of TOML files."""
+
+    def complete(incomplete: str) -> list[str]:
+        package = Path(__file__).parents[1]
+        names = sorted(path.stem for folder in folders for path in (package / folder).glob("*.toml"))
+        files = sorted(map(str, Path().glob("*.toml")))
+        return [name for name in (*names, *files) if name.startswith(incomplete)]
+
+    return complete
+
+
+ScenarioName = Annotated[
+    str,
+    typer.Argument(
+        help="A built-in scenario (see `zwerm list`) or a TOML file.", autocompletion=built_in_names("scenarios")
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Keys all randomness of the run.")]
 Sets = Annotated[
     Optional[list[str]],  # noqa: UP045 - typer reads it
     typer.Option("--set", metavar="PATH=VALUE", help="Override a setting of the scenario; may be given often."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
 Picture = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--picture", metavar="FILE.png", help="Where to draw the run; runs/SCENARIO-seedN.png by default."),
+    typer.Option(
+        "--picture",
+        metavar="FILE",
+        help="Where to draw the run: .png, .pdf or .svg; runs/SCENARIO-seedN.png by default. Settings are part of the name.",
+    ),
 ]
 PictureAt = Annotated[
     Optional[list[str]],  # noqa: UP045

@@ -1,26 +1,34 @@
 """The output of `zwerm run` and `zwerm world`: pictures, an animation, and the result as a table or as JSON."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, NoReturn
 
 import typer
 
-from zwerm.cli.console import RunProgress, print_result
+from zwerm.cli.console import RunProgress, print_file, print_result
+from zwerm.cli.output_files import ANIMATIONS, PICTURES, RECORDINGS, OutputFile, check_outputs, run_stem
 from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, out, print_json
-from zwerm.errors import PictureError, ScenarioError
+from zwerm.cli.tracebacks import print_tracebacks
+from zwerm.errors import PictureError, ScenarioError, ZwermError
 from zwerm.run.result import RunResult
+
+NO_PICTURE: Final = "no picture is drawn: matplotlib is not installed; pip install matplotlib"
 
 _MOMENT: Final = re.compile(r"(?P<cycle>\d+)|(?P<at_s>\d+(\.\d+)?)s")
 
 
 @dataclass(frozen=True)
 class RunOutput:
-    """The output options of a command. Raises ScenarioError for a moment that is neither a cycle nor a time.
+    """The output options of a command.
 
-    `radio_table` is the number of links to print, or None for no table.
+    `radio_table` is the number of links to print, or None for no table. Raises ScenarioError for a moment that is neither a
+    cycle nor a time, and for files that cannot be written.
     """
 
     picture: Path | None
@@ -28,6 +36,7 @@ class RunOutput:
     animation: Path | None
     radio_table: int | None
     as_json: bool
+    record: Path | None = None
 
     def __post_init__(self) -> None:
         diagnostics = [
@@ -35,46 +44,83 @@ class RunOutput:
             for each in self.moments
             if not _MOMENT.fullmatch(each)
         ]
+        files = [
+            OutputFile("--picture", self.picture, PICTURES, "matplotlib", "all"),
+            OutputFile("--animate", self.animation, ANIMATIONS, "matplotlib", "all"),
+            OutputFile("--record", self.record, RECORDINGS, "mcap", "record"),
+        ]
+        if self.draws_by_default or self.moments:  # where they go without an option
+            files.append(OutputFile("runs", Path("runs") / "picture.png", PICTURES))
+        try:
+            check_outputs(files)
+        except ScenarioError as error:
+            diagnostics += error.mistakes
         if diagnostics:
             raise ScenarioError(diagnostics)
 
+    @property
+    def draws_by_default(self) -> bool:
+        """Tell whether a picture is drawn although no option asks for it."""
+        return self.picture is None and not self.as_json
+
     def report(self, result: RunResult) -> NoReturn:
-        """Draw and print the result, and exit with the status of its outcome."""
-        drawn, errors = self._draw_stills(result)
-        if result.scenario.random_faults is not None and not self.as_json:
-            drawn.append(_write_faults(result))
-        if self.animation is not None:
-            with RunProgress(err, "animation", quiet=self.as_json) as progress:
-                drawn.append(result.animate(self.animation, progress.ticked))
-        for node, traceback in sorted(result.tracebacks.items()):
-            err.print(f"node {node} raised:\n{traceback}", markup=False, highlight=False, soft_wrap=True)
+        """Print the result, then write its files, and exit with the status of its outcome.
+
+        The result comes first: a full disk, or Ctrl-C while a picture is drawn, does not lose it.
+        """
+        print_tracebacks(err, result.tracebacks)
         if self.as_json:
             print_json(result.as_json())
         else:
-            print_result(out, result, drawn)
+            print_result(out, result)
             if self.radio_table is not None:
                 print_radio_ledger(out, result.radio, self.radio_table)
-        if errors:
-            raise PictureError("\n".join(errors))
+            if self.draws_by_default and self._lacks_matplotlib:
+                err.print(NO_PICTURE, highlight=False, markup=False, soft_wrap=True)
         if result.reason:
             err.print(f"zwerm: {result.reason}", style="red", markup=False, highlight=False, soft_wrap=True)
+        errors = [*result.problems, *self._write_files(result)]
+        if errors:
+            raise PictureError("\n".join(errors))
         if result.outcome == "interrupted":
             raise typer.Exit(EXIT_INTERRUPTED)
         raise typer.Exit(0 if result.ok else EXIT_FAILED)
 
-    def _draw_stills(self, result: RunResult) -> tuple[list[Path], list[str]]:
-        """Return the pictures drawn, and the errors of moments that the run does not have; the result is still printed."""
-        drawn: list[Path] = []
+    @property
+    def _lacks_matplotlib(self) -> bool:
+        return find_spec("matplotlib") is None
+
+    def _write_files(self, result: RunResult) -> list[str]:
+        """Write pictures, faults and animation, and print the path of each. Return why some cannot be written."""
+        path = self.picture or Path("runs") / f"{_stem(result)}.png"
+        files: list[Callable[[], Path]] = []
+        if self.record is not None and not result.problems:
+            files.append(partial(Path, self.record))
+        if self.picture is not None or (self.draws_by_default and not self._lacks_matplotlib):
+            files.append(lambda: result.picture(path))
+        files += [partial(_draw_moment, result, path, moment) for moment in self.moments]
+        if result.scenario.random_faults is not None and not self.as_json:
+            files.append(lambda: _write_faults(result))
+        if self.animation is not None:
+            files.append(partial(self._animate, result, self.animation))
         errors: list[str] = []
-        path = self.picture or Path("runs") / f"{result.scenario.name}-seed{result.seed}.png"
-        if self.picture is not None or not self.as_json:
-            drawn.append(result.picture(path))
-        for moment in self.moments:
+        for write in files:
             try:
-                drawn.append(_draw_moment(result, path, moment))
-            except PictureError as error:
+                written = write()
+            except (ZwermError, OSError) as error:
                 errors.append(str(error))
-        return drawn, errors
+            else:
+                if not self.as_json:
+                    print_file(out, written)
+        return errors
+
+    def _animate(self, result: RunResult, path: Path) -> Path:
+        with RunProgress(err, "animation", quiet=self.as_json) as progress:
+            return result.animate(path, progress.ticked)
+
+
+def _stem(result: RunResult) -> str:
+    return run_stem(result.scenario.name, result.seed, result.scenario.overrides)
 
 
 def _draw_moment(result: RunResult, final: Path, moment: str) -> Path:
@@ -90,7 +136,7 @@ def _write_faults(result: RunResult) -> Path:
     """Write the random faults of the run as a scenario's fault tables."""
     from zwerm.scenario.toml import write_toml
 
-    path = Path("runs") / f"{result.scenario.name}-seed{result.seed}-faults.toml"
+    path = Path("runs") / f"{_stem(result)}-faults.toml"
     path.parent.mkdir(exist_ok=True)
     path.write_text(write_toml({"faults": result.faults}), encoding="utf-8")
     return path

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn, Optional
 
 import typer
 
+from zwerm.cli.output_files import ROWS, OutputFile, check_outputs
 from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err
 from zwerm.errors import ZwermError
 
@@ -23,7 +24,15 @@ Jobs = Annotated[
 ]
 Out = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--out", metavar="FILE.parquet", help="Where the rows go; runs/NAME.parquet by default."),
+    typer.Option(
+        "--out",
+        metavar="FILE",
+        help="Where the rows go: .parquet, or .csv for both; runs/NAME.parquet by default.",
+    ),
+]
+Timeout = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--timeout", min=1.0, metavar="S", help="End a trial without a result after S seconds: it failed."),
 ]
 Retry = Annotated[bool, typer.Option("--retry", help="Run trials again that failed.")]
 
@@ -37,12 +46,34 @@ def study_extra() -> Iterator[None]:
         raise ZwermError(f"study: needs {error.name}; install it with: pip install 'zwerm[study]'") from None
 
 
+def rows_file(output: Path | None, name: str) -> Path:
+    """Return the Parquet file of a study; beside it go the picture and, if the user asks for it, the CSV file.
+
+    Raises ScenarioError where they cannot be written.
+    """
+    path = output or Path("runs") / f"{name}.parquet"
+    check_outputs([OutputFile("--out", path, ROWS)])
+    return path.with_suffix(".parquet")
+
+
+def write_csv(output: Path | None, result: "StudyResult") -> list[Path]:
+    """Write the rows as CSV where `output` asks for it, and return the files written."""
+    from zwerm.study.rows import export_csv
+
+    if output is None or output.suffix.lower() != ".csv" or not result.path.exists():
+        return []
+    return [export_csv(result.path, output)]
+
+
 def print_trial_counts(result: "StudyResult", drawn: list[Path]) -> None:
     """Print how many trials ran, and the files written."""
     ran = f"{result.done} of {result.planned} trials, {result.ran} of them run now: {result.path}"
     err.print(ran, highlight=False, soft_wrap=True)
+    for why in result.unknown:
+        err.print(f"its rows are not used again: {why}", markup=False, highlight=False, soft_wrap=True)
     for each in drawn:
-        err.print(f"picture: {each}", highlight=False, soft_wrap=True)
+        kind = "rows as CSV" if each.suffix.lower() == ".csv" else "picture"
+        err.print(f"{kind}: {each}", highlight=False, soft_wrap=True)
 
 
 def exit_with(result: "StudyResult", failed_trials_count: bool = True) -> NoReturn:

@@ -1,9 +1,9 @@
 """Paired comparison of a scenario's variants: same seeds and same random draws at each point of the sweeps.
 
-A comparison is a study with at least two variants. The first variant is the reference. For each seed that both variants ran,
-the comparison takes the difference of a metric; over all such seeds, its mean and 95 % interval (Student's t of the
-differences). A failed run counts with its measured values: leaving it out would favour a variant that fails in hard cases.
-A metric without a value (a time to a coverage that a run did not reach) gives no difference for that seed.
+A comparison is a study with at least two variants. The first variant is the reference. For each seed that both variants
+ran, the comparison takes the difference of a metric. Over these seeds it gives the mean and its 95 % interval
+(Student's t). A failed run counts with its measured values: leaving it out would favour a variant that fails in hard
+cases. A metric without a value (a time to a coverage that a run did not reach) gives no difference for that seed.
 """
 
 import math

@@ -1,7 +1,8 @@
 """A comparison as a figure: each metric over the first sweep, each variant with its 95 % interval.
 
 A panel of paired differences from the first variant is below each panel of means. Markers are hollow if not all runs have a
-value. With several sweeps there is one figure for each combination of the other sweeps' values.
+value. A marker stands at its value of the sweep; variants stand beside each other only where the values are not numbers. With
+several sweeps there is one figure for each combination of the other sweeps' values.
 """
 
 import math
@@ -120,7 +121,6 @@ def _draw_metric(
     above: "Axes", below: "Axes", comparison: Comparison, places: Sequence[SweepPoint], metric: str
 ) -> None:
     x, ticks = _axis(places)
-    step = min(np.diff(np.unique(x)), default=1.0)
     below.axhline(0.0, color="0.4", linewidth=0.8)
     count = len(comparison.variants)
     for number, variant in enumerate(comparison.variants):
@@ -135,7 +135,8 @@ def _draw_metric(
             "capsize": 2.5,
             "label": variant,
         }
-        shifted = x + DODGE * step * (number - (count - 1) / 2.0)
+        # Names of values have places beside each other; a number has its own.
+        shifted = x + DODGE * (number - (count - 1) / 2.0) if ticks else x
         points = [place.points[number] for place in places]
         whole = [_all_measured(comparison, point, metric) for point in points]
         _bars(above, shifted, [comparison.sample(point, metric) for point in points], whole, style)

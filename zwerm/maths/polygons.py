@@ -1,7 +1,7 @@
 """Convex polygons in the plane: Voronoi cells by clipping, and integrals of polynomials over them in closed form.
 
-A polygon is a list of (x, y) [m], counter-clockwise. Everything here is plain arithmetic on Python floats: the polygons of
-Voronoi coverage have about six corners, and for those it is several times quicker than arrays. Nothing here integrates
+A polygon is a list of (x, y) [m], counter-clockwise. All functions are plain arithmetic on Python floats. The polygons
+of Voronoi coverage have about six corners, and arrays are several times slower for so few. Nothing here integrates
 numerically. Repeated corners and polygons without area are allowed; what they give is stated where it matters.
 
 Source: Schwager, McLurkin, Rus: Distributed Coverage Control with Sensory Feedback for Networked Robots, 2006, section III.
@@ -84,9 +84,9 @@ class Moments(NamedTuple):
 def moments(polygon: Polygon, ox: float = 0.0, oy: float = 0.0) -> Moments:
     """Return the moments of `polygon` about (ox, oy), for at least one corner. Schwager 2006, the list after eq. 18.
 
-    The paper writes each as a sum of its own over the sides. With w = x0 y1 - x1 y0, twice the signed area that a side
-    spans with the origin, they are all sums of w times a symmetric polynomial: the same numbers by Green's theorem, with a
-    third of the arithmetic. Taken about one of the polygon's own corners every w is >= 0, and nothing cancels.
+    The paper writes each as a sum of its own over the sides. Let w = x0 y1 - x1 y0, twice the signed area between a
+    side and the origin. All moments are sums of w times a symmetric polynomial (Green's theorem), with a third of the
+    arithmetic of the printed form. Taken about one of the polygon's own corners every w is >= 0, and nothing cancels.
     """
     i00 = i10 = i01 = i20 = i11 = i02 = 0.0
     x0, y0 = polygon[-1]
@@ -136,9 +136,8 @@ def linear_centroid(polygon: Polygon, value: float, gx: float, gy: float) -> tup
 def estimated_centroid(cell: Polygon, value: float, gx: float, gy: float) -> Point | None:
     """Return the centroid of `cell` under the linear estimate value + gx x + gy y, truncated to V+. Schwager 2006, eq. 10.
 
-    V+ is where the estimate is not negative (eq. 12). Where nothing there has mass (a field that is zero, or negative all
-    over the cell) no place matters more than another, and the centroid is the cell's own, as it is for any constant field,
-    however small. A cell without area has none: None.
+    V+ is where the estimate is not negative (eq. 12). A field that is zero or negative all over the cell has no mass.
+    Then the centroid is that of a constant field, the cell's own. A cell without area has none: None.
     """
     positive = cell
     if cell and min([gx * x + gy * y for x, y in cell]) < -value:
@@ -152,7 +151,7 @@ def estimated_centroid(cell: Polygon, value: float, gx: float, gy: float) -> Poi
 
 
 def nearest_point(polygon: Polygon) -> Point:
-    """Return the place on the rim of `polygon` (not empty) that is nearest to the origin."""
+    """Return the point on the boundary of `polygon` (not empty) that is nearest to the origin."""
     best, nearest = float("inf"), polygon[0]
     x0, y0 = polygon[-1]
     for x1, y1 in polygon:

@@ -1,11 +1,11 @@
 """Flag complexes of a graph up to dimension 2, and their homology over Z2.
 
-A flag complex has every triangle whose three edges are there: the Vietoris-Rips complex of a swarm, from who sees whom
-alone (Ramaithitima et al. 2015, algorithm 2). Chains over Z2 are Python integers, one bit a simplex, so that adding two
-chains is one XOR. Nothing here knows where a vertex is, and nothing depends on the order of a set.
+A flag complex contains every triangle whose three edges it contains. It is the Vietoris-Rips complex of a swarm, built from
+visibility alone (Ramaithitima et al. 2015, algorithm 2). Chains over Z2 are Python integers with one bit for each simplex,
+so that the sum of two chains is one XOR. No function uses positions, and no result depends on the order of a set.
 
-Built to dimension 2, a complex keeps the boundary of every tetrahedron as a 2-cycle: H2 alone therefore says nothing.
-What says something is a relative cycle with a boundary on the fence, and `sparing` looks for that.
+In dimension 2 the boundary of every tetrahedron is a 2-cycle, so H2 alone proves nothing. A relative cycle whose boundary is
+on the fence proves coverage; `find_redundant` looks for such a cycle.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -21,10 +21,10 @@ def edge(i: int, j: int) -> Edge:
 
 
 class FlagComplex:
-    """Vertices, edges and triangles, each ascending and with ascending ids; `neighbours` maps a vertex to its own."""
+    """Vertices, edges and triangles, each in ascending order; `neighbours` maps a vertex to its neighbours."""
 
     def __init__(self, neighbours: Mapping[int, Iterable[int]]) -> None:
-        """Take neighbour lists. An edge needs both ends to name each other: two robots that see each other."""
+        """Take neighbour lists. There is an edge where both vertices list each other: the two robots see each other."""
         named = {vertex: frozenset(listed) for vertex, listed in sorted(neighbours.items())}
         self.neighbours: dict[int, tuple[int, ...]] = {
             i: tuple(j for j in sorted(listed) if j != i and j in named and i in named[j])
@@ -115,15 +115,15 @@ def betti(complex_: FlagComplex) -> tuple[int, int]:
 def hole_cycles(complex_: FlagComplex) -> list[tuple[int, ...]]:
     """Return one closed walk around each hole: a shortest basis of H1.
 
-    Erickson and Whittlesey 2005: every cycle of such a basis is, from one of its vertices, two shortest paths and an edge. Of
-    two cycles around the same hole, from the same vertex, one is enough.
+    From one of its vertices, every cycle of such a basis is two shortest paths and an edge (Erickson and Whittlesey 2005). Of
+    two cycles around the same hole from the same vertex one is enough.
     """
     labels, count = _edge_labels(complex_)
     found: dict[tuple[int, ...], int] = {}
     for root in complex_.vertices if count else ():
         before, depth, label = {root: root}, {root: 0}, {root: 0}
         reached = [root]
-        shortest: dict[int, tuple[int, Edge]] = {}  # hole: how long, and the edge opposite
+        shortest: dict[int, tuple[int, Edge]] = {}  # hole: length of the cycle, and its edge opposite to the root
         for i in reached:
             for j in complex_.neighbours[i]:
                 here = label[i] ^ labels[edge(i, j)]
@@ -157,7 +157,7 @@ def _ancestors(vertex: int, before: Mapping[int, int]) -> list[int]:
 
 
 def _edge_labels(complex_: FlagComplex) -> tuple[dict[Edge, int], int]:
-    """Return b1 bits for every edge, whose sums over a closed walk tell which holes it goes around, and b1."""
+    """Return b1 bits for every edge, and b1. The sum of the bits over a closed walk names the holes that it surrounds."""
     root = {vertex: vertex for vertex in complex_.vertices}
 
     def root_of(vertex: int) -> int:
@@ -177,7 +177,7 @@ def _edge_labels(complex_: FlagComplex) -> tuple[dict[Edge, int], int]:
         if left:
             pivots[left.bit_length()] = left
     free = [n for n in range(1, len(off_tree) + 1) if n not in pivots]
-    # An edge that leads a triangle's column is the sum of that column's others: those below it come first.
+    # The leading edge of a column equals the sum of the column's other edges, which are lower and so come first.
     value = {n: 1 << at for at, n in enumerate(free)}
     for n in sorted(pivots):
         value[n] = 0
@@ -190,8 +190,8 @@ def _edge_labels(complex_: FlagComplex) -> tuple[dict[Edge, int], int]:
 def relative_cycles(complex_: FlagComplex, fence: Iterable[Edge]) -> tuple[list[int], list[int]]:
     """Return a basis of the relative 2-cycles of (complex, fence), and their boundaries.
 
-    The cycles are bits over the triangles, the boundaries bits over the edges; a boundary has fence edges only. Since
-    there are no 3-simplices this is a basis of the relative H2 of the 2-dimensional complex.
+    The cycles are bits over the triangles, and the boundaries are bits over the edges. A boundary has fence edges only. The
+    complex has no 3-simplices, so this is a basis of its relative H2.
     """
     on_fence = frozenset(fence)
     inner = sum(1 << n for n, each in enumerate(complex_.edges) if each not in on_fence)
@@ -206,9 +206,9 @@ def relative_cycles(complex_: FlagComplex, fence: Iterable[Edge]) -> tuple[list[
 
 
 def _absorb(chain: int, combination: int, columns: dict[int, tuple[int, int]]) -> int:
-    """Reduce a chain, and along with it the combination that it is of, by columns kept under their highest bit.
+    """Reduce a chain by columns, which are keyed by their highest bit, and reduce its combination of triangles likewise.
 
-    Keeps what is left as a column and returns 0; where nothing is left, returns the combination that vanishes.
+    A remainder is stored as a new column, and 0 is returned. Without a remainder the combination is a cycle, and is returned.
     """
     while chain:
         known = columns.get(chain.bit_length())
@@ -231,9 +231,9 @@ def _boundary(cycle: int, whole: list[int]) -> int:
 
 
 def may_leave(vertex: int, neighbours: Mapping[int, Iterable[int]]) -> bool:
-    """Tell whether a vertex can leave without changing b0 or b1: the link criterion.
+    """Return whether a vertex can leave without changing b0 or b1: the link criterion.
 
-    It can iff the flag complex of the graph that its neighbours induce is non-empty, connected and without holes.
+    It can iff the flag complex of the graph that its neighbours induce is non-empty, connected and has no holes.
     """
     around = tuple(neighbours[vertex])
     if not around:
@@ -244,42 +244,42 @@ def may_leave(vertex: int, neighbours: Mapping[int, Iterable[int]]) -> bool:
     return betti(FlagComplex({each: [other for other in around if other in seen[each]] for each in around})) == (1, 0)
 
 
-class Sparing(NamedTuple):
-    """A relative 2-cycle through the fence, and the vertices it does without."""
+class RedundantVertices(NamedTuple):
+    """A relative 2-cycle through the fence, and the vertices that it does not need."""
 
     redundant: tuple[int, ...]
     cycle: tuple[Triangle, ...]
     boundary: tuple[Edge, ...]
-    missed: tuple[int, ...]  # fence vertices in a triangle that the cycle's boundary does not pass
+    missed: tuple[int, ...]  # fence vertices of triangles that the boundary of the cycle does not pass
 
 
-NOBODY = Sparing((), (), (), ())
+NONE_REDUNDANT = RedundantVertices((), (), (), ())
 
 
-def sparing(
+def find_redundant(
     complex_: FlagComplex,
     fence: Iterable[Edge],
     keep: Iterable[int] = (),
     missed_max: int = 0,
     order: Callable[[int], int] | None = None,
-) -> Sparing:
-    """Return a relative 2-cycle with a boundary on the fence and as few vertices as greed can find.
+) -> RedundantVertices:
+    """Return a relative 2-cycle with its boundary on the fence, and the vertices that a greedy search can remove.
 
-    Vertices of the fence, those in `keep` and those in no triangle always stay; the others are tried one after another,
-    the best connected first unless `order` says otherwise, by `may_leave`, which keeps the homotopy type and with it the
-    class of the cycle. Where no cycle passes all fence vertices that are part of a triangle, but for `missed_max`,
-    nobody is spared (de Silva and Ghrist 2006: then the cycle certifies nothing).
+    Vertices of the fence, those in `keep` and those in no triangle always stay. The others are tried one by one, in
+    ascending `order`; by default the vertex with most neighbours first. `may_leave` decides: a removal keeps the homotopy
+    type, and so the class of the cycle. The cycle must pass all fence vertices of triangles except `missed_max`; otherwise
+    it certifies nothing (de Silva and Ghrist 2006), and no vertex is redundant.
     """
     on_fence = tuple(sorted(set(fence)))
     guarded = {vertex for each in on_fence for vertex in each} | set(keep)
     left = {vertex: set(each) for vertex, each in complex_.neighbours.items()}
     key = order or (lambda vertex: -len(complex_.neighbours[vertex]))
-    spared: list[int] = []
+    removed: list[int] = []
     for vertex in sorted((v for v in complex_.vertices if v not in guarded), key=lambda v: (key(v), v)):
         if may_leave(vertex, {each: sorted(left[each]) for each in (vertex, *sorted(left[vertex]))}):
             for each in sorted(left.pop(vertex)):
                 left[each].discard(vertex)
-            spared.append(vertex)
+            removed.append(vertex)
     reduced = FlagComplex(left)
     cycles, edges = relative_cycles(reduced, on_fence)
     cycle, boundary = _widest(cycles, edges, reduced)
@@ -288,9 +288,9 @@ def sparing(
     solid = {vertex for each in reduced.triangles for vertex in each}
     missed = tuple(sorted((fenced & solid) - passed))
     if not boundary or len(missed) > missed_max:
-        return NOBODY._replace(missed=missed)
-    return Sparing(
-        tuple(sorted(spared)),
+        return NONE_REDUNDANT._replace(missed=missed)
+    return RedundantVertices(
+        tuple(sorted(removed)),
         tuple(reduced.triangles[n] for n in bits(cycle)),
         tuple(reduced.edges[n] for n in bits(boundary)),
         missed,
@@ -298,7 +298,7 @@ def sparing(
 
 
 def _widest(cycles: list[int], edges: list[int], complex_: FlagComplex) -> tuple[int, int]:
-    """Return the sum of cycles whose boundary passes most vertices, by greed, and that boundary."""
+    """Return the sum of cycles whose boundary passes most vertices, found greedily, and that boundary."""
     incident = [(1 << i) | (1 << j) for i, j in complex_.edges]
 
     def passed(boundary: int) -> int:

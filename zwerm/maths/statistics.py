@@ -37,8 +37,8 @@ def condense(values: Sequence[float]) -> Sample:
 def half_width(sd: float, n: int, n_other: int | None = None) -> float:
     """Return half the 95 % interval of a mean of `n` values, nan for fewer than two.
 
-    With `n_other`, half the interval of the difference to the mean of that many other values; both samples are assumed to have
-    the same unknown standard deviation.
+    With `n_other`, it is half the interval of the difference to the mean of that many other values. Both samples are
+    assumed to have the same unknown standard deviation.
     """
     if n < 2:
         return math.nan

@@ -1,8 +1,8 @@
 """Betti numbers of a complex given by its maximal simplices, after it was collapsed.
 
-A vertex is dominated if another one is in every maximal simplex that it is in; to remove it keeps the homotopy type
-(Barmak and Minian 2012). The same holds for maximal simplices, seen as the vertices of the dual complex (Dowker 1952). What is
-left of a complex that covers an area is hardly more than a cycle around each hole.
+A vertex is dominated if another one is in every maximal simplex that contains it. Its removal keeps the homotopy type
+(Barmak and Minian 2012). The same holds for maximal simplices, seen as the vertices of the dual complex (Dowker 1952).
+The remainder of a complex that covers an area is little more than a cycle around each hole.
 """
 
 from collections.abc import Iterable

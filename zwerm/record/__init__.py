@@ -1,1 +1,1 @@
-"""What a run keeps: the history of positions, and recordings in MCAP."""
+"""Records of a run: the history of positions, and recordings in MCAP."""

@@ -1,7 +1,7 @@
 """The history of a run: a thinned record of where the robots were, enough to draw it.
 
-Memory is bounded: when more than `held_max` samples are held, every second one is dropped and from then on only every
-second one is taken, so what is held stays evenly spaced over the whole run. The first and the newest sample are always
+Memory is bounded. When more than `held_max` samples are held, every second one is dropped, and from then on only every
+second one is taken. So the samples stay evenly spaced over the whole run. The first and the newest sample are always
 there. A history is for pictures; nothing in a run depends on it.
 """
 
@@ -17,7 +17,7 @@ HELD_MAX: Final = 2_000
 
 
 class SceneLike(Protocol):
-    """What a history takes of a scene."""
+    """The part of a scene that a history stores."""
 
     @property
     def time_s(self) -> float:

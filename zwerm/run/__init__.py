@@ -1,7 +1,7 @@
 """From a scenario to a result: assembly, the runners, the result, validation, and shrinking of fault schedules.
 
 The package itself can be called: `zwerm.run(...)` is `zwerm.run.runner.run(...)`. The import system binds the name of a
-package in its parent: a function of the same name would be replaced as soon as any module of the package is imported.
+package in its parent. A function of the same name would be replaced as soon as any module of the package is imported.
 """
 
 import sys

@@ -5,12 +5,14 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from zwerm.agents.runtime.controllers import find, parameters_of
-from zwerm.catalogue import BASE, COORDINATOR, ROBOT, SENSORS, Role
-from zwerm.deploy.node_specs import controller_for
+from zwerm.agents.runtime.controllers import find, parameters_of, step_place
+from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role
+from zwerm.deploy.node_specs import controller_for, node_specs
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
+from zwerm.scenario.overrides import blame
 from zwerm.scenario.parameter_files import with_file_texts
+from zwerm.scenario.plugin_names import look_in
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.arena.scatter import with_landmarks
@@ -36,12 +38,14 @@ def assemble_run(scenario: Scenario, seed: int) -> tuple[World, Observers]:
 
     Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the faults and the placement.
     """
+    look_in(scenario.folder)
     scenario = _with_landmarks(scenario, seed)
     arena, sensors, observers = prepare(scenario)
     mistakes: list[str] = []
     world = _attempt(lambda: World(scenario, seed, arena, sensors), scenario, mistakes)
     if world is None:
-        raise ScenarioError(mistakes)
+        raise ScenarioError(blame(mistakes, scenario.place, scenario.overrides))
+    world.place_of = lambda node: step_place(find(node_specs(scenario, seed)[node][0]))
     return world, observers
 
 
@@ -65,6 +69,7 @@ def prepare(scenario: Scenario) -> Prepared:
 
     Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
     """
+    look_in(scenario.folder)
     scenario = _with_landmarks(scenario, 1)
     mistakes: list[str] = []
     field, table = None, scenario.field
@@ -80,7 +85,7 @@ def prepare(scenario: Scenario) -> Prepared:
         sensors = _attempt(lambda: _sensors(scenario, arena, field), scenario, mistakes)
         observers = _attempt(lambda: make_observers(scenario, arena, field), scenario, mistakes)
     if arena is None or sensors is None or observers is None or mistakes:
-        raise ScenarioError(mistakes)
+        raise ScenarioError(blame(mistakes, scenario.place, scenario.overrides))
     return Prepared(arena, sensors, observers)
 
 
@@ -126,7 +131,7 @@ def check_controllers(scenario: Scenario) -> None:
     robots, base, coordinator = scenario.robots, scenario.base, scenario.coordinator
     kinds = [table.kind for table in robots.sensors]
     # A controller may name what it needs by the sensor's kind or by the field of the observation that it fills.
-    given = [*kinds, *(find_sensor(kind).field for kind in kinds if kind in SENSORS)]
+    given = [*kinds, *filter(None, map(_field_of, kinds))]
     mistakes = _controller_mistakes(scenario, "robots", ROBOT, robots.controller, robots.parameters, given)
     if base is not None:
         mistakes += _controller_mistakes(scenario, "base", BASE, base.controller, base.parameters, given)
@@ -136,6 +141,14 @@ def check_controllers(scenario: Scenario) -> None:
         )
     if mistakes:
         raise ScenarioError(list(dict.fromkeys(mistakes)))
+
+
+def _field_of(kind: str) -> str | None:
+    """Return the field that a sensor fills, or None if there is no such sensor; `make_sensors` reports that mistake."""
+    try:
+        return find_sensor(kind).field
+    except ValueError:
+        return None
 
 
 def _controller_mistakes(

@@ -9,8 +9,8 @@ from zwerm.world.scene import Bools, Floats, Ints
 class Positions:
     """The true poses of n robots at k times. Where a robot is not in the arena its pose is nan.
 
-    A scenario of less than 2,000 ticks has a sample at every tick; a longer one at even intervals of at most a thousandth of
-    its duration, and at the end.
+    A scenario of less than 2,000 ticks has a sample at every tick. A longer one has samples at even intervals of at
+    most a thousandth of its duration, and at the end.
     """
 
     time_s: Floats  # (k,) [s]

@@ -1,4 +1,4 @@
-"""What a run leaves behind: its outcome, its numbers, and enough of its history to draw it."""
+"""The result of a run: its outcome, its numbers, and enough of its history to draw it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -26,8 +26,9 @@ if TYPE_CHECKING:  # pictures need matplotlib
 class RunResult:
     """The result of one run. `as_json` is what `zwerm run --json` prints.
 
-    `metrics` are the values at the end by name, `series` the metrics that were sampled during the run, as arrays (k,) by name,
-    `time_s` among them. `telemetry` are the numbers that nodes reported. `snapshots` are records for the algorithm's own
+    `metrics` are the values at the end by name. `series` are the metrics that were sampled during the run, as arrays
+    (k,) by name, `time_s` among them. `telemetry` are the numbers that nodes reported. `snapshots` are records for the
+    algorithm's own
     pictures. `history` is what pictures are drawn from; `positions` gives it as arrays.
     """
 
@@ -55,7 +56,11 @@ class RunResult:
     missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
     series: dict[str, Floats] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)  # what could not be written during the run
     tracebacks: dict[int, str] = field(default_factory=dict)
+    crash_reasons: dict[int, str] = field(
+        default_factory=dict
+    )  # "tick 5: ..." by node, of programs that ended on their own
     telemetry: TelemetryArrays = field(default_factory=TelemetryArrays.empty)
     snapshots: list[TelemetryRecord] = field(default_factory=list)
 
@@ -98,7 +103,12 @@ class RunResult:
             "metrics": self.metrics,
             "radio": self.radio,
             "middleware_lost": self.middleware_lost,
-            "nodes": {"crashed": self.crashed, "restarted": self.restarted, **self.hindered},
+            "nodes": {
+                "crashed": self.crashed,
+                "restarted": self.restarted,
+                **self.hindered,
+                "reasons": {str(node): reason for node, reason in sorted(self.crash_reasons.items())},
+            },
             "faults": self.faults,
         }
 
@@ -145,7 +155,7 @@ class RunResult:
 
     @property
     def ending(self) -> str:
-        """How many robots there were in the end, and how long the run was."""
+        """Number of robots at the end, and duration of the run."""
         there = int(self.metrics.get("robots_deployed", self.metrics.get("robots_in_arena", self.robots)))
         robots = f"{self.robots} robots" if there == self.robots else f"{there} of {self.robots} robots"
         return f"{robots}, {self.sim_s:g} s"

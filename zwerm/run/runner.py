@@ -4,13 +4,15 @@ import gc
 import secrets
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Final, Literal, Protocol
+from typing import Final, Literal, Protocol, get_args
 
 import numpy as np
 
+from zwerm.agents.runtime.contract import Setup
+from zwerm.agents.runtime.controllers import make
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import ScenarioError, StragglerError
@@ -18,9 +20,11 @@ from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
 from zwerm.run.assembly import assemble_run, observers_of
+from zwerm.run.hang_guard import hang_guard
 from zwerm.run.measurement import measure, truth_of
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import load
+from zwerm.scenario.nearest import did_you_mean
 from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.driver import TickObserver
 from zwerm.world.drivers.lockstep import LockStep
@@ -84,6 +88,9 @@ def run(
     to write an MCAP recording to. Raises ScenarioError for a mistake in the scenario, and LinkError where robots cannot
     be started. A failed or interrupted run is a result like any other: look at its `outcome`.
     """
+    if runner not in get_args(Runner):
+        expected = " or ".join(map(repr, get_args(Runner)))
+        raise ScenarioError([f"runner: expected {expected}, got {runner!r}{did_you_mean(runner, get_args(Runner))}"])
     if seed < 0:
         raise ScenarioError([f"seed: expected >= 0, got {seed}"])
     if realtime is not None and not realtime > 0:
@@ -104,7 +111,10 @@ def run(
             lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
             world.schedule.late_joiners,
         )
-        return drive(world, link, seed, runner, realtime, watcher, record, link, metrics)
+        with hang_guard(scenario.time.straggler_s):
+            return drive(world, link, seed, runner, realtime, watcher, record, link, metrics)
+    _refuse_main(members)
+    _try_controllers(members)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
     with LocalSwarm(
@@ -116,6 +126,24 @@ def run(
         restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
     ) as swarm:
         return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics)
+
+
+def _refuse_main(specs: Mapping[int, tuple[str, Setup]]) -> None:
+    """Raise ScenarioError where a controller is in the program itself: the processes of robots do not run that."""
+    for name in dict.fromkeys(controller for controller, _ in specs.values()):
+        if name.startswith("__main__:"):
+            raise ScenarioError(
+                [f"{name}: robot processes do not import the program itself: move the class to a module, or run inline"]
+            )
+
+
+def _try_controllers(specs: Mapping[int, tuple[str, Setup]]) -> None:
+    """Make one controller of each kind. Raises ControllerError, which each robot's process would report apart."""
+    firsts: dict[str, Setup] = {}
+    for name, setup in specs.values():
+        firsts.setdefault(name, setup)
+    for name, setup in firsts.items():
+        make(name, setup)
 
 
 def serve(
@@ -179,6 +207,7 @@ def drive(
     sampling = Sampling(world, metrics, watcher or NullProgress())
     with ExitStack() as stack:
         observers: list[TickObserver] = []
+        recording = None
         if record is not None:
             from zwerm.record.recording import Recording
 
@@ -202,7 +231,11 @@ def drive(
             outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
         wall_s = time.monotonic() - start
         sampling.finish()
-        return _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, link)
+        result = _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, link)
+        if recording is not None:
+            recording.close()
+            result.problems += [recording.error] if recording.error else []
+        return result
 
 
 class Sampling:
@@ -322,5 +355,6 @@ def _result(
         series={name: np.array(values) for name, values in sampling.observers.series().items()},
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,
+        crash_reasons={node: f"tick {status.crash_ticks[node]}: {why}" for node, why in status.crashed.items()},
         tracebacks={node: failure.traceback for node, failure in status.failures.items()},
     )

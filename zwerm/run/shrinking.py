@@ -1,8 +1,8 @@
 """Shrinking: from a schedule of faults under which a run fails to a smallest one under which it still fails.
 
-Delta debugging (Zeller, Hildebrandt: Simplifying and isolating failure-inducing input. IEEE TSE 28, 2002, ddmin) over the
-faults of the schedule, those drawn at random included. What is left is 1-minimal: without any one of its faults the run no
-longer fails. Trials run inline, which gives what processes would; equal schedules are tried once.
+Delta debugging (Zeller, Hildebrandt: Simplifying and isolating failure-inducing input. IEEE TSE 28, 2002, ddmin) over
+the faults of the schedule, those drawn at random included. The remaining schedule is 1-minimal: without any one of its
+faults the run no longer fails. Trials run inline, which gives what processes would; equal schedules are tried once.
 """
 
 import operator
@@ -33,7 +33,7 @@ _CONDITION: Final = re.compile(r"\s*(\w+)\s*(<=|>=|==|!=|<|>)\s*([\w.+-]+)\s*")
 
 @dataclass(frozen=True, slots=True)
 class Failing:
-    """What counts as failing: a metric, `ticks`, `sim_s` or `outcome`, held against a value."""
+    """The condition that counts as failing: a metric, `ticks`, `sim_s` or `outcome`, compared with a value."""
 
     name: str
     sign: str
@@ -73,7 +73,7 @@ class Shrinker:
     def __init__(
         self, scenario: Scenario, seed: int, failing: Failing, progress: Callable[[int, int], None] | None = None
     ) -> None:
-        """`progress` is told, after each run, how many there were, and how many faults the smallest failing one has."""
+        """`progress` gets, after each run, the number of runs, and the number of faults in the smallest failing schedule."""
         self._scenario = scenario
         self._seed = seed
         self._failing = failing

@@ -1,7 +1,7 @@
 """Every mistake in a scenario at once, of whichever stage: its tables, or what is made of them.
 
-What is made of tables can only be checked where they are sound. So what is unsound is left out, and the rest is checked as
-if it were the whole; what is then said about a place that was left out, or is around or inside one, is not believed.
+Objects can be made of correct tables only. So wrong tables are left out, and the rest is checked as if it were
+complete. Mistakes at, around or inside a place that was left out are then ignored, because the omission may cause them.
 """
 
 import copy
@@ -9,9 +9,15 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from zwerm.agents.conformance.check import setup_violations
+from zwerm.agents.conformance.stimuli import sensor_class
+from zwerm.agents.runtime.controllers import find
+from zwerm.catalogue import algorithm_of
+from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import assemble, prepare
 from zwerm.scenario.load import load, tables_of, validate
+from zwerm.scenario.overrides import blame
 from zwerm.scenario.tables import Scenario
 
 Path = tuple[str, ...]
@@ -27,7 +33,28 @@ def scenario_mistakes(name: str, overrides: tuple[str, ...] = ()) -> list[str]:
         assemble(scenario, seed=1)
     except ScenarioError as error:
         return error.mistakes
-    return []
+    return own_controller_mistakes(scenario)
+
+
+def own_controller_mistakes(scenario: Scenario) -> list[str]:
+    """Return how the scenario's own controllers, `module:Class`, break the contract; one line for each violation.
+
+    The conformance kit makes and steps one controller of each role in this process, with the node's Setup of the scenario.
+    """
+    found: dict[str, None] = {}
+    tried: set[str] = set()
+    for controller, setup in node_specs(scenario, 1).values():
+        if algorithm_of(controller) is not None or controller in tried or _is_built_in(controller):
+            continue
+        tried.add(controller)
+        if all(hasattr(sensor_class(sensor), "stimulus") for sensor in setup.sensors):
+            for violation in setup_violations(find(controller), setup):
+                found[f"{scenario.place}: {setup.role}: {controller}: {violation}"] = None
+    return list(found)
+
+
+def _is_built_in(controller: str) -> bool:
+    return controller.startswith("zwerm.")
 
 
 def _mistakes_of_the_rest(name: str, overrides: tuple[str, ...]) -> list[str]:
@@ -41,7 +68,8 @@ def _mistakes_of_the_rest(name: str, overrides: tuple[str, ...]) -> list[str]:
         prepare(validate(rest, str(file), file.parent))
     except ScenarioError as error:
         found = [each.removeprefix(f"{file}: ") for each in error.mistakes]
-        return [f"{file}: {each}" for each in found if not any(_touches(each, path) for path in unsound)]
+        lines = [f"{file}: {each}" for each in found if not any(_touches(each, path) for path in unsound)]
+        return blame(lines, str(file), overrides)
     return []
 
 

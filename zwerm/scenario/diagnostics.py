@@ -2,22 +2,47 @@
 
 import json
 import re
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, get_args
 
 import msgspec
 from msgspec import Struct
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from zwerm.scenario.nearest import did_you_mean
 
-def mistakes(error: ValidationError, place: str, prefix: str = "") -> list[str]:
-    """Return one line for every mistake in `error`: `place: path: rule, got value`."""
+
+def mistakes(error: ValidationError, place: str, prefix: str = "", table: type[BaseModel] | None = None) -> list[str]:
+    """Return one line for every mistake in `error`: `place: path: rule, got value`.
+
+    `table` is what was validated; with it, the line for an unknown key names the most similar known one.
+    """
     lines = {}
     for each in error.errors(include_url=False):
         where, rule, got = _mistake(each)
+        if each["type"] == "extra_forbidden" and table is not None:
+            rule += did_you_mean(str(where[-1]), _keys_at(table, where[:-1]))
         path = prefix + ".".join(map(str, where))
         lines[f"{place}: {path}" if path else place] = rule if got is None else f"{rule}, got {got}"
     return [f"{where}: {what}" for where, what in lines.items()]
+
+
+def _keys_at(table: type[BaseModel], where: Sequence[int | str]) -> list[str]:
+    """Return the keys of the table at a path in `table`."""
+    tables = [table]
+    for key in where:
+        fields = [each.model_fields[key] for each in tables if isinstance(key, str) and key in each.model_fields]
+        if isinstance(key, str):
+            tables = [inner for each in fields for inner in _tables_in(each.annotation)]
+    return [key for each in tables for key in each.model_fields]
+
+
+def _tables_in(annotation: Any) -> list[type[BaseModel]]:
+    """Return the tables in a type such as `list[Table] | None`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [found for each in get_args(annotation) for found in _tables_in(each)]
 
 
 _RULES = {
@@ -64,7 +89,11 @@ def _mistake(each: ErrorDetails) -> tuple[tuple[int | str, ...], str, str | None
 def struct_mistakes(kind: type[Struct], given: dict[str, Any], path: str) -> list[str]:
     """Return one line for every mistake in what is given for a struct: `path.key: rule, got value`."""
     fields = {each.encode_name: each for each in msgspec.structs.fields(kind)}
-    found = [f"{path}.{key}: unknown key; known are {', '.join(fields)}" for key in given if key not in fields]
+    found = [
+        f"{path}.{key}: unknown key{did_you_mean(key, fields)}; known are {', '.join(fields) or 'none'}"
+        for key in given
+        if key not in fields
+    ]
     for name, field in fields.items():
         if name in given:
             try:

@@ -2,6 +2,7 @@
 
 import copy
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,14 @@ from pydantic import ValidationError
 
 from zwerm.errors import ScenarioError
 from zwerm.scenario.diagnostics import mistakes
-from zwerm.scenario.overrides import override
+from zwerm.scenario.nearest import nearest
+from zwerm.scenario.overrides import blame, override
 from zwerm.scenario.renamed import rename
 from zwerm.scenario.tables import Scenario
 from zwerm.scenario.types import OpenTable
 
 BUILT_IN = Path(__file__).parents[1] / "scenarios"
+STUDIES = Path(__file__).parents[1] / "studies"
 
 
 def built_in() -> dict[str, Path]:
@@ -32,8 +35,16 @@ def locate(name: str) -> Path:
     path = Path(name)
     if path.is_file():
         return path
-    hint = "" if path.suffix == ".toml" else "; built in are " + ", ".join(built_in())
+    if (STUDIES / f"{name}.toml").is_file():
+        raise ScenarioError([f"{name}: is a study and no scenario; run it with: zwerm study {name}"])
+    hint = "" if path.suffix == ".toml" else suggestion(name, built_in(), "zwerm list")
     raise ScenarioError([f"{name}: expected a scenario file or the name of a built-in one{hint}"])
+
+
+def suggestion(name: str, known: Iterable[str], command: str) -> str:
+    """Return the three known names that are most similar to `name`, and the command that lists all, as part of a line."""
+    similar = nearest(name, known, count=3, similarity=0.3)
+    return f"; nearest are {', '.join(similar)}; `{command}` names all" if similar else f"; `{command}` names all"
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -49,13 +60,13 @@ def read(path: Path) -> dict[str, Any]:
         raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
 
 
-def load(name: str, overrides: tuple[str, ...] = ()) -> Scenario:
+def load(name: str, overrides: tuple[str, ...] = (), blamed: tuple[str, ...] | None = None) -> Scenario:
     """Return the scenario `name` (built in, or a path) with each `path=value` of `overrides` applied.
 
-    Raises ScenarioError with every mistake.
+    `blamed` are those that a mistake names as its place, all by default. Raises ScenarioError with every mistake.
     """
     tables, path = tables_of(name, overrides)
-    return validate(tables, str(path), path.parent)
+    return validate(tables, str(path), path.parent, overrides if blamed is None else blamed)
 
 
 def tables_of(name: str, overrides: tuple[str, ...] = ()) -> tuple[dict[str, Any], Path]:
@@ -70,20 +81,20 @@ def tables_of(name: str, overrides: tuple[str, ...] = ()) -> tuple[dict[str, Any
     return tables, path
 
 
-def validate(tables: dict[str, Any], place: str, folder: Path) -> Scenario:
+def validate(tables: dict[str, Any], place: str, folder: Path, overrides: tuple[str, ...] = ()) -> Scenario:
     """Return `tables` as a Scenario whose relative paths start at `folder`.
 
-    Raises ScenarioError with every mistake, each led by `place`.
+    Raises ScenarioError with every mistake, each led by `place`, or by the one of `overrides` that made it.
     """
     tables = copy.deepcopy(tables)
     rename(tables, place)
     try:
         scenario = Scenario.model_validate(tables)
     except ValidationError as error:
-        raise ScenarioError(mistakes(error, place)) from None
+        raise ScenarioError(blame(mistakes(error, place, table=Scenario), place, overrides)) from None
     if scenario.variant is not None and not scenario.variant.coordinator:
         scenario = _without_coordinator(scenario)
-    scenario._folder, scenario._place = folder, place
+    scenario._folder, scenario._place, scenario._overrides = folder, place, overrides
     return scenario
 
 

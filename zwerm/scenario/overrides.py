@@ -1,6 +1,7 @@
 """Settings of a scenario from the command line: `path=value`, applied to its tables before anything is checked."""
 
 import tomllib
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from zwerm.errors import ScenarioError
@@ -29,6 +30,23 @@ def override(tables: dict[str, Any], assignment: str) -> None:
         place[last] = value
     else:
         raise ScenarioError([f"--set {assignment}: {'.'.join(parents)} is no table"])
+
+
+def blame(lines: Iterable[str], place: str, overrides: Sequence[str]) -> list[str]:
+    """Return lines `place: path: rule` with the override that set the path, or what is around it, as their place."""
+    found = []
+    for line in lines:
+        path, colon, _ = line.removeprefix(f"{place}: ").partition(": ")
+        if colon and line.startswith(f"{place}: "):
+            guilty = [each for each in overrides if f"{path}.".startswith(f"{_path_of(each)}.")]
+            if guilty:
+                line = f"--set {guilty[-1]}{line[len(place) :]}"
+        found.append(line)
+    return found
+
+
+def _path_of(assignment: str) -> str:
+    return renamed_path(assignment.partition("=")[0].strip())
 
 
 def _enter(place: Any, part: str, path: str, assignment: str) -> Any:

@@ -1,7 +1,7 @@
 """Files among the parameters of a controller: a controller reads none, it gets the text.
 
-A parameter whose name ends in `_file` is a path, relative to the scenario. Whatever starts the node puts the file's text in
-its place, so that a robot process on another machine needs no file.
+A parameter whose name ends in `_file` is a path, relative to the scenario. The starter of a node puts the file's text
+in its place. So a robot process on another machine needs no file.
 """
 
 from collections.abc import Mapping

@@ -1,8 +1,31 @@
-"""Plug-ins by name: `module:Class`, or `module:function`, as a scenario names those outside the catalogue."""
+"""Plug-ins by name: `module:Class`, or `module:function`, as a scenario names those outside the catalogue.
+
+A module is looked for in the scenario's folder, then in the working directory, then among the installed packages.
+"""
 
 import importlib
-from collections.abc import Iterable
-from typing import Any
+import sys
+import traceback
+from collections.abc import Iterable, Iterator
+from importlib.machinery import PathFinder
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+from zwerm.scenario.nearest import did_you_mean
+
+# The folders of the scenarios that ship with Zwerm: no module of a user is there.
+_OWN: Final = Path(__file__).parents[1].resolve()
+
+
+def look_in(folder: Path) -> None:
+    """Look for modules in a scenario's folder before any other place from now on."""
+    found = folder.resolve()
+    if found.parent in (_OWN, _OWN.parent) and found.name == "scenarios":
+        return
+    place = str(found)
+    if sys.path[:1] != [place]:
+        sys.path[:] = [place, *(each for each in sys.path if each != place)]
 
 
 def object_named(name: str, what: str) -> Any:
@@ -21,7 +44,9 @@ def class_named(name: str, what: str, built_in: Iterable[str]) -> type[Any]:
     Raises ValueError, in one line, where it names none; `what` is then what was expected, `built_in` the shorter names.
     """
     if not all(name.partition(":")):
-        raise ValueError(f"expected a built-in {what} ({', '.join(built_in)}) or module:Class, got {name!r}")
+        known = list(built_in)
+        expected = f"expected a built-in {what} ({', '.join(known)}) or module:Class"
+        raise ValueError(f"{expected}, got {name!r}{did_you_mean(name, known)}")
     found = _imported(name, "class")
     if not isinstance(found, type):
         module_name, _, class_name = name.partition(":")
@@ -33,9 +58,66 @@ def _imported(name: str, what: str) -> Any:
     module_name, _, object_name = name.partition(":")
     try:
         module = importlib.import_module(module_name)
-    except ImportError as error:
-        raise ValueError(f"cannot import {module_name!r}: {error}") from error
+    except SyntaxError as error:
+        raise ValueError(f"cannot import {module_name!r}: {_syntax_error(error)}") from error
+    except Exception as error:
+        raise ValueError(f"cannot import {module_name!r}: {error}{_raised_at(error)}") from error
+    if elsewhere := _nearer(module):
+        raise ValueError(
+            f"module {module_name!r} was imported from {_place_of(module)}, and {elsewhere} has the same name: rename one"
+        )
     found = getattr(module, object_name, None)
     if found is None:
-        raise ValueError(f"module {module_name!r} has no {what} {object_name!r}")
+        similar = did_you_mean(object_name, (each for each in vars(module) if not each.startswith("_")))
+        raise ValueError(f"module {module_name!r} has no {what} {object_name!r}{similar}{_where(module)}")
     return found
+
+
+def _syntax_error(error: SyntaxError) -> str:
+    return f"{type(error).__name__}: {error.msg} ({error.filename}:{error.lineno})"
+
+
+def _raised_at(error: Exception) -> str:
+    """Return the kind and the place of an error that a module raised while it was imported, or the empty text.
+
+    Where the module itself does not exist, no line of it was run.
+    """
+    frames = [each for each in traceback.extract_tb(error.__traceback__) if "importlib" not in each.filename]
+    last = frames[-1] if len(frames) > 1 else None
+    if last is None:
+        return ""
+    kind = "" if isinstance(error, ImportError) else f"{type(error).__name__}, "
+    return f" ({kind}{last.filename}:{last.lineno})"
+
+
+def _where(module: ModuleType) -> str:
+    """Return the place of a module that is a folder, or hides others of its name, as the rest of a line."""
+    place = _place_of(module)
+    hidden = [each for each in _places(module.__name__) if each != place]
+    if hidden:
+        return f"; it is {place}, which hides {' and '.join(hidden)}"
+    return f"; it is {place}" if module.__file__ is None else ""
+
+
+def _nearer(module: ModuleType) -> str:
+    """Return the file that an import of a module would find now, if it is another one than was imported, or ""."""
+    found = next(_places(module.__name__), "")
+    known = _place_of(module)
+    same = not found or not known or Path(found).resolve() == Path(known).resolve()
+    return "" if same or known.startswith("the folder") or found.startswith("the folder") else found
+
+
+def _place_of(module: ModuleType) -> str:
+    if module.__file__ is not None:
+        return module.__file__
+    return f"the folder {next(iter(getattr(module, '__path__', ())), '')}"
+
+
+def _places(name: str) -> Iterator[str]:
+    """Yield the files and folders of modules of this name on the search path, a nearer one first."""
+    if "." in name or name == "__main__":
+        return
+    for entry in sys.path:
+        spec = PathFinder.find_spec(name, [entry])
+        if spec is not None:
+            yield spec.origin or f"the folder {Path(entry) / name}"

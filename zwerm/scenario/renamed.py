@@ -1,7 +1,7 @@
 """Renamed keys and kinds of scenarios: the old names work for one version, with a warning that names the new ones.
 
 A renamed key is one row of `KEYS`: old path to new path, both from the root of the scenario. A renamed kind is one row of
-`KINDS`: the path of an array of tables, the old `kind` and the new one. The values keep their meaning.
+`KINDS`, by the path of an array of tables: the old `kind` and the new one. The values keep their meaning.
 """
 
 import sys
@@ -13,7 +13,8 @@ from zwerm.errors import ScenarioError
 KEYS: Final[dict[str, str]] = {
     "robots.inflow": "robots.entrance",
 }
-KINDS: Final[dict[tuple[str, str], str]] = {}
+_MODELS: Final = {"bursts": "gilbert_elliott", "walls": "wall_attenuation"}
+KINDS: Final[dict[str, dict[str, str]]] = {"radio.models": _MODELS, "uplink.models": _MODELS}
 
 Warn = Callable[[str], object]
 
@@ -54,12 +55,13 @@ def rename(tables: dict[str, Any], place: str, warn: Warn = warn_once) -> None:
             raise ScenarioError([f"{place}: {old}: deprecated name of {new}, expected only one of them"])
         warn(f"{place}: {old} is deprecated, use {new}")
         target[new_last] = table.pop(last)
-    for (path, old), new in KINDS.items():
+    for path, kinds in KINDS.items():
         rows = _table(tables, path.split("."))
         for index, row in enumerate(rows if isinstance(rows, list) else ()):
-            if isinstance(row, dict) and row.get("kind") == old:
-                warn(f"{place}: {path}.{index}.kind: {old!r} is deprecated, use {new!r}")
-                row["kind"] = new
+            kind = row.get("kind") if isinstance(row, dict) else None
+            if isinstance(kind, str) and kind in kinds:
+                warn(f"{place}: {path}.{index}.kind: {kind!r} is deprecated, use {kinds[kind]!r}")
+                row["kind"] = kinds[kind]
 
 
 def _table(tables: Any, path: list[str]) -> Any:

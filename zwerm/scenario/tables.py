@@ -1,8 +1,8 @@
 """A scenario: everything that defines an experiment but its seed, as strict typed tables read from TOML.
 
 Every table refuses keys it does not know and values of another type: "25" is no number, and true is no 1. All mistakes
-are reported at once, each as `file: path: rule, got value`. What a sensor or a controller takes as parameters is theirs
-to type; the tables here carry them as they are.
+are reported at once, each as `file: path: rule, got value`. Parameters of sensors and controllers are typed by their
+own classes; the tables here carry them unchanged.
 """
 
 from functools import cache
@@ -53,9 +53,10 @@ class TimeTable(Table):
 class ArenaTable(Table):
     """The space robots live in: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
 
-    `map` is a ROS map_server YAML, or a bitmap (dark is wall) with `resolution_m` or `size_m`; `start` is a place [m] in the
-    part to keep, else the largest is. Paths are relative to the scenario. `scale` multiplies all lengths, or `free_area_m2`
-    is the free space after scaling. Then gaps narrower than `passage_m` are closed, and what lies behind them is left out."""
+    `map` is a ROS map_server YAML, a bitmap (dark is wall) with `resolution_m` or `size_m`, or a grid map (MovingAI `.map`, or
+    `.mcpp`) with `resolution_m`; `start` is a place [m] in the part to keep, else the largest is. Paths are relative to the
+    scenario. `scale` multiplies all lengths, or `free_area_m2` is the free space after scaling. Then gaps narrower than
+    `passage_m` are closed, and what lies behind them is left out."""
 
     size_m: Size | None = None
     polygon: list[Point] | None = Field(default=None, min_length=3)
@@ -91,13 +92,14 @@ class BodyTable(Table):
 
 
 class PlacementTable(Table):
-    """Where robots start: `uniform` in the arena, within a `disc`, in a random `cell` of a grid, or at given `poses`.
+    """Where robots start: `uniform` in the arena, in a `disc`, in a random `cell` of a grid, at `poses`, or at `roots`.
 
     `disc` takes `radius_m` and optionally `center_m` (else a random one that fits); `cell` takes `grid` and `radius_m`
-    about the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad].
+    about the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad]; `roots` are the start
+    cells of a `.mcpp` map.
     """
 
-    kind: Literal["uniform", "disc", "cell", "poses"] = "uniform"
+    kind: Literal["uniform", "disc", "cell", "poses", "roots"] = "uniform"
     radius_m: Positive | None = None
     center_m: Point | None = None
     grid: Grid | None = None
@@ -129,8 +131,9 @@ class RobotsTable(Table):
 class BaseTable(Table):
     """A base station: robot 0, which never moves. The others wait in its depot until it releases them, one at a time.
 
-    It stands at its `pose`, else at a random free place. With several `poses`, or `count` at random places, there are as many
-    base stations, robots 0, 1, ..., each with a depot of its own: the other robots are dealt out to them in turn.
+    It stands at its `pose`, else at a random free place. With several `poses`, or `count` at random places, there are
+    as many base stations: robots 0, 1, ... Each has a depot of its own, and the other robots are distributed to the
+    depots in turn.
     """
 
     controller: str
@@ -141,7 +144,7 @@ class BaseTable(Table):
 
     @property
     def stations(self) -> int:
-        """How many base stations there are."""
+        """Number of base stations."""
         return len(self.poses) if self.poses is not None else self.count or 1
 
     @model_validator(mode="after")
@@ -229,7 +232,7 @@ def _is_rate(key: str) -> bool:
 
 
 class MetricsTable(Table):
-    """What is measured of the run. Each other key switches on the metrics of its row in the catalogue, and is typed there.
+    """The metrics of the run. Each other key switches on the metrics of its row in the catalogue, and is typed there.
 
     Metrics that sample during a run do so every `every_s`. `own` names metrics of the user's own as `module:name`: a
     subclass of `zwerm.Metric`, or a function of the truth.
@@ -290,6 +293,7 @@ class Scenario(Table):
     pictures: PicturesTable = PicturesTable()
     _folder: Path = PrivateAttr(default=Path())
     _place: str = PrivateAttr(default="scenario")
+    _overrides: tuple[str, ...] = PrivateAttr(default=())
 
     @model_validator(mode="after")
     def _variant_can_run(self) -> Self:
@@ -317,5 +321,10 @@ class Scenario(Table):
 
     @property
     def place(self) -> str:
-        """What messages call it: its file."""
+        """Name of the scenario in messages: its file."""
         return self._place
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """The settings, `path=value`, that were applied to it."""
+        return self._overrides

@@ -11,7 +11,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1)]
 
-# TOML knows arrays only: a tuple that takes one says so with this, and its items stay strict.
+# TOML has arrays only. A tuple type that accepts an array is marked with this; its items stay strict.
 ARRAY = Field(strict=False)
 Point = Annotated[tuple[Finite, Finite], ARRAY]
 Size = Annotated[tuple[Positive, Positive], ARRAY]

@@ -6,6 +6,7 @@ atomically by one with all rows. One study at a time writes to a file.
 
 import fcntl
 from collections.abc import Iterable, Sequence
+from csv import writer as csv_writer
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -20,7 +21,7 @@ from zwerm.study.trial import Row
 
 Key = tuple[str, str, int]
 
-_TEXTS = ("study", "variant", "outcome", "reason", "trace", "fingerprint")
+_TEXTS = ("study", "variant", "outcome", "reason", "trace", "fingerprint", "modules")
 _FIRST = ("seed", "outcome", "reason", "trace", "fingerprint", "ticks", "sim_s", "wall_s")
 
 
@@ -41,6 +42,27 @@ def read_rows(path: Path) -> list[Row]:
     except (pa.ArrowException, OSError, KeyError):
         raise ScenarioError([f"{path}: expected a Parquet file of a study's results"]) from None
     return [{name: value for name, value in row.items() if value is not None} for row in rows]
+
+
+def export_csv(path: Path, csv: Path) -> Path:
+    """Write the rows of a Parquet file as CSV, UTF-8 with one line of names, and return the path of the CSV file.
+
+    Lists are JSON. Raises ScenarioError where the file cannot be written.
+    """
+    table = pq.read_table(path)
+    names = table.column_names
+    try:
+        with csv.open("w", encoding="utf-8", newline="") as file:
+            writer = csv_writer(file)
+            writer.writerow(names)
+            for row in table.to_pylist():
+                values = (row[name] for name in names)
+                writer.writerow(
+                    [msgspec.json.encode(each).decode() if isinstance(each, list) else each for each in values]
+                )
+    except OSError as error:
+        raise ScenarioError([f"{csv}: cannot be written: {error.strerror}"]) from None
+    return csv
 
 
 class Rows:

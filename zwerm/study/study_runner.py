@@ -1,7 +1,8 @@
 """Run the trials of a study that its file does not have yet, store each row, and summarise all rows.
 
 An interrupted study, or one with new seeds or grid values, continues with the missing trials. Rows of points that are no
-longer in the study stay in the file. Rows of a point whose scenario has changed are replaced.
+longer in the study stay in the file. Rows of a point whose scenario or code has changed are replaced; rows whose code cannot
+be known are never used again.
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from zwerm.study.rows import Key, Rows
 from zwerm.study.study_tables import Setting, Study
 from zwerm.study.summary import Results
 from zwerm.study.trial import Row
+from zwerm.study.trial_identity import still_same
 from zwerm.study.trial_plan import Trial, make_points, make_trials
 from zwerm.world.tick.completion import FAILED
 
@@ -45,6 +47,11 @@ class StudyResult:
     interrupted: bool
 
     @property
+    def unknown(self) -> list[str]:
+        """Code that cannot be known, in words: rows that depend on it are not used again."""
+        return list(dict.fromkeys(each for point in self.results.points for each in point.modules.unknown))
+
+    @property
     def failed(self) -> int:
         """Number of failed trials."""
         return self.results.failures.total()
@@ -58,28 +65,35 @@ def run_study(
     jobs: int | None = None,
     sets: Sequence[str] = (),
     retry: bool = False,
+    timeout_s: float | None = None,
     runner: Runner = "inline",
     listener: StudyListener | None = None,
 ) -> StudyResult:
     """Run the trials of `study` that the file `out` does not have, `jobs` at a time, and return the results.
 
-    `seeds` replaces the study's seeds, `sets` overrides its scenarios, `retry` repeats failed trials. After Ctrl-C all rows
-    so far are kept, and the result says that it was interrupted. With the runner `processes` one trial runs at a time.
-    Raises ScenarioError for errors in the input, before any trial runs.
+    `seeds` replaces the study's seeds, `sets` overrides its scenarios, `retry` repeats failed trials. A trial without a
+    result after `timeout_s` fails. After Ctrl-C all rows so far are kept, and the result says that it was interrupted. With
+    one job trials run in this process, and nothing ends them early. With the runner `processes` one trial runs at a time, in
+    the same way. Raises ScenarioError for errors in the input, before any trial runs.
     """
     if jobs is not None and jobs < 1:
         raise ScenarioError([f"jobs: expected >= 1, got {jobs}"])
-    points = make_points(study, sets)
+    points = make_points(study, sets, runner)
     trials = make_trials(study, points, study.table.seeds if seeds is None else seeds, runner)
     with Rows(out) as rows:
         distinct = _distinct(trials)
+        for trial in distinct:
+            if trial.key in rows.held and not _trusted(trial, rows.held[trial.key]):
+                del rows.held[trial.key]
         todo = [trial for trial in distinct if _wanted(rows.held.get(trial.key), retry)]
         ran, interrupted = 0, False
         if listener is not None:
             listener.begin(len(todo))
         try:
-            workers = 1 if runner == "processes" else min(jobs or cpu_count(), max(1, len(todo)))
-            with closing(run_trials(todo, workers)) as ending:
+            here = runner == "processes" or jobs == 1
+            # At least two workers: one job means this process, and a trial that ends its process must not end the study.
+            workers = 1 if here else max(2, min(jobs or cpu_count(), len(todo)))
+            with closing(run_trials(todo, workers, timeout_s)) as ending:
                 for row in ending:
                     rows.add(row)
                     ran += 1
@@ -99,6 +113,11 @@ def _distinct(trials: Sequence[Trial]) -> list[Trial]:
     for trial in trials:
         found.setdefault(trial.key, trial)
     return list(found.values())
+
+
+def _trusted(trial: Trial, row: Row) -> bool:
+    """Tell whether the code that gave a row is known, and is the code of now."""
+    return not trial.point.modules.unknown and still_same(row.get("modules", ""))
 
 
 def _wanted(row: Row | None, retry: bool) -> bool:

@@ -1,6 +1,6 @@
 """A study's file as strict typed tables: scenarios, settings, seeds, and a paper's values.
 
-The rules are those of a scenario: unknown keys and wrong types are refused, and all errors are reported at once, each as
+The rules are those of a scenario. Unknown keys and wrong types are refused. All errors are reported at once, each as
 `file: path: rule, got value`. `plan` checks whether the settings exist in the scenario.
 """
 
@@ -15,7 +15,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 
 from zwerm.errors import ScenarioError
 from zwerm.scenario.diagnostics import mistakes
-from zwerm.scenario.load import read
+from zwerm.scenario.load import built_in as built_in_scenarios
+from zwerm.scenario.load import read, suggestion
 from zwerm.scenario.types import Finite, NonNegative, Table
 
 Setting = bool | int | float | str
@@ -23,7 +24,7 @@ Setting = bool | int | float | str
 # Reserved names of columns of the results.
 RESERVED = (
     *("study", "variant", "seed", "outcome", "reason", "trace", "fingerprint", "ticks", "sim_s", "wall_s"),
-    *("cell_counts", "series_time_s"),
+    *("modules", "cell_counts", "series_time_s"),
 )
 # Reserved columns that a study may report like a metric.
 REPORTABLE_COLUMNS = ("ticks", "sim_s", "wall_s")
@@ -181,7 +182,9 @@ def load_study(name: str) -> Study:
     """
     path = built_in().get(name, Path(name))
     if not path.is_file():
-        hint = "" if path.suffix == ".toml" else "; built in are " + ", ".join(built_in())
+        if name in built_in_scenarios():
+            raise ScenarioError([f"{name}: is a scenario and no study; run it with: zwerm run {name}"])
+        hint = "" if path.suffix == ".toml" else suggestion(name, built_in(), "zwerm list")
         raise ScenarioError([f"{name}: expected a study's file or the name of a built-in one{hint}"])
     tables = read(path)
     tables.setdefault("name", path.stem)
@@ -196,7 +199,7 @@ def check_study(tables: dict[str, Any], path: Path) -> Study:
     try:
         study = Study(StudyTable.model_validate(tables), path)
     except ValidationError as error:
-        raise ScenarioError(mistakes(error, str(path))) from None
+        raise ScenarioError(mistakes(error, str(path), table=StudyTable)) from None
     found = [f"{path}: {line}" for line in _contradictions(study.table)]
     if found:
         raise ScenarioError(found)

@@ -1,8 +1,8 @@
 """Statistics of a study's rows: for each point and metric the mean, its interval, and the difference from the paper.
 
-A paper's value agrees if it lies within the 95 % interval of the measured mean. The interval is widened by the paper's own
-interval (same spread, Student's t, if the study gives the paper's number of trials) and by the tolerance of printed values.
-A perfect replica fails one comparison in twenty. Failed trials are counted but not averaged.
+A paper's value agrees if it lies within the 95 % interval of the measured mean. The interval is widened by the
+tolerance of printed values, and by the paper's own interval if the study gives the paper's number of trials (same
+spread, Student's t). A perfect replica fails one comparison in twenty. Failed trials are counted but not averaged.
 """
 
 import math

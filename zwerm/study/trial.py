@@ -11,6 +11,7 @@ import numpy as np
 from zwerm.errors import ZwermError
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
+from zwerm.study.trial_identity import LoadedModules
 from zwerm.study.trial_plan import Trial
 from zwerm.world.tick.completion import FAILED, INTERRUPTED
 
@@ -21,10 +22,11 @@ SERIES_INTERVALS: Final = 120
 
 
 def run_trial(trial: Trial) -> Row:
-    """Return the row of `trial`.
+    """Return the row of `trial`. A trial whose modules changed since the study was planned has failed.
 
     Raises KeyboardInterrupt if the run is interrupted.
     """
+    loaded = LoadedModules(trial.point.modules, in_processes=trial.runner == "processes")
     try:
         result = run(trial.point.scenario, trial.seed, trial.runner)
     except ZwermError as error:
@@ -34,6 +36,8 @@ def run_trial(trial: Trial) -> Row:
         return failed_row(trial, f"{type(error).__name__}: {error} ({last.filename}:{last.lineno})")
     if result.outcome == INTERRUPTED:
         raise KeyboardInterrupt
+    if changed := loaded.changed():
+        return failed_row(trial, f"{changed} changed while the study ran")
     row = _head(trial) | {
         "outcome": result.outcome,
         "reason": result.reason,
@@ -42,6 +46,8 @@ def run_trial(trial: Trial) -> Row:
         "sim_s": result.sim_s,
         "wall_s": result.wall_s,
     }
+    if others := loaded.others():
+        row["modules"] = others
     row |= {name: float(value) for name, value in result.metrics.items()}
     if result.cell_counts is not None:
         row["cell_counts"] = result.cell_counts.ravel().tolist()

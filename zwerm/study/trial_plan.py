@@ -1,17 +1,12 @@
 """The trials of a study: each variant at each point of the grid with each seed. All scenarios are checked first.
 
-The fingerprint of a point depends on all inputs of its trials except the seed: the scenario, the shape of the arena, the
-contents of files and user modules that the scenario names, and Zwerm's version (not its code between two releases).
+The fingerprint of a point depends on all inputs of its trials except the seed; `trial_identity` says which.
 """
 
 import itertools
 import json
-import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
-from hashlib import blake2b
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, field
 
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import prepare
@@ -20,13 +15,10 @@ from zwerm.run.runner import Runner
 from zwerm.scenario.load import built_in as built_in_scenarios
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
+from zwerm.scenario.user_modules import UserModules
 from zwerm.study.study_tables import CELL_METRICS, REPORTABLE_COLUMNS, Setting, Study, VariantTable
-from zwerm.version import __version__
+from zwerm.study.trial_identity import Identities
 from zwerm.world.metrics.observers import is_measured
-
-# Descriptive keys of a scenario; runs do not depend on them.
-_DESCRIPTIVE = {"name", "summary", "source"}
-_PATH_LENGTH_MAX = 255
 
 
 @dataclass(frozen=True)
@@ -38,6 +30,7 @@ class Point:
     scenario: Scenario
     fingerprint: str
     metrics: tuple[str, ...] = ()  # names of what it measures, where `*` stands for any characters
+    modules: UserModules = field(default_factory=UserModules)
 
     @property
     def label(self) -> str:
@@ -66,18 +59,19 @@ def label(variant: str, settings: dict[str, Setting]) -> str:
     return ", ".join([*([variant] if variant else []), *(f"{axis}={value}" for axis, value in settings.items())])
 
 
-def make_points(study: Study, sets: Sequence[str] = ()) -> list[Point]:
+def make_points(study: Study, sets: Sequence[str] = (), runner: Runner = "inline") -> list[Point]:
     """Return the points of `study`, by variant and then in the order of the grid; `sets` override the file's settings.
 
     Raises ScenarioError with every mistake at every point, each mistake once.
     """
     points: list[Point] = []
     found: dict[str, str] = {}
+    identities = Identities()
     for variant in study.variants:
         for values in itertools.product(*study.table.grid.values()):
             settings = dict(zip(study.table.grid, values, strict=True))
             try:
-                points.append(_make_point(study, variant, settings, sets))
+                points.append(_make_point(study, variant, settings, sets, identities, runner))
             except ScenarioError as error:
                 where = label(variant.name, settings)
                 for line in error.mistakes:
@@ -111,16 +105,25 @@ def make_trials(study: Study, points: Sequence[Point], seeds: Sequence[int], run
     return [Trial(study.name, point, seed, series, runner) for seed in seeds for point in points]
 
 
-def _make_point(study: Study, variant: VariantTable, settings: dict[str, Setting], sets: Sequence[str]) -> Point:
+def _make_point(
+    study: Study,
+    variant: VariantTable,
+    settings: dict[str, Setting],
+    sets: Sequence[str],
+    identities: Identities,
+    runner: Runner,
+) -> Point:
     name = variant.scenario or study.table.scenario or ""
     beside = study.path.parent / name
     if name not in built_in_scenarios() and beside.is_file():
         name = str(beside)
     axes = [each for axis, value in settings.items() for each in _assignments(study, variant, axis, value)]
-    scenario = load(name, (*study.table.set, *variant.set, *sets, *axes))
+    scenario = load(name, (*study.table.set, *variant.set, *sets, *axes), tuple(sets))
     prepared = prepare(scenario)
-    fingerprint = _fingerprint(scenario, prepared.arena.segments.tobytes())
-    return Point(variant.name, settings, scenario, fingerprint, tuple(metric_names(scenario, prepared.observers)))
+    modules = identities.modules(scenario, runner)
+    fingerprint = identities.fingerprint(scenario, prepared.arena.segments.tobytes(), modules)
+    metrics = tuple(metric_names(scenario, prepared.observers))
+    return Point(variant.name, settings, scenario, fingerprint, metrics, modules)
 
 
 def _assignments(study: Study, variant: VariantTable, axis: str, value: Setting) -> list[str]:
@@ -128,32 +131,3 @@ def _assignments(study: Study, variant: VariantTable, axis: str, value: Setting)
     if axis in study.table.levels:
         return study.table.levels[axis][str(value)]
     return [f"{path}={json.dumps(value)}" for path in variant.axes.get(axis, axis).split("+")]
-
-
-def _fingerprint(scenario: Scenario, walls: bytes) -> str:
-    digest = blake2b(__version__.encode(), digest_size=16)
-    tables = scenario.model_dump(mode="json", exclude=_DESCRIPTIVE)
-    digest.update(json.dumps(tables, sort_keys=True).encode())
-    digest.update(walls)
-    for text in _strings(tables):
-        for file in (scenario.folder / text[:_PATH_LENGTH_MAX], _source(text)):
-            if file is not None and file.is_file():
-                digest.update(file.read_bytes())
-    return digest.hexdigest()
-
-
-def _source(text: str) -> Path | None:
-    """Return the file of the user module that `module:Class` names; checking the scenario has imported it."""
-    name, colon, _ = text.partition(":")
-    module = sys.modules.get(name) if colon and not name.startswith("zwerm.") else None
-    file = getattr(module, "__file__", None)
-    return None if file is None else Path(file)
-
-
-def _strings(value: Any) -> list[str]:
-    """Return every string in nested tables and arrays, in order."""
-    if isinstance(value, str):
-        return [value]
-    if isinstance(value, dict):
-        return [text for each in value.values() for text in _strings(each)]
-    return [text for each in value for text in _strings(each)] if isinstance(value, list) else []

@@ -1,10 +1,11 @@
 """Compare the modelled and the real result of each packet of a twin run.
 
-The compared quantity is the fraction of packets that pass: for the models, sent packets less dropped ones; for the network,
-packets that arrive before the end of the run. The half width belongs to a 99 % confidence interval of the difference. A link
-with n modelled and m real packets adds `p (1 - p) g (n/N^2 + m/M^2)` to the variance. N and M are the totals over all links;
-g > 1 accounts for the correlation of packets in bursts. The two sides agree if the difference is within the interval, and
-the difference of each link is within a joint interval for all links.
+The compared quantity is the fraction of packets that pass. For the models these are sent packets less dropped ones. For
+the network these are packets that arrive before the end of the run. The half width belongs to a 99 % confidence
+interval of the difference. A link with n modelled and m real packets adds `p (1 - p) g (n/N^2 + m/M^2)` to the
+variance. N and M are the totals over all links; g > 1 accounts for the correlation of packets in bursts. The two sides
+agree if the difference is within the interval, and the difference of each link is within a joint interval for all
+links.
 """
 
 import itertools

@@ -23,7 +23,7 @@ try:
     from zwerm.view.output import prepare
     from zwerm.view.run_view import RunView
 except ImportError as missing:
-    raise PictureError(f"pictures need matplotlib ({missing}): pip install 'zwerm[study]'") from None
+    raise PictureError(f"pictures need matplotlib ({missing}): pip install matplotlib") from None
 
 Progress = Callable[[int, int], None]
 
@@ -43,8 +43,9 @@ def animate_run(
 ) -> Path:
     """Draw a run as an animation at `path`, a .gif, or an .mp4 where ffmpeg is installed, and return the path.
 
-    A second of the animation shows `speed_up` seconds of the run; by default the whole lasts about 10 s, or as long as a
-    layer asks for. `progress` is called with the frames done and their total. Raises PictureError where the file cannot be
+    A second of the animation shows `speed_up` seconds of the run. By default the animation lasts about 10 s, or as long
+    as a layer asks for. `progress` is called with the frames done and their total. Raises PictureError where the file
+    cannot be
     written.
     """
     prepare(path, (".gif", ".mp4"))

@@ -1,8 +1,9 @@
 """The sheet that a run is drawn on, for pictures and animations.
 
-A sheet is laid out in inches, so that nothing overlaps at any shape of arena: title, metrics, the arena in metres with
-its walls and a scale bar, room for curves below, the legend at the foot. Colours are those of Okabe and Ito (2008), which
-readers with red-green colour blindness can tell apart. Matplotlib's global state is neither used nor touched.
+A sheet is laid out in inches, so that parts never overlap for any shape of arena. It has the title, metrics, the arena
+in metres with walls and a scale bar, curves below, and the legend at the foot. Colours are those of Okabe and Ito
+(2008), which readers with red-green colour blindness can tell apart. Matplotlib's global state is neither used nor
+touched.
 """
 
 import math

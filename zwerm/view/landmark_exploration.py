@@ -13,7 +13,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, read_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, read_report
 from zwerm.record.history import Tracks
 from zwerm.view.canvas import Sheet
 from zwerm.view.layer import Layer
@@ -28,7 +28,7 @@ ASSIGNED: Final = "#A3195B"
 
 
 class LandmarkComplexLayer(Layer):
-    """The complex as the nodes of the run told of it: the coordinator's, or the union of all robots' observations."""
+    """The reported complex: that of the coordinator, or the union of all robots' observations."""
 
     colours: ClassVar[Sequence[str]] = (SIMPLEX, EDGE, LANDMARK, FRONTIER, ASSIGNED)
     legend_entries: ClassVar[int] = 6
@@ -43,8 +43,8 @@ class LandmarkComplexLayer(Layer):
         self._axes = sheet.axes
         self._landmarks = np.array(view.landmarks, dtype=np.float64).reshape(-1, 2)
         self._view = view
-        told = [(each.time_s, each.node, read_told(each.snapshot)) for each in view.snapshots]
-        self._records = [(time_s, node, each) for time_s, node, each in told if isinstance(each, MapTold)]
+        reports = [(each.time_s, each.node, read_report(each.snapshot)) for each in view.snapshots]
+        self._records = [(time_s, node, each) for time_s, node, each in reports if isinstance(each, MapReport)]
         self._hulls: list[tuple[float, Floats]] = []
         self._lines: list[tuple[float, Floats]] = []
         for time_s, _, report in self._records:

@@ -48,7 +48,7 @@ class Layer(ABC):
     animation_s: ClassVar[float | None] = None
     # Metrics that are written above a picture, instead of all.
     headline: ClassVar[Sequence[str]] = ()
-    # What the layer's stages are called: the label of the axis below the picture.
+    # Name of the layer's stages: the label of the axis below the picture.
     stage_name: ClassVar[str] = "stage"
     # The robots are drawn without paths and noses, because the layer is to be seen.
     plain_swarm: ClassVar[bool] = False

@@ -13,7 +13,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from zwerm.agents.robot_teams.team_messages import decode_snapshot
+from zwerm.agents.robot_teams.protocols.team_messages import decode_snapshot
 from zwerm.record.history import Tracks
 from zwerm.view.canvas import Sheet
 from zwerm.view.layer import Layer

@@ -1,8 +1,8 @@
 """Still pictures of a run, at its end or at any moment.
 
-A picture shows the arena in metres, the paths and positions of the robots, the area they cover, the cells they occupy, and
-the layers of the algorithm. Where coverage was measured, a plot below shows how the arena was filled. Importing this module
-needs matplotlib.
+A picture shows the arena in metres, the paths and positions of the robots, the covered area, the occupied cells, and
+the layers of the algorithm. Where coverage was measured, a plot below shows how the arena was filled. Importing this
+module needs matplotlib.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ try:
     from zwerm.view.output import prepare
     from zwerm.view.run_view import RunView
 except ImportError as missing:
-    raise PictureError(f"pictures need matplotlib ({missing}): pip install 'zwerm[study]'") from None
+    raise PictureError(f"pictures need matplotlib ({missing}): pip install matplotlib") from None
 
 
 def draw_run(

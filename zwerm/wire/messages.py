@@ -1,9 +1,10 @@
-"""All messages on the wire: one `Observation` to a node, one `Command` back, and the messages that open and end its life.
+"""All messages on the wire: one `Observation` to a node, one `Command` back, and the messages that open and close a
+connection.
 
-Messages are MessagePack maps with field names, so that a node can be written in any language; small parts that come in numbers
-(a bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as `type`, for example
-"command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and trailing bytes are refused,
-each with a reason that is counted.
+Messages are MessagePack maps with field names, so that a node can be written in any language. Small parts that occur in
+numbers (a bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as
+`type`, for example "command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and
+trailing bytes are refused, each with a reason that is counted.
 
 New fields go last, with defaults; a field at its default is left out of a message (except in drives). Angles are radians in
 (-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
@@ -12,7 +13,7 @@ New fields go last, with defaults; a field at its default is left out of a messa
 import re
 from collections.abc import Callable
 from math import isfinite
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 from msgspec import Struct
@@ -126,7 +127,7 @@ SENSOR_FIELDS: Final = Observation.__struct_fields__[3:]
 # --- what a node commands -------------------------------------------------------------------------------------------
 
 
-# Drives are encoded with all fields. msgspec omits a default number only if it is the same object, so equal drives could
+# Drives are encoded with all fields. msgspec omits a default number only if it is the same object. Equal drives could
 # otherwise differ in their bytes, and equal runs in their traces.
 
 
@@ -233,7 +234,15 @@ class Goodbye(_Message, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
 
 # --- encode and decode ----------------------------------------------------------------------------------------------
 
-_encoder = msgspec.msgpack.Encoder()
+
+def _plain(value: Any) -> Any:
+    """Return a NumPy scalar as a number of Python. Raises TypeError for any other type that has no encoding."""
+    if getattr(value, "ndim", None) == 0 and hasattr(value, "item"):
+        return value.item()
+    raise TypeError(f"a message holds no {type(value).__name__}, got {value!r:.80}")
+
+
+_encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
 encode: Final[Callable[[object], bytes]] = _encoder.encode
 
 # For the hot paths; `refusal` turns their exceptions into a ProtocolError. In a union a message must carry its type.

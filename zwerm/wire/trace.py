@@ -1,8 +1,8 @@
 """The trace: a hash chain over every observation and command in (tick, node) order.
 
 Two runs with the same trace exchanged the same bytes with the same nodes at the same ticks. Each link of the chain is
-BLAKE2b over the previous link, a frame and the tick's messages; the frame holds the tick, the node ids and the length
-of every message, so that no two ticks share their bytes.
+BLAKE2b over the previous link, a frame and the tick's messages. The frame holds the tick, the node ids and the length
+of every message. So no two ticks share their bytes.
 """
 
 from collections.abc import Sequence

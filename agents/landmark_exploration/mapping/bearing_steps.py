@@ -13,7 +13,7 @@ HALF: Final = STEPS // 2
 _PER_RAD: Final = STEPS / (2.0 * math.pi)
 
 
-class Snapshot(NamedTuple):
+class BearingSnapshot(NamedTuple):
     """An observation: the ids of the landmarks seen, ascending, and the bearing of each in steps, in the compass frame."""
 
     landmarks: tuple[int, ...]

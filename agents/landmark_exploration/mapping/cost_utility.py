@@ -1,9 +1,9 @@
 """The next frontier for a robot, and the way there: cost-utility over the navigation graph.
 
-Section IV-C of Ramaithitima and Bhattacharya 2018: CU(S, <a, b>) = U(<a, b>) - beta C(S, <a, b>). The cost C is that of the
-cheapest path from the present observation S to an observation with a and b; the utility U is the number of open frontiers
-that share a landmark with <a, b>, divided by one more than the number of robots sent to a or b. The search ends as soon as
-no frontier farther away can be better.
+Section IV-C of Ramaithitima and Bhattacharya 2018: CU(S, <a, b>) = U(<a, b>) - beta C(S, <a, b>). The cost C is that of
+the cheapest path from the present observation S to an observation that contains a and b. The utility U is the number of
+open frontiers that share a landmark with <a, b>, divided by one more than the number of robots sent to a or b. The
+search ends as soon as no frontier farther away can be better.
 """
 
 import math
@@ -159,7 +159,7 @@ def nearest_frontier(complex_: LandmarkComplex, landmarks: Sequence[int], offer:
 
 
 class Costs(NamedTuple):
-    """What it costs to reach each open frontier, and the way: the vertex that has it, and the vertex before each."""
+    """The cost of each open frontier, its vertex, and the predecessor of each vertex on the path."""
 
     cost: dict[int, float]
     vertex: dict[int, int]

@@ -7,7 +7,7 @@ IV-A). A status only ever rises, so that statuses from several robots merge by m
 from collections.abc import Iterator
 from typing import Final
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import HALF, STEPS, Snapshot, is_inside
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import HALF, STEPS, BearingSnapshot, is_inside
 
 UNKNOWN: Final = 0
 UNEXPLORED: Final = 1
@@ -67,7 +67,7 @@ class Frontiers:
                 del self.open[key]
         return True
 
-    def note(self, snapshot: Snapshot) -> bool:
+    def note(self, snapshot: BearingSnapshot) -> bool:
         """Take in an observation; tell whether any status rose.
 
         Seen from inside the hull of the landmarks, every frontier that the observer is in is clear. All others become

@@ -8,7 +8,7 @@ edge costs 1 / (shared - 1) (section IV-C). The result does not depend on the or
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 
 # n_l of section IV-B: so many landmarks fix a bearing-only target.
 SHARED_MIN: Final = 2
@@ -35,17 +35,17 @@ class LandmarkComplex:
 
     @property
     def vertices(self) -> int:
-        """How many vertices there ever were: their numbers are below this."""
+        """Number of vertices ever added; all vertex numbers are lower."""
         return len(self._ever)
 
     def landmarks_of(self, vertex: int) -> Simplex:
         """Return the landmarks of a vertex that is or was free."""
         return self._ever[vertex]
 
-    def snapshot_of(self, vertex: int) -> Snapshot:
+    def snapshot_of(self, vertex: int) -> BearingSnapshot:
         """Return a vertex as it was observed: its entry in the bearing look-up table."""
         simplex = self._ever[vertex]
-        return Snapshot(simplex, self._bearings[simplex][1])
+        return BearingSnapshot(simplex, self._bearings[simplex][1])
 
     def bearings_of(self, simplex: Simplex) -> tuple[int, ...] | None:
         """Return the bearings at which exactly these landmarks were observed, or None where they never were."""
@@ -69,7 +69,7 @@ class LandmarkComplex:
                 return False
         return True
 
-    def update(self, snapshot: Snapshot, rank: Rank = (0, 0)) -> bool:
+    def update(self, snapshot: BearingSnapshot, rank: Rank = (0, 0)) -> bool:
         """Take in an observation (algorithm 2); tell whether the complex has a simplex more."""
         simplex = snapshot.landmarks
         known = self._bearings.get(simplex)

@@ -1,13 +1,13 @@
 """The map of a robot or of the coordinator: the landmark complex and the frontiers, derived from logs.
 
-What is shared are observations, and statuses that no observation implies; all else is derived, by the same rules everywhere.
-So maps made of the same logs are equal, whatever the order in which the logs' entries came.
+Robots share observations, and statuses that no observation implies. All else is derived from these, by the same rules
+on every robot. So maps made of the same logs are equal, whatever the order in which the logs' entries came.
 """
 
 from collections.abc import Sequence
 from typing import Any, Final
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.frontier_status import CLEAR, Frontiers
 from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
 from zwerm.agents.landmark_exploration.sharing import log_entries as entries
@@ -27,7 +27,7 @@ class LandmarkMap:
         self.version = 0
         self._parts: dict[int, list[tuple[int, int]]] = {}  # by origin, of an observation that is not complete
 
-    def observe(self, snapshot: Snapshot, rank: tuple[int, int] = (0, 0)) -> bool:
+    def observe(self, snapshot: BearingSnapshot, rank: tuple[int, int] = (0, 0)) -> bool:
         """Take in an observation; tell whether it was news: a simplex more, or a status that rose."""
         risen = not self._presence_only and self.frontiers.note(snapshot)
         news = self.complex.update(snapshot, rank) or risen

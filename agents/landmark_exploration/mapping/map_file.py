@@ -1,9 +1,9 @@
 """A landmark map as text, to be kept and used by later runs.
 
-JSON, one object: `format` is "landmark-map/1"; `observations` is a list of [landmarks, bearings], the ids of the landmarks of
-an observation, ascending, and the bearing of each in steps of a 256th of a turn, counter-clockwise from the compass's zero;
-`closed` is a list of [a, b, status] with the frontiers that are no longer to be explored and that no observation clears.
-Statuses are those of `frontier`. Observations that are faces of others may be left out.
+JSON, one object: `format` is "landmark-map/1"; `observations` is a list of [landmarks, bearings]. The landmarks are ids
+of one observation, ascending. The bearings are in steps of a 256th of a turn, counter-clockwise from the compass's
+zero; `closed` is a list of [a, b, status] with the frontiers that are no longer to be explored and that no observation
+clears. Statuses are those of `frontier`. Observations that are faces of others may be left out.
 """
 
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final
 import msgspec
 from msgspec import Meta, Struct
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import STEPS, Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import STEPS, BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.frontier_status import (
     CLEAR,
     LANDMARKS_MAX,
@@ -22,7 +22,7 @@ from zwerm.agents.landmark_exploration.mapping.frontier_status import (
     pair_of,
 )
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, read_told
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, read_report
 from zwerm.agents.landmark_exploration.sharing.log_entries import snapshot_of
 
 FORMAT: Final = "landmark-map/1"
@@ -32,7 +32,7 @@ Steps = Annotated[int, Meta(ge=0, lt=STEPS)]
 
 
 class MapFile(Struct, frozen=True, forbid_unknown_fields=True):
-    """What a map's file holds."""
+    """The contents of a map file."""
 
     format: str
     observations: tuple[tuple[tuple[Landmark, ...], tuple[Steps, ...]], ...]
@@ -68,7 +68,7 @@ def read_map(text: str) -> LandmarkMap:
             raise ValueError(
                 f"no landmark map: observation {number} has {len(landmarks)} landmarks, {len(bearings)} bearings"
             )
-        snapshot: Snapshot = snapshot_of(zip(landmarks, bearings, strict=True))
+        snapshot: BearingSnapshot = snapshot_of(zip(landmarks, bearings, strict=True))
         map_.observe(snapshot, (number, 0))
     for a, b, status in file.closed:
         if status != REOPENED:
@@ -76,13 +76,13 @@ def read_map(text: str) -> LandmarkMap:
     return map_
 
 
-def map_told(snapshots: Iterable[bytes]) -> LandmarkMap:
+def map_of_reports(snapshots: Iterable[bytes]) -> LandmarkMap:
     """Return the map of all observations in the snapshots that the nodes of a run reported, in that order."""
     map_ = LandmarkMap()
     number = 0
-    for told in map(read_told, snapshots):
-        if isinstance(told, MapTold):
-            for landmarks, bearings in zip(told.simplices, told.bearings, strict=True):
+    for report in map(read_report, snapshots):
+        if isinstance(report, MapReport):
+            for landmarks, bearings in zip(report.simplices, report.bearings, strict=True):
                 map_.observe(snapshot_of(zip(landmarks, bearings, strict=True)), (number, 0))
                 number += 1
     return map_

@@ -1,4 +1,7 @@
-"""What nodes of landmark-based exploration report to those who watch the run: a snapshot in bytes. No node receives it."""
+"""Reports of landmark exploration: what its nodes send to the observers of a run, as a snapshot in bytes.
+
+No node receives it.
+"""
 
 from collections.abc import Sequence
 from typing import Final
@@ -6,14 +9,14 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 
 
-class MapTold(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-map"):
-    """What is new in a map since the last report: `simplices` with the bearings at which they were seen.
+class MapReport(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-map"):
+    """The part of a map that is new since the last report: `simplices` with the bearings at which they were seen.
 
-    Of the coordinator also its open `frontiers`, and the robots `assigned`, as (robot, a, b); of a robot its `claim`, how many
-    frontiers it has `open`, and whether it is `done`.
+    A coordinator also reports its open `frontiers`, and the robots `assigned`, as (robot, a, b). A robot reports how
+    many frontiers it has `open`, and whether it is `done`.
     """
 
     simplices: tuple[tuple[int, ...], ...]
@@ -25,7 +28,7 @@ class MapTold(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-map
     assigned: tuple[tuple[int, int, int], ...] = ()
 
 
-class GoalTold(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-goal"):
+class GoalReport(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-goal"):
     """The end of a way to a goal, a set of landmarks."""
 
     goal: tuple[int, ...]
@@ -33,26 +36,26 @@ class GoalTold(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-go
     iterations: int
 
 
-Told = MapTold | GoalTold
+MapOrGoalReport = MapReport | GoalReport
 
 _encode: Final = msgspec.msgpack.Encoder().encode
-_decoder: Final = msgspec.msgpack.Decoder(MapTold | GoalTold)
+_decoder: Final = msgspec.msgpack.Decoder(MapReport | GoalReport)
 
 
-def write_told(told: Told) -> bytes:
+def write_report(report: MapOrGoalReport) -> bytes:
     """Return a report as bytes."""
-    return _encode(told)
+    return _encode(report)
 
 
-def read_told(snapshot: bytes) -> Told | None:
+def read_report(snapshot: bytes) -> MapOrGoalReport | None:
     """Return a report, or None where the bytes are none."""
     try:
-        told: Told = _decoder.decode(snapshot)
+        report: MapOrGoalReport = _decoder.decode(snapshot)
     except msgspec.MsgspecError:
         return None
-    return told
+    return report
 
 
-def columns(seen: Sequence[Snapshot]) -> tuple[tuple[tuple[int, ...], ...], tuple[tuple[int, ...], ...]]:
+def columns(seen: Sequence[BearingSnapshot]) -> tuple[tuple[tuple[int, ...], ...], tuple[tuple[int, ...], ...]]:
     """Return the landmarks and the bearings of observations."""
     return tuple(each.landmarks for each in seen), tuple(each.bearings for each in seen)

@@ -1,1 +1,1 @@
-"""How robots and the coordinator share logs, registers and orders over a lossy radio."""
+"""Sharing of logs, registers and orders between robots and the coordinator over a lossy radio."""

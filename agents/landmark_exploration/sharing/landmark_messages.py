@@ -1,4 +1,4 @@
-"""What crosses the radio in landmark-based exploration: under a checksum, and small.
+"""Messages of landmark-based exploration: under a checksum, and small.
 
 With a cap of `SMALL_BYTES` every packet fits into a small radio frame. Entries are never longer than one such packet (see
 `entries`); vectors, registers and paths are cut into packets that each make sense alone.
@@ -40,7 +40,7 @@ class Entries(_Message, frozen=True, tag="e"):
 class Vector(_Message, frozen=True, tag="v"):
     """The sender's version vector for all origins in [low, high): origin, count, origin, count, ...
 
-    An origin that is not named has no entries. With `ask` the receiver shall send what the sender lacks.
+    An origin that is not named has no entries. With `ask` the receiver sends the entries that the sender lacks.
     """
 
     low: Count
@@ -50,10 +50,10 @@ class Vector(_Message, frozen=True, tag="v"):
 
 
 class Register(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What a robot says of itself; the one with the greatest (incarnation, stamp) counts.
+    """The state that a robot announces; the register with the greatest (incarnation, stamp) counts.
 
-    `claim`: the key of the frontier that it explores, plus 1; 0: none. `frozen`: the digest, plus 1, of the logs with which it
-    found nothing left to explore, and to which it adds nothing any more; 0: none.
+    `claim`: the key of the frontier that it explores, plus 1; 0: none. `frozen`: 0, or the digest of the logs plus 1,
+    if the robot found nothing left to explore in these logs. It then adds no entry.
     """
 
     node: Count
@@ -63,7 +63,7 @@ class Register(Struct, frozen=True, array_like=True, forbid_unknown_fields=True)
     frozen: Digest = 0
 
 
-class Beacon(_Message, frozen=True, tag="b"):
+class RegisterBeacon(_Message, frozen=True, tag="b"):
     """The digest of the sender's version vector, and registers, the sender's own first."""
 
     digest: Digest
@@ -73,14 +73,15 @@ class Beacon(_Message, frozen=True, tag="b"):
 # --- robots and coordinator --------------------------------------------------------------------------------------------
 
 
-class Report(_Message, frozen=True, tag="r"):
-    """To the coordinator: the robot has the order `order` of the coordinator's `life`, and, if `free`, is done with it.
+class TaskReport(_Message, frozen=True, tag="r"):
+    """To the coordinator: the robot has the order `order` of the coordinator's incarnation `coordinator_incarnation`, and, if
+    `free`, has finished it.
 
     `reached` False: it did not get to the frontier. `entries`: how many its log has. `landmarks`: those it sees, 2 bytes each.
     """
 
     incarnation: Count
-    life: Count
+    coordinator_incarnation: Count
     order: Count
     free: bool
     reached: bool
@@ -88,13 +89,13 @@ class Report(_Message, frozen=True, tag="r"):
     landmarks: Bytes
 
 
-class Order(_Message, frozen=True, tag="o"):
+class TaskPart(_Message, frozen=True, tag="o"):
     """To a robot: part `part` of `parts` of the order number `order`, in bytes.
 
-    What the parts say in a row stands in `orders`. `incarnation` is that of the robot it is meant for.
+    The format of all parts together stands in `orders`. `incarnation` is that of the robot it is meant for.
     """
 
-    life: Count
+    coordinator_incarnation: Count
     incarnation: Count
     order: Count
     part: Count
@@ -102,7 +103,7 @@ class Order(_Message, frozen=True, tag="o"):
     bytes_: Bytes
 
 
-Message = Entries | Vector | Beacon | Report | Order
+Message = Entries | Vector | RegisterBeacon | TaskReport | TaskPart
 
 _sealed: Final = Sealed(Message)
 write: Final[Callable[[Message], bytes]] = _sealed.write

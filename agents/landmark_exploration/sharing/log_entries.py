@@ -1,17 +1,17 @@
-"""What a robot writes into its log: observations and statuses, each as a few bytes that fit into the smallest message.
+"""Entries of a robot's log: observations and statuses, each as a few bytes that fit into the smallest message.
 
     observation  kind, then landmark (2 bytes) and bearing (1 byte) for each; one of more than `LANDMARKS_AT_ONCE` landmarks
                  comes in parts, and only the last part is of the kind OBSERVATION
     statuses     kind, status, then the two landmarks (2 bytes each) of every frontier
 
-Numbers are little-endian. Whoever reads the entries of a log in order needs nothing else.
+Numbers are little-endian. The entries of a log, read in order, are complete without other data.
 """
 
 from collections.abc import Iterable, Sequence
 from struct import iter_unpack, pack
 from typing import Final
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import STEPS, Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import STEPS, BearingSnapshot
 
 PART: Final = 0
 OBSERVATION: Final = 1
@@ -24,7 +24,7 @@ FRONTIERS_AT_ONCE: Final = 9
 ENTRY_BYTES_MAX: Final = 1 + 3 * LANDMARKS_AT_ONCE
 
 
-def observation_entries(snapshot: Snapshot) -> list[bytes]:
+def observation_entries(snapshot: BearingSnapshot) -> list[bytes]:
     """Return the entries that say what was observed."""
     pairs = list(zip(snapshot.landmarks, snapshot.bearings, strict=True))
     entries: list[bytes] = []
@@ -58,10 +58,10 @@ def read_statuses(entry: bytes) -> tuple[int, list[int]]:
     return entry[1], [a << 16 | b for a, b in iter_unpack("<HH", entry[2:])]
 
 
-def snapshot_of(bearings: Iterable[tuple[int, int]]) -> Snapshot:
+def snapshot_of(bearings: Iterable[tuple[int, int]]) -> BearingSnapshot:
     """Return the snapshot of (landmark, bearing) pairs; of a landmark that comes twice the first bearing counts."""
     found: dict[int, int] = {}
     for landmark, bearing in bearings:
         found.setdefault(landmark, bearing % STEPS)
     landmarks = tuple(sorted(found))
-    return Snapshot(landmarks, tuple(found[landmark] for landmark in landmarks))
+    return BearingSnapshot(landmarks, tuple(found[landmark] for landmark in landmarks))

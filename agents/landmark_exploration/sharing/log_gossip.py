@@ -10,10 +10,10 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import (
     LARGE_BYTES,
-    Beacon,
     Entries,
     Message,
     Register,
+    RegisterBeacon,
     Vector,
 )
 from zwerm.agents.landmark_exploration.sharing.packing import counts_of, pack_entries, pack_vector
@@ -44,7 +44,8 @@ class Said(NamedTuple):
 class Gossip:
     """One node's part. `learn` is called with every stretch that brought something, and how much of it was known before.
 
-    `me` is the node whose register is its own; a hub has none. To be told everything heard by `hear`, then asked by `tick`.
+    `me` is the node whose register is its own; a hub has none. `hear` must get every message that arrives. `tick` then
+    returns the messages to send.
     """
 
     def __init__(
@@ -94,7 +95,7 @@ class Gossip:
                     self._differs[sender] = tick
             case Vector():
                 self._answer(sender, message, tick)
-            case Beacon():
+            case RegisterBeacon():
                 news = [self._registers.merge(each, tick) for each in message.registers if each.node != self._me]
                 if self._hub and any(news):
                     self._beacon_at = min(self._beacon_at, tick + 1)
@@ -118,7 +119,7 @@ class Gossip:
                 self._registers.merge(own(), tick)
                 leading = [self._me]
             most = min(_REGISTERS_MAX, max(1, (self._bytes_max - _BEACON_BYTES) // _REGISTER_BYTES))
-            said.append(Said(None, Beacon(self._replica.digest, self._registers.to_tell(leading, most, tick))))
+            said.append(Said(None, RegisterBeacon(self._replica.digest, self._registers.to_tell(leading, most, tick))))
         if tick >= self._sync_at:
             said += self._ask(tick)
         return said

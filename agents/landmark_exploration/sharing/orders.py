@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from struct import iter_unpack, pack, unpack_from
 from typing import Final, NamedTuple
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.frontier_status import TIMED_OUT, pair_of
-from zwerm.agents.landmark_exploration.sharing.landmark_messages import Order
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import TaskPart
 from zwerm.agents.landmark_exploration.sharing.log_entries import snapshot_of
 
 _HEAD: Final = "<HHB"
@@ -26,19 +26,19 @@ _PARTS_MAX: Final = 1 << 12
 _LANDMARKS_MAX: Final = 255
 
 
-class Task(NamedTuple):
-    """What a robot shall do: explore the frontier `key` by way of `path`, and give it `status` if time runs out.
+class ExplorationTask(NamedTuple):
+    """The task of a robot: explore the frontier `key` by way of `path`, and give it `status` if the time runs out.
 
     Without a frontier it halts, or walks about where it is cut off from all that is to be explored.
     """
 
     key: int | None
-    path: tuple[Snapshot, ...] = ()
+    path: tuple[BearingSnapshot, ...] = ()
     status: int = TIMED_OUT
     walk: bool = False
 
 
-def write_task(task: Task) -> bytes:
+def write_task(task: ExplorationTask) -> bytes:
     """Return a task as bytes."""
     a, b = (int(task.walk), int(task.walk)) if task.key is None else pair_of(task.key)
     said = [pack(_HEAD, a, b, task.status)]
@@ -48,7 +48,7 @@ def write_task(task: Task) -> bytes:
     return b"".join(said)
 
 
-def read_task(said: bytes) -> Task:
+def read_task(said: bytes) -> ExplorationTask:
     """Return the task that bytes say. Raises ValueError where they say none."""
     if len(said) < _HEAD_BYTES:
         raise ValueError(f"a task takes at least {_HEAD_BYTES} bytes, got {len(said)}")
@@ -60,18 +60,21 @@ def read_task(said: bytes) -> Task:
             raise ValueError("a vertex of the path is cut off")
         path.append(snapshot_of(iter_unpack("<HB", said[at + 1 : end])))
         at = end
-    return Task(None if a == b else a << 16 | b, tuple(path), status, walk=a == b == 1)
+    return ExplorationTask(None if a == b else a << 16 | b, tuple(path), status, walk=a == b == 1)
 
 
-def cut(said: bytes, life: int, incarnation: int, order: int, bytes_max: int) -> list[Order]:
+def cut(said: bytes, coordinator_incarnation: int, incarnation: int, order: int, bytes_max: int) -> list[TaskPart]:
     """Return what an order says in parts that fit into packets of `bytes_max`."""
     size = bytes_max - _AROUND_BYTES
     parts = [said[start : start + size] for start in range(0, len(said), size)]
-    return [Order(life, incarnation, order, number, len(parts), part) for number, part in enumerate(parts)]
+    return [
+        TaskPart(coordinator_incarnation, incarnation, order, number, len(parts), part)
+        for number, part in enumerate(parts)
+    ]
 
 
 class OrderIntake:
-    """Puts orders together. `newest` is the (life, number) of the last one that is complete."""
+    """Puts orders together. `newest` is the (incarnation, number) of the last one that is complete."""
 
     def __init__(self, incarnation: int) -> None:
         self.newest = (0, 0)
@@ -79,9 +82,9 @@ class OrderIntake:
         self._coming = (0, 0)
         self._parts: dict[int, bytes] = {}
 
-    def accept(self, order: Order) -> Task | None:
+    def accept(self, order: TaskPart) -> ExplorationTask | None:
         """Take in a part, and return the task that is complete with it, if one is and it is newer than all before."""
-        number = order.life, order.order
+        number = order.coordinator_incarnation, order.order
         if order.incarnation != self._incarnation or number <= self.newest or number < self._coming:
             return None
         if not 0 <= order.part < order.parts <= _PARTS_MAX:

@@ -31,7 +31,7 @@ def pack_entries(stretch: Stretch, bytes_max: int) -> Iterator[Entries]:
 
 
 def pack_vector(vector: Mapping[int, int], bytes_max: int, ask: bool) -> list[Vector]:
-    """Return a version vector in messages of at most `bytes_max` bytes, which together speak of all origins."""
+    """Return a version vector in messages of at most `bytes_max` bytes, which together cover all origins."""
     origins = sorted(vector)
     most = max(1, (bytes_max - _VECTOR_BYTES) // _PAIR_BYTES)
     starts = range(0, max(len(origins), 1), most)

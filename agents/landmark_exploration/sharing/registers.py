@@ -1,14 +1,16 @@
-"""What robots say of themselves, the newest of each: claims with leases, and who has nothing left to explore.
+"""Registers: the newest state that each robot has announced. It holds claims with leases, and which robots have nothing
+left to explore.
 
-Registers merge by the greatest (incarnation, stamp), in any order. A robot raises its stamp with every beacon, so that a
-claim of a robot from which nothing new was heard for a lease, by the listener's own clock, is void: no clocks are compared.
+Registers merge by the greatest (incarnation, stamp), in any order. A robot raises its stamp with every beacon. A claim
+is void if no newer register of its robot arrived for the time of a lease, by the listener's own clock. So clocks are
+not compared.
 
-**Termination.** A robot that finds nothing left to explore *freezes*: it adds nothing to its log any more until it receives an
-entry that it does not have. Its register then holds the digest of its logs. Where every robot has said that it is frozen
-with the same digest, none of them can ever add anything: the first of them to do so would have had to receive an entry that
-none of them has, from a robot that is not among them. It does not matter when each of them said it. So a conclusion is wrong
-only about robots that were not heard of, that lost their memory since, or that fell silent for so long that they were presumed
-dead. All have to agree for `settle_ticks`, so that a robot in reach that has lost its memory is heard of.
+**Termination.** A robot that finds nothing left to explore *freezes*: it adds nothing to its log until it receives an
+entry that it does not have. Its register then holds the digest of its logs. If every robot has announced that it is
+frozen with the same digest, no robot can add an entry again. The first to do so would need an entry that none of them
+has, from a robot that is not among them. It does not matter when each of them said it. So a conclusion can be wrong
+only about three kinds of robots: unknown ones, ones that lost their memory since, and ones presumed dead after a long
+silence. All must agree for `settle_ticks`. In this time a robot in reach that lost its memory is found.
 """
 
 from collections.abc import Iterable, Iterator
@@ -21,14 +23,14 @@ SETTLE_TICKS: Final = 60
 
 
 class Registers:
-    """The newest register of every robot that was heard of, by node, and the tick at which it came."""
+    """The newest register of every known robot, by node, and the tick at which it came."""
 
     def __init__(
         self, lease_ticks: int, dead_ticks: int, robots_expected: int, settle_ticks: int = SETTLE_TICKS
     ) -> None:
         self.newest: dict[int, Register] = {}
         self._heard: dict[int, int] = {}
-        self._told: dict[int, int] = {}  # when each was last told on
+        self._forwarded: dict[int, int] = {}  # tick at which each was last forwarded
         self._lease_ticks = lease_ticks
         self._dead_ticks = dead_ticks
         self._robots_expected = robots_expected
@@ -45,7 +47,7 @@ class Registers:
         return True
 
     def is_silent(self, node: int, tick: int) -> bool:
-        """Tell whether nothing new was heard of a robot for so long that it is presumed dead."""
+        """Return whether no new register of a robot came for so long that it is presumed dead."""
         return tick - self._heard.get(node, 0) >= self._dead_ticks
 
     def claims(self, me: int, tick: int) -> Iterator[int]:
@@ -55,14 +57,15 @@ class Registers:
                 yield register.claim - 1
 
     def to_tell(self, first: Iterable[int], most: int, tick: int) -> tuple[Register, ...]:
-        """Return up to `most` registers: of the robots in `first`, then those that were told on longest ago."""
+        """Return up to `most` registers: first of the robots in `first`, then those that were forwarded longest ago."""
         leading = list(first)
         rest = sorted(
-            (node for node in self.newest if node not in leading), key=lambda node: (self._told.get(node, -1), node)
+            (node for node in self.newest if node not in leading),
+            key=lambda node: (self._forwarded.get(node, -1), node),
         )
         chosen = (leading + rest)[:most]
         for node in chosen:
-            self._told[node] = tick
+            self._forwarded[node] = tick
         return tuple(self.newest[node] for node in chosen)
 
     def concluded(self, digest: int, tick: int) -> bool:

@@ -48,7 +48,7 @@ class CollectReports(_Message, frozen=True, tag="collect"):
     """The coordinator lacks the receiver's report."""
 
 
-class RedundantAdvice(_Message, frozen=True, tag="spare"):
+class RedundantAdvice(_Message, frozen=True, tag="redundant"):
     """The receiver is redundant while it sees exactly these neighbours, and each has its list of this version."""
 
     versions: tuple[tuple[Count, Count], ...]

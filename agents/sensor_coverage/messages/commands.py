@@ -65,20 +65,20 @@ class Waypoint(_Part, frozen=True):
 # --- to a robot -----------------------------------------------------------------------------------------------------
 
 
-class RollCall(_Message, frozen=True, tag="muster"):
+class RollCall(_Message, frozen=True, tag="roll-call"):
     """To all: stop, average bearings anew, and report."""
 
     cycle: int
 
 
-class ScanRequest(_Message, frozen=True, tag="survey"):
+class ScanRequest(_Message, frozen=True, tag="scan"):
     """Report visible robots and touched walls. The robots in `moved` have moved since the last scan."""
 
     cycle: int
     moved: tuple[int, ...]
 
 
-class NegotiateLeave(_Message, frozen=True, tag="confer"):
+class NegotiateLeave(_Message, frozen=True, tag="negotiate-leave"):
     """Leave the complex if the neighbours agree, and report. Sent to robots that are not on the fence."""
 
     cycle: int
@@ -161,7 +161,7 @@ class Report(_Message, frozen=True, tag="report"):
     home: bool = False
 
 
-class LeftComplex(Report, frozen=True, tag="aside"):
+class LeftComplex(Report, frozen=True, tag="left-complex"):
     """The same report from a robot that has left the complex by agreement, and whose body still stands there."""
 
 
@@ -212,7 +212,7 @@ class Walked(_Message, frozen=True, tag="walked"):
     waypoints: tuple[Waypoint, ...]
 
 
-class Ack(_Message, frozen=True, tag="heard"):
+class Ack(_Message, frozen=True, tag="ack"):
     """The command has arrived and is being carried out."""
 
 

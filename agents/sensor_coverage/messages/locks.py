@@ -14,15 +14,15 @@ class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True)
 class NeighbourList(_Message, frozen=True, tag="neighbours"):
     """The robots that the sender sees, ascending; another list always has another version.
 
-    `over` has the meaning of `LockRelease`, in case the release was lost.
+    `released` is the number of the latest `LockRelease`, in case that message was lost.
     """
 
     version: Count
     listed: tuple[Count, ...]
-    over: Count = 0
+    released: Count = 0
 
 
-class LockRequest(_Message, frozen=True, tag="ask"):
+class LockRequest(_Message, frozen=True, tag="lock-request"):
     """To all neighbours: the sender wants to leave, and relies on these (neighbour, version of its list)."""
 
     number: Count
@@ -41,13 +41,13 @@ class LockDenial(_Message, frozen=True, tag="deny"):
     number: Count
 
 
-class LockRelease(_Message, frozen=True, tag="over"):
+class LockRelease(_Message, frozen=True, tag="lock-release"):
     """To all neighbours: the sender has left, or will never leave by this or an earlier request."""
 
     number: Count
 
 
-class ListRequest(_Message, frozen=True, tag="q"):
+class ListRequest(_Message, frozen=True, tag="list-request"):
     """A request that these robots send their neighbour lists to the sender."""
 
     nodes: tuple[int, ...]

@@ -15,7 +15,7 @@ class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True)
     """A whole message, which begins with its tag."""
 
 
-class SlotVacated(_Message, frozen=True, tag="g"):
+class SlotVacated(_Message, frozen=True, tag="vacated"):
     """To all: the leader of a push has left its slot for good. Receivers forward it `hops` times."""
 
     push: int
@@ -35,7 +35,7 @@ class ReferenceBearing(_Part, frozen=True):
 
 
 class SlotMemory(_Part, frozen=True):
-    """The memory of a slot, which the next occupant inherits."""
+    """The memory of a slot, which the next occupant inherits. `claims` is the number of its newest claim."""
 
     slot: int
     references: tuple[ReferenceBearing, ...]
@@ -44,13 +44,14 @@ class SlotMemory(_Part, frozen=True):
     failed: tuple[tuple[int, ...], ...]
     attempts: tuple[tuple[tuple[int, ...], int], ...]
     blocked: tuple[float, ...]
+    claims: int = 0
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).
 Chain = tuple[tuple[int, int], ...]
 
 
-class PushToken(_Message, frozen=True, tag="T"):
+class PushToken(_Message, frozen=True, tag="token"):
     """A push searches its leader: forward along the path vectors, first to `via`. `fresh` is the new slot."""
 
     push: int
@@ -59,7 +60,7 @@ class PushToken(_Message, frozen=True, tag="T"):
     via: int
 
 
-class LeaderReady(_Message, frozen=True, tag="R"):
+class LeaderReady(_Message, frozen=True, tag="ready"):
     """The leader to its follower: this will be your slot once I am gone. The leader stands there since drive `epoch`."""
 
     push: int
@@ -68,7 +69,7 @@ class LeaderReady(_Message, frozen=True, tag="R"):
     epoch: int
 
 
-class TakeSlot(_Message, frozen=True, tag="K"):
+class TakeSlot(_Message, frozen=True, tag="take-slot"):
     """To the follower: take my slot, because I leave it now."""
 
     push: int
@@ -76,46 +77,46 @@ class TakeSlot(_Message, frozen=True, tag="K"):
     memory: SlotMemory
 
 
-class PushAborted(_Message, frozen=True, tag="A"):
+class PushAborted(_Message, frozen=True, tag="aborted"):
     """The push has ended and no robot has moved. `tried`: its leader tried to drive."""
 
     push: int
     tried: bool
 
 
-class AllStanding(_Message, frozen=True, tag="S"):
+class AllStanding(_Message, frozen=True, tag="all-standing"):
     """All robots ahead of the receiver stand still."""
 
     push: int
 
 
-class AllSettled(_Message, frozen=True, tag="P"):
+class AllSettled(_Message, frozen=True, tag="all-settled"):
     """All robots behind the receiver have reached their slots."""
 
     push: int
 
 
-class PushDone(_Message, frozen=True, tag="D"):
+class PushDone(_Message, frozen=True, tag="done"):
     """The push has ended, and one more robot has left the base."""
 
     push: int
 
 
-class RedundantOffer(_Message, frozen=True, tag="O"):
+class RedundantOffer(_Message, frozen=True, tag="offer"):
     """To the base, hop by hop: a robot has left the first of `slots`, and can be called. `slots` lead back to it."""
 
     push: int
     slots: tuple[int, ...]
 
 
-class RedundantCall(_Message, frozen=True, tag="C"):
+class RedundantCall(_Message, frozen=True, tag="call"):
     """From the base, hop by hop: the robot that has left the first of `slots` shall be the rear of a push."""
 
     push: int
     slots: tuple[int, ...]
 
 
-class RedundantPushEnd(_Message, frozen=True, tag="E"):
+class RedundantPushEnd(_Message, frozen=True, tag="end"):
     """To the base, hop by hop: the push of a called robot has ended. `tried`: its leader tried. `done`: it succeeded."""
 
     push: int
@@ -128,14 +129,14 @@ PushMessage = LeaderReady | TakeSlot | PushAborted | AllStanding | AllSettled | 
 Body = PushToken | PushMessage | RelayedMessage
 
 
-class Segment(_Message, frozen=True, tag="l"):
+class Segment(_Message, frozen=True, tag="segment"):
     """The `number`-th segment from its sender to its receiver."""
 
     number: int
     body: Body
 
 
-class SegmentAck(_Message, frozen=True, tag="r"):
+class SegmentAck(_Message, frozen=True, tag="segment-ack"):
     """The segment of this number has arrived."""
 
     number: int

@@ -25,7 +25,7 @@ def attempts_at(log: AttemptLog, me: int) -> tuple[Attempt, ...]:
 def take_over(log: AttemptLog, me: int, states: Iterable[StateBeacon], attempts_max: int) -> None:
     """Take over the attempts that neighbours announced at their common edges with slot `me`."""
     for state in states:
-        for each in state.tries:
+        for each in state.attempts:
             if each.other == me:
                 key = (*edge(me, state.slot), each.sign)
                 if each.failed:

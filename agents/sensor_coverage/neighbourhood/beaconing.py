@@ -5,7 +5,7 @@ from typing import ClassVar, Final
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.messages.beacons import UNSAID, PathVector, StateBeacon, StateRequest
+from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, PathVector, StateBeacon, StateRequest
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
@@ -41,7 +41,7 @@ class Beaconing(Component):
         self._state_basis: object = None
         self._number = 0
         self._due: list[int] = []
-        self._sent = UNSAID
+        self._sent = NO_PATH_VECTOR
         self._route_due: list[int] = []
         self._sent_at = -ROUTE_TICKS
         self._lossy_until: int | None = None

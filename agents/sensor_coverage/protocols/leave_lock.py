@@ -186,7 +186,7 @@ class LeaveLock:
                 known = self._lists.get(sender)
                 if sender in self._listed and (known is None or message.version > known.version):
                     self._lists[sender] = message
-                self._end(sender, message.over)
+                self._end(sender, message.released)
             case LockRequest():
                 return self._answer(sender, message, now_s)
             case LockGrant():

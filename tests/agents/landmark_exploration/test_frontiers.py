@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import (
     STEPS,
-    Snapshot,
+    BearingSnapshot,
     is_inside,
     is_left,
     to_rad,
@@ -31,10 +31,10 @@ from zwerm.agents.landmark_exploration.mapping.frontier_status import (
 TRIANGLE = {1: (0.0, 0.0), 2: (1.0, -0.5), 3: (1.0, 0.5)}
 
 
-def seen_from(x: float, y: float, landmarks: dict[int, tuple[float, float]]) -> Snapshot:
+def seen_from(x: float, y: float, landmarks: dict[int, tuple[float, float]]) -> BearingSnapshot:
     ids = tuple(sorted(landmarks))
     bearings = [math.atan2(landmarks[each][1] - y, landmarks[each][0] - x) for each in ids]
-    return Snapshot(ids, tuple(map(to_steps, bearings)))
+    return BearingSnapshot(ids, tuple(map(to_steps, bearings)))
 
 
 def test_outside_the_hull_no_frontier_is_cleared() -> None:
@@ -62,18 +62,18 @@ def test_a_robot_left_of_the_line_from_a_to_b_knows_it_by_the_relative_bearing()
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_fewer_than_three_landmarks_clear_nothing(count: int) -> None:
     frontiers = Frontiers()
-    frontiers.note(Snapshot(tuple(range(count)), tuple(range(0, 90 * count, 90))))
+    frontiers.note(BearingSnapshot(tuple(range(count)), tuple(range(0, 90 * count, 90))))
     assert CLEAR not in frontiers.statuses.values()
     assert len(frontiers.open) == count * (count - 1)
 
 
 def test_landmarks_in_line_with_the_observer_are_on_neither_side() -> None:
     frontiers = Frontiers()
-    frontiers.note(Snapshot((1, 2, 3, 4), (0, 0, 100, 180)))  # 1 and 2 behind each other, or at one place
+    frontiers.note(BearingSnapshot((1, 2, 3, 4), (0, 0, 100, 180)))  # 1 and 2 behind each other, or at one place
     assert frontiers.status(1, 2) == frontiers.status(2, 1) == UNEXPLORED
     assert frontiers.status(1, 3) == CLEAR
     opposite = Frontiers()
-    opposite.note(Snapshot((1, 2, 3), (0, STEPS // 2, 50)))
+    opposite.note(BearingSnapshot((1, 2, 3), (0, STEPS // 2, 50)))
     assert set(opposite.statuses.values()) == {UNEXPLORED}
 
 
@@ -81,7 +81,7 @@ def test_clear_stays_clear_whatever_comes_later() -> None:
     frontiers = Frontiers()
     assert frontiers.raise_to(key_of(1, 2), CLEAR)
     assert not frontiers.raise_to(key_of(1, 2), BOUNDARY)
-    assert not frontiers.note(Snapshot((1, 2), (0, 200))) or frontiers.status(1, 2) == CLEAR
+    assert not frontiers.note(BearingSnapshot((1, 2), (0, 200))) or frontiers.status(1, 2) == CLEAR
     assert not frontiers.is_open(1, 2)
 
 
@@ -103,12 +103,12 @@ def test_utility_counts_each_frontier_that_shares_a_landmark_once() -> None:
 
 
 snapshots = st.lists(st.tuples(st.integers(0, 8), st.integers(0, STEPS - 1)), max_size=7).map(
-    lambda pairs: Snapshot(tuple(sorted(dict(pairs))), tuple(dict(pairs)[key] for key in sorted(dict(pairs))))
+    lambda pairs: BearingSnapshot(tuple(sorted(dict(pairs))), tuple(dict(pairs)[key] for key in sorted(dict(pairs))))
 )
 
 
 @given(st.lists(snapshots, max_size=6), st.randoms())
-def test_statuses_do_not_depend_on_the_order_of_observations(some: list[Snapshot], random: object) -> None:
+def test_statuses_do_not_depend_on_the_order_of_observations(some: list[BearingSnapshot], random: object) -> None:
     one, other = Frontiers(), Frontiers()
     shuffled = [*some, *some]
     random.shuffle(shuffled)  # type: ignore[attr-defined]
@@ -122,7 +122,7 @@ def test_statuses_do_not_depend_on_the_order_of_observations(some: list[Snapshot
 
 
 @given(snapshots)
-def test_inside_means_that_no_half_plane_holds_all_landmarks(snapshot: Snapshot) -> None:
+def test_inside_means_that_no_half_plane_holds_all_landmarks(snapshot: BearingSnapshot) -> None:
     angles = [to_rad(each) for each in snapshot.bearings]
     # A direction to whose left no landmark is: all lie in one closed half plane through the observer.
     empty = any(

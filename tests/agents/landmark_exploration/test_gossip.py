@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.frontier_status import BOUNDARY, key_of
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
@@ -164,7 +164,7 @@ def chain(count: int) -> set[tuple[int, int]]:
 def scribble(robot: Robot, fate: random.Random) -> None:
     """Write an observation of up to 30 landmarks, or a status."""
     landmarks = tuple(sorted(fate.sample(range(900), fate.randrange(1, 30))))
-    robot.write(observation_entries(Snapshot(landmarks, tuple(fate.randrange(256) for _ in landmarks))))
+    robot.write(observation_entries(BearingSnapshot(landmarks, tuple(fate.randrange(256) for _ in landmarks))))
     robot.write(status_entries([key_of(fate.randrange(900), 900 + fate.randrange(9))], BOUNDARY))
 
 

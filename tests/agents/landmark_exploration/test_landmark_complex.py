@@ -7,7 +7,7 @@ import gudhi
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
 from zwerm.maths.strong_collapse import betti, collapsed
 
@@ -17,7 +17,7 @@ simplices = st.lists(st.frozensets(st.integers(0, 11), max_size=6).map(lambda ea
 def complex_of(some: list[tuple[int, ...]]) -> LandmarkComplex:
     found = LandmarkComplex()
     for number, each in enumerate(some):
-        found.update(Snapshot(each, (number % 256,) * len(each)), (number, 0))
+        found.update(BearingSnapshot(each, (number % 256,) * len(each)), (number, 0))
     return found
 
 
@@ -28,7 +28,7 @@ def graph_of(complex_: LandmarkComplex) -> set[tuple[tuple[int, ...], tuple[int,
 
 @given(simplices, st.randoms())
 def test_complex_and_graph_do_not_depend_on_the_order(some: list[tuple[int, ...]], order: random.Random) -> None:
-    ranked = [(Snapshot(each, (number % 256,) * len(each)), (number, 0)) for number, each in enumerate(some)]
+    ranked = [(BearingSnapshot(each, (number % 256,) * len(each)), (number, 0)) for number, each in enumerate(some)]
     shuffled = [*ranked, *ranked]
     order.shuffle(shuffled)
     one, other = LandmarkComplex(), LandmarkComplex()
@@ -66,11 +66,11 @@ def test_the_graph_of_figure_7() -> None:
 
 def test_the_table_keeps_a_simplex_that_became_a_face() -> None:
     complex_ = LandmarkComplex()
-    complex_.update(Snapshot((1, 2), (10, 20)))
-    complex_.update(Snapshot((1, 2, 3), (11, 21, 31)))
+    complex_.update(BearingSnapshot((1, 2), (10, 20)))
+    complex_.update(BearingSnapshot((1, 2, 3), (11, 21, 31)))
     assert list(complex_.simplices.values()) == [(1, 2, 3)]
     assert complex_.table == {(1, 2): (10, 20), (1, 2, 3): (11, 21, 31)}
-    assert complex_.snapshot_of(0) == Snapshot((1, 2), (10, 20))
+    assert complex_.snapshot_of(0) == BearingSnapshot((1, 2), (10, 20))
 
 
 def gudhi_betti(some: list[tuple[int, ...]]) -> tuple[int, int]:

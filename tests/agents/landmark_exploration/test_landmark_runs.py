@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from zwerm.agents.landmark_exploration.mapping.map_file import map_told, write_map
+from zwerm.agents.landmark_exploration.mapping.map_file import map_of_reports, write_map
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.errors import ScenarioError
 from zwerm.run.result import RunResult
@@ -154,7 +154,7 @@ def test_no_landmarks_at_all_are_one_line() -> None:
 def test_robots_find_every_goal_by_a_map_that_others_made(tmp_path: Any) -> None:
     scattered = {"dispersion_m": 0.57735, "seed": 3}
     explored = ran(hall(scatter=scattered))
-    (tmp_path / "map.json").write_text(write_map(map_told(each.snapshot for each in explored.snapshots)))
+    (tmp_path / "map.json").write_text(write_map(map_of_reports(each.snapshot for each in explored.snapshots)))
     base = read(load("landmark-navigate").folder / "landmark-navigate.toml")
     base |= {"name": "hall", "arena": HALL, "scatter": scattered}
     base["robots"] |= {"count": 3, "parameters": {"map_file": "map.json", "random_goals": 4}}

@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.frontier_status import BOUNDARY, key_of
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
-from zwerm.agents.landmark_exploration.mapping.map_file import map_told, read_map, write_map
-from zwerm.agents.landmark_exploration.mapping.map_reports import MapTold, write_told
+from zwerm.agents.landmark_exploration.mapping.map_file import map_of_reports, read_map, write_map
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, write_report
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing import log_entries as entries
-from zwerm.agents.landmark_exploration.sharing.landmark_messages import Report, Vector
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import TaskReport, Vector
 from zwerm.agents.landmark_exploration.sharing.orders import (
+    ExplorationTask,
     OrderIntake,
-    Task,
     cut,
     landmark_bytes,
     landmarks_in,
@@ -30,12 +30,12 @@ from zwerm.agents.landmark_exploration.sharing.upload import RETRY_TICKS, Upload
 
 ids = st.integers(0, 65_535)
 snapshots = st.dictionaries(ids, st.integers(0, 255), max_size=20).map(
-    lambda pairs: Snapshot(tuple(sorted(pairs)), tuple(pairs[each] for each in sorted(pairs)))
+    lambda pairs: BearingSnapshot(tuple(sorted(pairs)), tuple(pairs[each] for each in sorted(pairs)))
 )
 
 
 @given(st.lists(snapshots, max_size=3), st.integers(0, 200_000))
-def test_a_log_says_what_was_observed_in_packets_of_any_size(some: list[Snapshot], origin: int) -> None:
+def test_a_log_says_what_was_observed_in_packets_of_any_size(some: list[BearingSnapshot], origin: int) -> None:
     log = tuple(entry for each in some for entry in entries.observation_entries(each))
     assert all(len(entry) <= entries.ENTRY_BYTES_MAX for entry in log)
     direct, packed = LandmarkMap(), LandmarkMap()
@@ -63,7 +63,7 @@ def test_a_vector_in_parts_speaks_of_every_origin_once(vector: dict[int, int], s
 
 
 tasks = st.builds(
-    Task,
+    ExplorationTask,
     st.tuples(ids, ids).filter(lambda pair: pair[0] != pair[1]).map(lambda pair: key_of(*pair)),
     st.lists(snapshots, max_size=4).map(tuple),
     st.integers(1, 6),
@@ -72,7 +72,9 @@ tasks = st.builds(
 
 
 @given(tasks, st.randoms(), st.sampled_from([64, 1_000]))
-def test_an_order_is_put_together_from_parts_in_any_order(task: Task, order: random.Random, size: int) -> None:
+def test_an_order_is_put_together_from_parts_in_any_order(
+    task: ExplorationTask, order: random.Random, size: int
+) -> None:
     assert read_task(write_task(task)) == task
     parts = cut(write_task(task), 3, 1, 9, size)
     assert all(len(messages.write(part)) <= size for part in parts)
@@ -86,14 +88,14 @@ def test_an_order_is_put_together_from_parts_in_any_order(task: Task, order: ran
 
 def test_late_parts_of_an_older_order_do_no_harm() -> None:
     intake = OrderIntake(1)
-    (old,) = cut(write_task(Task(key_of(1, 2))), 1, 1, 4, 64)
-    (new,) = cut(write_task(Task(key_of(3, 4))), 1, 1, 5, 64)
-    (later_life,) = cut(write_task(Task(None)), 2, 1, 1, 64)
-    (other_robot,) = cut(write_task(Task(None)), 2, 2, 1, 64)
-    assert intake.accept(new) == Task(key_of(3, 4))
+    (old,) = cut(write_task(ExplorationTask(key_of(1, 2))), 1, 1, 4, 64)
+    (new,) = cut(write_task(ExplorationTask(key_of(3, 4))), 1, 1, 5, 64)
+    (later_incarnation,) = cut(write_task(ExplorationTask(None)), 2, 1, 1, 64)
+    (other_robot,) = cut(write_task(ExplorationTask(None)), 2, 2, 1, 64)
+    assert intake.accept(new) == ExplorationTask(key_of(3, 4))
     assert intake.accept(old) is None
     assert intake.accept(other_robot) is None
-    assert intake.accept(later_life) == Task(None)
+    assert intake.accept(later_incarnation) == ExplorationTask(None)
     assert intake.accept(new) is None
 
 
@@ -111,7 +113,7 @@ def test_entries_that_say_nothing_change_nothing(entry: bytes) -> None:
 
 
 def test_a_report_is_small() -> None:
-    report = Report(255, 2**16, 2**16, True, True, 2**31, landmark_bytes(range(60_000, 60_040)))
+    report = TaskReport(255, 2**16, 2**16, True, True, 2**31, landmark_bytes(range(60_000, 60_040)))
     assert len(messages.write(report)) <= messages.SMALL_BYTES
     assert landmarks_in(landmark_bytes((5, 3))) == (3, 5)
 
@@ -141,13 +143,13 @@ def test_an_upload_begins_again_for_a_coordinator_that_lost_its_memory() -> None
 
 def test_a_map_survives_its_file() -> None:
     map_ = LandmarkMap()
-    map_.observe(Snapshot((1, 2, 3), (0, 90, 180)))
-    map_.observe(Snapshot((2, 3, 4), (10, 100, 190)))
+    map_.observe(BearingSnapshot((1, 2, 3), (0, 90, 180)))
+    map_.observe(BearingSnapshot((2, 3, 4), (10, 100, 190)))
     map_.raise_all([key_of(3, 2)], BOUNDARY)
     again = read_map(write_map(map_))
     assert again.content() == map_.content()
-    told = write_told(MapTold(((1, 2, 3),), ((0, 90, 180),), open=3))
-    assert map_told([b"nothing", told]).complex.table == {(1, 2, 3): (0, 90, 180)}
+    report = write_report(MapReport(((1, 2, 3),), ((0, 90, 180),), open=3))
+    assert map_of_reports([b"nothing", report]).complex.table == {(1, 2, 3): (0, 90, 180)}
 
 
 @pytest.mark.parametrize(

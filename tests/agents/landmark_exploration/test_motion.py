@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot, to_steps
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot, to_steps
 from zwerm.agents.landmark_exploration.motion import CROSSED_TICKS, Drive, explore, homing, travel, wander
-from zwerm.agents.landmark_exploration.view import Slide, View
+from zwerm.agents.landmark_exploration.view import ExplorerView, Slide
 from zwerm.wire.messages import Contact, LandmarkBearing, Observation
 
 STEP = 0.05
@@ -21,7 +21,7 @@ class Plane:
 
     def __init__(self, x: float, y: float, above: float = math.inf, heading: float = 0.0) -> None:
         self.x, self.y, self.above, self.heading = x, y, above, heading
-        self.view = View()
+        self.view = ExplorerView()
         self.tick = 0
         self.look()
 
@@ -48,7 +48,7 @@ class Plane:
         return None
 
 
-def snapshot_at(x: float, y: float) -> Snapshot:
+def snapshot_at(x: float, y: float) -> BearingSnapshot:
     return Plane(x, y).view.snapshot
 
 
@@ -79,7 +79,7 @@ def test_travel_passes_observations_that_share_two_landmarks() -> None:
 
 def test_travel_gives_up_where_nothing_on_the_path_is_seen() -> None:
     plane = Plane(0.3, 0.2)
-    drive = travel(plane.view, [Snapshot((90, 91), (0, 64))], random(), lambda: False)
+    drive = travel(plane.view, [BearingSnapshot((90, 91), (0, 64))], random(), lambda: False)
     assert plane.follow(drive) == "unreached"
 
 

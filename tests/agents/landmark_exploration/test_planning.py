@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import Snapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.cost_utility import Offer, cost_utility, nearest_frontier, reach
 from zwerm.agents.landmark_exploration.mapping.frontier_status import UNEXPLORED, Frontiers, key_of, pair_of
 from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
@@ -23,7 +23,7 @@ pairs = st.lists(
 def made(some: Sequence[frozenset[int]], open_: Sequence[tuple[int, int]]) -> tuple[LandmarkComplex, Frontiers]:
     complex_, frontiers = LandmarkComplex(), Frontiers()
     for each in some:
-        complex_.update(Snapshot(tuple(sorted(each)), (0,) * len(each)))
+        complex_.update(BearingSnapshot(tuple(sorted(each)), (0,) * len(each)))
     for pair in open_:
         frontiers.raise_to(key_of(*pair), UNEXPLORED)
     return complex_, frontiers

@@ -25,7 +25,7 @@ def test_a_claim_lasts_while_its_robot_is_heard_whatever_its_clock_says(pace: fl
 def test_the_claim_of_a_robot_that_crashed_runs_out_after_a_lease() -> None:
     registers = Registers(LEASE, DEAD, 2)
     registers.merge(Register(1, 1, 7, claim=42), 100)
-    registers.merge(Register(1, 1, 7, claim=42), 240)  # told on by a third robot: no news
+    registers.merge(Register(1, 1, 7, claim=42), 240)  # forwarded by a third robot: nothing new
     assert list(registers.claims(0, 249)) == [41]
     assert list(registers.claims(0, 250)) == []
 

@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import pytest
 
-from zwerm.agents.robot_teams.team_membership import Membership, later
-from zwerm.agents.robot_teams.team_messages import READY, Beacon, Status, View
+from zwerm.agents.robot_teams.protocols.team_membership import Membership, later
+from zwerm.agents.robot_teams.protocols.team_messages import READY, Beacon, Status, View
 
 DT_S, SILENCE_S = 1.0, 3.0
 

@@ -2,7 +2,8 @@
 
 import msgspec
 
-from zwerm.agents.robot_teams.facts import RIGHT, TOP, Arc, End, Segment
+from zwerm.agents.robot_teams.mapping.facts import RIGHT, TOP, Arc, End, Segment
+from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.planning import (
     LINK,
     Task,
@@ -15,8 +16,7 @@ from zwerm.agents.robot_teams.planning import (
     reservation,
     room,
 )
-from zwerm.agents.robot_teams.slice_map import SliceMap
-from zwerm.agents.robot_teams.team_messages import HUNTS, READY, Plan, Status, View
+from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, Plan, Status, View
 
 VIEW = View(2, 0, (0, 1, 2, 3))
 CORNER = End(0, TOP, 5_000)

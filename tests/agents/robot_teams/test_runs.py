@@ -76,10 +76,6 @@ def check(found: Outcome) -> None:
     assert found.gap_m > 0.0
 
 
-# The team waits until the time limit; docs/papers/robot-teams.md lists these cases as unsolved.
-WAITS = pytest.mark.xfail(reason="the team waits for a robot that it lost", strict=True)
-
-
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_a_hall_with_an_obstacle_is_covered(count: int) -> None:
     check(cover(team(count)))
@@ -111,7 +107,7 @@ def test_a_run_that_is_stopped_early_has_not_covered_the_hall() -> None:
     [
         {"loss": 0.3},
         {"models": [{"kind": "gilbert_elliott", "loss_fraction": 0.2, "burst_packets": 8.0}]},
-        pytest.param({"range_m": 4.0}, marks=WAITS),
+        {"range_m": 4.0},
     ],
     ids=["loss", "bursts", "range"],
 )
@@ -119,12 +115,11 @@ def test_lost_packets_cost_no_coverage(radio: dict[str, Any]) -> None:
     check(cover(team(3, radio=radio)))
 
 
-@pytest.mark.parametrize(("node", "at_s"), [(0, 5.0), (0, 25.0), pytest.param(1, 40.0, marks=WAITS)])
+@pytest.mark.parametrize(("node", "at_s"), [(0, 5.0), (0, 25.0), (1, 40.0)])
 def test_the_rest_covers_what_a_dead_robot_left(node: int, at_s: float) -> None:
     check(cover(team(3, faults=[{"kind": "crash", "nodes": [node], "at_s": at_s}])))
 
 
-@WAITS
 def test_a_partition_costs_no_coverage() -> None:
     partition = {"kind": "partition", "groups": [[0], [1, 2]], "at_s": 10.0, "for_s": 60.0}
     check(cover(team(3, faults=[partition])))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwerm.agents.robot_teams.facts import (
+from zwerm.agents.robot_teams.mapping.facts import (
     BOTTOM,
     CONCAVE,
     CONVEX,
@@ -19,8 +19,9 @@ from zwerm.agents.robot_teams.facts import (
     Fact,
     Segment,
     Void,
+    Wreck,
 )
-from zwerm.agents.robot_teams.slice_map import TOLERANCE_MM, SliceMap
+from zwerm.agents.robot_teams.mapping.slice_map import TOLERANCE_MM, SliceMap
 
 ENDS = st.builds(End, st.integers(-3, 3), st.sampled_from([TOP, BOTTOM]), st.integers(0, 2_000))
 SEGMENTS = st.builds(Segment, st.integers(-3, 3), st.integers(0, 1_000), st.integers(1_001, 2_000))
@@ -162,7 +163,7 @@ def test_there_is_no_route_to_where_nothing_leads() -> None:
 def test_what_a_dead_robot_hides_is_not_open() -> None:
     facts: list[Fact] = [fact for fact in room(3) if not isinstance(fact, Arc) or End(1, TOP, 5_000) not in fact[:3]]
     assert not known(facts).certificate.complete
-    hidden = known([*facts, Void(1, 950, 4_600, 5_400)]).certificate
+    hidden = known([*facts, Void(1, 950, 4_600, 5_400, Wreck(3, 100))]).certificate
     assert all(end != End(1, TOP, 5_000) for end, _ in hidden.open_ports)
     assert hidden.open_ports == ((End(0, TOP, 5_000), RIGHT), (End(2, TOP, 5_000), LEFT))
 

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from zwerm.agents.robot_teams.facts import BOTTOM, LEFT, RIGHT, TOP
-from zwerm.agents.robot_teams.manoeuvres import Grid, hand_of
-from zwerm.agents.robot_teams.wall_following import INTO, LEFT_HAND, RIGHT_HAND, WallFollower
+from zwerm.agents.robot_teams.mapping.facts import BOTTOM, LEFT, RIGHT, TOP
+from zwerm.agents.robot_teams.motion.manoeuvres import Grid, hand_of
+from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGHT_HAND, WallFollower
 
 UP, DOWN, EAST, WEST = (0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0)
 

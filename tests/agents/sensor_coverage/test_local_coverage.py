@@ -6,7 +6,7 @@ from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
-from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, UNSAID, StateBeacon
+from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, StateBeacon
 from zwerm.agents.sensor_coverage.messages.peers import read, write
 from zwerm.agents.sensor_coverage.messages.pushes import PushDone, PushToken, Segment, SegmentAck
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
@@ -165,7 +165,7 @@ def test_the_decentralised_base_reports_an_empty_depot() -> None:
 
 
 def at(slot: int) -> StateBeacon:
-    return StateBeacon(1, slot, 3, False, False, 1, (), (), (), UNSAID)
+    return StateBeacon(1, slot, 3, False, False, 1, (), (), (), NO_PATH_VECTOR)
 
 
 @pytest.mark.parametrize(

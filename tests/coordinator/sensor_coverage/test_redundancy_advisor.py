@@ -53,7 +53,7 @@ class Centre:
     """A coordinator, and what it says."""
 
     def __init__(self) -> None:
-        self.sparing = RedundancyAdvisor(Setup(CENTRE, "coordinator", DT_S, (), b"0" * 32, bases=(BASE,)))
+        self.advisor = RedundancyAdvisor(Setup(CENTRE, "coordinator", DT_S, (), b"0" * 32, bases=(BASE,)))
         self.tick = -1
 
     def hear(self, words: Iterable[tuple[int, AdviceMessage]] = (), ticks: int = 1) -> Said:
@@ -63,7 +63,7 @@ class Centre:
         for number in range(ticks):
             self.tick += 1
             observation = Observation(self.tick, self.tick * DT_S, inbox=() if number else inbox)
-            for each in self.sparing.step(observation).outbox:
+            for each in self.advisor.step(observation).outbox:
                 word = read(each.payload)
                 assert word is not None
                 said.append((each.to, word))

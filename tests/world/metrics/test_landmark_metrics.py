@@ -1,4 +1,4 @@
-"""Completion: the fraction of places whose visible landmarks were all seen together."""
+"""MapCompletion: the fraction of places whose visible landmarks were all seen together."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from zwerm.scenario.tables import ArenaTable
 from zwerm.world.arena.arena import Arena
-from zwerm.world.metrics.landmark_exploration import Completion, maximal, visible
+from zwerm.world.metrics.landmark_exploration import MapCompletion, maximal, visible
 
 LANDMARKS = np.array([(0.5, 0.5), (1.5, 0.5), (3.5, 0.5)])
 
@@ -17,7 +17,7 @@ def hall(walls: list[list[list[float]]] | None = None) -> Arena:
 
 def test_nothing_is_covered_before_anything_is_seen_and_all_when_every_set_was() -> None:
     arena = hall()
-    completion = Completion(arena, LANDMARKS, 1.0)
+    completion = MapCompletion(arena, LANDMARKS, 1.0)
     assert completion.places == 40 * 10
     assert completion.fraction == 0.0
     places = np.column_stack([np.linspace(0.05, 3.95, 40), np.full(40, 0.5)])
@@ -26,7 +26,7 @@ def test_nothing_is_covered_before_anything_is_seen_and_all_when_every_set_was()
 
 
 def test_a_simplex_covers_the_places_that_see_a_face_of_it() -> None:
-    completion = Completion(hall(), LANDMARKS, 1.0)
+    completion = MapCompletion(hall(), LANDMARKS, 1.0)
     completion.add([(2,)])
     alone = completion.fraction
     assert 0.2 < alone < 0.4
@@ -43,7 +43,7 @@ def test_a_wall_hides_landmarks() -> None:
 
 
 def test_where_nothing_is_visible_nothing_can_be_covered() -> None:
-    completion = Completion(hall(), np.array([(0.5, 0.5)]), 0.3)
+    completion = MapCompletion(hall(), np.array([(0.5, 0.5)]), 0.3)
     completion.add([(0,)])
     assert 0.0 < completion.fraction < 0.2
 

@@ -117,7 +117,7 @@ def test_a_triangulation_that_is_kept_or_mended_is_the_one_made_anew(monkeypatch
 def test_a_rim_that_is_dented_or_crossed_is_mended_too(monkeypatch):
     angle = np.arange(9) * (math.tau / 9)
     inner = np.random.default_rng(6).uniform(-0.5, 0.5, (20, 2))
-    made, rims = [], []
+    made, hulls = [], []
     kept = Tessellation()
     triangulate = tessellation._triangulate
     for step in range(120):
@@ -128,8 +128,8 @@ def test_a_rim_that_is_dented_or_crossed_is_mended_too(monkeypatch):
         monkeypatch.setattr(tessellation, "_triangulate", lambda place: made.append(1) or triangulate(place))
         np.testing.assert_array_equal(kept.pairs(position), expected)
         monkeypatch.setattr(tessellation, "_triangulate", triangulate)
-        rims.append(kept._mesh.rim.shape[1])
-    assert (len(made), max(rims), min(rims), rims[-1]) == (1, 9, 6, 9)
+        hulls.append(kept._mesh.hull.shape[1])
+    assert (len(made), max(hulls), min(hulls), hulls[-1]) == (1, 9, 6, 9)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from air import DT_S, Radio, ring
 
-from zwerm.catalogue import RADIO_MODELS, RENAMED_RADIO_MODELS
+from zwerm.catalogue import RADIO_MODELS
 from zwerm.errors import ProtocolError, ScenarioError
 from zwerm.scenario import renamed
 from zwerm.wire.checksum import seal, unseal
@@ -380,6 +380,7 @@ def test_a_model_states_its_range_and_others_have_no_bound() -> None:
     assert [model.range_max_m for model in models] == [2.5, math.inf, math.inf]
 
 
+FORMER_NAMES = renamed.KINDS["radio.models"]
 FORMER: dict[str, dict[str, Any]] = {
     "bursts": {"loss_fraction": 0.3, "burst_packets": 4.0},
     "walls": {"loss_db": 1.0, "margin_db": 0.5},
@@ -396,16 +397,16 @@ def test_a_former_name_of_a_model_works_with_one_warning_and_the_same_random_num
     def summary(kind: str) -> dict[str, Any]:
         return Radio(ring(6), [{"kind": kind, **FORMER[former]}], walls=walls).all_broadcast(50)
 
-    current = summary(RENAMED_RADIO_MODELS[former])
+    current = summary(FORMER_NAMES[former])
     assert capsys.readouterr().err == ""
     assert summary(former) == summary(former) == current
     assert current["dropped"]
-    warning = f"radio.models.0.kind: '{former}' is deprecated, use '{RENAMED_RADIO_MODELS[former]}'"
+    warning = f"radio.models.0.kind: '{former}' is deprecated, use '{renamed.KINDS['radio.models'][former]}'"
     assert capsys.readouterr().err == f"zwerm: warning: small.toml: {warning}\n"
 
 
 def test_these_tests_try_every_former_name() -> None:
-    assert set(FORMER) == set(RENAMED_RADIO_MODELS)
+    assert set(FORMER) == set(FORMER_NAMES)
 
 
 # --- mistakes -------------------------------------------------------------------------------------------------------
@@ -416,7 +417,7 @@ def test_these_tests_try_every_former_name() -> None:
     [
         ({"kind": "los"}, "radio.models.0.kind: expected a built-in model (range, line_of_sight, path_loss, "
          "wall_attenuation, loss, gilbert_elliott, delay, duplication, corruption, rate_limit, collision) or module:Class, "
-         "got 'los'"),
+         "got 'los'; did you mean loss?"),
         ({"kind": "own_models:Missing"}, "radio.models.0.kind: module 'own_models' has no class 'Missing'"),
         ({"kind": "own_models:WithoutJudge"}, "radio.models.0.kind: own_models:WithoutJudge is no radio model: it has no "
          "method judge(sent, packets)"),

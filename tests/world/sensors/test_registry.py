@@ -6,11 +6,14 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from support import scenario
 
+from zwerm import Command, Controller, Observation, check_controller
 from zwerm.catalogue import SENSORS
 from zwerm.errors import ScenarioError
+from zwerm.run.assembly import check_controllers
 from zwerm.scenario.types import OpenTable
-from zwerm.wire.messages import SENSOR_FIELDS, Observation, Wake, decode_observation, encode
+from zwerm.wire.messages import SENSOR_FIELDS, Wake, decode_observation, encode
 from zwerm.world.fields.linear import Linear
 from zwerm.world.sensors import Surroundings
 from zwerm.world.sensors.registry import find, make_sensors
@@ -75,7 +78,7 @@ def test_every_built_in_sensor_reads_nobody_where_nobody_is_asked(make, scene):
             [
                 "robots.sensors.0.switches: expected >= 1, got 0",
                 "robots.sensors.0.false_negative: expected <= 1, got 1.5",
-                "robots.sensors.0.reach: unknown key",
+                "robots.sensors.0.reach: unknown key; did you mean reach_m?",
             ],
         ),
         (
@@ -101,7 +104,7 @@ def test_every_built_in_sensor_reads_nobody_where_nobody_is_asked(make, scene):
         ),
         (
             {"kind": "other_peoples:Barometer"},
-            ["robots.sensors.0.kind: module 'other_peoples' has no class 'Barometer'"],
+            ["robots.sensors.0.kind: module 'other_peoples' has no class 'Barometer'; did you mean Hygrometer?"],
         ),
         (
             {"kind": "other_peoples:Blind"},
@@ -195,3 +198,21 @@ def test_a_sensor_that_does_not_inherit_has_the_traits_of_the_base_class():
     assert found.dark is None
     assert not found.has_items
     assert found.rest() == (0.0,)
+
+
+class Dried(Controller):
+    """Needs a sensor that is outside the catalogue, by the field that the sensor fills."""
+
+    sensors = ("humidity",)
+
+    def step(self, observation: Observation) -> Command:
+        assert observation.extra is not None
+        return Command(telemetry={"humidity": observation.extra["humidity"][0]})
+
+
+def test_a_controller_names_a_sensor_of_a_users_own_by_its_field() -> None:
+    robots = {"controller": f"{__name__}:Dried", "sensors": [{"kind": "other_peoples:Hygrometer"}]}
+    check_controllers(scenario(robots=robots))
+    check_controller(Dried, sensors=["other_peoples:Hygrometer"])
+    with pytest.raises(ScenarioError, match="needs the sensor 'humidity'"):
+        check_controllers(scenario(robots=robots | {"sensors": [{"kind": "compass"}]}))

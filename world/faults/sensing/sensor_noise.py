@@ -1,8 +1,8 @@
 """Sensor noise: one sensor of some robots, or of all, reads wrong numbers, misses items, and sees items that are not there.
 
-Every number of a reading gets `bias` and Gaussian noise of standard deviation `sd`, in the unit of the sensor. Of the items
-of a reading (robots or landmarks seen, closed switches, a bit that is true) a fraction `missed_fraction` is missing, and
-one that is not there is added with probability `false_fraction`.
+Every number of a reading gets `bias` and Gaussian noise of standard deviation `sd`, in the unit of the sensor. Items of
+a reading are robots or landmarks seen, closed switches, or a bit that is true. A fraction `missed_fraction` of them is
+missing. A phantom item is added with probability `false_fraction`.
 """
 
 from collections.abc import Callable, Iterator, Sequence

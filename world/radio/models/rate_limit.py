@@ -1,8 +1,8 @@
 """Rate limit: the radio of a sender transmits `rate_bytes_s` and queues `queue_bytes`; it drops what does not fit.
 
-The queue is first in, first out. Its drop-tail rule and its numbers are those of tc-tbf(8) with no burst: a transmission with q
-bytes before it leaves the radio after (q + its size) / rate. A broadcast is transmitted once: the radio sends or drops all its
-packets together. A transmission takes no time if earlier models dropped all its packets.
+The queue is first in, first out. Its drop-tail rule and its numbers are those of tc-tbf(8) with no burst. A
+transmission with q bytes before it leaves the radio after (q + its size) / rate. A broadcast is transmitted once: the
+radio sends or drops all its packets together. A transmission takes no time if earlier models dropped all its packets.
 """
 
 from typing import ClassVar

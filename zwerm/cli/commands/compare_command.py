@@ -6,8 +6,20 @@ from typing import Annotated, Optional
 import typer
 
 from zwerm.cli.options import Json, ScenarioName, Sets
+from zwerm.cli.output_files import PICTURES, OutputFile, check_outputs
 from zwerm.cli.terminal import err, errors_as_lines, out, print_json
-from zwerm.cli.trials import Jobs, Out, Retry, Seeds, exit_with, print_trial_counts, study_extra
+from zwerm.cli.trials import (
+    Jobs,
+    Out,
+    Retry,
+    Seeds,
+    Timeout,
+    exit_with,
+    print_trial_counts,
+    rows_file,
+    study_extra,
+    write_csv,
+)
 
 
 def compare(
@@ -58,6 +70,7 @@ def compare(
         ),
     ] = None,
     retry: Retry = False,
+    timeout: Timeout = None,
     as_json: Json = False,
 ) -> None:
     """Compare variants of a scenario, seed by seed: same seeds, same random draws, same faults.
@@ -95,8 +108,9 @@ def compare(
             None if variants_file is None else load_study(variants_file),
         )
         chosen = None if seeds is None else parse_seeds(seeds)
-        path = output or Path("runs") / f"{planned.name}.parquet"
+        path = rows_file(output, planned.name)
         drawing = check_figure(figure or path.with_suffix(".png"))
+        check_outputs([OutputFile("--figure", figure, PICTURES)])
         with StudyProgress(err, planned.name, quiet=as_json) as progress:
             result = run_study(
                 planned,
@@ -105,11 +119,13 @@ def compare(
                 jobs=jobs,
                 sets=tuple(sets or ()),
                 retry=retry,
+                timeout_s=timeout,
                 runner="inline" if inline else "processes",
                 listener=progress,
             )
         comparison = Comparison(result.results)
         drawn = draw_comparison(drawing, comparison, wanted) if result.done else []
+        drawn += write_csv(output, result)
         if as_json:
             print_json(comparison_json(result, comparison, drawn))
         elif result.done:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from zwerm.cli.options import check_endpoint
 from zwerm.cli.terminal import EXIT_FAILED, err, errors_as_lines
 
 
@@ -21,6 +22,7 @@ def robot(
     from zwerm.deploy.remote import run_robots
 
     with errors_as_lines():
+        check_endpoint("--connect", connect)
         with RunProgress(err, "swarm") as progress:
             codes = run_robots(connect, credentials, ids, progress.joined)
         failed = {node: code for node, code in codes.items() if code}

@@ -9,6 +9,7 @@ from zwerm.cli.options import (
     Json,
     Picture,
     PictureAt,
+    Quiet,
     RadioTable,
     RealTime,
     Record,
@@ -33,6 +34,7 @@ def run(
     animate: Animation = None,
     radio_table: RadioTable = None,
     as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Run a scenario: the world in this process, and every robot in a process of its own.
 
@@ -49,14 +51,15 @@ def run(
     [bold]zwerm run computation-free --set robots.controller=my_file:MyController[/bold]
     """
     from zwerm.cli.console import RunProgress
+    from zwerm.cli.debugger import breakpoints
     from zwerm.cli.run_output import RunOutput
     from zwerm.run.runner import run as run_scenario
     from zwerm.scenario.load import load
 
     with errors_as_lines():
-        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json)
+        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json, record)
         loaded = load(scenario, tuple(sets or ()))
-        with RunProgress(err, loaded.name, quiet=as_json) as progress:
+        with RunProgress(err, loaded.name, quiet=as_json or quiet) as progress, breakpoints(progress.suspend):
             result = run_scenario(
                 loaded, seed, "inline" if inline else "processes", realtime=realtime, watcher=progress, record=record
             )

@@ -1,22 +1,40 @@
 """`zwerm study`: run a study, print its table and draw it."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from zwerm.cli.options import Json, Sets
+from zwerm.cli.options import Json, Sets, built_in_names
 from zwerm.cli.terminal import err, errors_as_lines, out, print_json
-from zwerm.cli.trials import Jobs, Out, Retry, Seeds, exit_with, print_trial_counts, study_extra
+from zwerm.cli.trials import (
+    Jobs,
+    Out,
+    Retry,
+    Seeds,
+    Timeout,
+    exit_with,
+    print_trial_counts,
+    rows_file,
+    study_extra,
+    write_csv,
+)
 
 
 def study(
-    study: Annotated[str, typer.Argument(metavar="STUDY", help="A built-in study (see `zwerm list`) or a TOML file.")],
+    study: Annotated[
+        str,
+        typer.Argument(
+            metavar="STUDY",
+            help="A built-in study (see `zwerm list`) or a TOML file.",
+            autocompletion=built_in_names("studies"),
+        ),
+    ],
     seeds: Seeds = None,
     jobs: Jobs = None,
     output: Out = None,
     sets: Sets = None,
     retry: Retry = False,
+    timeout: Timeout = None,
     as_json: Json = False,
 ) -> None:
     """Run a study: scenarios over a grid of settings and many seeds, compared with a paper's numbers.
@@ -39,12 +57,20 @@ def study(
             from zwerm.study.study_tables import load_study, parse_seeds
         loaded = load_study(study)
         chosen = None if seeds is None else parse_seeds(seeds)
-        path = output or Path("runs") / f"{loaded.name}.parquet"
+        path = rows_file(output, loaded.name)
         with StudyProgress(err, loaded.name, quiet=as_json) as progress:
             result = run_study(
-                loaded, path, seeds=chosen, jobs=jobs, sets=tuple(sets or ()), retry=retry, listener=progress
+                loaded,
+                path,
+                seeds=chosen,
+                jobs=jobs,
+                sets=tuple(sets or ()),
+                retry=retry,
+                timeout_s=timeout,
+                listener=progress,
             )
         drawn = [draw_study(path.with_suffix(".png"), result.results)] if result.done else []
+        drawn += write_csv(output, result)
         if as_json:
             print_json(study_json(result, drawn))
         elif result.done:

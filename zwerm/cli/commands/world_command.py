@@ -16,6 +16,7 @@ from zwerm.cli.options import (
     ScenarioName,
     Seed,
     Sets,
+    check_endpoint,
 )
 from zwerm.cli.terminal import err, errors_as_lines
 
@@ -46,7 +47,9 @@ def world(
     from zwerm.scenario.load import load
 
     with errors_as_lines():
-        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json)
+        for endpoint in listen:
+            check_endpoint("--listen", endpoint)
+        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json, record)
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
             result = serve(loaded, seed, listen, credentials, realtime=realtime, watcher=progress, record=record)

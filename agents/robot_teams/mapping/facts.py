@@ -1,0 +1,163 @@
+"""Facts about the free space that a robot observed: swept segments and traced arcs. A set of facts only grows.
+
+Slice `k` is the line x = origin + k * spacing. The configuration space of the body's centre meets it in segments. The upper end
+of a segment is a TOP end, the lower one a BOTTOM end. An arc is the part of the boundary between two consecutive crossings of
+slices. Two sets of facts merge by union, which is commutative, associative and idempotent, so that lost, late and copied
+messages can do no harm. Lengths are whole millimetres: equal facts are equal bytes on every robot.
+
+A dead robot is an obstacle. What a robot observed of such an obstacle names the `Wreck`. A sign of life of that robot is a fact
+too, and all facts that name one of its earlier wrecks are void from then on: no suspicion lasts longer than its proof.
+"""
+
+from typing import Final, NamedTuple
+from zlib import crc32
+
+TOP: Final = 1
+BOTTOM: Final = -1
+RIGHT: Final = 1
+LEFT: Final = -1
+
+# The kinds of arc. At a critical point the arc returns to the slice it left.
+PASSES: Final = 0
+CONVEX: Final = 1
+CONCAVE: Final = -1
+
+
+class Wreck(NamedTuple):
+    """Robot `node` was taken for dead at `tick`."""
+
+    node: int
+    tick: int
+
+
+class End(NamedTuple):
+    """The end of a segment of slice `slice`: on its side TOP or BOTTOM, at height `y_mm`."""
+
+    slice: int
+    side: int
+    y_mm: int
+
+
+class Segment(NamedTuple):
+    """A robot swept slice `slice` from `bottom_mm` to `top_mm`, wall to wall, or to one of the `wrecks`."""
+
+    slice: int
+    bottom_mm: int
+    top_mm: int
+    wrecks: tuple[Wreck, ...] = ()
+
+    @property
+    def ends(self) -> tuple[End, End]:
+        """The upper and the lower end."""
+        return End(self.slice, TOP, self.top_mm), End(self.slice, BOTTOM, self.bottom_mm)
+
+
+class Arc(NamedTuple):
+    """A robot followed the boundary from one end into the slab on its side `direction`, until it came to another end.
+
+    The arc is `length_mm` long. Its point farthest from the first slice is (`x_mm`, `y_mm`): where the arc returns, that is the
+    critical point. The robot touched the `wrecks` on the way.
+    """
+
+    start: End
+    direction: int
+    stop: End
+    length_mm: int
+    x_mm: int
+    y_mm: int
+    wrecks: tuple[Wreck, ...] = ()
+
+    @property
+    def kind(self) -> int:
+        """PASSES to the next slice; or around an obstacle (CONVEX), or around free space (CONCAVE), back to its own."""
+        if self.stop.slice != self.start.slice:
+            return PASSES
+        return CONVEX if (self.stop.y_mm - self.start.y_mm) * self.start.side > 0 else CONCAVE
+
+    @property
+    def ports(self) -> tuple[tuple[End, int], tuple[End, int]]:
+        """The two ports that the arc joins: an end, and the side on which the arc leaves it."""
+        back = self.direction if self.stop.slice == self.start.slice else -self.direction
+        return (self.start, self.direction), (self.stop, back)
+
+
+class Void(NamedTuple):
+    """A wreck at `x_mm` hides the ends of slice `slice` between two heights: nobody can reach them any more."""
+
+    slice: int
+    x_mm: int
+    low_mm: int
+    high_mm: int
+    wreck: Wreck
+
+    @property
+    def wrecks(self) -> tuple[Wreck, ...]:
+        """The wreck, as other facts name theirs."""
+        return (self.wreck,)
+
+
+class Return(NamedTuple):
+    """Robot `node` lived at `tick`: it was no wreck before."""
+
+    node: int
+    tick: int
+
+
+Fact = Segment | Arc | Void | Return
+
+
+class FactSet:
+    """A grow-only set of facts. `digest` is equal for equal sets, and with certainty 1 - 2**-32 only for those."""
+
+    def __init__(self) -> None:
+        self._facts: dict[Fact, None] = {}
+        self.digest = 0
+
+    def __len__(self) -> int:
+        return len(self._facts)
+
+    def __contains__(self, fact: Fact) -> bool:
+        return fact in self._facts
+
+    def add(self, fact: Fact) -> bool:
+        """Add one fact; tell whether it is new."""
+        if fact in self._facts:
+            return False
+        self._facts[fact] = None
+        self.digest ^= crc32(repr(tuple(fact)).encode())
+        return True
+
+    def since(self, count: int) -> list[Fact]:
+        """Return the facts in the order in which they were added, without the first `count`."""
+        return list(self._facts)[count:]
+
+    @property
+    def alive_ticks(self) -> dict[int, int]:
+        """The newest proof of life of every robot that was ever taken for dead wrongly."""
+        found: dict[int, int] = {}
+        for fact in self._facts:
+            if isinstance(fact, Return):
+                found[fact.node] = max(fact.tick, found.get(fact.node, fact.tick))
+        return found
+
+    @property
+    def segments(self) -> list[Segment]:
+        """The swept segments that hold, sorted: the order of arrival has no influence."""
+        return sorted([fact for fact in self._facts if isinstance(fact, Segment) and self._holds(fact.wrecks)])
+
+    @property
+    def voids(self) -> list[Void]:
+        """What wrecks hide, sorted."""
+        return sorted([fact for fact in self._facts if isinstance(fact, Void) and self._holds(fact.wrecks)])
+
+    @property
+    def arcs(self) -> list[Arc]:
+        """The traced arcs that hold, sorted."""
+        return sorted([fact for fact in self._facts if isinstance(fact, Arc) and self._holds(fact.wrecks)])
+
+    def _holds(self, wrecks: tuple[Wreck, ...]) -> bool:
+        """Tell whether no robot that is named in `wrecks` was alive later."""
+        if not wrecks:
+            return True
+        alive = self.alive_ticks
+        return all(wreck.tick >= alive.get(wreck.node, wreck.tick) for wreck in wrecks)

@@ -1,0 +1,259 @@
+"""The map of ends, ports and mates, derived from a set of facts, and the certificate of complete coverage.
+
+Every end of a segment needs a mate, the other end, once the segment is swept; and has two ports, the arcs of the boundary that
+leave it to either side. Coverage is complete if and only if no end lacks its mate and no port is open: then every slab between
+two slices is bounded by swept segments and traced arcs only. That presumes that the spacing is at most twice the footprint's
+radius, and at most the sum of the footprint's radius and the body's diameter, so that an obstacle between two slices that
+no arc reaches hides nothing.
+
+A wreck may hide ends. They count for nothing while it lies there: its own footprint covers what is there, and arcs lead around
+it. A wreck also blocks ways that were free. Ways therefore prefer segments and arcs that were observed beside the wreck. Where
+no way leads from an end to what is open, all that can be reached from that end is covered if and only if every end that
+ways from it reach has a mate and two arcs, none of them blocked.
+
+A slice may graze an obstacle: one robot stops there, and another sweeps past. An end that lies inside a swept segment
+is no end of anything that is left to cover, and counts for nothing either.
+
+Ends that two robots measured a little differently are one: those of one slice and side are joined where neighbours are at most
+`TOLERANCE_MM` apart. The joined ends are a function of the set of facts alone, so that merging maps needs no order.
+"""
+
+import heapq
+from collections.abc import Collection, Iterable
+from typing import Final, NamedTuple
+
+from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, Arc, End, Fact, FactSet, Segment, Void
+
+TOLERANCE_MM: Final = 120
+
+# A port: an end, and the side on which the arc leaves.
+Port = tuple[End, int]
+
+
+class Step(NamedTuple):
+    """One way from an end to another: along the swept segment (`direction` 0), or along the arc on that side."""
+
+    direction: int
+    stop: End
+    length_mm: int
+
+
+class Certificate(NamedTuple):
+    """Why coverage is complete, or what is missing."""
+
+    ends: int
+    ends_without_mate: tuple[End, ...]
+    open_ports: tuple[Port, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether at least one end is known and nothing is open."""
+        return self.ends > 0 and not self.ends_without_mate and not self.open_ports
+
+
+class SliceMap:
+    """What a robot knows of the free space: its facts, and the graph of ends that follows from them."""
+
+    def __init__(self) -> None:
+        self.facts = FactSet()
+        self._known = -1
+        self._levels: dict[tuple[int, int], list[tuple[int, int, End]]] = {}
+        self._mates: dict[End, Step] = {}
+        self._arcs: dict[Port, Step] = {}
+        self._by_slice: dict[int, list[Segment]] = {}
+        self._voids: list[Void] = []
+        self._closed: dict[End, bool] = {}
+        self._certificate = Certificate(0, (), ())
+
+    def add(self, fact: Fact) -> bool:
+        """Add one fact; tell whether it is new."""
+        return self.facts.add(fact)
+
+    def merge(self, facts: Iterable[Fact]) -> int:
+        """Add all of `facts`; return how many are new."""
+        return sum([self.facts.add(fact) for fact in facts])
+
+    def end(self, end: End) -> End | None:
+        """Return the known end that `end` is a measurement of, or None."""
+        self._derive()
+        nearest, apart = None, TOLERANCE_MM + 1
+        for low, high, known in self._levels.get((end.slice, end.side), ()):
+            distance = max(low - end.y_mm, end.y_mm - high, 0)
+            if distance < apart:
+                nearest, apart = known, distance
+        return nearest
+
+    def mate(self, end: End) -> Step | None:
+        """Return the way along the swept segment of a known end, or None while it is not swept, or blocked."""
+        self._derive()
+        return self._mates.get(end)
+
+    def arc(self, end: End, direction: int) -> Step | None:
+        """Return the way along the arc that leaves a known end on the side `direction`, or None while it is open."""
+        self._derive()
+        return self._arcs.get((end, direction))
+
+    def is_swept(self, k: int, y_mm: int) -> bool:
+        """Tell whether a swept segment of slice k reaches within the tolerance of the height y."""
+        self._derive()
+        low, high = y_mm - 4 * TOLERANCE_MM, y_mm + 4 * TOLERANCE_MM
+        return any(segment.bottom_mm <= high and segment.top_mm >= low for segment in self._by_slice.get(k, ()))
+
+    @property
+    def arcs_known(self) -> bool:
+        """Whether any arc was traced."""
+        self._derive()
+        return bool(self._arcs)
+
+    @property
+    def certificate(self) -> Certificate:
+        """What is open, sorted."""
+        self._derive()
+        return self._certificate
+
+    @property
+    def voids(self) -> list[Void]:
+        """What wrecks hide."""
+        self._derive()
+        return self._voids
+
+    def complete_from(self, at: End | None) -> bool:
+        """Tell whether all is covered that a robot at the known end `at` can reach; None: it is somewhere else."""
+        certificate = self.certificate
+        return certificate.complete or (certificate.ends > 0 and at is not None and self._is_closed(at))
+
+    def openings(self, reached: Collection[End]) -> Certificate:
+        """Return which of the ends in `reached` lack a mate, or arcs, that nothing blocks."""
+        self._derive()
+        ends = sorted(reached)
+        return Certificate(
+            len(ends),
+            tuple([end for end in ends if end not in self._mates]),
+            tuple([(end, side) for end in ends for side in (LEFT, RIGHT) if (end, side) not in self._arcs]),
+        )
+
+    def _is_closed(self, at: End) -> bool:
+        if at not in self._closed:
+            reached = self.distances(at)
+            self._closed.update(dict.fromkeys(reached, self.openings(reached).complete))
+        return self._closed[at]
+
+    def distances(self, start: End) -> dict[End, int]:
+        """Return the length [mm] of the shortest known way from a known end to every end that can be reached."""
+        return {end: length for end, (length, _) in self._shortest(start).items()}
+
+    def route(self, start: End, stop: End) -> list[tuple[End, Step]] | None:
+        """Return the shortest known way as (end, step) pairs; empty where start is stop, None where there is none."""
+        found = self._shortest(start)
+        if stop not in found:
+            return None
+        steps: list[tuple[End, Step]] = []
+        while stop != start:
+            previous = found[stop][1]
+            assert previous is not None
+            steps.append(previous)
+            stop = previous[0]
+        return steps[::-1]
+
+    def _shortest(self, start: End) -> dict[End, tuple[int, tuple[End, Step] | None]]:
+        self._derive()
+        found: dict[End, tuple[int, tuple[End, Step] | None]] = {start: (0, None)}
+        heap = [(0, start)]
+        while heap:
+            length, end = heapq.heappop(heap)
+            if length > found[end][0]:
+                continue
+            for step in (self._mates.get(end), self._arcs.get((end, LEFT)), self._arcs.get((end, RIGHT))):
+                if step is None:
+                    continue
+                total = length + step.length_mm
+                if step.stop not in found or total < found[step.stop][0]:
+                    found[step.stop] = total, (end, step)
+                    heapq.heappush(heap, (total, step.stop))
+        return found
+
+    def _derive(self) -> None:
+        """Work out ends, mates and arcs anew if facts were added."""
+        if len(self.facts) == self._known:
+            return
+        self._known = len(self.facts)
+        self._closed.clear()
+        segments, arcs, voids = self.facts.segments, self.facts.arcs, self.facts.voids
+        self._voids = voids
+        measured = [end for arc in arcs for end in (arc.start, arc.stop)]
+        measured += [end for segment in segments for end in segment.ends]
+        self._levels = _joined([end for end in measured if not any(_hides(void, end) for void in voids)])
+        self._mates, self._arcs, self._by_slice = {}, {}, {}
+        ends = sorted(end for level in self._levels.values() for _, _, end in level)
+        mated: set[End] = set()
+        joined: set[Port] = set()
+        # What was observed beside a wreck comes first: it is the way that is free now.
+        for segment in sorted(segments, key=_wrecks_first):
+            self._by_slice.setdefault(segment.slice, []).append(segment)
+            mated.update([known for known in map(self._known_end, segment.ends) if known is not None])
+            if not any(_blocks(void, segment) for void in voids):
+                self._mate(segment)
+        for arc in sorted(arcs, key=_wrecks_first):
+            found = [(self._known_end(end), side) for end, side in arc.ports]
+            joined.update([(known, side) for known, side in found if known is not None])
+            self._join(arc)
+        counting = [end for end in ends if not self._is_passed(end)]
+        sides = [(end, side) for end in counting for side in (LEFT, RIGHT)]
+        self._certificate = Certificate(
+            len(ends),
+            tuple([end for end in counting if end not in mated]),
+            tuple([port for port in sides if port not in joined]),
+        )
+
+    def _known_end(self, end: End) -> End | None:
+        """Return the name of a measured end; None where a wreck hides it."""
+        for low, high, known in self._levels.get((end.slice, end.side), ()):
+            if low <= end.y_mm <= high:
+                return known
+        return None
+
+    def _is_passed(self, end: End) -> bool:
+        """Tell whether a robot swept past an end."""
+        low, high = end.y_mm - TOLERANCE_MM, end.y_mm + TOLERANCE_MM
+        return any(segment.bottom_mm < low and high < segment.top_mm for segment in self._by_slice.get(end.slice, ()))
+
+    def _mate(self, segment: Segment) -> None:
+        top, bottom = map(self._known_end, segment.ends)
+        if top is None or bottom is None:
+            return
+        length = segment.top_mm - segment.bottom_mm
+        self._mates.setdefault(top, Step(0, bottom, length))
+        self._mates.setdefault(bottom, Step(0, top, length))
+
+    def _join(self, arc: Arc) -> None:
+        (start, there), (stop, back) = ((self._known_end(end), side) for end, side in arc.ports)
+        if start is None or stop is None:
+            return
+        self._arcs.setdefault((start, there), Step(there, stop, arc.length_mm))
+        self._arcs.setdefault((stop, back), Step(back, start, arc.length_mm))
+
+
+def _wrecks_first(fact: Segment | Arc) -> tuple[bool, int, Segment | Arc]:
+    """Return the rank of a way: beside a wreck before others, and of two segments the longer one."""
+    return not fact.wrecks, fact.bottom_mm - fact.top_mm if isinstance(fact, Segment) else 0, fact
+
+
+def _blocks(void: Void, segment: Segment) -> bool:
+    return void.slice == segment.slice and void.low_mm < segment.top_mm and segment.bottom_mm < void.high_mm
+
+
+def _hides(void: Void, end: End) -> bool:
+    return void.slice == end.slice and void.low_mm <= end.y_mm <= void.high_mm
+
+
+def _joined(ends: Iterable[End]) -> dict[tuple[int, int], list[tuple[int, int, End]]]:
+    """Return by slice and side the groups of neighbouring ends, ascending: the lowest, the highest, and its name."""
+    levels: dict[tuple[int, int], list[tuple[int, int, End]]] = {}
+    for end in sorted(set(ends)):
+        level = levels.setdefault((end.slice, end.side), [])
+        if level and end.y_mm - level[-1][1] <= TOLERANCE_MM:
+            low, _, known = level[-1]
+            level[-1] = low, end.y_mm, known
+        else:
+            level.append((end.y_mm, end.y_mm, end))
+    return levels

@@ -1,0 +1,252 @@
+"""The three manoeuvres: approach an end, sweep a slice, trace the boundary to the next slice.
+
+Each is stepped once a tick with what the robot senses; it returns the unit vector to move along, or None when it is done.
+Robots that stand in the way are handed in as `blocks`, unit vectors towards them: a manoeuvre goes around them as if they
+were walls. What it finds it offers as facts; the pilot decides what to do next.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
+
+from zwerm.agents.robot_teams.mapping.facts import Arc, End, Wreck
+from zwerm.agents.robot_teams.motion.senses import Senses
+from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGHT_HAND, Vector, WallFollower
+
+# A contact blocks a sweep if this much of its normal lies along the motion.
+BLOCKS: Final = 0.02
+# How far a sweep may leave its slice before the contact counts as the end of the segment [m].
+OFF_SLICE_M: Final = 0.006
+# How far beyond a slice the centre must be for it to have crossed it [m].
+CROSSED_M: Final = 0.002
+# A sweep that takes longer than this to get around other robots gives up [ticks].
+AROUND_TICKS_MAX: Final = 100
+# How far it may leave its slice for that [m].
+AROUND_M: Final = 1.2
+# How far on the wrong side of its slice a trace may begin [m].
+SLACK_M: Final = 0.75
+
+
+# Tells at which ends the robots in contact stand.
+Parked = Callable[[Senses], Sequence[End]]
+
+
+class Grid(NamedTuple):
+    """The slices: x = origin_m + k * spacing_m."""
+
+    origin_m: float
+    spacing_m: float
+
+    def x_m(self, k: int) -> float:
+        """Return where slice k is."""
+        return self.origin_m + k * self.spacing_m
+
+    def nearest(self, x_m: float) -> int:
+        """Return the slice nearest to x."""
+        return round((x_m - self.origin_m) / self.spacing_m)
+
+
+def mm(length_m: float) -> int:
+    """Return a length in whole millimetres."""
+    return round(1000.0 * length_m)
+
+
+def hand_of(side: int, direction: int) -> int:
+    """Return the hand on which the wall is when a robot leaves an end of this side in x-direction `direction`."""
+    return LEFT_HAND if side * direction > 0 else RIGHT_HAND
+
+
+class Around:
+    """The way around robots that stand on a straight course: follow their bodies and the walls until back on the course."""
+
+    def __init__(self, senses: Senses, course: Vector, hand: int) -> None:
+        self._course = course
+        self._origin = senses.x_m, senses.y_m
+        self._follower = WallFollower(hand, course)
+        self.ticks = 0
+
+    def direction(self, senses: Senses, blocks: Sequence[Vector], offset_m: float) -> Vector | None:
+        """Return where to go, or None once the course is reached again, farther on and free; `offset_m` is the way off it."""
+        self.ticks += 1
+        cx, cy = self._course
+        ahead = (senses.x_m - self._origin[0]) * cx + (senses.y_m - self._origin[1]) * cy
+        if not blocks and not senses.walls and abs(offset_m) < 0.04 and ahead > 0.1:
+            return None
+        return self._follower.direction(senses.walls, blocks)
+
+
+class Approach:
+    """Go straight to an end near by, sliding along walls, and press against the boundary there."""
+
+    def __init__(self, end: End, grid: Grid, parked: Parked) -> None:
+        self.end = end
+        self._parked = parked
+        self._x_m, self._y_m = grid.x_m(end.slice), end.y_mm / 1000.0
+        self._ticks = 0
+
+    def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
+        """Return where to go, or None at the end."""
+        dx, dy = self._x_m - senses.x_m, self._y_m - senses.y_m
+        distance = math.hypot(dx, dy)
+        self._ticks += 1
+        if distance < 0.03 or (blocks and distance < 0.7 and self.end in self._parked(senses)):
+            return None
+        return dx / distance, dy / distance
+
+    @property
+    def ticks(self) -> int:
+        """For how long it has lasted."""
+        return self._ticks
+
+
+class Sweep:
+    """Move along a slice to the end of its segment on side `side`."""
+
+    def __init__(self, k: int, side: int, grid: Grid, step_m: float, parked: Parked) -> None:
+        self.slice, self.side = k, side
+        self._parked = parked
+        self._x_m = grid.x_m(k)
+        self._step_m = step_m
+        self._last_y_m: float | None = None
+        self._around: Around | None = None
+        self.around_ticks = 0
+        self.wrecks: dict[Wreck, None] = {}
+        self.end: End | None = None
+
+    def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
+        """Return where to go, or None once the boundary is reached: then `end` is where."""
+        off = self._x_m - senses.x_m
+        side = self.side
+        self.wrecks.update(dict.fromkeys(senses.wrecks))
+        if self._around is not None:
+            self.around_ticks += 1
+            if self.around_ticks > AROUND_TICKS_MAX or abs(off) > AROUND_M:
+                return None
+            way = self._around.direction(senses, blocks, off)
+            if way is not None:
+                return way
+            self._around, self._last_y_m = None, None
+        last, self._last_y_m = self._last_y_m, senses.y_m
+        if any(ny * side > BLOCKS for _, ny in senses.walls):
+            steep = max([ny * side for _, ny in senses.walls])
+            slow = last is not None and (senses.y_m - last) * side < 0.3 * self._step_m
+            if abs(off) > OFF_SLICE_M or slow or steep > 0.9:
+                self.end = End(self.slice, side, mm(senses.y_m))
+                return None
+        if any(ny * side > 0.2 for _, ny in blocks):
+            for end in self._parked(senses):
+                if (end.slice, end.side) == (self.slice, side) and (end.y_mm / 1000.0 - senses.y_m) * side > 0.0:
+                    self.end = end
+                    return None
+            self._around = Around(senses, (0.0, float(side)), LEFT_HAND if senses.tick // 200 % 2 else RIGHT_HAND)
+            return self._around.direction(senses, blocks, off)
+        vx = max(-0.7, min(0.7, off / self._step_m))
+        return vx, side * math.sqrt(1.0 - vx * vx)
+
+
+class Trace:
+    """Follow the boundary from an end into the slab on the side `direction`, until it crosses a slice."""
+
+    def __init__(self, start: End, direction: int, grid: Grid, parked: Parked) -> None:
+        self.start, self.direction = start, direction
+        self._parked = parked
+        self._grid = grid
+        self._follower = WallFollower(hand_of(start.side, direction), (float(direction), 0.0))
+        self._inside = False
+        self._x_m = grid.x_m(start.slice)
+        self._last: Vector | None = None
+        self._length_m = 0.0
+        self._extreme: Vector = (-math.inf, 0.0)
+        self._wall_tick = -10
+        self.wrecks: dict[Wreck, None] = {}
+        self.arc: Arc | None = None
+        self.end: End | None = None
+
+    def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
+        """Return where to go, or None at a crossing: then `end` is where, and `arc` the fact unless a robot hid it."""
+        x, y, d = senses.x_m, senses.y_m, self.direction
+        self.wrecks.update(dict.fromkeys(senses.wrecks))
+        if senses.walls:
+            self._wall_tick = senses.tick
+        last = self._last
+        if last is not None:
+            self._length_m += math.hypot(x - last[0], y - last[1])
+        depth = (x - self._x_m) * d
+        if depth > self._extreme[0]:
+            self._extreme = depth, y
+        spacing = self._grid.spacing_m
+        if depth > CROSSED_M:
+            self._inside = True
+        if depth > spacing + CROSSED_M:
+            self._arrive(senses, self.start.slice + d, 1)
+            return None
+        if self._inside and depth < -CROSSED_M:
+            # The wall beside the other end lies on the other side; else the robot was only pushed back.
+            if any(ny * self.start.side < INTO for _, ny in senses.walls):
+                self._arrive(senses, self.start.slice, -1)
+                return None
+            self._inside = False
+        if depth < -SLACK_M:
+            return None
+        if blocks and self._inside:
+            ahead = (self.start.slice + d, self.start.side), (self.start.slice, -self.start.side)
+            for end in self._parked(senses):
+                if (end.slice, end.side) in ahead:
+                    self._stop(end)
+                    return None
+        self._last = x, y
+        return self._follower.direction(senses.walls, blocks)
+
+    def _arrive(self, senses: Senses, k: int, way: int) -> None:
+        x, y, side = senses.x_m, senses.y_m, self.start.side * way
+        if self._last is not None:
+            line, (x0, y0) = self._grid.x_m(k), self._last
+            if abs(x - x0) > 1e-9:
+                y = y0 + max(0.0, min(1.0, (line - x0) / (x - x0))) * (y - y0)
+        if senses.tick - self._wall_tick <= 1:
+            self._stop(End(k, side, mm(y)))
+            return
+        # A robot hides the end: it stands there, or the arc stays open.
+        self.end = End(k, side, mm(y))
+        for end in self._parked(senses):
+            if (end.slice, end.side) == (k, side):
+                self._stop(end)
+
+    def _stop(self, end: End) -> None:
+        depth, extreme_y = self._extreme
+        extreme_x = self._x_m + self.direction * max(depth, 0.0)
+        self.end = end
+        self.arc = Arc(
+            self.start, self.direction, end, mm(self._length_m), mm(extreme_x), mm(extreme_y), tuple(self.wrecks)
+        )
+
+
+class Seek:
+    """From anywhere, go to the nearest slice: straight, and along the boundary where a wall is in the way."""
+
+    def __init__(self, grid: Grid) -> None:
+        self._grid = grid
+        self._follower: WallFollower | None = None
+        self._last_x_m = math.nan
+        self.slice = 0
+
+    def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
+        """Return where to go, or None on slice `slice`."""
+        x = senses.x_m
+        nearest = self._grid.nearest(x)
+        line = self._grid.x_m(nearest)
+        last, self._last_x_m = self._last_x_m, x
+        if abs(x - line) < 0.02 or (last - line) * (x - line) < 0.0:
+            self.slice = nearest
+            return None
+        if self._follower is None:
+            way = math.copysign(1.0, line - x)
+            ahead = [each for each in (*senses.walls, *blocks) if each[0] * way > BLOCKS]
+            if not ahead:
+                return way, 0.0
+            # Slide along what is in the way, on the side that leads on.
+            self._follower = WallFollower(LEFT_HAND if ahead[0][1] * way > 0.0 else RIGHT_HAND, (way, 0.0))
+        return self._follower.direction(senses.walls, blocks)
+
+
+Manoeuvre = Approach | Sweep | Trace | Seek

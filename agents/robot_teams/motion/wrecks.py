@@ -1,0 +1,75 @@
+"""Which robots are wrecks: those that do not move though they are touched, and say nothing.
+
+Silence alone proves nothing: a packet may be lost, or the radio divided. A living robot that is touched makes way, or goes on.
+So a robot is taken for a wreck only after it was touched for `TOUCHED_S` in all, did not move for `STILL_S`, and was silent
+for twice the time after which a member is dropped. Any motion, and any later status, shows that it lives.
+"""
+
+from collections.abc import Callable, Iterable
+from typing import Final
+
+from zwerm.agents.robot_teams.mapping.facts import Void, Wreck
+from zwerm.agents.robot_teams.motion.senses import DEAD_M, Senses
+
+# A robot that was touched for so long, and did not move for so long, is dead if it is silent as well [s].
+TOUCHED_S: Final = 3.0
+STILL_S: Final = 8.0
+# More than this is motion [m].
+MOVED_M: Final = 0.03
+# The place of a wreck that a teammate told of may be this far off [m].
+TOLD_M: Final = 0.1
+
+
+class _Track:
+    """A robot that was last seen to move at `since` and stands at (x, y) since; it was `touched` for so many ticks."""
+
+    def __init__(self, x_m: float, y_m: float, since: int) -> None:
+        self.x_m, self.y_m, self.since = x_m, y_m, since
+        self.touched = 0
+
+
+class WreckWatch:
+    """Watches the robots in sight. `silent_ticks` tells for how long nothing was heard of one."""
+
+    def __init__(self, dt_s: float, silence_s: float, silent_ticks: Callable[[int, int], int]) -> None:
+        self.wrecks: dict[int, Wreck] = {}
+        self.moved: list[int] = []  # those of them that moved in the last tick
+        self._tracks: dict[int, _Track] = {}
+        self._silent_ticks = silent_ticks
+        self._touched_ticks = round(TOUCHED_S / dt_s)
+        self._still_ticks = round(STILL_S / dt_s)
+        self._silence_ticks = round(2.0 * silence_s / dt_s)
+
+    def watch(self, senses: Senses, told: Iterable[Void]) -> list[int]:
+        """Take in one tick's senses and the wrecks that teammates `told` of; return the robots that are new wrecks."""
+        found = []
+        self.moved.clear()
+        for other in senses.robots:
+            track = self._tracks.get(other.node)
+            if track is None or abs(other.x_m - track.x_m) + abs(other.y_m - track.y_m) > MOVED_M:
+                track = self._tracks[other.node] = _Track(other.x_m, other.y_m, senses.tick)
+                if self.wrecks.pop(other.node, None) is not None:
+                    self.moved.append(other.node)
+            if other.gap_m < DEAD_M:
+                track.touched += 1
+            if other.node in self.wrecks:
+                continue
+            for void in told:
+                if void.wreck.node == other.node and abs(void.x_mm / 1000.0 - other.x_m) < TOLD_M:
+                    self.wrecks[other.node] = void.wreck
+            if (
+                other.node not in self.wrecks
+                and track.touched > self._touched_ticks
+                and senses.tick - track.since > self._still_ticks
+                and self._silent_ticks(other.node, senses.tick) > self._silence_ticks
+            ):
+                self.wrecks[other.node] = Wreck(other.node, senses.tick)
+                found.append(other.node)
+        return found
+
+    def lives(self, node: int, tick: int) -> None:
+        """Take in that a robot lived at `tick`."""
+        wreck = self.wrecks.get(node)
+        if wreck is not None and tick > wreck.tick:
+            del self.wrecks[node]
+            self._tracks.pop(node, None)

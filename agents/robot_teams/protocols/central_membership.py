@@ -1,0 +1,61 @@
+"""One team of all robots, which the coordinator leads: what it is told by robots, and what they take from it.
+
+The coordinator makes a view of all robots that it hears. A robot takes every later view that includes it, and founds none. It
+waits while it hears nothing.
+"""
+
+from zwerm.agents.robot_teams.protocols.team_membership import Membership, later
+from zwerm.agents.robot_teams.protocols.team_messages import Beacon, View
+
+
+class CoordinatedMembership(Membership):
+    """A robot's view of the coordinator's team. All that it hears comes from the coordinator."""
+
+    @property
+    def leads(self) -> bool:
+        """Never: the coordinator decides."""
+        return False
+
+    def knows(self, sender: int) -> bool:
+        """Tell whether facts and plans of a sender are taken over: those of the coordinator are."""
+        return True
+
+    def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
+        """Take in the coordinator's beacon."""
+        self._note_statuses(beacon, tick)
+        for view in beacon.views:
+            self._latest_epoch = max(self._latest_epoch, view.epoch)
+            if self.node in view.members and later(view, self.view):
+                self._adopt(view, tick)
+
+    def muster(self, tick: int) -> None:
+        """Wait for the coordinator's view."""
+
+    def poll(self, tick: int) -> None:
+        """Drop nobody: the coordinator does."""
+
+
+class CoordinatorMembership(Membership):
+    """The coordinator's view: all robots that it hears. It is no member itself."""
+
+    def __init__(self, node: int, dt_s: float, silence_s: float) -> None:
+        super().__init__(node, dt_s, silence_s)
+        self.view = View(1, node, ())
+
+    def knows(self, sender: int) -> bool:
+        """Tell whether facts of a sender are taken over: those of all robots are."""
+        return True
+
+    def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
+        """Take in a robot's beacon."""
+        self._note_statuses(beacon, tick)
+        for view in beacon.views:
+            self._latest_epoch = max(self._latest_epoch, view.epoch)
+
+    def poll(self, tick: int) -> None:
+        """Take in robots that are heard, and drop silent ones. Plans hold within a view: robots finish theirs first."""
+        heard = [
+            node for node in sorted(self.roster.statuses) if self.roster.silent_ticks(node, tick) <= self._silence_ticks
+        ]
+        if tuple(heard) != self.view.members:
+            self._adopt(View(self._latest_epoch + 1, self.node, tuple(heard)), tick)

@@ -1,0 +1,42 @@
+"""What a robot knows of its teammates in one corridor: by their statuses, whatever was lost."""
+
+from collections.abc import Callable
+
+from zwerm.agents.robot_teams.protocols.team_membership import Membership
+from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, Plan, Status
+
+
+class CorridorMates:
+    """What a robot knows of its teammates in one corridor, from their statuses."""
+
+    def __init__(self, plan: Plan, node: int, membership: Membership, sweeping: Callable[[int], bool]) -> None:
+        self._plan, self._node, self._membership = plan, node, membership
+        self.sweeping = sweeping
+
+    def _statuses(self) -> list[Status]:
+        plan, statuses = self._plan, self._membership.roster.statuses
+        found = [statuses[node] for node in plan.order if node != self._node and node in statuses]
+        return [status for status in found if (status.epoch, status.number) == (plan.epoch, plan.number)]
+
+    def slot(self, room: int | None) -> int:
+        """Return which slice of the corridor is this robot's, given for how many it found room; negative for none."""
+        rooms = [status.room for status in self._statuses() if status.room is not None]
+        if room is not None:
+            rooms.append(room)
+        order = self._plan.order
+        return order.index(self._node) - max(0, len(order) - min(rooms, default=len(order)))
+
+    def claimed(self, k: int) -> bool:
+        """Tell whether a teammate takes slice k in this corridor."""
+        return any(status.claim == k for status in self._statuses())
+
+    def awaits_predecessor(self) -> bool:
+        """Tell whether the predecessor has still to sweep its slice."""
+        order, plan = self._plan.order, self._plan
+        index = order.index(self._node) - 1
+        if index < 0 or order[index] not in self._membership.view.members:
+            return False
+        status = self._membership.roster.statuses.get(order[index])
+        if status is None or (status.epoch, status.number) < (plan.epoch, plan.number):
+            return True
+        return (status.epoch, status.number) == (plan.epoch, plan.number) and status.phase not in (HUNTS, READY)

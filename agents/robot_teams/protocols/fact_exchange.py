@@ -1,0 +1,74 @@
+"""Sharing facts within a team: new ones in every beacon for a while, all of them where a teammate's set stays different."""
+
+from typing import Final
+
+from zwerm.agents.robot_teams.mapping.facts import Arc, Fact, Return, Segment, Void
+from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
+from zwerm.agents.robot_teams.protocols.team_messages import Beacon
+
+# For how long a new fact is in every beacon, how long sets may differ before all facts are sent, and how often those are [s].
+NEW_S: Final = 1.5
+DIFFERENT_S: Final = 1.0
+ALL_EVERY_S: Final = 1.0
+# At most so many facts in one message: an arc takes about 40 bytes.
+FACTS_MAX: Final = 800
+
+
+# Facts by kind, as a beacon carries them.
+Parcel = tuple[tuple[Segment, ...], tuple[Arc, ...], tuple[Void, ...], tuple[Return, ...]]
+
+
+class FactExchange:
+    """Anti-entropy for one robot's map."""
+
+    def __init__(self, slice_map: SliceMap, dt_s: float) -> None:
+        self._map = slice_map
+        self._new_ticks = round(NEW_S / dt_s)
+        self._different_ticks = round(DIFFERENT_S / dt_s)
+        self._all_every_ticks = round(ALL_EVERY_S / dt_s)
+        self._told: list[tuple[int, int]] = []  # when the set first had so many facts
+        self._differs_since: dict[int, int] = {}
+        self._all_tick = -self._all_every_ticks
+        self._page = 0
+
+    def receive(self, beacon: Beacon, tick: int) -> None:
+        """Take over the facts of a beacon, and note whether its sender lacks some of ours."""
+        self._map.merge((*beacon.segments, *beacon.arcs, *beacon.voids, *beacon.returns))
+        if beacon.digest == self._map.facts.digest:
+            self._differs_since.pop(beacon.sender, None)
+        else:
+            self._differs_since.setdefault(beacon.sender, tick)
+
+    def forget(self, node: int) -> None:
+        """Owe a robot nothing any more."""
+        self._differs_since.pop(node, None)
+
+    def outgoing(self, tick: int) -> Parcel:
+        """Return the facts to send now."""
+        facts = self._map.facts
+        if not self._told or self._told[-1][1] != len(facts):
+            self._told.append((tick, len(facts)))
+        while len(self._told) > 1 and self._told[1][0] <= tick - self._new_ticks:
+            self._told.pop(0)
+        # Everything that came after the newest count that is old enough.
+        old = self._told[0][1] if self._told[0][0] <= tick - self._new_ticks else 0
+        send = facts.since(old)
+        owing = any(tick - since >= self._different_ticks for since in self._differs_since.values())
+        if owing and tick - self._all_tick >= self._all_every_ticks:
+            self._all_tick = tick
+            send = facts.since(0)
+            if len(send) > FACTS_MAX:
+                pages = -(-len(send) // FACTS_MAX)
+                self._page = (self._page + 1) % pages
+                send = send[self._page * FACTS_MAX : (self._page + 1) * FACTS_MAX]
+        send = send[-FACTS_MAX:]
+        return _sorted_out(send)
+
+
+def _sorted_out(facts: list[Fact]) -> Parcel:
+    return (
+        tuple([fact for fact in facts if isinstance(fact, Segment)]),
+        tuple([fact for fact in facts if isinstance(fact, Arc)]),
+        tuple([fact for fact in facts if isinstance(fact, Void)]),
+        tuple([fact for fact in facts if isinstance(fact, Return)]),
+    )

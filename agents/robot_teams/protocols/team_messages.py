@@ -1,0 +1,110 @@
+"""The one message of a team: a beacon that every robot broadcasts, with all that teammates must know.
+
+Beacons carry states, not changes: any beacon may be lost, late or copied, and the next one makes up for it. Statuses are passed
+on, so that a team may be larger than the radio's range.
+"""
+
+from typing import Final
+
+import msgspec
+from msgspec import Struct
+
+from zwerm.agents.robot_teams.mapping.facts import Arc, End, Return, Segment, Void
+
+# The phases of a robot's work on its slice, in order.
+READY: Final = 0  # has finished the plan
+TRAVELS: Final = 1
+SWEEPS: Final = 2
+HUNTS: Final = 3
+
+
+class View(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """Who is in a team: its `members`, ascending, and the one that decides for it. A later `epoch` replaces earlier ones."""
+
+    epoch: int
+    lead: int
+    members: tuple[int, ...]
+
+
+class Plan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """One corridor: move over from the end `anchor` in x-direction `direction`, one slice a robot; `order` is lag to lead.
+
+    The lag's slice is the anchor's own if its segment is not swept (`own_slice`), else the next.
+    """
+
+    epoch: int
+    number: int
+    anchor: End
+    direction: int
+    own_slice: bool
+    order: tuple[int, ...]
+
+
+class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """What one robot does: `beat` grows with every status. `at` is the end where it last was.
+
+    Of the corridor: it `found` a new segment on its slice, is `spare`, takes slice `claim`, found `room` for so many robots.
+    It is `sweeping` a slice now. `team` is the epoch and the lead of its view; `epoch` and `number` are of its plan.
+    """
+
+    node: int
+    beat: int
+    x_mm: int
+    y_mm: int
+    epoch: int
+    number: int
+    phase: int
+    at: End | None
+    found: bool
+    spare: bool
+    claim: int | None
+    room: int | None
+    sweeping: int | None
+    team: tuple[int, int]
+
+
+class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """What a robot broadcasts. `views` are its own team's, then those its lead has made of it, and teams that were met.
+
+    `digest` and `count` describe its facts, `segments`, `arcs`, `voids` and `returns` are some of them.
+    """
+
+    sender: int
+    views: tuple[View, ...]
+    met: tuple[View, ...]
+    plans: tuple[Plan, ...]
+    statuses: tuple[Status, ...]
+    digest: int
+    count: int
+    segments: tuple[Segment, ...] = ()
+    arcs: tuple[Arc, ...] = ()
+    voids: tuple[Void, ...] = ()
+    returns: tuple[Return, ...] = ()
+
+
+class FoundSnapshot(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """What one robot found, for metrics and pictures: no node receives it.
+
+    `slices` are x, bottom and top of swept segments [m], `critical_points` are x and y [m]; `team` is the lead's id.
+    """
+
+    team: int
+    slices: tuple[tuple[float, float, float], ...]
+    critical_points: tuple[tuple[float, float], ...]
+
+
+encode_snapshot: Final = msgspec.msgpack.Encoder().encode
+_decode_snapshot: Final = msgspec.msgpack.Decoder(FoundSnapshot).decode
+
+
+def decode_snapshot(payload: bytes) -> FoundSnapshot | None:
+    """Return the snapshot in `payload`, or None where it holds none."""
+    try:
+        found: FoundSnapshot = _decode_snapshot(payload)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return None
+    return found
+
+
+encode_beacon: Final = msgspec.msgpack.Encoder().encode
+decode_beacon: Final = msgspec.msgpack.Decoder(Beacon).decode

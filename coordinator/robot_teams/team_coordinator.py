@@ -1,0 +1,124 @@
+"""The coordinator of coverage by robot teams: it plans the cells of all robots from what they tell it.
+
+It is the lead of one team of all robots that it hears, with the same decisions as the lead of any team. It has no body. Robots
+hear of one another through its beacons only. It never divides the team: free robots take the nearest open cells.
+"""
+
+from typing import Annotated, Final, Protocol
+
+import msgspec
+from msgspec import Meta, Struct
+
+from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
+from zwerm.agents.robot_teams.protocols.central_membership import CoordinatorMembership
+from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
+from zwerm.agents.robot_teams.protocols.team_messages import Beacon, decode_beacon, encode_beacon
+from zwerm.agents.robot_teams.team_lead import TeamLead, findings
+from zwerm.errors import ProtocolError
+from zwerm.wire.checksum import seal, unseal
+from zwerm.wire.messages import Command, Observation, Transmission
+
+# The coordinator waits so long for robots to say where they are [s], and then decides every so many ticks.
+GATHER_S: Final = 1.0
+DECIDE_TICKS: Final = 4
+
+
+class CoordinatorTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """How often it sends, when it drops a silent robot, and how far robots go to join a corridor while others work."""
+
+    beacon_s: Annotated[float, Meta(gt=0.0)] = 0.25
+    silence_s: Annotated[float, Meta(gt=0.0)] = 6.0
+    one_corridor: bool = False
+    join_m: Annotated[float, Meta(gt=0.0)] = 6.0
+
+
+class Setup(Protocol):
+    """What the coordinator needs of its setup."""
+
+    @property
+    def node(self) -> int:
+        """Its id."""
+
+    @property
+    def dt_s(self) -> float:
+        """The length of a tick [s]."""
+
+    @property
+    def parameters(self) -> dict[str, object]:
+        """What the scenario set."""
+
+
+class TeamCoordinator:
+    """Leads all robots."""
+
+    Parameters = CoordinatorTable
+
+    def __init__(self, setup: Setup) -> None:
+        table = msgspec.convert(setup.parameters, CoordinatorTable)
+        self.map = SliceMap()
+        self.membership = CoordinatorMembership(setup.node, setup.dt_s, table.silence_s)
+        self.lead = TeamLead(
+            self.map,
+            self.membership,
+            setup.dt_s,
+            divide=False,
+            merge=False,
+            one_corridor=table.one_corridor,
+            join_m=table.join_m,
+        )
+        self.refused = 0
+        self._node = setup.node
+        self._exchange = FactExchange(self.map, setup.dt_s)
+        self._view = self.membership.view
+        self._gather_ticks = round(GATHER_S / setup.dt_s)
+        self._every = max(1, round(table.beacon_s / setup.dt_s))
+        self._told = -1, False
+
+    def step(self, observation: Observation) -> Command:
+        """Hear, decide, and say."""
+        tick = observation.tick
+        for packet in observation.inbox:
+            try:
+                beacon: Beacon = decode_beacon(unseal(packet.payload))
+            except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
+                self.refused += 1
+                continue
+            self.membership.receive(beacon, tick, near=False)
+            self._exchange.receive(beacon, tick)
+        urgent = False
+        if tick >= self._gather_ticks:
+            self.membership.poll(tick)
+            if self.membership.view != self._view:
+                self._view = self.membership.view
+                self.lead.begin(tick)
+                urgent = True
+            if tick % DECIDE_TICKS == 0 and self.lead.decide(tick):
+                urgent = True
+        done = self._is_done()
+        outbox = self._say(tick) if urgent or tick % self._every == 0 else ()
+        telemetry: dict[str, float | bool] = {}
+        if (len(self.map.facts), done) != self._told:
+            self._told = len(self.map.facts), done
+            telemetry = {"certificate_satisfied": done, **findings(self.map, self.membership)}
+        return Command(outbox=outbox, done=done, telemetry=telemetry)
+
+    def _is_done(self) -> bool:
+        """Tell whether all is covered that any of the robots that are heard can reach."""
+        statuses, members = self.membership.roster.statuses, self.membership.view.members
+        places = [statuses[node].at for node in members]
+        return bool(members) and all(
+            self.map.complete_from(None if place is None else self.map.end(place)) for place in places
+        )
+
+    def _say(self, tick: int) -> tuple[Transmission, ...]:
+        beacon = Beacon(
+            self._node,
+            self.membership.outgoing(),
+            (),
+            self.lead.plans,
+            tuple(self.membership.others()),
+            self.map.facts.digest,
+            len(self.map.facts),
+            *self._exchange.outgoing(tick),
+        )
+        return (Transmission("uplink", seal(encode_beacon(beacon))),)

@@ -1,0 +1,137 @@
+"""A robot is taken for a wreck by touch, rest and silence together; what names a wreck is void once that robot lives."""
+
+from zwerm.agents.robot_teams.mapping.facts import (
+    BOTTOM,
+    LEFT,
+    RIGHT,
+    TOP,
+    Arc,
+    End,
+    Fact,
+    Return,
+    Segment,
+    Void,
+    Wreck,
+)
+from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
+from zwerm.agents.robot_teams.motion.senses import Beside, Senses
+from zwerm.agents.robot_teams.motion.wrecks import STILL_S, TOUCHED_S, WreckWatch
+
+DT_S, SILENCE_S = 0.5, 6.0
+LONG_TICKS = round((2.0 * SILENCE_S + STILL_S + TOUCHED_S) / DT_S) + 2
+WRECK = Wreck(3, 100)
+
+
+def watched(
+    ticks: int, silent: bool = True, gap_m: float = 0.01, moves_m: float = 0.0, told: tuple[Void, ...] = ()
+) -> WreckWatch:
+    """Return a watch after it saw robot 3 for so many ticks."""
+    watch = WreckWatch(DT_S, SILENCE_S, lambda node, tick: tick if silent else 0)
+    for tick in range(ticks):
+        beside = Beside(3, 1.0 + moves_m * (tick % 2), 2.0, 1.0, 0.0, gap_m, 0.0, 0.0)
+        watch.watch(Senses(tick, 0.5, 2.0, (), (beside,)), told)
+    return watch
+
+
+def test_a_robot_that_is_touched_rests_and_is_silent_is_a_wreck() -> None:
+    assert list(watched(LONG_TICKS).wrecks) == [3]
+    assert not watched(round(TOUCHED_S / DT_S)).wrecks
+
+
+def test_neither_silence_nor_rest_nor_touch_alone_makes_a_wreck() -> None:
+    assert not watched(LONG_TICKS, silent=False).wrecks
+    assert not watched(LONG_TICKS, gap_m=0.5).wrecks
+    assert not watched(LONG_TICKS, moves_m=0.1).wrecks
+
+
+def test_a_wreck_that_a_teammate_told_of_is_known_at_sight_and_only_there() -> None:
+    assert watched(1, told=(Void(1, 1_020, 0, 0, WRECK),)).wrecks == {3: WRECK}
+    assert not watched(1, told=(Void(1, 2_020, 0, 0, WRECK),)).wrecks
+
+
+def test_a_wreck_that_moves_or_speaks_lives() -> None:
+    watch = watched(1, told=(Void(1, 1_000, 0, 0, WRECK),))
+    watch.watch(Senses(120, 0.5, 2.0, (), (Beside(3, 1.2, 2.0, 1.0, 0.0, 0.2, 0.0, 0.0),)), ())
+    assert watch.moved == [3]
+    assert not watch.wrecks
+    watch = watched(LONG_TICKS)
+    tick = watch.wrecks[3].tick
+    watch.lives(3, tick)
+    assert watch.wrecks, "a status from before proves nothing"
+    watch.lives(3, tick + 1)
+    assert not watch.wrecks
+
+
+# --- the map ----------------------------------------------------------------------------------------------------------
+
+
+def known(facts: list[Fact]) -> SliceMap:
+    slice_map = SliceMap()
+    slice_map.merge(facts)
+    return slice_map
+
+
+def arc(start: End, direction: int, stop: End, *wrecks: Wreck) -> Arc:
+    return Arc(start, direction, stop, 950, 0, 0, wrecks)
+
+
+def room(slices: int) -> list[Fact]:
+    facts: list[Fact] = [Segment(k, 0, 5_000) for k in range(slices)]
+    for k in range(slices - 1):
+        facts += [arc(End(k, side, y), RIGHT, End(k + 1, side, y)) for side, y in ((TOP, 5_000), (BOTTOM, 0))]
+    facts.append(arc(End(0, TOP, 5_000), LEFT, End(0, BOTTOM, 0)))
+    facts.append(arc(End(slices - 1, TOP, 5_000), RIGHT, End(slices - 1, BOTTOM, 0)))
+    return facts
+
+
+def test_what_a_wreck_hides_is_open_again_once_the_robot_lived_later() -> None:
+    facts: list[Fact] = [fact for fact in room(3) if not isinstance(fact, Arc) or End(1, TOP, 5_000) not in fact[:3]]
+    hidden: list[Fact] = [
+        *facts,
+        Void(1, 950, 4_600, 5_400, WRECK),
+        arc(End(0, TOP, 5_000), RIGHT, End(2, TOP, 5_000), WRECK),
+    ]
+    assert known(hidden).certificate.complete
+    assert known([*hidden, Return(3, 100)]).certificate.complete
+    again = known([*hidden, Return(3, 101)]).certificate
+    assert (End(1, TOP, 5_000), RIGHT) in again.open_ports
+    assert again == known([*facts]).certificate
+    assert known([*hidden, Return(4, 101)]).certificate.complete
+
+
+def test_a_later_wreck_of_a_robot_that_returned_holds() -> None:
+    facts: list[Fact] = [fact for fact in room(1) if not isinstance(fact, Arc)]
+    voids: list[Fact] = [Void(0, 0, 4_600, 5_400, WRECK), Void(0, 0, -400, 400, Wreck(3, 300))]
+    slice_map = known([*facts, *voids, Return(3, 200)])
+    assert slice_map.voids == voids[1:]
+
+
+def test_a_way_through_a_wreck_is_closed_and_the_way_around_it_is_taken() -> None:
+    """The wreck lies on slice 1; robots have traced around it from above, and the segment ends there now."""
+    facts = [*room(3), Void(1, 950, 2_500, 3_500, WRECK), Segment(1, 3_540, 5_000, (WRECK,))]
+    slice_map = known(facts)
+    assert slice_map.certificate.complete
+    mate = slice_map.mate(End(1, TOP, 5_000))
+    assert mate is not None
+    assert mate.stop == End(1, BOTTOM, 3_540)
+    assert slice_map.mate(End(1, BOTTOM, 0)) is None
+    returned = known([*facts, Return(3, 200)]).mate(End(1, TOP, 5_000))
+    assert returned is not None
+    assert returned.stop == End(1, BOTTOM, 0)
+
+
+def test_what_no_way_leads_to_counts_only_from_where_a_way_is_open() -> None:
+    beyond: list[Fact] = [Segment(9, 0, 5_000)]
+    slice_map = known([*room(2), *beyond])
+    assert not slice_map.certificate.complete
+    assert slice_map.complete_from(End(0, TOP, 5_000))
+    assert not slice_map.complete_from(End(9, TOP, 5_000))
+    assert not slice_map.complete_from(None)
+    assert not known([*room(2)[:-1], *beyond]).complete_from(End(0, TOP, 5_000))
+
+
+def test_an_end_that_a_robot_swept_past_counts_for_nothing() -> None:
+    grazed = [*room(2), arc(End(0, TOP, 5_000), RIGHT, End(1, TOP, 2_500)), Segment(1, 0, 2_500)]
+    assert known(grazed).certificate.complete
+    beside = [*room(2), arc(End(0, TOP, 5_000), RIGHT, End(1, TOP, 6_500))]
+    assert not known(beside).certificate.complete

@@ -1,0 +1,129 @@
+"""Errors and breakpoints in a user's controller, as the command line shows them."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support import ROOT, ZWERM
+
+from zwerm.cli.tracebacks import grouped
+
+CONTROLLERS = """
+import dataclasses
+from zwerm import Command, Controller
+
+class Plain(Controller):
+    def step(self, observation):
+        return Command()
+
+class Raises(Plain):
+    def step(self, observation):
+        if observation.tick == 3:
+            raise ValueError(f"no luck for {self.setup.node}")
+        return Command()
+
+class Stops(Plain):
+    def step(self, observation):
+        if observation.tick == 3 and self.setup.node == 1:
+            breakpoint()
+        return Command()
+
+class NoSetup(Plain):
+    def __init__(self):
+        pass
+
+class BadConstructor(Plain):
+    def __init__(self, setup):
+        super().__init__(setup)
+        self.ratio = 1 / 0
+
+class WithDataclass(Plain):
+    @dataclasses.dataclass
+    class Parameters:
+        speed: float = 1.0
+"""
+
+
+def run(folder: Path, controller: str, *options: str, typed: str = "") -> subprocess.CompletedProcess[str]:
+    (folder / "debugged.py").write_text(CONTROLLERS)
+    arguments = ["run", "computation-free", "--set", "time.duration_s=0.5", "--set", "robots.count=12"]
+    environment = {"PYTHONPATH": str(ROOT), "PATH": os.environ["PATH"], "COLUMNS": "120", "HOME": str(folder)}
+    return subprocess.run(
+        [sys.executable, *ZWERM, *arguments, "--set", f"robots.controller=debugged:{controller}", *options],
+        cwd=folder,
+        env=environment,
+        input=typed,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def trace_of(output: str) -> str:
+    return next(line.split()[1] for line in output.splitlines() if line.startswith("trace "))
+
+
+def test_an_error_of_many_robots_is_printed_once_with_the_line_of_the_user(tmp_path: Path) -> None:
+    ran = run(tmp_path, "Raises", "--inline", "--quiet")
+    assert ran.returncode == 1
+    said = ran.stderr.splitlines()
+    assert said[0] == "node 0 raised, and 11 more from the same line: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, ..."
+    assert [line for line in said if line.startswith("  File ")] == [
+        f'  File "{tmp_path / "debugged.py"}", line 12, in step'
+    ]
+    assert said.count("ValueError: no luck for 0") == 1
+    assert said[-1] == "zwerm: node 0 crashed at tick 3: ValueError: no luck for 0"
+
+
+def test_errors_from_different_lines_or_of_different_kinds_are_apart() -> None:
+    one, other = 'File "a.py", line 1, in f\n', 'File "a.py", line 2, in f\n'
+    head = "Traceback (most recent call last):\n  "
+    found = grouped(
+        {
+            4: f"{head}{one}ValueError: 4",
+            1: f"{head}{one}ValueError: 1",
+            2: f"{head}{other}ValueError: 1",
+            3: f"{head}{one}KeyError: 1",
+        }
+    )
+    assert found == [[1, 4], [2], [3]]
+
+
+def test_a_breakpoint_opens_the_debugger_and_the_run_goes_on_with_the_same_trace(tmp_path: Path) -> None:
+    ran = run(tmp_path, "Stops", "--inline", typed="p observation.tick + 1000\nc\n")
+    assert ran.returncode == 0, ran.stderr
+    assert "(Pdb) 1003" in ran.stdout
+    assert trace_of(ran.stdout) == trace_of(run(tmp_path, "Plain", "--inline").stdout)
+
+
+def test_to_quit_the_debugger_ends_the_run_as_interrupted(tmp_path: Path) -> None:
+    ran = run(tmp_path, "Stops", "--inline", typed="q\n")
+    assert ran.returncode == 130
+    assert "zwerm: interrupted at tick 3" in ran.stderr
+    assert "Traceback" not in ran.stderr
+
+
+def test_a_breakpoint_in_a_process_names_the_option_that_it_needs(tmp_path: Path) -> None:
+    ran = run(tmp_path, "Stops")
+    assert ran.returncode == 1
+    assert "breakpoint() needs a terminal, and a robot process has none: run with --inline" in ran.stderr
+
+
+@pytest.mark.parametrize(
+    ("controller", "said"),
+    [
+        (
+            "NoSetup",
+            "robots.controller: debugged:NoSetup: a controller's constructor takes its Setup: __init__(self, setup)",
+        ),
+        ("BadConstructor", "debugged:BadConstructor: its constructor raised ZeroDivisionError: division by zero ("),
+        ("WithDataclass", "debugged:WithDataclass: its Parameters must be a subclass of msgspec.Struct, got <class"),
+    ],
+)
+def test_a_class_that_cannot_be_a_controller_is_one_line(tmp_path: Path, controller: str, said: str) -> None:
+    ran = run(tmp_path, controller)
+    assert ran.returncode == 2
+    assert len(ran.stderr.splitlines()) == 1
+    assert said in ran.stderr

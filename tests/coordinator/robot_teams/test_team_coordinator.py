@@ -1,0 +1,80 @@
+"""Cells planned by the coordinator: the hall is covered with no radio between robots, under loss, and when a robot dies."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from zwerm.agents.robot_teams.protocols.central_membership import CoordinatedMembership, CoordinatorMembership
+from zwerm.agents.robot_teams.protocols.team_messages import READY, Beacon, Status, View
+from zwerm.run.runner import run
+from zwerm.scenario.load import tables_of, validate
+from zwerm.scenario.tables import Scenario
+
+
+def hall(count: int, **tables: Any) -> Scenario:
+    """Return a scenario of `count` robots in a small hall whose cells the coordinator plans."""
+    base, _ = tables_of("robot-teams", ())
+    base["name"] = "small"
+    base["arena"] = {"size_m": [9.0, 6.0], "obstacles": [[[4.0, 2.2], [5.9, 2.6], [5.3, 4.0]]]}
+    base["robots"]["count"] = count
+    base["robots"]["placement"] = {"kind": "poses", "poses": [[0.6 + 0.95 * i, 5.0, 0.0] for i in range(count)]}
+    base["time"]["duration_s"] = 600.0
+    base["services"] = {"cells": "coordinator"}
+    del base["radio"]
+    return validate(base | tables, "small.toml", Path())
+
+
+@pytest.mark.parametrize("uplink", [{}, {"loss": 0.3}], ids=["no-loss", "loss"])
+def test_robots_that_hear_the_coordinator_only_cover_the_hall(uplink: dict[str, Any]) -> None:
+    result = run(hall(3, uplink=uplink), 1, "inline")
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.999
+    assert result.metrics["certificate_satisfied"] == 1.0
+
+
+def test_the_rest_covers_what_a_dead_robot_left() -> None:
+    result = run(hall(2, faults=[{"kind": "crash", "nodes": [1], "at_s": 25.0}]), 1, "inline")
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.999
+
+
+def test_without_the_uplink_nothing_is_called_complete() -> None:
+    result = run(hall(2, uplink={"loss": 1.0}, time={"dt_s": 0.05, "duration_s": 30.0}), 1, "inline")
+    assert result.outcome == "time-limit"
+    assert result.metrics["certificate_satisfied"] == 0.0
+
+
+# --- membership -------------------------------------------------------------------------------------------------------
+
+COORDINATOR = 3
+
+
+def beacon(sender: int, tick: int, *views: View) -> Beacon:
+    status = Status(sender, tick, 0, 0, 1, 0, READY, None, False, False, None, None, None, (1, 0))
+    return Beacon(sender, views, (), (), (status,), 0, 0)
+
+
+def test_the_coordinator_takes_in_what_it_hears_and_drops_the_silent() -> None:
+    membership = CoordinatorMembership(COORDINATOR, 1.0, 3.0)
+    for tick in range(10):
+        for node in (0, 1) if tick < 3 else (0,):
+            membership.receive(beacon(node, tick, View(4, node, (node,))), tick, near=False)
+        membership.poll(tick)
+    assert membership.view.members == (0,)
+    assert membership.view.epoch == 6
+    membership.receive(beacon(1, 10, View(5, COORDINATOR, (0, 1))), 10, near=False)
+    membership.poll(10)
+    assert membership.view == View(7, COORDINATOR, (0, 1))
+
+
+def test_a_robot_takes_later_views_that_include_it_and_no_others() -> None:
+    membership = CoordinatedMembership(0, 1.0, 3.0)
+    membership.receive(beacon(COORDINATOR, 1, View(2, COORDINATOR, (1,))), 1, near=False)
+    assert membership.view.members == (0,)
+    membership.receive(beacon(COORDINATOR, 2, View(3, COORDINATOR, (0, 1))), 2, near=False)
+    membership.receive(beacon(COORDINATOR, 3, View(2, COORDINATOR, (0, 2))), 3, near=False)
+    for tick in range(4, 30):
+        membership.poll(tick)
+    assert membership.view == View(3, COORDINATOR, (0, 1))
+    assert not membership.leads
