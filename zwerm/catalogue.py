@@ -267,6 +267,10 @@ METRICS: Final = {
 }
 
 
+# Layers of the pictures of every run, each of which applies only where it is asked for.
+PICTURE_LAYERS: Final = ("zwerm.view.radio_links:RadioLinks", "zwerm.view.telemetry_colours:TelemetryColours")
+
+
 def plugins() -> dict[str, Mapping[str, str]]:
     """Return the rows of every kind of plug-in."""
     return {
