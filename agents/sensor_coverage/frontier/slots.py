@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_heading, refined_reference
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
 

@@ -5,7 +5,8 @@ import math
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Walk, WalkPoint, open_arcs
+from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import open_arcs
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 from zwerm.maths.simplicial import FlagComplex
 
