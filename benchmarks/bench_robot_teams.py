@@ -4,7 +4,7 @@ Every run is drawn from its seed: the arena and the line in which robots start, 
 the fault. Runs are kept in a file and not made again, so that a long measurement may be stopped and continued.
 
     python benchmarks/bench_robot_teams.py --runs runs.csv --seeds 0-19 --robots 1 2 4
-    python benchmarks/bench_robot_teams.py --runs runs.csv --seeds 0-19 --robots 4 --trouble loss death partition
+    python benchmarks/bench_robot_teams.py --runs runs.csv --seeds 0-19 --robots 4 --setting loss death partition
     python benchmarks/bench_robot_teams.py --runs runs.csv --summary --csv summary.csv
 """
 
@@ -52,14 +52,24 @@ HALLS: Final[dict[str, tuple[float, float, tuple[str, ...]]]] = {
     "one obstacle": (20.0, 12.0, ("five",)),
     "three obstacles": (28.0, 16.0, ("five", "low", "high")),
 }
-TROUBLE: Final = ("none", "loss", "bursts", "range", "death", "partition", "pause", "coordinator", "coordinator loss")
+# What is different from the scenario `robot-teams`.
+SETTINGS: Final = (
+    *("none", "loss", "bursts", "range", "death", "partition", "pause", "coordinator", "coordinator loss"),
+    *("virtual frontier", "never divides", "never merges", "one corridor"),
+)
+PARAMETERS: Final[dict[str, dict[str, bool]]] = {
+    "virtual frontier": {"virtual_frontier": True},
+    "never divides": {"divide": False},
+    "never merges": {"merge": False},
+    "one corridor": {"one_corridor": True},
+}
 COLUMNS: Final = (
-    *("arena", "trouble", "robots", "seed", "outcome", "coverage_fraction", "gap_m"),
+    *("arena", "setting", "robots", "seed", "outcome", "coverage_fraction", "gap_m"),
     *("completion_time_s", "repeat_coverage_fraction", "area_m2", "messages", "bytes", "processor_s"),
 )
 
 
-def scenario(arena: str, trouble: str, robots: int, seed: int) -> Scenario:
+def scenario(arena: str, setting: str, robots: int, seed: int) -> Scenario:
     """Return the scenario of one run."""
     tables, _ = tables_of("robot-teams", ())
     tables["name"] = "drawn"
@@ -78,18 +88,18 @@ def scenario(arena: str, trouble: str, robots: int, seed: int) -> Scenario:
     tables["robots"]["placement"] = {"kind": "poses", "poses": poses}
     tables["robots"]["parameters"]["origin_m"] = origin_m
     tables["time"]["duration_s"] = LIMIT_S
-    return validate(tables | troubled(trouble, robots, np.random.default_rng([77, seed, robots])), "drawn", Path())
+    tables["robots"]["parameters"] |= PARAMETERS.get(setting, {})
+    return validate(tables | changed(setting, robots, np.random.default_rng([77, seed, robots])), "drawn", Path())
 
 
-def troubled(trouble: str, robots: int, random: np.random.Generator) -> dict[str, Any]:
-    """Return the tables of a scenario that make the trouble."""
+def changed(setting: str, robots: int, random: np.random.Generator) -> dict[str, Any]:
+    """Return the tables that are different: the radio, faults, and services."""
     at_s = round(float(random.uniform(*FAULT_AT_S)), 2)
     order = [int(node) for node in random.permutation(robots)]
     cut = int(random.integers(1, robots)) if robots > 1 else 1
     bursts = {"kind": "gilbert_elliott", "loss_fraction": 0.2, "burst_packets": 8.0}
     parts = {"kind": "partition", "groups": [sorted(order[:cut]), sorted(order[cut:])], "at_s": at_s}
     tables: dict[str, dict[str, Any]] = {
-        "none": {},
         "loss": {"radio": {"loss": 0.3}},
         "bursts": {"radio": {"models": [bursts]}},
         "range": {"radio": {"range_m": 4.0}},
@@ -99,12 +109,12 @@ def troubled(trouble: str, robots: int, random: np.random.Generator) -> dict[str
         "coordinator": {"services": {"cells": "coordinator"}},
         "coordinator loss": {"services": {"cells": "coordinator"}, "uplink": {"loss": 0.3}},
     }
-    return tables[trouble]
+    return tables.get(setting, {})
 
 
-def measure(arena: str, trouble: str, robots: int, seed: int) -> dict[str, str]:
+def measure(arena: str, setting: str, robots: int, seed: int) -> dict[str, str]:
     """Run one trial; the coverage is measured on the true paths, and the smallest gap between bodies at every tick."""
-    drawn = scenario(arena, trouble, robots, seed)
+    drawn = scenario(arena, setting, robots, seed)
     began = time.process_time()
     world = assemble(drawn, seed)
     nodes = {node: Node(*spec).answer for node, spec in node_specs(drawn, seed).items()}
@@ -126,7 +136,7 @@ def measure(arena: str, trouble: str, robots: int, seed: int) -> dict[str, str]:
     reports = [channel.ledger for channel in world.medium.channels.values()]
     values: dict[str, object] = {
         "arena": arena,
-        "trouble": trouble,
+        "setting": setting,
         "robots": robots,
         "seed": seed,
         "outcome": outcome,
@@ -143,25 +153,25 @@ def measure(arena: str, trouble: str, robots: int, seed: int) -> dict[str, str]:
 
 
 def summary(rows: Sequence[dict[str, str]]) -> Iterator[dict[str, str]]:
-    """Return one row for each arena, trouble and number of robots: the worst coverage, and means over the runs.
+    """Return one row for each arena, setting and number of robots: the worst coverage, and means over the runs.
 
-    `time_over_one_robot` and `time_over_no_trouble` are medians, of pairs of runs of the same seed.
+    `time_over_one_robot` and `time_over_none` are medians, of pairs of runs of the same seed.
     """
     times = {key(row): float(row["completion_time_s"]) for row in rows}
 
     def order(row: dict[str, str]) -> tuple[str, int, int]:
-        return row["arena"], TROUBLE.index(row["trouble"]), int(row["robots"])
+        return row["arena"], SETTINGS.index(row["setting"]), int(row["robots"])
 
-    for (arena, trouble, robots), group in groupby(sorted(rows, key=order), order):
+    for (arena, setting, robots), group in groupby(sorted(rows, key=order), order):
         runs = list(group)
-        name = TROUBLE[trouble]
+        name = SETTINGS[setting]
         alone = [times[key(r)] / times[arena, "none", "1", r["seed"]] for r in runs if one(r, times, "none", "1")]
         calm = [times[key(r)] / times[arena, "none", r["robots"], r["seed"]] for r in runs if one(r, times, "none", "")]
         gaps = [float(run["gap_m"]) for run in runs if run["gap_m"]]
         bound = [float(run["area_m2"]) / robots for run in runs]  # at 1 m/s and a footprint 1 m wide
         yield {
             "arena": arena,
-            "trouble": name,
+            "setting": name,
             "robots": str(robots),
             "runs": str(len(runs)),
             "completed": str(sum(run["outcome"] == "completed" for run in runs)),
@@ -170,7 +180,7 @@ def summary(rows: Sequence[dict[str, str]]) -> Iterator[dict[str, str]]:
             "gap_least_m": f"{min(gaps):.3f}" if gaps else "",
             "time_s": f"{np.mean([float(run['completion_time_s']) for run in runs]):.0f}",
             "time_over_one_robot": f"{np.median(alone):.2f}" if alone else "",
-            "time_over_no_trouble": f"{np.median(calm):.2f}" if calm and trouble else "",
+            "time_over_none": f"{np.median(calm):.2f}" if calm and setting else "",
             "time_over_lower_bound": f"{np.mean([times[key(r)] / b for r, b in zip(runs, bound, strict=True)]):.2f}",
             "repeat_coverage": f"{np.mean([float(run['repeat_coverage_fraction']) for run in runs]):.2f}",
             "messages_per_robot": f"{np.mean([int(run['messages']) for run in runs]) / robots:.0f}",
@@ -179,11 +189,11 @@ def summary(rows: Sequence[dict[str, str]]) -> Iterator[dict[str, str]]:
 
 
 def key(row: dict[str, str]) -> tuple[str, str, str, str]:
-    return row["arena"], row["trouble"], row["robots"], row["seed"]
+    return row["arena"], row["setting"], row["robots"], row["seed"]
 
 
-def one(row: dict[str, str], times: dict[tuple[str, str, str, str], float], trouble: str, robots: str) -> bool:
-    return (row["arena"], trouble, robots or row["robots"], row["seed"]) in times
+def one(row: dict[str, str], times: dict[tuple[str, str, str, str], float], setting: str, robots: str) -> bool:
+    return (row["arena"], setting, robots or row["robots"], row["seed"]) in times
 
 
 def read(path: Path) -> list[dict[str, str]]:
@@ -201,7 +211,7 @@ def main() -> None:
     parser.add_argument("--seeds", default="0-1", metavar="FIRST-LAST")
     parser.add_argument("--robots", type=int, nargs="+", default=[1, 2, 4])
     parser.add_argument("--arenas", nargs="+", choices=["random", *HALLS], default=["random"])
-    parser.add_argument("--trouble", nargs="+", choices=TROUBLE, default=["none"])
+    parser.add_argument("--setting", nargs="+", choices=SETTINGS, default=["none"])
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further run after so many minutes")
     parser.add_argument("--summary", action="store_true", help="make no run; summarise those that are kept")
     add_csv_option(parser)
@@ -211,16 +221,16 @@ def main() -> None:
     known = {key(row) for row in rows}
     began = time.monotonic()
     wanted = [
-        (arena, trouble, robots, seed)
+        (arena, setting, robots, seed)
         for seed in range(first, last + 1)
         for arena in options.arenas
-        for trouble in options.trouble
+        for setting in options.setting
         for robots in options.robots
     ]
-    for arena, trouble, robots, seed in [] if options.summary else wanted:
-        if (arena, trouble, str(robots), str(seed)) in known or time.monotonic() - began > 60.0 * options.minutes:
+    for arena, setting, robots, seed in [] if options.summary else wanted:
+        if (arena, setting, str(robots), str(seed)) in known or time.monotonic() - began > 60.0 * options.minutes:
             continue
-        row = measure(arena, trouble, robots, seed)
+        row = measure(arena, setting, robots, seed)
         new = not options.runs.exists()
         with options.runs.open("a", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")

@@ -1,8 +1,8 @@
 """The barrier of a corridor in all interleavings of small cases: a robot hunts only once its predecessor's slice is swept.
 
-An explorer lets everything happen in every order: a robot goes on with its work, its newest status reaches another robot, or one
-that was sent earlier does, and the predecessor dies. In every state the promise is checked, and then that the time after which
-a silent member is dropped brings every living robot through the barrier.
+An explorer lets everything happen in every order: a robot goes on with its work, its newest status reaches another robot, or
+one that was sent earlier does, and the predecessor dies. In every state the promise is checked, and then that the time after
+which a silent member is dropped brings every living robot through the barrier.
 """
 
 import copy
