@@ -134,8 +134,7 @@ def load(path: Path) -> Credentials:
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Write a file that only its owner can read, from its first byte on. Replaces an existing file."""
-    path.unlink(missing_ok=True)
+    """Write a new file that only its owner can read, from its first byte on. Raises OSError if `path` exists."""
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, PRIVATE_FILE_MODE)
     with os.fdopen(descriptor, "wb") as file:
         file.write(content)

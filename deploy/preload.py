@@ -12,10 +12,11 @@ import msgspec  # noqa: F401
 import numpy  # noqa: F401
 import zenoh  # noqa: F401
 
-from zwerm.agents.runtime.process import die_with_parent
+from zwerm.agents.runtime.process import die_with_parent, serve_robots
 from zwerm.catalogue import controller_classes
 
 die_with_parent()
+serve_robots()
 for path in controller_classes():
     __import__(path.partition(":")[0])
 gc.collect()

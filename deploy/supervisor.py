@@ -130,6 +130,17 @@ class LocalSupervisor:
         process.kill()
         process.join()
 
+    def end_of(self, node: int, wait_s: float) -> str:
+        """Return how a robot's process ended, waiting at most `wait_s` for it: its signal or exit code; "" while it runs."""
+        process = self._processes[node]
+        process.join(wait_s)
+        code = process.exitcode
+        if code is None:
+            return ""
+        if code < 0:
+            return f"its process was ended by signal {-code} ({signal.Signals(-code).name})"
+        return f"its process ended with exit code {code}"
+
     def send_signal(self, node: int, number: signal.Signals) -> None:
         """Send a signal to one robot, such as SIGSTOP and SIGCONT."""
         os.kill(self.pids[node], number)

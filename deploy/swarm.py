@@ -27,9 +27,10 @@ from zwerm.deploy.supervisor import (
     prepare,
 )
 from zwerm.errors import LinkError
+from zwerm.link.admission import ExpectedNode
 from zwerm.link.peer_radio import Station
-from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials
-from zwerm.link.world_link import ExpectedNode, ZenohWorldLink
+from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials, close_without_waiting
+from zwerm.link.world_link import ZenohWorldLink
 from zwerm.wire.messages import encode
 
 Members = Mapping[int, tuple[str, Setup]]
@@ -176,6 +177,10 @@ class LocalSwarm(_Swarm):
         self._stopped.discard(node)
         self.supervisor.send_signal(node, signal.SIGCONT)
 
+    def end_of(self, node: int, wait_s: float) -> str:
+        """Return how a lost node's process ended, waiting for its end at most `wait_s`; "" where it runs on."""
+        return self.supervisor.end_of(node, wait_s)
+
     def restart(self, node: int) -> None:
         """Kill a node, start its next incarnation without its former state, and return when it has joined.
 
@@ -239,6 +244,7 @@ class RemoteSwarm(_Swarm):
                 )
             count = len(self.link.joined)
             self._progress(count, total)
+        close_without_waiting()
 
     def _end(self) -> None:
         self.link.dismiss("the run is over")

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import zenoh
 
 from zwerm.deploy.identity import issue, router_settings
+from zwerm.link.admission import ExpectedNode
 from zwerm.link.node_link import ZenohNodeLink
 from zwerm.link.session import TWO_THREADS, Credential, Credentials, open_session, set_threads
-from zwerm.link.world_link import ExpectedNode, ZenohWorldLink
+from zwerm.link.world_link import ZenohWorldLink
 from zwerm.wire.keys import hello_key
 from zwerm.wire.messages import Hello, encode
 

@@ -33,6 +33,10 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ): "names the random streams that the conformance kit watches; it draws from none",
     ("zwerm/link/peer_radio.py", "wall_clock"): "measures how long packets take on a real network",
     ("zwerm/twin/twin_runner.py", "wall_clock"): "the twin runs in real time, and waits until nodes have met",
+    (
+        "zwerm/record/recording.py",
+        "wall_clock",
+    ): "what was recorded goes to the disk twice a second; the run does not see it",
     ("zwerm/link/node_link.py", "wall_clock"): "joining has a deadline; observations and commands do not look at it",
 }
 LONG_FILES: dict[str, str] = {

@@ -63,6 +63,9 @@ class World:
         self.intake = CommandIntake(self.bodies.drives.kind, scenario.robots.body.kind, fixed, self.medium)
         self.telemetry = TelemetrySink(dt_s)
         self.trace = Trace()
+        self.place_of: Callable[[int], str] = lambda node: (
+            ""
+        )  # where a node's controller answers: " (file.py:12, in C.step)"
         self._sensing = Sensing(sensors)
         events = {each.field: WakeEvent(each.wake_event, each.signature) for each in sensors if each.wake_event}
         self._wakes = Wakes(nodes, dt_s, events)
@@ -131,15 +134,18 @@ class World:
     def accept(self, node: int, payload: bytes, late_allowed: bool = False) -> None:
         """Accept a node's answer to its observation of this tick, or with `late_allowed` of an earlier one.
 
-        Raises ProtocolError, and counts its reason, for a malformed or unexpected answer; the node is still awaited then. A
-        controller that raised has crashed. So has one whose telemetry breaks the rules: it gives no other answer.
+        Raises ProtocolError, and counts its reason, for a stray message; the node is still awaited then. A controller that
+        raised has crashed. So has one whose answer is refused: it gives no other.
         """
+        if node in self.status.crashed:  # a program that the run has given up acts for no body
+            self.intake.refused["crashed"] += 1
+            raise ProtocolError("crashed", f"node {node} crashed at tick {self.status.crash_ticks[node]}")
         try:
             answer = self.intake.accept(node, payload, late_allowed)
         except ProtocolError as error:
-            if error.reason != "telemetry" or node not in self.awaited():
+            if error.stray or not (late_allowed or self.intake.is_pending(node)):
                 raise
-            reason = f"refused: {error}"
+            reason = f"its command was refused: {error}{self.place_of(node)}"
         else:
             if type(answer) is not Failure:
                 return
@@ -176,6 +182,7 @@ class World:
 
     def crash(self, node: int, reason: str) -> None:
         """Record that a node's program ended: its motors stop, it is never awaited again, its body stays where it is."""
+        self.status.crash_ticks.setdefault(node, self.tick)
         self._lifecycle.crash(node, reason)
 
     def withhold(self, node: int, withheld: bool) -> None:
@@ -237,7 +244,7 @@ class World:
             if answer.wake is not None:
                 self._wakes.sleep(node, answer.wake, tick)
             if answer.telemetry or answer.snapshot:
-                self.telemetry.accept(self.scene, node, answer)
+                self.telemetry.accept(self.scene, node, answer, self.status.down)
             if answer.gave_up:
                 completion.give_up(node, answer.gave_up, self.status.dead)
             if answer.release:

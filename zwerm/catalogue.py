@@ -185,6 +185,8 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
 # Commands of the command line, in the order of `zwerm --help`, as `module:function`.
 COMMANDS: Final = {
     "list": "zwerm.cli.commands.list_command:list_catalogue",
+    "show": "zwerm.cli.commands.show_command:show",
+    "new": "zwerm.cli.commands.new_command:new",
     "check": "zwerm.cli.commands.check_command:check",
     "run": "zwerm.cli.commands.run_command:run",
     "world": "zwerm.cli.commands.world_command:world",
@@ -263,6 +265,10 @@ METRICS: Final = {
     "voronoi": "zwerm.world.metrics.voronoi_coverage:VoronoiMetrics",
     "sight_range_m": "zwerm.world.metrics.sight_coverage:SightCoverage",
 }
+
+
+# Layers of the pictures of every run, each of which applies only where it is asked for.
+PICTURE_LAYERS: Final = ("zwerm.view.radio_links:RadioLinks", "zwerm.view.telemetry_colours:TelemetryColours")
 
 
 def plugins() -> dict[str, Mapping[str, str]]:

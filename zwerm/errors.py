@@ -18,11 +18,15 @@ class ControllerError(ZwermError):
 
 
 class ProtocolError(ZwermError):
-    """A message was refused; `reason` is a stable name to count it by."""
+    """A message was refused; `reason` is a stable name to count it by.
+
+    A `stray` message is no answer to the newest observation: the node may still give one.
+    """
 
     def __init__(self, reason: str, detail: str) -> None:
         super().__init__(f"{reason}: {detail}")
         self.reason = reason
+        self.stray = reason in ("out-of-order", "unasked", "duplicate", "crashed")
 
 
 class StragglerError(ZwermError):

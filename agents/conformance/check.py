@@ -39,7 +39,6 @@ _BODIES: Final = (
     Body("differential", radius_m=0.037, max_speed_m_s=0.128, max_turn_rad_s=6.0, wheel_base_m=0.051),
     Body("holonomic", radius_m=0.1, max_speed_m_s=0.5, max_turn_rad_s=3.0),
 )
-_DRIVE_OF: Final = {"differential": WheelSpeeds, "holonomic": BodyVelocity}
 _DT_S: Final = 0.1
 _HASH_SEEDS: Final = ("1", "2")
 _CHILD_S: Final = 120.0
@@ -79,6 +78,15 @@ def check(
         found = fitting.violations
     if found:
         raise ConformanceError(name, found)
+
+
+def setup_violations(controller: type[Any], setup: Setup) -> list[str]:
+    """Return the violations of the contract by `controller` on a node with exactly this Setup, in this process.
+
+    The answers are checked against the body and the channels of the Setup. A node without a body must not drive.
+    """
+    examination = _Examination(controller, setup, None)
+    return [*_declarations(controller, setup.sensors, None), *examination.violations]
 
 
 def controller_sensors(controller: type[Any]) -> tuple[str, ...]:
@@ -186,9 +194,14 @@ class _Examination:
             self._note(f"step() returned what the world refuses: {error}, on {when}")
             return None
         body = self._setup.body
-        if command.drive is not None and body is not None and type(command.drive) is not _DRIVE_OF[body.kind]:
+        if command.drive is not None and body is None:
+            self._note(f"step() drives with {type(command.drive).__name__}, but its Setup names no body, on {when}")
+        if command.drive is not None and body is not None and type(command.drive) is not _drive_of(body):
             self.fits = False
-            self._note(f"step() drives a {body.kind} body with {type(command.drive).__name__}, on {when}")
+            expected = f"takes {_drive_of(body).__name__}"
+            self._note(
+                f"step() drives a {body.kind} body with {type(command.drive).__name__}; it {expected}, on {when}"
+            )
         for message in command.outbox:
             if message.channel not in self._setup.channels:
                 known = ", ".join(self._setup.channels) or "none"
@@ -341,6 +354,11 @@ def _in_one_line(error: Exception) -> str:
     while trace.tb_next is not None:
         trace = trace.tb_next
     return f"{line} at {trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}"
+
+
+def _drive_of(body: Body) -> type[Any]:
+    """Return the command type that drives a body: a body with wheels takes their speeds."""
+    return WheelSpeeds if body.wheel_base_m > 0 else BodyVelocity
 
 
 def _short(value: object) -> str:

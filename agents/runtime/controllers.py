@@ -2,6 +2,7 @@
 
 import inspect
 import traceback
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -52,6 +53,12 @@ def make(name: str, setup: Setup) -> Stepper:
         where = f"{last.filename}:{last.lineno}"
         raise ControllerError(f"{name}: its constructor raised {type(error).__name__}: {error} ({where})") from error
     return controller
+
+
+def step_place(found: type[Any]) -> str:
+    """Return where a controller answers, such as " (mine.py:12, in Mine.step)", or "" where that is not known."""
+    code = getattr(inspect.unwrap(found.step), "__code__", None)
+    return "" if code is None else f" ({Path(code.co_filename).name}:{code.co_firstlineno}, in {found.__name__}.step)"
 
 
 def parameters_of(found: type[Any]) -> type[Any]:

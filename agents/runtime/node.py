@@ -3,14 +3,16 @@
 The memory link and the robot process run the same object, so both return the same bytes.
 """
 
+import inspect
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import msgspec
 
 from zwerm.agents.runtime.contract import Setup, Stepper
-from zwerm.agents.runtime.controllers import make
+from zwerm.agents.runtime.controllers import make, step_place
 from zwerm.link import Answer
 from zwerm.wire.messages import (
     MESSAGE_BYTES_MAX,
@@ -70,6 +72,8 @@ class Node:
             tick = observation.tick
             try:
                 command = step(observation)
+                if command.__class__ is not Command:
+                    raise TypeError(f"step() returned {command!r:.80}, expected a Command")
                 command.tick = tick
                 payload_out = write(command)
                 if len(payload_out) > MESSAGE_BYTES_MAX:
@@ -89,10 +93,18 @@ class Node:
         return encode(
             Failure(
                 tick,
-                _printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX],
+                _printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX] + self._place(error),
                 _printable("".join(_formatted(error)))[-TRACEBACK_CHARS_MAX:],
             )
         )
+
+    def _place(self, error: BaseException) -> str:
+        """Return the last line of the controller's own file that led to `error`, or the place of its `step`."""
+        own = inspect.unwrap(type(self._controller).step).__code__.co_filename
+        frames = [each for each in traceback.extract_tb(error.__traceback__) if each.filename == own]
+        if not frames:
+            return step_place(type(self._controller))
+        return f" ({Path(own).name}:{frames[-1].lineno}, in {frames[-1].name})"
 
 
 def _formatted(error: BaseException) -> list[str]:

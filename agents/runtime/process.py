@@ -13,6 +13,7 @@ If the sending thread answered it, the backlog could block that thread.
 import asyncio
 import contextlib
 import ctypes
+import io
 import os
 import signal
 import sys
@@ -20,7 +21,7 @@ from collections.abc import Callable
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import msgspec
 import uvloop
@@ -57,12 +58,14 @@ def main(
 
     With a `station` the process moves into its network namespace and sends packets over that network.
     """
+    die_with_parent(_server)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)
-    die_with_parent()
     parent = parent_process()
-    if parent is not None and not parent.is_alive():  # it died before die_with_parent took effect
-        sys.exit(EXIT_LOST)
+    if parent is not None and not parent.is_alive():  # where the kernel has no die_with_parent
+        os._exit(EXIT_LOST)
+    os.dup2(2, 1)  # standard output is for the results of the run
+    sys.stdout = _Prefixed(sys.stderr, f"node {credential.node}: ")
     set_threads(ONE_THREAD if is_local(endpoint) and station is None else TWO_THREADS)
     sys.breakpointhook = _no_terminal
     here = str(Path.cwd())
@@ -80,6 +83,25 @@ def main(
         sys.stderr.flush()
         os._exit(code)  # closing the radio's session waits for messages that the network loses
     sys.exit(code)
+
+
+class _Prefixed(io.TextIOBase):
+    """A text stream that writes whole lines to `stream`, each after `prefix`."""
+
+    def __init__(self, stream: TextIO, prefix: str) -> None:
+        self._stream, self._prefix, self._line = stream, prefix, ""
+
+    def writable(self) -> bool:
+        """Tell that the stream can be written to."""
+        return True
+
+    def write(self, text: str) -> int:
+        """Write the lines that `text` completes."""
+        *whole, self._line = (self._line + text).split("\n")
+        if whole:
+            self._stream.write("".join(f"{self._prefix}{line}\n" for line in whole))
+            self._stream.flush()
+        return len(text)
 
 
 def _no_terminal(*_: object, **__: object) -> None:
@@ -198,7 +220,21 @@ def _is_goodbye(payload: bytes) -> bool:
         return False
 
 
-def die_with_parent() -> None:
-    """Tell the kernel to kill this process when its parent dies (Linux only)."""
+def die_with_parent(parent: int | None = None) -> None:
+    """Tell the kernel to kill this process when its parent dies (Linux only).
+
+    Exits at once if `parent` is not the parent any more: it died before the kernel was told, and the kernel says nothing then.
+    """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if parent is not None and os.getppid() != parent:
+            os._exit(EXIT_LOST)
+
+
+_server: int | None = None
+
+
+def serve_robots() -> None:
+    """Note that this process is the server that robots are forked from: a robot ends when it is not their parent any more."""
+    global _server
+    _server = os.getpid()

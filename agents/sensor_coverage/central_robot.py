@@ -53,7 +53,7 @@ class CentralRobot(Controller):
         super().__init__(setup)
         self.motion = Locomotion(self.parameters, setup)
         self.commands = RequestDeduplicator(int(self.random.integers(1, INCARNATIONS)), self._on_command)
-        self.components = ComponentLoop(self._make_components(), self._make_codecs())
+        self.components = ComponentLoop(self._make_components(), self._make_codecs(), setup.incarnation)
         self._activity: Drive | None = self._emerge()
 
     def _make_components(self) -> Sequence[Component]:

@@ -5,8 +5,9 @@ from zwerm.agents.sensor_coverage.local_node import CODECS, LocalNode
 from zwerm.agents.sensor_coverage.neighbourhood.surveillance import Surveillance
 from zwerm.agents.sensor_coverage.protocols.component import Component
 from zwerm.agents.sensor_coverage.protocols.component_loop import ComponentLoop
+from zwerm.agents.sensor_coverage.protocols.ending.termination import COVERED
 from zwerm.agents.sensor_coverage.protocols.membership import Membership
-from zwerm.agents.sensor_coverage.protocols.push_scheduler import COVERED, PushScheduler
+from zwerm.agents.sensor_coverage.protocols.push_scheduler import PushScheduler
 from zwerm.agents.sensor_coverage.protocols.transport.delivery import Delivery
 from zwerm.wire.messages import Command, Observation, Wake
 
@@ -37,12 +38,13 @@ class LocalBase(LocalNode):
                 *([] if self.advice_client is None else [self.advice_client]),
             ),
             CODECS,
+            setup.incarnation,
         )
 
     def step(self, observation: Observation) -> Command:
         """Step as a robot that cannot drive, release robots, and end the run with the outcome."""
         schedule = self.schedule
-        schedule.count_released([each.node for each in observation.bearings or ()])
+        schedule.see([each.node for each in observation.bearings or ()])
         command = super().step(observation)
         command.drive = None
         command.release, schedule.release = schedule.release, False

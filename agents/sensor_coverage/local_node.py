@@ -11,12 +11,12 @@ from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.advice_client import AdviceClient
-from zwerm.agents.sensor_coverage.protocols.completion_census import CompletionProtocol
 from zwerm.agents.sensor_coverage.protocols.component_loop import Codec, ComponentLoop
+from zwerm.agents.sensor_coverage.protocols.ending.completion_census import CompletionProtocol
 from zwerm.wire.messages import Command, Observation, Wake
 
 CODECS: Final = {
-    peers.CHANNEL: Codec(peers.read, peers.write, needs_sender=True),
+    peers.CHANNEL: Codec(peers.read, peers.write, in_envelopes=True),
     advice.CHANNEL: Codec(advice.read, advice.write),
 }
 
@@ -38,7 +38,8 @@ class LocalNode(Controller):
         self.advice_client: AdviceClient | None = None
         if setup.services.get("redundancy") == "coordinator":
             self.advice_client = AdviceClient(setup.dt_s)
-        self._claimed = False
+        self._claimed: bool | None = False if setup.incarnation == 1 else None  # a former one may have claimed
+        self._search = 0
 
     @property
     def node(self) -> int:
@@ -54,11 +55,15 @@ class LocalNode(Controller):
         """Observe, receive messages, go on with the activity, poll the components, and send their messages."""
         situation = self.situation
         situation.observe(observation)
-        self.completion.update(situation.tick, situation.bearings, situation.claims, self._occupied)
+        dead = [node for node in situation.failure_detector.dead if node in situation.motion.frame.seen]
+        self.completion.update(situation.tick, situation.bearings, situation.claims, self._occupied, dead)
         self.components.deliver(observation.inbox, situation.tick)
         velocity = situation.advance()
+        if self.completion.search != self._search:
+            self._search = self.completion.search
+            situation.local_map.reopen()
         self.components.poll(situation.tick)
-        if bool(situation.claims) != self._claimed:
+        if bool(situation.claims) is not self._claimed:
             self._claimed = bool(situation.claims)
             situation.telemetry["claims_frontier"] = self._claimed
         telemetry, situation.telemetry = situation.telemetry, {}
@@ -76,7 +81,7 @@ class LocalNode(Controller):
         """Whether the node is busy, as the census counts it: a message in flight keeps its sender busy."""
         situation = self.situation
         here = situation.in_push or situation.active or situation.local_map.moving
-        return here or not situation.calm or not situation.mailbox.empty
+        return here or situation.homeless or not situation.calm or not situation.mailbox.empty
 
     def _wake(self) -> Wake | None:
         """Return the next wake-up: the next tick during an activity, else the earliest of the components'."""

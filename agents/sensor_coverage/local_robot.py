@@ -119,6 +119,11 @@ class PushParticipant(Component):
     def _has_me(self, chain: Chain) -> bool:
         return any(node == self._situation.node for _, node in chain)
 
+    def restarted(self, node: int, tick: int) -> None:
+        """Take in that a robot has lost its memory, and with it its part in a push."""
+        if self.push is not None:
+            self.push.member_lost(node)
+
     # --- every tick ---------------------------------------------------------------------------------------------------
 
     def poll(self, tick: int) -> None:
@@ -191,6 +196,7 @@ class LocalRobot(LocalNode):
                 *([] if self.advice_client is None else [self.advice_client]),
             ),
             CODECS,
+            setup.incarnation,
         )
 
     @property

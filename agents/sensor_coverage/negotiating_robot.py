@@ -44,7 +44,7 @@ class NegotiatingRobot(CentralRobot):
         return (*super()._make_components(), self._leave)
 
     def _make_codecs(self) -> dict[str, Codec]:
-        return super()._make_codecs() | {peers.CHANNEL: Codec(peers.read, peers.write, needs_sender=True)}
+        return super()._make_codecs() | {peers.CHANNEL: Codec(peers.read, peers.write, in_envelopes=True)}
 
     def step(self, observation: Observation) -> Command:
         """Observe the neighbours, and step as a robot under a coordinator."""

@@ -192,8 +192,6 @@ def test_each_run_has_its_own_credentials() -> None:
 
 def test_credentials_are_equal_after_saving_and_loading_a_private_file(tmp_path: Path) -> None:
     path = tmp_path / "keys"
-    path.write_text("a file that others can read")
-    path.chmod(0o644)
     some = slice_of(issue(RUN, range(9), "PEM"), [2, 5])
     save(some, path)
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
@@ -206,6 +204,8 @@ def test_a_bad_credentials_file_is_an_error_of_one_line(tmp_path: Path) -> None:
     with pytest.raises(LinkError, match=r"keys: cannot read credentials: No such file or directory$"):
         load(path)
     save(issue(RUN, [0]), path)
+    with pytest.raises(LinkError, match=r"keys: cannot write credentials: File exists$"):
+        save(issue(RUN, [0]), path)
     path.chmod(0o640)
     with pytest.raises(LinkError, match=r"keys: credentials must be readable by their owner only \(chmod 600\)$"):
         load(path)

@@ -332,3 +332,31 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+ORPHAN = """
+import os, sys
+from zwerm.agents.runtime.process import die_with_parent
+parent = os.getpid()
+read, write = os.pipe()
+if os.fork():
+    os._exit(0)
+os.close(write)
+while os.getppid() == parent:
+    os.sched_yield()
+print("orphaned", flush=True)
+die_with_parent(parent)
+print("lives on", flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the kernel kills no child of a dead process")
+def test_a_robot_whose_parent_died_before_it_asked_the_kernel_ends_at_once() -> None:
+    ran = subprocess.run(
+        [sys.executable, "-c", ORPHAN],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert ran.stdout.split("\n") == ["orphaned", ""]

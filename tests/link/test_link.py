@@ -17,8 +17,8 @@ from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError
 from zwerm.link import Answer, Arrival, WorldLink
+from zwerm.link.admission import ExpectedNode
 from zwerm.link.memory import MemoryLink
-from zwerm.link.world_link import ExpectedNode
 from zwerm.wire.keys import command_key
 from zwerm.wire.messages import (
     MESSAGE_BYTES_MAX,
@@ -209,7 +209,7 @@ def test_a_wrong_hello_is_refused_and_counted_by_its_reason(net: Network) -> Non
 def test_a_hello_of_an_unexpected_node_is_refused(private_tmp: Path) -> None:
     with network(private_tmp, members={0: ExpectedNode(1, "nobody", NIL)}) as net:
         node = net.node(1)
-        with pytest.raises(LinkError, match=r"^node 1 at unixsock-stream/.*: the world refuses it: unknown$"):
+        with pytest.raises(LinkError, match=r"^node 1 at unixsock-stream/.*: the world refuses it: unknown: "):
             node.join()
         node.close()
         assert net.link.refused == {"unknown": 1}
@@ -405,3 +405,21 @@ def test_a_paused_process_is_not_lost_and_answers_after_it_resumes(nothing_left:
         assert answer is not None
         assert answer.node == 0
         assert answer.payload is not None
+
+
+def test_a_node_that_was_lost_is_told_that_it_is_not_taken_back(net: Network) -> None:
+    node, other = net.node(0), net.node(1)
+    node.join()
+    other.join()
+    node.close()
+    assert net.link.receive(20.0) == Arrival(0, None)
+    again = net.node(0)
+    with pytest.raises(LinkError, match=r"refuses it: returned: the run has given it up as lost"):
+        again.join()
+    again.send(b"I am still here")
+    other.send(b"control")
+    assert net.link.receive(20.0) == Arrival(1, b"control")
+    assert net.link.joined == {1}
+    assert net.link.refused["returned"] == 1
+    again.close()
+    other.close()

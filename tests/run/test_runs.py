@@ -22,7 +22,7 @@ def troubled(controller: str, **robots: object) -> dict[str, object]:
 def test_a_controller_that_raises_fails_the_run_with_its_traceback(runner: Runner, nothing_left: None) -> None:
     result = run(scenario(robots=troubled("Raises")), runner=runner)
     assert result.outcome == "failed"
-    assert result.reason == "node 2 crashed at tick 5: ZeroDivisionError: division by zero"
+    assert result.reason == "node 2 crashed at tick 5: ZeroDivisionError: division by zero (troubled.py:16, in step)"
     assert result.crashed == [2]
     assert "troubled.py" in result.tracebacks[2]
     assert not result.ok
@@ -40,7 +40,7 @@ def test_a_controller_that_raises_is_survived_where_the_scenario_says_so(runner:
 def test_a_robot_killed_mid_run_fails_the_run_and_is_named(nothing_left: None) -> None:
     result = run(scenario(robots=troubled("Dies")))
     assert result.outcome == "failed"
-    assert result.reason == "node 2 crashed at tick 5: process ended"
+    assert result.reason == "node 2 crashed at tick 5: its process was ended by signal 9 (SIGKILL)"
 
 
 def test_a_robot_killed_mid_run_is_survived_where_the_scenario_says_so(nothing_left: None) -> None:
@@ -53,6 +53,7 @@ def test_a_straggler_ends_the_run_with_its_name(nothing_left: None) -> None:
     result = run(scenario(robots=troubled("Hangs"), time={"straggler_s": 0.5}))
     assert result.outcome == "failed"
     assert result.reason == "tick 3: no command from node 1 within 0.5 s"
+    assert result.middleware_lost == 0, "a controller that hangs is no loss of the middleware"
 
 
 @pytest.mark.parametrize("runner", ["inline", "processes"])
@@ -152,8 +153,11 @@ def test_a_failed_run_exits_1_and_prints_its_traceback_and_reason() -> None:
     out, err = running.communicate(timeout=60)
     assert running.returncode == 1
     assert json.loads(out)["nodes"]["crashed"] == [2]
-    assert "ZeroDivisionError: division by zero" in err
-    assert err.splitlines()[-1] == "zwerm: node 2 crashed at tick 5: ZeroDivisionError: division by zero"
+    assert "ZeroDivisionError: division by zero (troubled.py:16, in step)" in err
+    assert (
+        err.splitlines()[-1]
+        == "zwerm: node 2 crashed at tick 5: ZeroDivisionError: division by zero (troubled.py:16, in step)"
+    )
 
 
 def test_robots_started_elsewhere_join_over_tcp_and_give_the_same_trace(tmp_path: Path) -> None:

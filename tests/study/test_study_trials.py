@@ -128,7 +128,9 @@ def test_a_failed_trial_gives_a_row_with_its_reason(write: Callable[..., Study],
     failed = [row for row in rows if row["outcome"] == "failed"]
     assert len(rows) == 8
     assert 0 < len(failed) < 8
-    assert {row["reason"] for row in failed} == {"node 0 crashed at tick 3: ValueError: no luck"}
+    assert {row["reason"] for row in failed} == {
+        "node 0 crashed at tick 3: ValueError: no luck (study_robots.py:16, in step)"
+    }
     assert result.failed == len(failed)
     assert result.results.lines()[0].sample.n == 8 - len(failed)
     assert run_here(study, out).ran == 0
@@ -174,3 +176,32 @@ def test_counts_of_robots_are_sampled_over_time(write: Callable[..., Study], tmp
     assert row["robots_in_arena_series"] == row["robots_entered_series"]
     at = dict(zip(row["series_time_s"], row["robots_entered_series"], strict=True))
     assert [at[t] for t in (0.0, 0.45, 0.55, 1.05, 2.0)] == [1, 1, 2, 3, 5]
+
+
+HANGS_OR_DIES = """
+import os, time
+from zwerm.agents.runtime.contract import Controller
+from zwerm.wire.messages import Command
+
+class Dies(Controller):
+    def step(self, observation):
+        os._exit(9)
+
+class Hangs(Controller):
+    def step(self, observation):
+        time.sleep(3600.0)
+"""
+
+
+@pytest.mark.parametrize(
+    ("controller", "reason"), [("Dies", "its process died"), ("Hangs", "it had no result within 3 s")]
+)
+def test_the_only_trial_of_a_study_can_neither_end_nor_hang_it(
+    write: Callable[..., Study], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, controller: str, reason: str
+) -> None:
+    (tmp_path / "hard_to_end.py").write_text(HANGS_OR_DIES)
+    study = write(TINY.replace("seeds = 3", "seeds = 1") + f"set = ['robots.controller=hard_to_end:{controller}']\n")
+    result = run_study(study, tmp_path / "out.parquet", timeout_s=3.0)
+    [row] = read_rows(result.path)
+    assert row["outcome"] == "failed"
+    assert row["reason"].startswith(reason)

@@ -13,6 +13,7 @@ import pymunk
 from pymunk import batch
 
 from zwerm.scenario.tables import BodyTable
+from zwerm.world.bodies.parking import FEW_BODIES, SEARCH_TICKS, Parking
 from zwerm.world.scene import Bools, Floats, Ints
 
 # Iterations of the contact solver in each substep; a disc in the plane seldom touches more than four others.
@@ -38,6 +39,9 @@ class Physics:
         self._moment = pymunk.moment_for_circle(body.mass_kg, 0.0, body.radius_m)
         self._space = _make_space(self._substep_s, body.friction, segments)
         self._bodies: dict[int, pymunk.Body] = {}
+        self._present: Bools = np.zeros(count, dtype=np.bool_)
+        # Contact, the way of both bodies until the next search, and half a body more for what the solver adds.
+        self._parking = Parking(count, 3.0 * body.radius_m + 2.0 * body.max_speed_m_s * dt_s * SEARCH_TICKS)
         # The middle of each substep [s], and the factor from a change of velocity to the force that causes it.
         self._middle_s: Floats = np.arange(0.5, body.substeps)[:, None] * self._substep_s
         self._inertia: Floats = np.array([body.mass_kg, body.mass_kg, self._moment]) / self._substep_s
@@ -56,6 +60,8 @@ class Physics:
             disc.filter = pymunk.ShapeFilter(group=1)
         self._space.add(body, disc)
         self._bodies[robot] = body
+        self._present[robot] = True
+        self._parking.admit(robot)
         self.position[robot] = position
         self.heading[robot] = heading
         self._arranged = False
@@ -68,12 +74,15 @@ class Physics:
     def remove(self, robot: int) -> None:
         """Remove a robot's body from the arena; `position` and `heading` keep its last pose."""
         body = self._bodies.pop(robot)
-        self._space.remove(body, *body.shapes)
+        self._present[robot] = False
+        if not self._parking.parked[robot]:
+            self._space.remove(body, *body.shapes)
         self._arranged = False
 
     def _arrange(self) -> None:
         """Rebuild the buffers: pymunk's batches follow its own order of bodies, and include the static one."""
-        owner = {body.id: robot for robot, body in self._bodies.items()}
+        parked = self._parking.parked
+        owner = {body.id: robot for robot, body in self._bodies.items() if not parked[robot]}
         self._poses.clear()
         batch.get_space_bodies(self._space, _POSE, self._poses)
         ids = np.frombuffer(bytes(self._poses.int_buf()), dtype=np.uintp).tolist()
@@ -87,18 +96,35 @@ class Physics:
         self._resting = False
         self._arranged = True
 
+    def _park(self, forward: Floats, left: Floats | None, turn: Floats) -> None:
+        """Move bodies into the engine and out of it."""
+        driven = (forward != 0.0) | (turn != 0.0)
+        if left is not None:
+            driven |= left != 0.0
+        entering, leaving = self._parking.change(self.position, self._present, driven)
+        for robot in entering.tolist():
+            body = self._bodies[robot]
+            self._space.add(body, *body.shapes)
+        for robot in leaving.tolist():
+            body = self._bodies[robot]
+            self._space.remove(body, *body.shapes)
+        if len(entering) or len(leaving):
+            self._arranged = False
+
     def advance(self, forward_m_s: Floats, left_m_s: Floats | None, turn_rad_s: Floats) -> Bools:
         """Integrate one tick under the drives (n,), by robot id; return (n,) which robots moved."""
         moved: Bools = np.zeros(len(self.position), dtype=np.bool_)
+        idle = not (forward_m_s.any() or turn_rad_s.any() or (left_m_s is not None and left_m_s.any()))
+        if idle and self._resting and self._arranged:
+            return moved
+        if len(self._bodies) > FEW_BODIES or self._parking.in_use:
+            self._park(forward_m_s, left_m_s, turn_rad_s)
         if not self._arranged:
             self._arrange()
         ids, rows = self._ids, self._rows
         turn = turn_rad_s[ids]
         forward = forward_m_s[ids]
         left = None if left_m_s is None else left_m_s[ids]
-        idle = self._resting and not (forward.any() or turn.any() or (left is not None and left.any()))
-        if idle:
-            return moved
         # The heading in the middle of each substep, so that an arc is integrated by its chords.
         angle = self.heading[ids] + self._middle_s * turn
         pushes = self._pushes
@@ -132,6 +158,7 @@ class Physics:
         self.position[ids] = place
         self.heading[ids] = angle
         self._resting = not moved.any()
+        self._parking.note_moved(moved)
         return moved
 
 

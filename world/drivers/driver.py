@@ -7,7 +7,7 @@ also when the run ends.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 
-from zwerm.link import WorldLink
+from zwerm.link import NodeProcesses, WorldLink
 from zwerm.world.tick.node_status import ProcessAction
 from zwerm.world.world import World
 
@@ -20,10 +20,17 @@ class Driver(ABC):
     `reason` says why a run failed.
     """
 
-    def __init__(self, world: World, link: WorldLink, observers: Sequence[TickObserver] = ()) -> None:
+    def __init__(
+        self,
+        world: World,
+        link: WorldLink,
+        observers: Sequence[TickObserver] = (),
+        programs: NodeProcesses | None = None,
+    ) -> None:
         self._world = world
         self._link = link
         self._observers = tuple(observers)
+        self._programs = programs
         self.reason = ""
 
     def run(self) -> str:
@@ -38,6 +45,11 @@ class Driver(ABC):
                     observe(world)
         self.reason = ending.reason
         return ending.outcome
+
+    def _lose(self, node: int, wait_s: float) -> None:
+        """Tell the world that a node is lost, and how its program ended, as far as that is known within `wait_s`."""
+        known = self._programs is not None and self._programs.end_of(node, wait_s)
+        self._world.crash(node, known or "the connection to it was lost")
 
     @property
     @abstractmethod

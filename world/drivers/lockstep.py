@@ -18,6 +18,16 @@ from zwerm.world.world import World
 # The last 1 / 8 of the answers is awaited only after the rest has been decoded.
 _LAST: Final = 8
 
+# After a crash that ends the run: how long the driver takes in other answers, so that the first of several crashes in id
+# order is named, whichever arrives first.
+CRASH_GRACE_S: Final = 1.0
+
+# How long a node without an answer has to leave when it is told to: one that leaves was not busy, so a message was lost.
+PROBE_S: Final = 1.0
+
+# How long the driver waits for the exit code of a lost node's process. The connection ends before the process does.
+EXIT_CODE_S: Final = 2.0
+
 
 class LockStep(Driver):
     """Drives a world in lock-step. `run` raises StragglerError where a node misses the deadline."""
@@ -29,14 +39,14 @@ class LockStep(Driver):
         observers: Sequence[TickObserver] = (),
         programs: NodeProcesses | None = None,
     ) -> None:
-        super().__init__(world, link, observers)
+        super().__init__(world, link, observers, programs)
         self._processes = ProcessController(world, link, programs, self._take)
         self._straggler_s = world.scenario.time.straggler_s
         self._lost = 0
 
     @property
     def lost(self) -> int:
-        """Number of observations that living nodes have not answered: at most those of the last tick."""
+        """How many messages the middleware lost. A node that is busy, hangs or is stopped has lost none."""
         return self._lost
 
     def _carry_out(self, actions: Sequence[ProcessAction]) -> None:
@@ -50,14 +60,19 @@ class LockStep(Driver):
     def _collect(self, missing: int) -> None:
         """Receive until no node is awaited; `missing` bounds the number of answers that are still to come."""
         world = self._world
-        deadline: float | None = None
+        fatal = False
+        # Neither an answer, nor a loss, nor a refused message extends the deadline.
+        deadline = time.monotonic() + self._straggler_s
         while missing > 0:
-            timeout_s = self._straggler_s if deadline is None else max(0.0, deadline - time.monotonic())
+            timeout_s = max(0.0, deadline - time.monotonic())
             # All but a few: the last ones arrive while the others are decoded.
             arrivals = self._link.receive_many(missing - missing // _LAST, timeout_s)
             if not arrivals:
-                self._lost += len(world.awaited())
-                raise StragglerError(world.awaited(), world.tick, self._straggler_s)
+                if fatal:
+                    return
+                awaited = world.awaited()
+                self._lost += len(self._link.idle(awaited, PROBE_S))
+                raise StragglerError(awaited, world.tick, self._straggler_s)
             accept = world.accept
             for arrival in arrivals:
                 node, payload = arrival
@@ -65,18 +80,18 @@ class LockStep(Driver):
                     self._take(arrival)
                     missing = len(world.awaited())
                     continue
-                try:
+                with contextlib.suppress(ProtocolError):  # the world has counted it
                     accept(node, payload)
                     missing -= 1
-                except ProtocolError:  # the world has counted it
-                    # A refused message does not extend the deadline.
-                    deadline = deadline or time.monotonic() + self._straggler_s
+            if not fatal and world.ending(within_tick=True) is not None:
+                fatal = True
+                deadline = min(deadline, time.monotonic() + CRASH_GRACE_S)
 
     def _take(self, arrival: Arrival) -> None:
         """Give an arrival to the world."""
         node, payload = arrival
         if payload is None:
-            self._world.crash(node, "process ended")
+            self._lose(node, EXIT_CODE_S)
             return
         with contextlib.suppress(ProtocolError):  # the world has counted it
             self._world.accept(node, payload)

@@ -19,6 +19,8 @@ from zwerm.world.drivers.process_control import ActionThread
 from zwerm.world.tick.node_status import ProcessAction
 from zwerm.world.world import World
 
+EXIT_CODE_S: Final = 0.05  # how long a tick may wait for the exit code of a lost node's process
+
 # The unanswered observations at which a node is no longer observed: their number, and their total size in bytes.
 UNANSWERED_MAX: Final = 64
 UNANSWERED_BYTES_MAX: Final = 131_072
@@ -40,25 +42,26 @@ class RealTime(Driver):
         before_send: TickObserver | None = None,
     ) -> None:
         """`before_send` is called between sensing and sending."""
-        super().__init__(world, link, observers)
+        super().__init__(world, link, observers, programs)
         self._actions = ActionThread(programs)
         self._tick_s = world.scenario.time.dt_s / factor
         self._deadman_s = world.scenario.time.deadman_s
         self._before_send = before_send
         self._start_s = 0.0  # on the monotonic clock
-        self._unanswered: dict[int, deque[int]] = {}  # the sizes of a node's unanswered observations [bytes]
+        # The tick and size [bytes] of each node's unanswered observations.
+        self._unanswered: dict[int, deque[tuple[int, int]]] = {}
         self._silent_since_s: dict[int, float] = {}  # virtual time of the first of them
         self._dying: Counter[int] = Counter()  # kills that have been requested and not yet reported, by node
         self._starting: Counter[int] = Counter()
         self._stopped: dict[int, None] = {}
         self.deadman_stops = 0
         self.overruns = 0
+        self._lost = 0
 
     @property
     def lost(self) -> int:
-        """Number of observations that living nodes have not answered yet, besides the newest of each node."""
-        dead = self._world.dead
-        return sum(max(0, len(sizes) - 1) for node, sizes in self._unanswered.items() if node not in dead)
+        """How many observations were never answered although the node answered a later one."""
+        return self._lost
 
     def run(self) -> str:
         """Drive until the run ends, and return its outcome. Raises LinkError where a fault cannot be carried out."""
@@ -94,7 +97,7 @@ class RealTime(Driver):
             self._before_send(world)
         for node, observation in zip(nodes, observations, strict=True):
             self._link.send(node, observation)
-            self._unanswered.setdefault(node, deque()).append(len(observation))
+            self._unanswered.setdefault(node, deque()).append((world.tick, len(observation)))
             self._withhold(node)
             self._silent_since_s.setdefault(node, time_s)
         self._listen(deadline_s)
@@ -119,19 +122,27 @@ class RealTime(Driver):
                 self._world.refuse_stale()
             return
         if payload is None:
-            self._world.crash(node, "process ended")
+            self._lose(node, EXIT_CODE_S)
             return
-        if sizes := self._unanswered.get(node):
-            sizes.popleft()
-            self._withhold(node)
         self._silent_since_s.pop(node, None)
         self._stopped.pop(node, None)
         with contextlib.suppress(ProtocolError):  # the world has counted it
             self._world.accept(node, payload, late_allowed=True)
+        self._note_answer(node)
+
+    def _note_answer(self, node: int) -> None:
+        """Forget the observations that a node has answered, and count those that it skipped: nodes answer in order."""
+        unanswered, newest = self._unanswered.get(node), self._world.intake.newest_tick(node)
+        if not unanswered:
+            return
+        while unanswered and unanswered[0][0] <= newest:
+            tick, _ = unanswered.popleft()
+            self._lost += tick < newest
+        self._withhold(node)
 
     def _withhold(self, node: int) -> None:
         """Exclude a node from observation while its program starts or it has too many unanswered observations."""
-        sizes = self._unanswered.get(node, ())
+        sizes = [size for _, size in self._unanswered.get(node, ())]
         too_many = len(sizes) >= UNANSWERED_MAX or sum(sizes) >= UNANSWERED_BYTES_MAX
         self._world.withhold(node, bool(self._starting[node]) or too_many)
 

@@ -20,6 +20,9 @@ _TRIPLES_AT_ONCE = 1 << 15
 # Up to this many robots all pairs are measured: a search tree costs more.
 _FEW_ROBOTS = 128
 
+# Up to this fraction of the present robots, observers are measured against all robots: the other pairs are not needed.
+_FEW_OBSERVERS = 0.25
+
 
 class VisiblePairs(NamedTuple):
     """Pairs (observer, seen), sorted; robot `robots[r]` is the observer in rows `ends[r - 1]` to `ends[r]`."""
@@ -109,6 +112,41 @@ class NearPairs:
         self._reach_m, self._pairs, self._apart2 = reach_m, ids[pairs], apart2
 
 
+class FewObservers:
+    """The robots within a range of a few observers, for any range and one scene, which is measured once.
+
+    The cost grows with observers times robots, and no work is done for the pairs of other robots.
+    """
+
+    def __init__(self) -> None:
+        self._position: Floats = np.empty((0, 2))
+        self._present: Bools = np.empty(0, dtype=np.bool_)
+        self._robots: Ints = np.empty(0, dtype=np.int64)
+        self._reach_m = -1.0
+        self._row: Ints = np.empty(0, dtype=np.int64)
+        self._seen: Ints = np.empty(0, dtype=np.int64)
+        self._apart2: Floats = np.empty(0)
+
+    def within(self, scene: Scene, robots: Ints, range_m: float) -> tuple[Ints, Ints]:
+        """Return pairs (k,), (k,) of a row of `robots` and a present robot at most range_m from it, sorted."""
+        known = scene.position is self._position and scene.present is self._present and range_m <= self._reach_m
+        if not known or not np.array_equal(robots, self._robots):
+            self._measure(scene, robots, max(range_m, self._reach_m))
+        near = self._apart2 <= range_m**2
+        return self._row[near], self._seen[near]
+
+    def _measure(self, scene: Scene, robots: Ints, reach_m: float) -> None:
+        x, y = scene.position.T
+        apart2 = (x - x[robots][:, None]) ** 2 + (y - y[robots][:, None]) ** 2
+        # Slightly too far, so that the comparison in `within` alone decides at the edge.
+        near = apart2 <= (reach_m * (1.0 + 1e-9)) ** 2
+        near &= scene.present
+        near[np.arange(len(robots)), robots] = False
+        self._row, self._seen = near.nonzero()
+        self._apart2 = apart2[self._row, self._seen]
+        self._position, self._present, self._robots, self._reach_m = scene.position, scene.present, robots, reach_m
+
+
 class Visibility:
     """The visible pairs of one run, kept from scene to scene."""
 
@@ -117,6 +155,7 @@ class Visibility:
         self._present: Bools = np.empty(0, dtype=np.bool_)
         self._verdicts = WallVerdicts()
         self._near = NearPairs()
+        self._few = FewObservers()
         self._pairs: dict[tuple[float | None, bool, bool], Ints] = {}
         self._sightings: dict[tuple[float | None, bool, bool], tuple[Ints, Ints]] = {}
 
@@ -146,6 +185,8 @@ class Visibility:
         robots_occlude: bool = False,
     ) -> VisiblePairs:
         """Return both directions of `pairs`, for the observers `robots` (ascending ids of present robots)."""
+        if range_m is not None and not robots_occlude and len(robots) <= _FEW_OBSERVERS * len(scene.present):
+            return self._few_sightings(scene, robots, range_m, through_walls)
         pairs = self.pairs(scene, range_m, through_walls, robots_occlude)
         settings = (range_m, through_walls, robots_occlude)
         directed = self._sightings.get(settings)
@@ -164,6 +205,16 @@ class Visibility:
             rows = asked[observer]
             observer, seen = observer[rows], seen[rows]
         return VisiblePairs(observer, seen, np.searchsorted(observer, robots, side="right"))
+
+    def _few_sightings(self, scene: Scene, robots: Ints, range_m: float, through_walls: bool) -> VisiblePairs:
+        """Return the sightings of a few robots without those of all others; a range and walls are all that limits them."""
+        row, seen = self._few.within(scene, robots, range_m)
+        if not (through_walls or scene.arena.is_convex):
+            observer = robots[row]
+            first, second = np.minimum(observer, seen), np.maximum(observer, seen)
+            free = ~scene.arena.blocked(scene.position[first], scene.position[second])
+            row, seen = row[free], seen[free]
+        return VisiblePairs(robots[row], seen, np.searchsorted(row, np.arange(len(robots)), side="right"))
 
     def _advance(self, scene: Scene) -> None:
         """Drop results that no longer hold. Positions are compared, so the sequence of queried scenes does not matter."""

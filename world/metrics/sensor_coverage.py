@@ -8,19 +8,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Final
 
+import shapely
+
 from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, MembershipSnapshot, decode_snapshot
 from zwerm.catalogue import BASE
 from zwerm.maths.simplicial import betti
 from zwerm.scenario.tables import Scenario
 from zwerm.world.geometry.visibility import Visibility
 from zwerm.world.metrics import Metric, MetricContext, Truth
-from zwerm.world.metrics.sight import complex_of
+from zwerm.world.metrics.sight import SeenArea, complex_of, living, reachable
 from zwerm.world.tick.telemetry import TelemetryRecord
 
 # Numbers that the coordinator and the base stations report; the newest of each is the metric.
 NUMBERS: Final = ("pushes", "robots_released", "redundant_robots")
 CYCLES: Final = "deployment_cycles"
 CLAIM: Final = "claims_frontier"
+# Coverage of the reachable space from which on a deployment is complete.
+ENOUGH: Final = 0.98
 
 
 class Deployment(Metric):
@@ -81,13 +85,19 @@ class Deployment(Metric):
 
 
 class Conclusion(Metric):
-    """`concluded_early`: 1 where the base station has concluded while a living robot claimed a frontier, else 0."""
+    """`concluded_early`: 1 where the base station has concluded too early, by the truth at that time, else 0.
+
+    Too early is a coverage of the space that robots can reach below `ENOUGH`, measured where `metrics.sight_range_m` is given;
+    or a claim of a running robot that it stands at a frontier. A robot that has restarted reports its claim anew.
+    """
 
     names: ClassVar[Sequence[str]] = ("concluded_early",)
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
-        variant = context.scenario.variant
+        variant, range_m = context.scenario.variant, context.scenario.metrics.sight_range_m
         self._applies = variant is not None and variant.decides == BASE
+        self._arena = context.arena
+        self._sight = None if range_m is None else SeenArea(context.arena, range_m)
         self._claims: dict[int, bool] = {}
         self._truth: Truth | None = None
 
@@ -97,7 +107,7 @@ class Conclusion(Metric):
             self._claims[record.node] = bool(record.numbers[CLAIM])
 
     def sample(self, truth: Truth) -> None:
-        """Take the state at the end."""
+        """Take the state at the end: the run ends when the base station concludes."""
         self._truth = truth
 
     def metrics(self) -> dict[str, float]:
@@ -106,14 +116,26 @@ class Conclusion(Metric):
         if not self._applies or truth is None:
             return {}
         claimed = any(claims and node not in truth.dead for node, claims in self._claims.items())
-        return {"concluded_early": float(truth.completed and claimed)}
+        return {"concluded_early": float(truth.completed and (claimed or not self._is_covered(truth)))}
+
+    def _is_covered(self, truth: Truth) -> bool:
+        """Return whether the living robots see the space that they can reach, as far as that is measured."""
+        if self._sight is None:
+            return True
+        scene = truth.scene
+        position = scene.position[living(scene.present_ids(), truth.dead)]
+        if not len(position):
+            return False
+        inside = reachable(self._arena, scene.radius_m, position)
+        return bool(shapely.intersection(self._sight.area(position), inside).area >= ENOUGH * inside.area)
 
 
 class Removals(Metric):
     """Number of robots that have left the complex, and number of these departures that changed its true b0 or b1.
 
-    The complex is that of all living robots in the arena that have not left it, by true visibility within
-    `metrics.sight_range_m`. The metric needs that setting, and robots that leave by agreement.
+    Each departure is judged by the truth at its own time. The complex is that of all robots in the arena that run then and
+    have not left it, by true visibility within `metrics.sight_range_m`; measured only where that is given and robots leave by
+    agreement.
     """
 
     names: ClassVar[Sequence[str]] = ("removals", "unsafe_removals")
@@ -143,7 +165,6 @@ def robots_leave(scenario: Scenario) -> bool:
 def removals(truth: Truth, range_m: float) -> dict[str, float]:
     """Return how many robots have left the complex, and how many departures changed b0 or b1; sight within `range_m`."""
     out: dict[int, None] = {}
-    dead = dict.fromkeys(truth.dead)
     count = unsafe = 0
     sight = Visibility()
     for record in truth.telemetry.snapshots:
@@ -154,7 +175,7 @@ def removals(truth: Truth, range_m: float) -> dict[str, float]:
             out.pop(record.node, None)
             continue
         scene = replace(truth.scene, tick=record.tick, position=record.position, present=record.present)
-        members = [node for node in scene.present_ids().tolist() if node not in out and node not in dead]
+        members = [node for node in scene.present_ids().tolist() if node not in out and node not in record.down]
         whole = complex_of(sight.pairs(scene, range_m), members)
         count += 1
         unsafe += betti(whole) != betti(whole.without([record.node]))

@@ -174,6 +174,8 @@ class RadioModel(ABC):
     needs_positions: ClassVar[bool] = False
     # Receivers of dropped packets are out of reach, by no chance. Otherwise the packets are losses.
     out_of_reach: ClassVar[bool] = False
+    # The verdict on a packet depends on no other packet: the channel need not show it packets that a later model drops.
+    memoryless: ClassVar[bool] = False
 
     # The model drops every packet over more than this distance [m].
     range_max_m: float = math.inf
@@ -185,6 +187,15 @@ class RadioModel(ABC):
     @abstractmethod
     def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
         """Return the effects on `packets`, which are those of `sent` that no earlier model dropped."""
+
+    @property
+    def reach_m(self) -> float:
+        """The distance [m] beyond which the channel shows the model no broadcast: it counts the packets as dropped by it.
+
+        A model without a sharp edge states the distance beyond which it would let a packet pass with a negligible probability.
+        While no model of a channel has a bound, the models judge all pairs of nodes.
+        """
+        return self.range_max_m
 
     @classmethod
     def network_rule(cls, parameters: Any) -> NetworkRule | None:

@@ -4,8 +4,12 @@ The channel drops packets to absent and switched-off receivers first. The leadin
 Faults judge next, and then all other models. So a packet that a fault drops would have reached its receiver. These
 leading models use no random numbers, so the order of faults and models changes the causes and not the packets that
 pass.
+
+Models see a broadcast as packets to the receivers in reach (`reach`): those that are available, within the shortest reach
+that a model states. The packets to all others count for `absent`, `receiver-down` or the cause of that model.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -15,9 +19,11 @@ from numpy.typing import NDArray
 from zwerm.maths.keyed_random import key_part
 from zwerm.wire.messages import Packet, Transmission
 from zwerm.world.radio import PacketJudge, Packets, Transmissions, Verdict
+from zwerm.world.radio.availability import Absent, SwitchedOff
 from zwerm.world.radio.ledger import Ledger
 from zwerm.world.radio.links import Links
 from zwerm.world.radio.packet_queue import PacketBatch, PacketQueue
+from zwerm.world.radio.reach import Reach
 from zwerm.world.scene import Ints, Scene
 
 Outboxes = Sequence[tuple[int, Sequence[Transmission]]]
@@ -25,6 +31,9 @@ Outboxes = Sequence[tuple[int, Sequence[Transmission]]]
 # Key of a packet: its tick, its number among those of its sender at that tick, and the number of the copy.
 _TICK_BITS: Final = np.uint64(32)
 _COPY_BITS: Final = np.uint64(16)
+
+# Addressee of a broadcast.
+_EVERYONE: Final = -1
 
 
 class Channel:
@@ -44,15 +53,19 @@ class Channel:
         self.name = name
         self.models = list(models)
         self.links = links or Links(nodes)
-        self.ledger = Ledger(self.links, nodes, dt_s)
+        self.ledger = Ledger(self.links, nodes, dt_s, members)
         self.queue = PacketQueue(nodes)
         self._members = members
         self._center = center
         self.dt_s = dt_s
         self._anonymous = anonymous
         self._audiences: dict[int, Ints] = {}
+        self._reach = Reach(members)
         # The number of leading models that find receivers out of reach.
         self._leading = next((at for at, model in enumerate(self.models) if not model.out_of_reach), len(self.models))
+        # The model that bounds broadcasts. Faults judge before it, unless it is a leading one.
+        self._bound = _shortest(self.models)
+        self._bound_leads = self._bound in self.models[: self._leading]
 
     def carries(self, sender: int, to: int) -> bool:
         """Return whether `sender` may address `to`."""
@@ -83,41 +96,74 @@ class Channel:
         return sorted(zip(packets.sender[stopped].tolist(), packets.receiver[stopped].tolist(), strict=True))
 
     def send(
-        self, scene: Scene, outboxes: Outboxes, before: Sequence[PacketJudge] = (), faults: Sequence[PacketJudge] = ()
+        self,
+        scene: Scene,
+        outboxes: Outboxes,
+        absent: Absent,
+        off: SwitchedOff,
+        faults: Sequence[PacketJudge] = (),
     ) -> None:
         """Judge every packet that the nodes sent on this channel at this tick; (node, outbox) are in id order."""
-        name, ledger = self.name, self.ledger
+        name, ledger, center = self.name, self.ledger, self._center
         senders: list[int] = []
         ranks: list[int] = []
         payloads: list[bytes] = []
-        links: list[Ints] = []
+        addressees: list[int] = []
         sent: dict[int, int] = {}  # a node that answered late appears twice
         for node, outbox in outboxes:
             rank = sent.get(node, 0)
+            everyone = _EVERYONE if center is None or node == center else center
             for message in outbox:
                 if message.channel == name:
                     senders.append(node)
                     ranks.append(rank)
                     payloads.append(message.payload)
-                    links.append(self._audience(node) if message.to is None else self._link(node, message.to))
+                    addressees.append(everyone if message.to is None else message.to)
                     ledger.node_bytes[node] += len(message.payload)
                     rank += 1
             ledger.node_messages[node] += rank - sent.get(node, 0)
             sent[node] = rank
         if not senders:
             return
-        audience = list(map(len, links))
         traffic = Transmissions(scene, self.dt_s, np.array(senders), np.array(ranks), payloads)
-        link = np.concatenate(links)
-        transmission = np.repeat(np.arange(len(senders)), audience)
+        bound = None if faults and not self._bound_leads else self._bound
+        link, transmission = self._links_of(traffic, np.array(addressees), absent, off, bound)
         key = key_part(_stamp(traffic))[transmission]
-        ledger.send(link)
         packets = Packets(self.links, link, transmission, transmission, key)
-        for model in (*before, *self.models[: self._leading], *faults, *self.models[self._leading :]):
+        judges: list[PacketJudge] = [absent, off, *self.models[: self._leading], *faults, *self.models[self._leading :]]
+        for model in judges:
             if not len(packets):
                 return
             packets = self._apply(model.judge(traffic, packets), model, traffic, packets)
         self._enqueue(traffic, packets)
+
+    def _links_of(
+        self, traffic: Transmissions, to: Ints, absent: Absent, off: SwitchedOff, bound: PacketJudge | None
+    ) -> tuple[Ints, Ints]:
+        """Count all packets as sent. Return the links (k,) of those that models judge, and the transmissions (k,), ascending.
+
+        Broadcasts have the addressee `_EVERYONE` in `to` (t,).
+        """
+        sender, scene, ledger = traffic.sender, traffic.scene, self.ledger
+        broadcast = to == _EVERYONE
+        which, alone = np.flatnonzero(broadcast), np.flatnonzero(~broadcast)
+        link, transmission = self.links.rows(sender[alone], to[alone]), alone
+        ledger.send(link, addressed=True)
+        if not len(which):
+            return link, transmission
+        found = self._reach.find(scene, off.off, sender[which], _reach_m(bound))
+        ledger.broadcasts.add(sender[which], scene.present, off.off)
+        for reason, judge in (("absent", absent), ("off", off), ("beyond", bound)):
+            if judge is not None:
+                ledger.drop_unshown(reason, int(getattr(found, reason).sum()), judge.cause, judge.out_of_reach)
+        heard = np.repeat(which, found.counts)
+        near = self.links.rows(sender[heard], found.ids)
+        ledger.send(near)
+        if not len(alone):
+            return near, heard
+        transmission = np.concatenate([heard, transmission])
+        order = np.argsort(transmission, kind="stable")
+        return np.concatenate([near, link])[order], transmission[order]
 
     def _apply(self, verdict: Verdict, model: PacketJudge, traffic: Transmissions, packets: Packets) -> Packets:
         """Return the packets that remain after a verdict of `model`."""
@@ -146,7 +192,7 @@ class Channel:
         fresh = number > 0
         stamp = _stamp(traffic)[made.transmission] | made.copy.astype(np.uint64)
         made.key = np.where(fresh, key_part(stamp), made.key)
-        self.ledger.send(made.link[fresh])
+        self.ledger.send(made.link[fresh], addressed=True)
         self.ledger.copies += int(np.count_nonzero(fresh))
         return made
 
@@ -198,8 +244,21 @@ class Channel:
             links = self._audiences[sender] = self.links.rows(np.full(len(receivers), sender), receivers)
         return links
 
-    def _link(self, sender: int, to: int) -> Ints:
-        return self.links.rows(np.array([sender]), np.array([to]))
+
+def _shortest(models: Sequence[PacketJudge]) -> PacketJudge | None:
+    """Return the model with the shortest reach among those that no model with a memory precedes, or None without a bound."""
+    found: PacketJudge | None = None
+    for model in models:
+        if _reach_m(model) < _reach_m(found):
+            found = model
+        if not getattr(model, "memoryless", False):
+            break
+    return found
+
+
+def _reach_m(model: PacketJudge | None) -> float:
+    """Return the distance beyond which a model receives no broadcast [m]; infinite for one that states none."""
+    return float(getattr(model, "reach_m", math.inf))
 
 
 def _stamp(traffic: Transmissions) -> NDArray[np.uint64]:

@@ -1,24 +1,34 @@
 """Ledger: counts of sent, delivered and dropped packets, by link of a channel and by cause.
 
 At every tick and for every link: sent = delivered + dropped, by cause + in flight. Dropped packets are out of reach (their
-receivers were), or losses. A copy that the medium made counts as sent, and as a copy; a damaged packet that arrives counts as
-delivered, and as damaged. The age of information of a link is the time since its newest delivered packet was sent, from its
-first delivery on.
+receivers were), or losses. Broadcast packets that no model saw are counted by cause, and get a link on request only
+(`by_link`): they are part of the totals, and not of the columns `sent`, `dropped` and `out_of_reach`.
+
+A copy that the medium made counts as sent, and as a copy; a damaged packet that arrives counts as delivered, and as damaged.
+The age of information of a link is the time since its newest delivered packet was sent, from its first delivery on.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from zwerm.world.radio.broadcast_log import BroadcastLog
 from zwerm.world.radio.links import Column, Links
 from zwerm.world.scene import Floats, Ints
 
 
-class Ledger:
-    """The ledger of one channel, among `nodes` nodes."""
+class UnshownCause(NamedTuple):
+    """The cause under which broadcast packets that no model saw are counted, and whether their receivers are out of reach."""
 
-    def __init__(self, links: Links, nodes: int, dt_s: float) -> None:
+    cause: str
+    out_of_reach: bool
+
+
+class Ledger:
+    """The ledger of one channel, among `nodes` nodes. `broadcasts` are those to all `members`."""
+
+    def __init__(self, links: Links, nodes: int, dt_s: float, members: range) -> None:
         self.copies = 0
         self.damaged = 0
         self.delay_ticks = 0  # from sending to delivery, over all delivered packets
@@ -30,6 +40,9 @@ class Ledger:
         self._delivered = links.integers()
         self._lost: dict[str, Column] = {}  # by cause
         self._out_of_reach: dict[str, Column] = {}
+        self.broadcasts = BroadcastLog(members, nodes)
+        self._addressed = links.integers()  # packets with an addressee, and copies
+        self._unshown: dict[str, tuple[UnshownCause, int]] = {}  # by the field of `Unshown` that tells their links
         # Age of information [ticks]: sending of the newest packet, its delivery, the sum of ages, the largest age.
         self._newest = links.integers(-1)
         self._since = links.integers()
@@ -37,9 +50,11 @@ class Ledger:
         self._age_peak = links.numbers()
         self._age_ticks = links.integers()
 
-    def send(self, link: Ints) -> None:
-        """Count packets sent on `link` (k,)."""
+    def send(self, link: Ints, addressed: bool = False) -> None:
+        """Count packets sent on `link` (k,): broadcast ones, or ones with an addressee and copies."""
         np.add.at(self._sent.values, link, 1)
+        if addressed:
+            np.add.at(self._addressed.values, link, 1)
 
     def drop(self, link: Ints, cause: str, out_of_reach: bool = False) -> None:
         """Count packets dropped on `link` (k,), with receivers in reach or out of it."""
@@ -49,6 +64,12 @@ class Ledger:
             if column is None:
                 column = columns[cause] = self._links.integers()
             np.add.at(column.values, link, 1)
+
+    def drop_unshown(self, reason: str, count: int, cause: str, out_of_reach: bool) -> None:
+        """Count broadcast packets that no model saw, for a `reason` that is a field of `Unshown`."""
+        if count:
+            before = self._unshown[reason][1] if reason in self._unshown else 0
+            self._unshown[reason] = UnshownCause(cause, out_of_reach), before + count
 
     def deliver(self, link: Ints, sent_tick: Ints, tick: int) -> None:
         """Count packets received at `tick` on `link` (k,) that were sent at `sent_tick` (k,)."""
@@ -70,6 +91,29 @@ class Ledger:
         self._since.values[link] = tick
 
     # --- totals -----------------------------------------------------------------------------------------------------
+
+    def sent_total(self) -> int:
+        """Return the packets sent."""
+        return int(self.sent().sum()) + sum(count for _, count in self._unshown.values())
+
+    def dropped_total(self) -> dict[str, int]:
+        """Return the packets dropped, by cause; causes are sorted."""
+        found = {cause: int(column.sum()) for cause, column in self.dropped().items()}
+        for (cause, _), count in self._unshown.values():
+            found[cause] = found.get(cause, 0) + count
+        return {cause: count for cause, count in sorted(found.items()) if count}
+
+    def out_of_reach_total(self) -> int:
+        """Return the packets dropped because their receivers were out of reach."""
+        return int(self.out_of_reach().sum()) + sum(count for (_, out), count in self._unshown.values() if out)
+
+    def link_count(self) -> int:
+        """Return the number of links in `by_link`."""
+        senders = self.broadcasts.senders()
+        others = ~np.isin(self._of_links(self._links.sender), senders)
+        return self.broadcasts.link_count() + int(np.count_nonzero(others))
+
+    # --- by link, packets that no model saw left out ------------------------------------------------------------------
 
     def sent(self) -> Ints:
         """Return the packets sent, by link."""
@@ -130,26 +174,53 @@ class Ledger:
         mean = np.divide(total, ticks, out=np.full(len(ticks), np.nan), where=counted)
         return mean * self._dt_s, np.where(counted, peak, np.nan) * self._dt_s
 
-    def order(self) -> Ints:
-        """Return the rows of the links, sorted by sender and receiver."""
-        return np.lexsort((self._of_links(self._links.receiver), self._of_links(self._links.sender)))
+    def by_link(self, tick: int | None = None) -> dict[str, Any]:
+        """Return the counts of all links as columns, sorted by sender and receiver, for a JSON encoder.
 
-    def by_link(self) -> dict[str, Any]:
-        """Return the counts of all links as columns, sorted by sender and receiver, for a JSON encoder."""
+        Packets that no model saw are among them: the cost grows with all pairs. With `tick`, there are columns of the mean and
+        the largest age of information up to it [s], None before the first delivery.
+        """
         sender, receiver = self._of_links(self._links.sender), self._of_links(self._links.receiver)
-        order = self.order()
-        return {
-            "sender": sender[order].tolist(),
-            "receiver": receiver[order].tolist(),
-            "sent": self.sent()[order].tolist(),
-            "delivered": self.delivered()[order].tolist(),
-            "dropped": {cause: column[order].tolist() for cause, column in self.dropped().items()},
-            "out_of_reach": self.out_of_reach()[order].tolist(),
-            "in_flight": self.in_flight()[order].tolist(),
+        unshown = self.broadcasts.unshown(sender, receiver, self.sent() - self._of(self._addressed))
+        nodes = len(self.node_messages)
+        known, extra = sender * nodes + receiver, unshown.sender * nodes + unshown.receiver
+        links = np.union1d(known, extra)
+        at, extra_at = np.searchsorted(links, known), np.searchsorted(links, extra)
+
+        def column(values: NDArray[Any], fill: float = 0) -> NDArray[Any]:
+            whole = np.full(len(links), fill, dtype=values.dtype)
+            whole[at] = values
+            return whole
+
+        sent, out_of_reach = column(self.sent()), column(self.out_of_reach())
+        dropped = {cause: column(values) for cause, values in self.dropped().items()}
+        for reason, ((cause, out), _) in self._unshown.items():
+            count = getattr(unshown, reason)
+            sent[extra_at] += count
+            dropped.setdefault(cause, np.zeros(len(links), dtype=np.int64))[extra_at] += count
+            if out:
+                out_of_reach[extra_at] += count
+        found = {
+            "sender": (links // nodes).tolist(),
+            "receiver": (links % nodes).tolist(),
+            "sent": sent.tolist(),
+            "delivered": column(self.delivered()).tolist(),
+            "dropped": {cause: values.tolist() for cause, values in sorted(dropped.items())},
+            "out_of_reach": out_of_reach.tolist(),
+            "in_flight": column(self.in_flight()).tolist(),
         }
+        if tick is not None:
+            mean_s, peak_s = (column(ages, np.nan) for ages in self.link_ages_s(tick))
+            found |= {"age_mean_s": _numbers(mean_s), "age_max_s": _numbers(peak_s)}
+        return found
 
     def _of(self, column: Column) -> NDArray[Any]:
         return self._of_links(column.values)
 
     def _of_links(self, values: NDArray[Any]) -> NDArray[Any]:
         return values[: self._links.count]
+
+
+def _numbers(values: Floats) -> list[float | None]:
+    """Return numbers for JSON: None in place of nan."""
+    return [None if value != value else value for value in values.tolist()]

@@ -5,49 +5,20 @@ switched off receives nothing: packets that are sent to it or due to it are drop
 ledger of every link is compared with the packets in flight at every tick.
 """
 
+from collections import Counter
 from collections.abc import Sequence
-from typing import Any, ClassVar
-
-import numpy as np
+from typing import Any
 
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Packet, Transmission
 from zwerm.world.arena.arena import Arena
-from zwerm.world.radio import ROBOTS, UPLINK, PacketJudge, Packets, Transmissions, Verdict
+from zwerm.world.radio import ROBOTS, UPLINK, PacketJudge
+from zwerm.world.radio.availability import Absent, SwitchedOff
 from zwerm.world.radio.channel import Channel, Outboxes
 from zwerm.world.radio.links import Links
 from zwerm.world.radio.registry import make_models
-from zwerm.world.scene import Bools, Scene
-
-
-class Absent:
-    """Drops packets to robots that are not in the arena. Nodes without a body are always present."""
-
-    cause: ClassVar[str] = "absent"
-    out_of_reach: ClassVar[bool] = True
-
-    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
-        """Check the presence of the receivers."""
-        present = sent.scene.present
-        if present.all():
-            return Verdict()
-        receiver = packets.receiver
-        return Verdict((receiver < len(present)) & ~present[np.minimum(receiver, len(present) - 1)])
-
-
-class SwitchedOff:
-    """Drops packets to nodes whose programs do not run: crashed, or not started yet."""
-
-    cause: ClassVar[str] = "receiver-down"
-    out_of_reach: ClassVar[bool] = True
-
-    def __init__(self, nodes: int) -> None:
-        self.off: Bools = np.zeros(nodes, dtype=np.bool_)
-
-    def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
-        """Check the status of the receivers."""
-        return Verdict(self.off[packets.receiver]) if self.off.any() else Verdict()
+from zwerm.world.scene import Scene
 
 
 class Medium:
@@ -62,7 +33,7 @@ class Medium:
         self.faults: dict[str, list[PacketJudge]] = {ROBOTS: [], UPLINK: []}  # the active ones, by channel
         self._off = SwitchedOff(nodes)
         self._causes: dict[int, str] = {}
-        self._before: list[PacketJudge] = [Absent(), self._off]
+        self._absent = Absent()
         tables = {ROBOTS: scenario.radio, UPLINK: scenario.uplink}
         self._check = any(table.check for table in tables.values() if table is not None)
         members: dict[str, tuple[range, int | None]] = (
@@ -80,10 +51,10 @@ class Medium:
 
     def arrive(self, tick: int) -> Sequence[int]:
         """Move packets that are due at `tick` to the inboxes; return the nodes with packets in them, in id order."""
-        off = self._off.off
+        off = self._off
         for channel in self.channels.values():
-            if off.any():
-                for receiver, link in zip(*channel.queue.remove_due(tick, off), strict=True):
+            if off.any:
+                for receiver, link in zip(*channel.queue.remove_due(tick, off.off), strict=True):
                     channel.ledger.drop(link[None], self._causes[int(receiver)])
             channel.queue.arrive(tick)
         if self._check:
@@ -105,24 +76,24 @@ class Medium:
     def send(self, scene: Scene, outboxes: Outboxes) -> None:
         """Judge every packet that the nodes sent at this tick; (node, outbox) are in id order."""
         for name, channel in self.channels.items():
-            channel.send(scene, outboxes, self._before, self.faults[name])
+            channel.send(scene, outboxes, self._absent, self._off, self.faults[name])
 
     def stopped(self, name: str, scene: Scene, numbers: Sequence[int]) -> list[tuple[int, int]]:
         """Return the pairs of a channel that are blocked now, by faults or by its models with these `numbers`."""
         channel = self.channels[name]
         chosen = [channel.models[number] for number in numbers]
-        return channel.stopped(scene, [*self._before, *self.faults[name], *chosen])
+        return channel.stopped(scene, [self._absent, self._off, *self.faults[name], *chosen])
 
     def switch_off(self, node: int, cause: str) -> None:
         """Let a node receive nothing; drop the packets in its inbox, and those that become due, for `cause`."""
-        self._off.off[node] = True
+        self._off.switch(node, True)
         self._causes[node] = cause
         for channel in self.channels.values():
             channel.ledger.drop(channel.queue.remove_to(node), cause)
 
     def switch_on(self, node: int) -> None:
         """Let a node receive again; drop the undelivered packets of its former incarnation."""
-        self._off.off[node] = False
+        self._off.switch(node, False)
         self._causes.pop(node, None)
         for channel in self.channels.values():
             channel.ledger.drop(channel.queue.remove_from(node), "stale-incarnation")
@@ -148,17 +119,16 @@ class Medium:
 
         `out_of_reach` are the dropped packets with receivers out of reach. `bytes` are payload, counted once a transmission.
         """
-        dropped: dict[str, int] = {}
-        for channel in self.channels.values():
-            for cause, column in channel.ledger.dropped().items():
-                dropped[cause] = dropped.get(cause, 0) + int(column.sum())
         ledgers = [channel.ledger for channel in self.channels.values()]
+        dropped: Counter[str] = Counter()
+        for each in ledgers:
+            dropped.update(each.dropped_total())
         return {
-            "sent": sum(int(each.sent().sum()) for each in ledgers),
+            "sent": sum(each.sent_total() for each in ledgers),
             "delivered": sum(int(each.delivered().sum()) for each in ledgers),
             "dropped": {cause: count for cause, count in sorted(dropped.items()) if count},
             "in_flight": sum(int(each.in_flight().sum()) for each in ledgers),
-            "out_of_reach": sum(int(each.out_of_reach().sum()) for each in ledgers),
+            "out_of_reach": sum(each.out_of_reach_total() for each in ledgers),
             "bytes": sum(int(each.node_bytes.sum()) for each in ledgers),
             "copies": sum(each.copies for each in ledgers),
             "damaged": sum(each.damaged for each in ledgers),

@@ -6,7 +6,7 @@ receiver gets it later. An inbox is sorted by arrival, then by sending, then by 
 
 from collections.abc import Sequence
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,14 @@ class PacketBatch:
         )
 
 
+class _Arrived(NamedTuple):
+    """Packets that arrived at one tick, by receiver: those of node n are in rows `starts[n]` to `starts[n + 1]`."""
+
+    batch: PacketBatch
+    receivers: list[int]  # ascending
+    starts: list[int]  # (nodes + 1,)
+
+
 class PacketQueue:
     """The packets of one channel among `nodes` nodes."""
 
@@ -52,6 +60,7 @@ class PacketQueue:
         self._ids: NDArray[Any] = np.arange(nodes + 1, dtype=np.uint16 if nodes < 65_536 else np.int64)
         self._due: dict[int, list[PacketBatch]] = {}
         self._inboxes: dict[int, list[PacketBatch]] = {}
+        self._arrived: _Arrived | None = None  # packets of this tick that are not in `_inboxes` yet
 
     def push(self, batch: PacketBatch, due: Ints | int) -> None:
         """Add packets that are due at one tick, or each (k,) at its own."""
@@ -77,15 +86,34 @@ class PacketQueue:
         order = np.argsort(receiver.astype(self._ids.dtype), kind="stable")
         arrived = arrived.take(order)
         starts = np.searchsorted(arrived.receiver.astype(self._ids.dtype), self._ids)
-        for node in np.flatnonzero(starts[1:] > starts[:-1]).tolist():
-            self._inboxes.setdefault(node, []).append(arrived.take(slice(starts[node], starts[node + 1])))
+        self._distribute()
+        self._arrived = _Arrived(arrived, np.flatnonzero(starts[1:] > starts[:-1]).tolist(), starts.tolist())
+
+    def _distribute(self) -> None:
+        """Give the packets that arrived last to the inboxes of their receivers."""
+        if self._arrived is None:
+            return
+        batch, receivers, starts = self._arrived
+        self._arrived = None
+        for node in receivers:
+            self._inboxes.setdefault(node, []).append(batch.take(slice(starts[node], starts[node + 1])))
 
     def waiting(self) -> Sequence[int]:
         """Return the nodes with packets in their inboxes, in id order."""
-        return sorted(self._inboxes)
+        if self._arrived is None:
+            return sorted(self._inboxes)
+        return sorted({*self._inboxes, *self._arrived.receivers}) if self._inboxes else self._arrived.receivers
 
     def collect(self, nodes: Sequence[int]) -> tuple[dict[int, tuple[Packet, ...]], Ints, Ints]:
         """Empty the inboxes of `nodes`; return their packets, and the link (k,) and tick of sending (k,) of each packet."""
+        arrived = self._arrived
+        if arrived is not None and not self._inboxes and set(arrived.receivers).issubset(nodes):
+            # All inboxes are emptied in the tick in which they were filled: no need to fill them.
+            self._arrived = None
+            packets, starts = arrived.batch.packets.tolist(), arrived.starts
+            whole = {node: tuple(packets[starts[node] : starts[node + 1]]) for node in arrived.receivers}
+            return whole, arrived.batch.link, arrived.batch.sent_tick
+        self._distribute()
         handed: dict[int, tuple[Packet, ...]] = {}
         taken: list[PacketBatch] = []
         for node in nodes:
@@ -99,6 +127,7 @@ class PacketQueue:
 
     def remove_to(self, receiver: int) -> Ints:
         """Empty an inbox; return the links (k,) of its packets."""
+        self._distribute()
         batches = self._inboxes.pop(receiver, ())
         return np.concatenate([_NOTHING, *(batch.link for batch in batches)])
 
@@ -120,6 +149,7 @@ class PacketQueue:
 
     def remove_from(self, sender: int) -> Ints:
         """Remove all packets of `sender` that are not delivered yet; return their links (k,)."""
+        self._distribute()
         removed = [_NOTHING]
         for boxes in (self._due, self._inboxes):
             for key in list(boxes):
@@ -137,6 +167,7 @@ class PacketQueue:
 
     def in_flight(self, links: int) -> Ints:
         """Count the packets that are sent and not delivered yet, by link (links,)."""
+        self._distribute()
         counts = np.zeros(links, dtype=np.int64)
         for boxes in (self._due, self._inboxes):
             for batches in boxes.values():

@@ -41,6 +41,7 @@ class Selected:
     def __init__(self, model: RadioModel, senders: Bools, receivers: Bools) -> None:
         self.cause = model.cause
         self.out_of_reach = model.out_of_reach
+        self.memoryless = model.memoryless
         self._model = model
         self._senders = senders
         self._receivers = receivers

@@ -5,7 +5,6 @@ from typing import Any, Final
 import numpy as np
 
 from zwerm.world.radio.medium import Medium
-from zwerm.world.scene import Floats
 
 # Largest number of links with counts of their own in the JSON object.
 LINKS_IN_JSON_MAX: Final = 10_000
@@ -20,16 +19,13 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
     channel = medium.channels[name]
     ledger = channel.ledger
     age = ledger.ages_s(tick)
-    links = None
-    if channel.links.count <= LINKS_IN_JSON_MAX:
-        mean_s, peak_s = (_numbers(ages[ledger.order()]) for ages in ledger.link_ages_s(tick))
-        links = ledger.by_link() | {"age_mean_s": mean_s, "age_max_s": peak_s}
+    links = ledger.by_link(tick) if ledger.link_count() <= LINKS_IN_JSON_MAX else None
     delivered = int(ledger.delivered().sum())
     return {
-        "sent": int(ledger.sent().sum()),
+        "sent": ledger.sent_total(),
         "delivered": delivered,
-        "dropped": {cause: int(column.sum()) for cause, column in ledger.dropped().items() if column.any()},
-        "out_of_reach": int(ledger.out_of_reach().sum()),
+        "dropped": ledger.dropped_total(),
+        "out_of_reach": ledger.out_of_reach_total(),
         "in_flight": int(ledger.in_flight().sum()),
         "messages": ledger.node_messages.tolist(),
         "message_bytes": ledger.node_bytes.tolist(),
@@ -40,11 +36,6 @@ def _channel(medium: Medium, name: str, tick: int) -> dict[str, Any]:
     }
 
 
-def _numbers(values: Floats) -> list[float | None]:
-    """Return numbers for JSON: None in place of nan."""
-    return [None if value != value else value for value in values.tolist()]
-
-
 def messages(medium: Medium) -> int:
     """Return the number of transmissions of all nodes over all channels; a broadcast is one."""
     return sum(int(channel.ledger.node_messages.sum()) for channel in medium.channels.values())
@@ -53,12 +44,12 @@ def messages(medium: Medium) -> int:
 def radio_metrics(medium: Medium, robots: int, tick: int) -> dict[str, float]:
     """Return the metrics of a radio over all channels; empty if no node sent a packet."""
     ledgers = [channel.ledger for channel in medium.channels.values()]
-    sent = sum(int(each.sent().sum()) for each in ledgers)
+    sent = sum(each.sent_total() for each in ledgers)
     if not sent:
         return {}
     messages = np.sum([each.node_messages[:robots] for each in ledgers], axis=0)
     message_bytes = np.sum([each.node_bytes[:robots] for each in ledgers], axis=0)
-    out_of_reach = sum(int(each.out_of_reach().sum()) for each in ledgers)
+    out_of_reach = sum(each.out_of_reach_total() for each in ledgers)
     found = {"out_of_reach_fraction": out_of_reach / sent}
     if sent > out_of_reach:
         found["delivered_fraction"] = sum(int(each.delivered().sum()) for each in ledgers) / (sent - out_of_reach)

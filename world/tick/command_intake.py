@@ -107,6 +107,14 @@ class CommandIntake:
             self._newest[node] = answer.tick
         return answer
 
+    def is_pending(self, node: int) -> bool:
+        """Tell whether a node's answer to the observation of this tick has not been accepted."""
+        return node in self._pending
+
+    def newest_tick(self, node: int) -> int:
+        """Return the tick of the newest answer accepted from a node, where answers may be late; -1 for none."""
+        return self._newest.get(node, -1)
+
     def pending(self) -> list[int]:
         """Return the observed nodes whose answer has not been accepted, ascending."""
         return list(self._pending)
@@ -137,10 +145,11 @@ class CommandIntake:
     def _check_content(self, node: int, command: Command) -> None:
         """Raise ProtocolError for a command that this world cannot carry out."""
         if command.drive is not None and type(command.drive) is not self._drive:
-            raise ProtocolError("wrong-drive", f"a {self._body} body takes no {command.drive!r}")
+            expected = f"a {self._body} body takes {self._drive.__name__}"
+            raise ProtocolError("wrong-drive", f"drive: {expected}, got {command.drive!r}")
         if command.drive is not None and node in self._fixed:
-            raise ProtocolError("wrong-drive", f"node {node} has no drive")
+            raise ProtocolError("wrong-drive", f"drive: node {node} has no drive, got {command.drive!r}")
         for message in command.outbox:
             refused = self._addressing.refuses(node, message)
             if refused:
-                raise ProtocolError("wrong-packet", refused)
+                raise ProtocolError("wrong-packet", f"outbox: {refused}")

@@ -1,8 +1,8 @@
 """Completion: the one rule that decides when a run ends, and with which outcome.
 
 A run ends for one of these reasons, in this order of precedence: a node crashed and the scenario says `robots.on_crash
-= "fail"`; a deciding node gave up; the task is done; the time limit is reached. Both drivers ask the same rule after
-every tick.
+= "fail"`; a deciding node gave up; the task is done; every robot is lost for good; the time limit is reached. Both drivers
+ask the same rule after every tick.
 """
 
 from collections.abc import Collection, Mapping
@@ -100,4 +100,6 @@ class Completion:
             return Ending(FAILED, self._gave_up)
         if self.completed(exited, dead):
             return Ending(COMPLETED)
+        if len(dead) >= self._robots and all(robot in dead for robot in range(self._robots)):
+            return Ending(FAILED, "every robot was lost")
         return Ending(TIME_LIMIT) if tick >= self._last_tick else None

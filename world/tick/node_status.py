@@ -37,6 +37,7 @@ class NodeStatus:
         self.answer_ticks: Ints = np.full(nodes, FULL_SPEED_TICKS)  # ticks that a node takes over an answer
         self.withheld: Bools = np.zeros(nodes, dtype=np.bool_)  # nodes that the driver excludes from observation
         self.crashed: dict[int, str] = {}  # the reason by node, of programs that ended on their own, in order
+        self.crash_ticks: dict[int, int] = {}  # the tick of the newest such end, by node
         self.failures: dict[int, Failure] = {}  # of controllers that raised
         self.gone: Sequence[int] = ()  # nodes that a fault keeps down to the end of the run
         self.history: dict[Event, list[int]] = {}  # the nodes to which each event ever happened, in order

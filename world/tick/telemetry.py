@@ -7,7 +7,7 @@ of each known name of each node, and what listeners of the sink compute, do not 
 """
 
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple, Self
 
@@ -26,9 +26,9 @@ DROPPED: Final = "telemetry_dropped"
 
 
 class TelemetryRecord(NamedTuple):
-    """The report of one command of a node, and the robots' true positions at that tick.
+    """What one command of a node reported, and the truth at that tick. The arrays must not be changed.
 
-    The arrays must not be changed.
+    `down` are the nodes whose programs did not run then, ascending.
     """
 
     tick: int
@@ -38,6 +38,7 @@ class TelemetryRecord(NamedTuple):
     snapshot: bytes
     position: Floats  # (n, 2) [m]
     present: Bools  # (n,)
+    down: Sequence[int] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,13 +84,14 @@ class TelemetrySink:
         self._names: dict[str, int] = {}
         self._tick, self._node, self._name, self._value = array("q"), array("i"), array("h"), array("d")
 
-    def accept(self, scene: Scene, node: int, command: Command) -> None:
-        """Take the telemetry and the snapshot of a command."""
+    def accept(self, scene: Scene, node: int, command: Command, down: Bools | None = None) -> None:
+        """Take the telemetry and the snapshot of a command; `down` (nodes,) tells whose programs do not run."""
         if not command.telemetry and not command.snapshot:
             return
         numbers = {name: float(value) for name, value in command.telemetry.items()}
         record = TelemetryRecord(
-            scene.tick, scene.time_s, node, numbers, command.snapshot, scene.position, scene.present
+            *(scene.tick, scene.time_s, node, numbers, command.snapshot, scene.position, scene.present),
+            () if down is None else np.flatnonzero(down).tolist(),
         )
         if numbers:
             self._keep_numbers(scene.tick, node, numbers)

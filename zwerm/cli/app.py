@@ -19,7 +19,7 @@ import typer
 from typer.core import TyperGroup
 
 from zwerm.catalogue import COMMANDS
-from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err
+from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, reserve_stdout
 from zwerm.version import __version__
 
 HELP: Final = (
@@ -68,7 +68,7 @@ app = typer.Typer(
     name="zwerm",
     cls=LazyGroup,
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -90,13 +90,17 @@ def _interrupt(signum: int, frame: FrameType | None) -> None:
 def main() -> None:
     """Run the command line. Modules in the current directory are importable: a scenario or a command can name them."""
     sys.path.insert(0, str(Path.cwd()))
-    signal.signal(signal.SIGTERM, _interrupt)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores hang-ups
+            signal.signal(number, _interrupt)
     try:
         if ":" in "".join(sys.argv[1:2]):
             from zwerm.cli.user_command import run_user_command
 
             run_user_command(sys.argv[1], sys.argv[2:])
         else:
+            if "--json" in sys.argv:
+                reserve_stdout()
             app()
     except KeyboardInterrupt:
         err.print("zwerm: interrupted", style="red")

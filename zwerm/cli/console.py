@@ -1,6 +1,5 @@
 """Progress bars of a run, and the tables printed at its end."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
@@ -76,8 +75,13 @@ FILE_KINDS: Final = {
 }
 
 
-def print_result(console: Console, result: "RunResult", written: Sequence[Path]) -> None:
-    """Print the outcome of a run, its metrics, its packet counts, and the paths of its files."""
+def print_file(console: Console, path: Path) -> None:
+    """Print the path of a file that a run has written, and what it is."""
+    console.print(f"{FILE_KINDS[path.suffix.lower()]}: {path}", markup=False, highlight=False, soft_wrap=True)
+
+
+def print_result(console: Console, result: "RunResult") -> None:
+    """Print the outcome of a run, its metrics and its packet counts."""
     table = Table(title=result.title, title_justify="left", show_header=False, box=None, padding=(0, 2, 0, 0))
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
@@ -106,6 +110,4 @@ def print_result(console: Console, result: "RunResult", written: Sequence[Path])
         table.add_row("faults that never came", ", ".join(result.missed_faults))
     table.add_row("wall time", f"{result.wall_s:.1f} s, {rate:,.0f} robot-ticks/s, {result.runner}")
     table.add_row("trace", result.trace)
-    for path in written:
-        table.add_row(FILE_KINDS[path.suffix.lower()], str(path))
     console.print(table)

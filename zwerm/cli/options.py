@@ -1,6 +1,7 @@
 """Arguments and options that several commands share, with their help texts."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Final, Optional
 
@@ -17,7 +18,24 @@ def check_endpoint(option: str, endpoint: str) -> None:
         raise ScenarioError([f"{option}: expected an endpoint such as tcp/0.0.0.0:7447, got {endpoint!r}"])
 
 
-ScenarioName = Annotated[str, typer.Argument(help="A built-in scenario (see `zwerm list`) or a TOML file.")]
+def built_in_names(*folders: str) -> Callable[[str], list[str]]:
+    """Return the function by which the shell completes the names of built-in files, and of TOML files."""
+
+    def complete(incomplete: str) -> list[str]:
+        package = Path(__file__).parents[1]
+        names = sorted(path.stem for folder in folders for path in (package / folder).glob("*.toml"))
+        files = sorted(map(str, Path().glob("*.toml")))
+        return [name for name in (*names, *files) if name.startswith(incomplete)]
+
+    return complete
+
+
+ScenarioName = Annotated[
+    str,
+    typer.Argument(
+        help="A built-in scenario (see `zwerm list`) or a TOML file.", autocompletion=built_in_names("scenarios")
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Keys all randomness of the run.")]
 Sets = Annotated[
     Optional[list[str]],  # noqa: UP045 - typer reads it
@@ -32,6 +50,21 @@ Picture = Annotated[
         metavar="FILE",
         help="Where to draw the run: .png, .pdf or .svg; runs/SCENARIO-seedN.png by default. Settings are part of the name.",
     ),
+]
+PictureSize = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--size", metavar="WIDTHxHEIGHT", help="Greatest size of the arena in pictures [inches], such as 3.4x3."
+    ),
+]
+Bare = Annotated[bool, typer.Option("--bare", help="Draw the arena only: no title, numbers, legend or curve.")]
+ColourBy = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--colour-by", "--color-by", metavar="NAME", help="Colour robots by this telemetry."),
+]
+Links = Annotated[
+    Optional[bool],  # noqa: UP045
+    typer.Option("--links/--no-links", help="Connect robots whose packets have arrived."),
 ]
 PictureAt = Annotated[
     Optional[list[str]],  # noqa: UP045

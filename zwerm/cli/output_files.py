@@ -4,7 +4,6 @@ import os
 import re
 import shutil
 from collections.abc import Sequence
-from hashlib import blake2b
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -58,5 +57,7 @@ def run_stem(name: str, seed: int, overrides: Sequence[str] = ()) -> str:
     """Return the name of a run's files, without a suffix: scenario, seed and settings."""
     slug = "-".join(re.sub(r"[^A-Za-z0-9.=_+-]+", "-", each).strip("-") for each in overrides)
     if len(slug) > _SLUG_CHARS_MAX:
+        from hashlib import blake2b  # 10 ms that most commands do not need
+
         slug = f"{slug[:_SLUG_CHARS_MAX]}-{blake2b(repr(overrides).encode(), digest_size=4).hexdigest()}"
     return f"{name}-seed{seed}" + (f"-{slug}" if slug else "")

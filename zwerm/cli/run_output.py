@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 import typer
 
-from zwerm.cli.console import RunProgress, print_result
+from zwerm.cli.console import RunProgress, print_file, print_result
 from zwerm.cli.output_files import ANIMATIONS, PICTURES, RECORDINGS, OutputFile, check_outputs, run_stem
 from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, out, print_json
@@ -20,6 +20,7 @@ from zwerm.run.result import RunResult
 
 NO_PICTURE: Final = "no picture is drawn: matplotlib is not installed; pip install matplotlib"
 
+_SIZE: Final = re.compile(r"\d+(\.\d+)?x\d+(\.\d+)?")
 _MOMENT: Final = re.compile(r"(?P<cycle>\d+)|(?P<at_s>\d+(\.\d+)?)s")
 
 
@@ -37,6 +38,10 @@ class RunOutput:
     radio_table: int | None
     as_json: bool
     record: Path | None = None
+    size: str | None = None
+    bare: bool = False
+    colour_by: str | None = None
+    links: bool | None = None
 
     def __post_init__(self) -> None:
         diagnostics = [
@@ -44,6 +49,8 @@ class RunOutput:
             for each in self.moments
             if not _MOMENT.fullmatch(each)
         ]
+        if self.size is not None and (not _SIZE.fullmatch(self.size) or 0.0 in self._style["size_in"]):
+            diagnostics.append(f"--size: expected WIDTHxHEIGHT in inches, such as 3.4x3, got {self.size!r}")
         files = [
             OutputFile("--picture", self.picture, PICTURES, "matplotlib", "all"),
             OutputFile("--animate", self.animation, ANIMATIONS, "matplotlib", "all"),
@@ -59,34 +66,34 @@ class RunOutput:
             raise ScenarioError(diagnostics)
 
     @property
+    def _style(self) -> dict[str, Any]:
+        size = None if self.size is None else tuple(map(float, self.size.split("x")))
+        return {"size_in": size, "bare": self.bare, "colour_by": self.colour_by, "links": self.links}
+
+    @property
     def draws_by_default(self) -> bool:
         """Tell whether a picture is drawn although no option asks for it."""
         return self.picture is None and not self.as_json
 
     def report(self, result: RunResult) -> NoReturn:
-        """Draw and print the result, and exit with the status of its outcome."""
-        written, errors = self._draw_stills(result)
-        if result.scenario.random_faults is not None and not self.as_json:
-            _attempt(lambda: _write_faults(result), written, errors)
-        if self.animation is not None:
-            path = self.animation
-            with RunProgress(err, "animation", quiet=self.as_json) as progress:
-                _attempt(lambda: result.animate(path, progress.ticked), written, errors)
-        if self.record is not None:
-            written.append(self.record)
+        """Print the result, then write its files, and exit with the status of its outcome.
+
+        The result comes first: a full disk, or Ctrl-C while a picture is drawn, does not lose it.
+        """
         print_tracebacks(err, result.tracebacks)
         if self.as_json:
             print_json(result.as_json())
         else:
-            print_result(out, result, written)
+            print_result(out, result)
             if self.radio_table is not None:
                 print_radio_ledger(out, result.radio, self.radio_table)
             if self.draws_by_default and self._lacks_matplotlib:
                 err.print(NO_PICTURE, highlight=False, markup=False, soft_wrap=True)
-        if errors:
-            raise PictureError("\n".join(errors))
         if result.reason:
             err.print(f"zwerm: {result.reason}", style="red", markup=False, highlight=False, soft_wrap=True)
+        errors = [*result.problems, *self._write_files(result)]
+        if errors:
+            raise PictureError("\n".join(errors))
         if result.outcome == "interrupted":
             raise typer.Exit(EXIT_INTERRUPTED)
         raise typer.Exit(0 if result.ok else EXIT_FAILED)
@@ -95,37 +102,46 @@ class RunOutput:
     def _lacks_matplotlib(self) -> bool:
         return find_spec("matplotlib") is None
 
-    def _draw_stills(self, result: RunResult) -> tuple[list[Path], list[str]]:
-        """Return the pictures drawn, and the errors of those that were not; the result is still printed."""
-        drawn: list[Path] = []
-        errors: list[str] = []
+    def _write_files(self, result: RunResult) -> list[str]:
+        """Write pictures, faults and animation, and print the path of each. Return why some cannot be written."""
         path = self.picture or Path("runs") / f"{_stem(result)}.png"
+        files: list[Callable[[], Path]] = []
+        if self.record is not None and not result.problems:
+            files.append(partial(Path, self.record))
         if self.picture is not None or (self.draws_by_default and not self._lacks_matplotlib):
-            _attempt(lambda: result.picture(path), drawn, errors)
-        for moment in self.moments:
-            _attempt(partial(_draw_moment, result, path, moment), drawn, errors)
-        return drawn, errors
+            files.append(lambda: result.picture(path, **self._style))
+        files += [partial(_draw_moment, result, path, moment, self._style) for moment in self.moments]
+        if result.scenario.random_faults is not None and not self.as_json:
+            files.append(lambda: _write_faults(result))
+        if self.animation is not None:
+            files.append(partial(self._animate, result, self.animation))
+        errors: list[str] = []
+        for write in files:
+            try:
+                written = write()
+            except (ZwermError, OSError) as error:
+                errors.append(str(error))
+            else:
+                if not self.as_json:
+                    print_file(out, written)
+        return errors
 
-
-def _attempt(write: Callable[[], Path], written: list[Path], errors: list[str]) -> None:
-    """Add the file that `write` writes to `written`, or the line that says why it could not."""
-    try:
-        written.append(write())
-    except (ZwermError, OSError) as error:
-        errors.append(str(error))
+    def _animate(self, result: RunResult, path: Path) -> Path:
+        with RunProgress(err, "animation", quiet=self.as_json) as progress:
+            return result.animate(path, progress.ticked, **self._style)
 
 
 def _stem(result: RunResult) -> str:
     return run_stem(result.scenario.name, result.seed, result.scenario.overrides)
 
 
-def _draw_moment(result: RunResult, final: Path, moment: str) -> Path:
+def _draw_moment(result: RunResult, final: Path, moment: str, style: dict[str, Any]) -> Path:
     """Draw the run at a moment; the file name is that of the final picture with the moment appended."""
     found = _MOMENT.fullmatch(moment)
     assert found is not None
     if found["cycle"] is not None:
-        return result.picture(final.with_stem(f"{final.stem}-cycle{moment}"), cycle=int(moment))
-    return result.picture(final.with_stem(f"{final.stem}-{moment}"), at_s=float(found["at_s"]))
+        return result.picture(final.with_stem(f"{final.stem}-cycle{moment}"), cycle=int(moment), **style)
+    return result.picture(final.with_stem(f"{final.stem}-{moment}"), at_s=float(found["at_s"]), **style)
 
 
 def _write_faults(result: RunResult) -> Path:

@@ -1,9 +1,10 @@
 """The consoles, the exit codes, and how commands print errors and JSON."""
 
+import os
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import typer
 from rich.console import Console
@@ -32,5 +33,20 @@ def print_json(content: Mapping[str, Any]) -> None:
     """Print one JSON object on one line of standard output. NaN and infinity become null."""
     import msgspec
 
-    sys.stdout.write(msgspec.json.encode(content).decode() + "\n")
+    stream = _reserved or sys.stdout
+    stream.write(msgspec.json.encode(content).decode() + "\n")
+    stream.flush()
+
+
+_reserved: TextIO | None = None
+
+
+def reserve_stdout() -> None:
+    """From now on only `print_json` writes to standard output; what anything else writes there goes to standard error.
+
+    Processes started later inherit this. A controller or a library that prints does not spoil the JSON object.
+    """
+    global _reserved
     sys.stdout.flush()
+    _reserved = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)

@@ -30,6 +30,10 @@ Out = Annotated[
         help="Where the rows go: .parquet, or .csv for both; runs/NAME.parquet by default.",
     ),
 ]
+Timeout = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--timeout", min=1.0, metavar="S", help="End a trial without a result after S seconds: it failed."),
+]
 Retry = Annotated[bool, typer.Option("--retry", help="Run trials again that failed.")]
 
 

@@ -4,7 +4,7 @@ A link does not interpret the bytes. Messages of one node arrive in the order se
 The order of messages of different nodes is undefined.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any, Final, NamedTuple, Protocol
 
@@ -32,6 +32,12 @@ class WorldLink(Protocol):
     def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
         """Return all arrivals once there are `count`, or a node is lost, or `timeout_s` seconds have passed."""
 
+    def idle(self, nodes: Sequence[int], timeout_s: float) -> list[int]:
+        """Dismiss `nodes`, whose answers are missing, and return those that leave within `timeout_s` without an answer.
+
+        Their programs are not busy: the observation or the answer was lost on the way.
+        """
+
     def close(self) -> None:
         """Release all resources of the link; idempotent."""
 
@@ -50,6 +56,9 @@ class NodeProcesses(Protocol):
 
     def resume(self, node: int) -> None:
         """Resume a paused process."""
+
+    def end_of(self, node: int, wait_s: float) -> str:
+        """Return how a lost node's process ended, waiting for its end at most `wait_s`; "" where that is not known."""
 
 
 Answer = Callable[[bytes], bytes]

@@ -46,6 +46,10 @@ class MemoryLink:
         answers = [arrival((node, nodes[node](payload))) for node, payload in unanswered]
         return [*losses, *answers] if losses else answers
 
+    def idle(self, nodes: Sequence[int], timeout_s: float) -> list[int]:
+        """Return no node: in memory nothing is lost."""
+        return []
+
     def close(self) -> None:
         """Drop everything that has not been received; idempotent."""
         self._unanswered.clear()
@@ -69,3 +73,7 @@ class MemoryLink:
 
     def resume(self, node: int) -> None:
         """Do nothing: the world observes the node again."""
+
+    def end_of(self, node: int, wait_s: float) -> str:
+        """Return "": a node in memory has no process."""
+        return ""

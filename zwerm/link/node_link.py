@@ -15,7 +15,16 @@ import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
 from zwerm.errors import LinkError
-from zwerm.link.session import Credential, keep_thread, open_session, transport_settings, trust_settings
+from zwerm.link.admission import MEANINGS
+from zwerm.link.session import (
+    Credential,
+    close_without_waiting,
+    is_local,
+    keep_thread,
+    open_session,
+    transport_settings,
+    trust_settings,
+)
 from zwerm.wire.keys import alive_key, command_key, hello_key, observation_key
 from zwerm.wire.messages import REFUSABLE, Goodbye, Hello, Welcome, decode_welcome, encode, refusal
 
@@ -68,6 +77,8 @@ class ZenohNodeLink:
             },
             f"{self._place}: no world answers there, or it does not take these credentials",
         )
+        if not is_local(endpoint):
+            close_without_waiting()
         try:
             self._session.info.declare_transport_events_listener(Callback(self._on_transport, indirect=False))
             self.send = self._session.declare_publisher(
@@ -144,7 +155,9 @@ class ZenohNodeLink:
         except REFUSABLE as error:
             raise LinkError(f"{self._place}: the world's welcome is {refusal(error)}") from None
         if welcome.refused:
-            raise LinkError(f"{self._place}: the world refuses it: {welcome.refused}")
+            meaning = MEANINGS.get(welcome.refused)
+            reason = welcome.refused if meaning is None else f"{welcome.refused}: {meaning}"
+            raise LinkError(f"{self._place}: the world refuses it: {reason}")
         return welcome
 
     def _on_sample(self, sample: zenoh.Sample) -> None:

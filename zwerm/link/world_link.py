@@ -11,16 +11,16 @@ for each message would cost more than the work on the message.
 import contextlib
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Final
 
 import msgspec
 import zenoh
-from msgspec import Struct
 from zenoh.handlers import Callback
 
 from zwerm.errors import LinkError
 from zwerm.link import Arrival, arrival
+from zwerm.link.admission import IDENTITY, NOT_JOINED, Admission, ExpectedNode
 from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threads
 from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
 from zwerm.wire.messages import REFUSABLE, Goodbye, Welcome, decode_hello, encode, refusal
@@ -30,15 +30,6 @@ from zwerm.wire.messages import REFUSABLE, Goodbye, Welcome, decode_hello, encod
 CAPACITY: Final = 16_384
 
 
-class ExpectedNode(Struct, frozen=True):
-    """A node that may join: its incarnation, its controller's name, its encoded Setup, and whether time is real."""
-
-    incarnation: int
-    controller: str
-    setup: bytes
-    paced: bool = False
-
-
 class ZenohWorldLink:
     """The world's end of the link to the nodes `members` of the run `run`; `settings` are the router's."""
 
@@ -46,8 +37,7 @@ class ZenohWorldLink:
         """Open the router's session, without waiting for nodes. Raises LinkError if it cannot listen."""
         self.refused: Counter[str] = Counter()
         self._run = run
-        self._members = dict(members)
-        self._joined: dict[int, int] = {}
+        self._members = Admission(members)
         self._source_of: dict[str, int] = {}
         self._changed = threading.Condition()
         self._dismissed = False
@@ -58,7 +48,7 @@ class ZenohWorldLink:
         set_threads(TWO_THREADS)
         self._session = open_session({"mode": "router", **settings}, "the world cannot listen")
         try:
-            self._put = {node: self._publisher(observation_key(run, node)).put for node in self._members}
+            self._put = {node: self._publisher(observation_key(run, node)).put for node in members}
             self._session.declare_subscriber(command_key(run, EVERY), Callback(self._on_command, indirect=False))
             self._session.liveliness().declare_subscriber(alive_key(run, EVERY), self._on_liveliness)
             self._session.declare_queryable(hello_key(run, EVERY), self._on_hello)
@@ -69,19 +59,20 @@ class ZenohWorldLink:
     @property
     def joined(self) -> frozenset[int]:
         """Nodes that have been welcomed and are not lost."""
-        return frozenset(self._joined)
+        return frozenset(self._members.joined)
 
     def wait_joined(self, enough: Callable[[Collection[int]], bool], timeout_s: float) -> bool:
         """Wait until `enough(joined nodes)` is true; return whether it is within `timeout_s` seconds."""
         with self._changed:
-            return self._changed.wait_for(lambda: enough(self._joined.keys()), timeout_s)
+            return self._changed.wait_for(lambda: enough(self._members.joined.keys()), timeout_s)
 
     def expect(self, node: int, member: ExpectedNode) -> None:
         """Allow a lost or new node to join as `member`. Raises LinkError if it is still joined."""
         with self._changed:
-            if node in self._joined:
-                raise LinkError(f"node {node} is still joined as incarnation {self._joined[node]}")
-            self._members[node] = member
+            try:
+                self._members.expect(node, member)
+            except ValueError as error:
+                raise LinkError(str(error)) from None
             if node not in self._put:
                 self._put[node] = self._publisher(observation_key(self._run, node)).put
 
@@ -110,8 +101,19 @@ class ZenohWorldLink:
         if self._session.is_closed():
             return
         farewell = encode(Goodbye(reason))
-        for node in sorted(self._joined):
+        for node in sorted(self._members.joined):
             self._put[node](farewell)
+
+    def idle(self, nodes: Sequence[int], timeout_s: float) -> list[int]:
+        """Dismiss `nodes`, whose answers are missing, and return those that leave within `timeout_s` without an answer."""
+        farewell = encode(Goodbye("its answer did not come in time"))
+        asked = [node for node in nodes if node in self._members.joined]
+        for node in asked:
+            self._put[node](farewell)
+        self.wait_joined(lambda joined: not any(node in joined for node in asked), timeout_s)
+        left = [node for node in asked if node not in self._members.joined]
+        answered = {arrival.node for arrival in self.receive_many(0, 0.0) if arrival.payload is not None}
+        return [node for node in left if node not in answered]
 
     def close(self) -> None:
         """Release all resources of the link; idempotent."""
@@ -157,7 +159,7 @@ class ZenohWorldLink:
         node = self._source_of.get(str(sample.key_expr))
         if node is None:
             with self._changed:
-                self.refused["not-joined"] += 1
+                self.refused[NOT_JOINED] += 1
             return
         self._arrivals.append(arrival((node, sample.payload.to_bytes())))
         if len(self._arrivals) >= self._wanted:
@@ -172,7 +174,7 @@ class ZenohWorldLink:
         node = node_of(str(sample.key_expr))
         with self._changed:
             self._source_of.pop(command_key(self._run, node), None)
-            if self._joined.pop(node, None) is not None and not self._dismissed:
+            if self._members.lose(node) and not self._dismissed:
                 self._arrivals.append(Arrival(node, None))
                 self._losses += 1
             self._changed.notify_all()
@@ -184,7 +186,7 @@ class ZenohWorldLink:
             try:
                 welcome = self._welcome(node_of(key), query.payload.to_bytes() if query.payload else b"")
             except ValueError:
-                welcome = Welcome(refused="identity")
+                welcome = Welcome(refused=IDENTITY)
             if welcome.refused:
                 with self._changed:
                     self.refused[welcome.refused] += 1
@@ -197,18 +199,10 @@ class ZenohWorldLink:
         except REFUSABLE as error:
             return Welcome(refused=refusal(error).reason)
         with self._changed:
-            if isinstance(hello, Goodbye):
-                return Welcome(refused="" if node in self._joined else "not-joined")
-            member = self._members.get(node)
-            if hello.node != node:
-                return Welcome(refused="identity")
-            if member is None:
-                return Welcome(refused="unknown")
-            if hello.incarnation != member.incarnation:
-                return Welcome(refused="incarnation")
-            if node in self._joined:
-                return Welcome(refused="joined")
-            self._joined[node] = member.incarnation
+            refused = self._members.greet(node, hello)
+            if refused or isinstance(hello, Goodbye):
+                return Welcome(refused=refused)
+            member = self._members.expected(node)
             self._source_of[command_key(self._run, node)] = node
             self._changed.notify_all()
         return Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced)

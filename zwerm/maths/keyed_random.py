@@ -16,6 +16,8 @@ _MIX_2 = np.uint64(0x94D049BB133111EB)
 _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 _ONE = np.uint64(1)
 _TO_UNIT = 2.0**-53
+_WORD = 2**64 - 1
+_GOLDEN_INT, _MIX_1_INT, _MIX_2_INT = int(_GOLDEN), int(_MIX_1), int(_MIX_2)
 
 
 def splitmix64(state: NDArray[np.uint64]) -> NDArray[np.uint64]:
@@ -24,6 +26,14 @@ def splitmix64(state: NDArray[np.uint64]) -> NDArray[np.uint64]:
     z = (z ^ (z >> _S30)) * _MIX_1
     z = (z ^ (z >> _S27)) * _MIX_2
     return z ^ (z >> _S31)
+
+
+def _mixed(state: int) -> int:
+    """Return what `splitmix64` returns, for one state."""
+    z = (state + _GOLDEN_INT) & _WORD
+    z = ((z ^ (z >> 30)) * _MIX_1_INT) & _WORD
+    z = ((z ^ (z >> 27)) * _MIX_2_INT) & _WORD
+    return z ^ (z >> 31)
 
 
 def key_part(part: ArrayLike) -> NDArray[np.uint64]:
@@ -48,7 +58,7 @@ class Draws:
 
     def __init__(self, seed: int) -> None:
         self.seed = seed
-        self._roots: dict[str, NDArray[np.uint64]] = {}
+        self._roots: dict[str, int] = {}
 
     def _digest(self, purpose: str, *ids: int) -> bytes:
         key = f"{self.seed}/{purpose}/{'/'.join(map(str, ids))}"
@@ -59,13 +69,19 @@ class Draws:
 
         `splitmix64(splitmix64(states(purpose, a) ^ key_part(b)))` is `bits(purpose, a, b)`.
         """
-        root = self._roots.get(purpose)
-        if root is None:
-            root = np.frombuffer(self._digest(purpose)[:8], dtype="<u8").astype(np.uint64)
-            self._roots[purpose] = root
-        state = root
-        for part in ids:
-            state = splitmix64(state ^ key_part(part))
+        word = self._roots.get(purpose)
+        if word is None:
+            word = self._roots[purpose] = int.from_bytes(self._digest(purpose)[:8], "little")
+        # Single numbers at the head of the key, such as the tick, are mixed without the overhead of arrays.
+        head = 0
+        while head < len(ids) and type(part := ids[head]) is int:
+            if part < 0:
+                raise OverflowError(f"expected a non-negative id, got {part}")
+            word = _mixed(word ^ _mixed(part * _GOLDEN_INT & _WORD))
+            head += 1
+        state = np.array([word], dtype=np.uint64)
+        for each in ids[head:]:
+            state = splitmix64(state ^ key_part(each))
         return state
 
     def bits(self, purpose: str, *ids: ArrayLike) -> NDArray[np.uint64]:

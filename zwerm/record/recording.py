@@ -6,8 +6,10 @@ the robots (JSON), which no robot knows. Times are virtual. A recording that is 
 is complete and indexed; one cut off by a kill holds all chunks written until then.
 """
 
+import contextlib
 import json
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -41,10 +43,16 @@ _TELEMETRY_SCHEMA: Final = {
 }
 
 
+# A run that is killed leaves a recording of all but the last seconds, at most about this many.
+FLUSH_S: Final = 0.5
+
+
 class Recording:
     """Writes one run to `path`. Raises ScenarioError where that cannot be written."""
 
     def __init__(self, path: Path, dt_s: float, about: dict[str, str]) -> None:
+        self.error = ""  # why the recording is incomplete
+        self._path = path
         self._dt_s = dt_s
         self._channels: dict[str, int] = {}
         try:
@@ -52,6 +60,7 @@ class Recording:
             self._file = path.open("wb")
         except OSError as error:
             raise ScenarioError([f"{path}: cannot write a recording: {error.strerror}"]) from None
+        self._flush_s = time.monotonic() + FLUSH_S
         self._writer = Writer(self._file)
         self._writer.start(profile="", library=f"zwerm {__version__}")
         self._writer.add_metadata("run", about)
@@ -96,8 +105,17 @@ class Recording:
     def close(self) -> None:
         """Write the index and close the file; idempotent."""
         if not self._file.closed:
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._file.close()
+            try:
+                if not self.error:
+                    self._writer.finish()  # type: ignore[no-untyped-call]
+            except OSError as error:
+                self._fail(error)
+            with contextlib.suppress(OSError):  # reported already
+                self._file.close()
+
+    def _fail(self, error: OSError) -> None:
+        """Record no more: the run goes on without a recording."""
+        self.error = f"{self._path}: the recording is incomplete: {error.strerror}"
 
     def _channel(self, topic: str, encoding: str = "msgpack", schema: int = 0) -> int:
         if topic not in self._channels:
@@ -105,5 +123,20 @@ class Recording:
         return self._channels[topic]
 
     def _write(self, channel: int, tick: int, message: bytes) -> None:
+        if self.error:
+            return
         time_ns = round(tick * self._dt_s * 1e9)
-        self._writer.add_message(channel, time_ns, message, time_ns, sequence=tick)
+        try:
+            self._writer.add_message(channel, time_ns, message, time_ns, sequence=tick)
+            # A chunk goes to the disk at the end of a second: a run that is killed leaves all but the last one.
+            if time.monotonic() >= self._flush_s:
+                self._flush()
+        except OSError as error:
+            self._fail(error)
+
+    def _flush(self) -> None:
+        """Write what has been recorded so far to the file."""
+        finish_chunk: Callable[[], None] = getattr(self._writer, "_Writer__finalize_chunk")  # noqa: B009 - it has no public name
+        finish_chunk()
+        self._file.flush()
+        self._flush_s = time.monotonic() + FLUSH_S

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from zwerm.agents.runtime.controllers import find, parameters_of
+from zwerm.agents.runtime.controllers import find, parameters_of, step_place
 from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role
-from zwerm.deploy.node_specs import controller_for
+from zwerm.deploy.node_specs import controller_for, node_specs
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
 from zwerm.scenario.overrides import blame
@@ -45,6 +45,7 @@ def assemble_run(scenario: Scenario, seed: int) -> tuple[World, Observers]:
     world = _attempt(lambda: World(scenario, seed, arena, sensors), scenario, mistakes)
     if world is None:
         raise ScenarioError(blame(mistakes, scenario.place, scenario.overrides))
+    world.place_of = lambda node: step_place(find(node_specs(scenario, seed)[node][0]))
     return world, observers
 
 

@@ -20,6 +20,7 @@ from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
 from zwerm.run.assembly import assemble_run, observers_of
+from zwerm.run.hang_guard import hang_guard
 from zwerm.run.measurement import measure, truth_of
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import load
@@ -110,7 +111,8 @@ def run(
             lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
             world.schedule.late_joiners,
         )
-        return drive(world, link, seed, runner, realtime, watcher, record, link, metrics)
+        with hang_guard(scenario.time.straggler_s):
+            return drive(world, link, seed, runner, realtime, watcher, record, link, metrics)
     _refuse_main(members)
     _try_controllers(members)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
@@ -205,6 +207,7 @@ def drive(
     sampling = Sampling(world, metrics, watcher or NullProgress())
     with ExitStack() as stack:
         observers: list[TickObserver] = []
+        recording = None
         if record is not None:
             from zwerm.record.recording import Recording
 
@@ -228,7 +231,11 @@ def drive(
             outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
         wall_s = time.monotonic() - start
         sampling.finish()
-        return _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, link)
+        result = _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, link)
+        if recording is not None:
+            recording.close()
+            result.problems += [recording.error] if recording.error else []
+        return result
 
 
 class Sampling:
@@ -348,5 +355,6 @@ def _result(
         series={name: np.array(values) for name, values in sampling.observers.series().items()},
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,
+        crash_reasons={node: f"tick {status.crash_ticks[node]}: {why}" for node, why in status.crashed.items()},
         tracebacks={node: failure.traceback for node, failure in status.failures.items()},
     )

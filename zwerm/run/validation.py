@@ -9,6 +9,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from zwerm.agents.conformance.check import setup_violations
+from zwerm.agents.conformance.stimuli import sensor_class
+from zwerm.agents.runtime.controllers import find
+from zwerm.catalogue import algorithm_of
+from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import assemble, prepare
 from zwerm.scenario.load import load, tables_of, validate
@@ -28,7 +33,28 @@ def scenario_mistakes(name: str, overrides: tuple[str, ...] = ()) -> list[str]:
         assemble(scenario, seed=1)
     except ScenarioError as error:
         return error.mistakes
-    return []
+    return own_controller_mistakes(scenario)
+
+
+def own_controller_mistakes(scenario: Scenario) -> list[str]:
+    """Return how the scenario's own controllers, `module:Class`, break the contract; one line for each violation.
+
+    The conformance kit makes and steps one controller of each role in this process, with the node's Setup of the scenario.
+    """
+    found: dict[str, None] = {}
+    tried: set[str] = set()
+    for controller, setup in node_specs(scenario, 1).values():
+        if algorithm_of(controller) is not None or controller in tried or _is_built_in(controller):
+            continue
+        tried.add(controller)
+        if all(hasattr(sensor_class(sensor), "stimulus") for sensor in setup.sensors):
+            for violation in setup_violations(find(controller), setup):
+                found[f"{scenario.place}: {setup.role}: {controller}: {violation}"] = None
+    return list(found)
+
+
+def _is_built_in(controller: str) -> bool:
+    return controller.startswith("zwerm.")
 
 
 def _mistakes_of_the_rest(name: str, overrides: tuple[str, ...]) -> list[str]:

@@ -65,14 +65,16 @@ def run_study(
     jobs: int | None = None,
     sets: Sequence[str] = (),
     retry: bool = False,
+    timeout_s: float | None = None,
     runner: Runner = "inline",
     listener: StudyListener | None = None,
 ) -> StudyResult:
     """Run the trials of `study` that the file `out` does not have, `jobs` at a time, and return the results.
 
-    `seeds` replaces the study's seeds, `sets` overrides its scenarios, `retry` repeats failed trials. After Ctrl-C all rows
-    so far are kept, and the result says that it was interrupted. With the runner `processes` one trial runs at a time.
-    Raises ScenarioError for errors in the input, before any trial runs.
+    `seeds` replaces the study's seeds, `sets` overrides its scenarios, `retry` repeats failed trials. A trial without a
+    result after `timeout_s` fails. After Ctrl-C all rows so far are kept, and the result says that it was interrupted. With
+    one job trials run in this process, and nothing ends them early. With the runner `processes` one trial runs at a time, in
+    the same way. Raises ScenarioError for errors in the input, before any trial runs.
     """
     if jobs is not None and jobs < 1:
         raise ScenarioError([f"jobs: expected >= 1, got {jobs}"])
@@ -88,8 +90,10 @@ def run_study(
         if listener is not None:
             listener.begin(len(todo))
         try:
-            workers = 1 if runner == "processes" else min(jobs or cpu_count(), max(1, len(todo)))
-            with closing(run_trials(todo, workers)) as ending:
+            here = runner == "processes" or jobs == 1
+            # At least two workers: one job means this process, and a trial that ends its process must not end the study.
+            workers = 1 if here else max(2, min(jobs or cpu_count(), len(todo)))
+            with closing(run_trials(todo, workers, timeout_s)) as ending:
                 for row in ending:
                     rows.add(row)
                     ran += 1

@@ -13,7 +13,7 @@ New fields go last, with defaults; a field at its default is left out of a messa
 import re
 from collections.abc import Callable
 from math import isfinite
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 from msgspec import Struct
@@ -234,7 +234,15 @@ class Goodbye(_Message, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
 
 # --- encode and decode ----------------------------------------------------------------------------------------------
 
-_encoder = msgspec.msgpack.Encoder()
+
+def _plain(value: Any) -> Any:
+    """Return a NumPy scalar as a number of Python. Raises TypeError for any other type that has no encoding."""
+    if getattr(value, "ndim", None) == 0 and hasattr(value, "item"):
+        return value.item()
+    raise TypeError(f"a message holds no {type(value).__name__}, got {value!r:.80}")
+
+
+_encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
 encode: Final[Callable[[object], bytes]] = _encoder.encode
 
 # For the hot paths; `refusal` turns their exceptions into a ProtocolError. In a union a message must carry its type.

@@ -44,18 +44,18 @@ class Attempt(_Part, frozen=True):
 class Route(_Part, frozen=True):
     """The route to the nearest frontier robot: its cost, and its slots, the sender's first.
 
-    The last slot has been at the frontier since the tick `since`.
+    `claim` is the number of the claim of the last slot that it is at the frontier. Each slot counts its own claims.
     """
 
     cost: float
     slots: tuple[int, ...]
-    since: int = 0
+    claim: int = 0
 
 
 class PathVector(_Message, frozen=True, tag="path"):
     """The route from a slot, by the robot at the slot; `number` counts the sender's path vectors.
 
-    `ended` has (slot, tick) of slots that have not been at the frontier since that tick, the newest last. `home` is the
+    `ended` has (slot, claim): this claim of the slot and all earlier ones have ended, the newest last. `home` is the
     number of hops to the base, or FAR if unknown.
     """
 
@@ -75,7 +75,8 @@ class StateBeacon(_Message, frozen=True, tag="state"):
 
     `number` counts the sender's states, `epoch` its drives, and `samples` its averages of bearings. `expandable` has the
     sides, as (other slot, sign), that it could expand. `waiting`: it stands at the base, ready to go. `redundant`: it
-    has left the complex, and its body still stands at its slot.
+    has left the complex, and its body still stands at its slot. `guests` are the robots that stand at the base's own
+    point; only a base station names them.
     """
 
     number: int
@@ -89,6 +90,7 @@ class StateBeacon(_Message, frozen=True, tag="state"):
     expandable: tuple[tuple[int, int], ...]
     path_vector: PathVector
     redundant: bool = False
+    guests: tuple[int, ...] = ()
 
 
 class StateRequest(_Message, frozen=True, tag="state-request"):

@@ -1,9 +1,12 @@
-"""All messages between neighbours on the robots' radio channel, and how they are sealed under a checksum."""
+"""All messages between neighbours on the robots' radio channel, in envelopes that are sealed under a checksum."""
 
 from collections.abc import Callable
-from typing import Final
+from typing import Annotated, Final
+
+from msgspec import Meta, Struct
 
 from zwerm.agents.sensor_coverage.messages.beacons import PathVector, StateBeacon, StateRequest
+from zwerm.agents.sensor_coverage.messages.incarnations import ANY, Incarnation
 from zwerm.agents.sensor_coverage.messages.locks import ListRequest, LockProtocolMessage
 from zwerm.agents.sensor_coverage.messages.pushes import Segment, SegmentAck, SlotVacated
 from zwerm.agents.sensor_coverage.messages.waves import CensusMessage
@@ -23,6 +26,33 @@ PeerMessage = (
     | LockProtocolMessage
 )
 
-_sealed: Final = Sealed(PeerMessage)
-write: Final[Callable[[PeerMessage], bytes]] = _sealed.write
-read: Final[Callable[[bytes], PeerMessage | None]] = _sealed.read
+
+Number = Annotated[int, Meta(ge=0, le=2**62)]
+
+
+class Envelope(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A message with the incarnation of its sender, and that of its receiver (ANY: unknown, or many receivers).
+
+    `number` counts the sender's broadcasts; a message to one robot has 0. Each message is sent in `copies` equal packets.
+    """
+
+    sender: Incarnation
+    receiver: Incarnation
+    number: Number
+    copies: Number
+    message: PeerMessage
+
+
+_sealed: Final = Sealed(Envelope)
+read_envelope: Final[Callable[[bytes], Envelope | None]] = _sealed.read
+
+
+def write(message: PeerMessage, sender: int = 1, receiver: int = ANY, number: int = 0, copies: int = 1) -> bytes:
+    """Return the packet with a message from an incarnation of its sender to one of its receiver."""
+    return _sealed.write(Envelope(sender, receiver, number, copies, message))
+
+
+def read(payload: bytes) -> PeerMessage | None:
+    """Return the message in a packet of any incarnation, or None if it is corrupt."""
+    envelope = read_envelope(payload)
+    return None if envelope is None else envelope.message

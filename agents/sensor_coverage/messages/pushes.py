@@ -35,7 +35,7 @@ class ReferenceBearing(_Part, frozen=True):
 
 
 class SlotMemory(_Part, frozen=True):
-    """The memory of a slot, which the next occupant inherits."""
+    """The memory of a slot, which the next occupant inherits. `claims` is the number of its newest claim."""
 
     slot: int
     references: tuple[ReferenceBearing, ...]
@@ -44,6 +44,7 @@ class SlotMemory(_Part, frozen=True):
     failed: tuple[tuple[int, ...], ...]
     attempts: tuple[tuple[tuple[int, ...], int], ...]
     blocked: tuple[float, ...]
+    claims: int = 0
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).

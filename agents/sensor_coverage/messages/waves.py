@@ -10,19 +10,23 @@ Count = Annotated[int, Meta(ge=0, le=2**62)]
 class CensusWave(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag="wave"):
     """The sender has joined this wave by `parent` (None at the base), and waits for the neighbours in `missing`.
 
-    With `again` the neighbours in `missing` that have joined shall send their wave or tally once more.
+    With `again` the neighbours in `missing` that have joined shall send their wave or tally once more. `roster` are all
+    robots that were ever let out. `search` counts the times that the base has all robots try again what had failed.
     """
 
     number: Count
     parent: Count | None
     missing: tuple[Count, ...]
     again: bool
+    roster: bytes = b""
+    search: Count = 0
 
 
 class CensusTally(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag="tally"):
     """To the parent: the counted robots, their frontier claims, and the latest wave in which one of them was disturbed.
 
-    `incarnations` is the sum of the robots' random incarnation numbers.
+    `incarnations` is the sum of the robots' random incarnation numbers. `present` are the counted robots, and `dead` those
+    that one of them sees and that do not answer it. `roster` has robots that were let out, if the wave lacked any.
     """
 
     number: Count
@@ -30,6 +34,9 @@ class CensusTally(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     claims: Count
     disturbed: Count
     incarnations: Count
+    present: bytes = b""
+    dead: bytes = b""
+    roster: bytes = b""
 
 
 CensusMessage = CensusWave | CensusTally

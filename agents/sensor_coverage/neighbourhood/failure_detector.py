@@ -34,6 +34,10 @@ class FailureDetector(Component):
         self.dead.pop(node, None)
         return dead
 
+    def restarted(self, node: int, tick: int) -> None:
+        """Record that a robot has sent its first message of another incarnation."""
+        self.answered(node)
+
     def check(self, tick: int, table: NeighbourTable, visible: Mapping[int, float], samples: int) -> None:
         """Ask the robots whose states are needed, if it is time; averaging bearings takes `samples` ticks."""
         wanted = [node for node in dict.fromkeys(table.stale(visible)) if node not in self.dead]
@@ -54,8 +58,9 @@ class FailureDetector(Component):
         self.due = tick + REPEAT_TICKS
         self._requests = {node: self._requests.get(node, 0) + 1 for node in wanted}
         for node, requests in self._requests.items():
-            if requests > REQUESTS_MAX and tick - table.heard.get(node, -SILENT_TICKS) > SILENT_TICKS:
-                table.forget(node)
+            silent = node not in table.heard or tick - table.heard[node] > SILENT_TICKS
+            if requests > REQUESTS_MAX and silent:
+                table.bury(node)
                 self.dead[node] = None
         self._outbox.append(Outgoing(None, StateRequest(tuple(wanted))))
 

@@ -34,11 +34,15 @@ class LocalMap(NeighbourTable):
     """One robot's neighbourhood.
 
     `plans` expand edges and `gaps` expand gaps around this robot. `obstacle` has the obstacle edges here.
-    `path_vectors` has the routes to the frontier. `plan_count` counts the times that plans were made.
+    `path_vectors` has the routes to the frontier. `plan_count` counts the times that plans were made. A base station sets
+    `guests`.
     """
 
-    def __init__(self, node: int, parameters: PlannerParameters, make_planner: MakePlanner) -> None:
-        super().__init__(node)
+    def __init__(
+        self, node: int, parameters: PlannerParameters, make_planner: MakePlanner, incarnation: int = 1
+    ) -> None:
+        super().__init__(node, incarnation)
+        self.guests: tuple[int, ...] = ()
         self.parameters = parameters
         self.plans: list[Plan] = []
         self.gaps: list[Plan] = []
@@ -93,7 +97,24 @@ class LocalMap(NeighbourTable):
             tuple(key for key, slot in log.failed if slot == me),
             tuple(log.attempts.items()),
             tuple(log.blocked.get(me, ())),
+            self.path_vectors.newest_claim(me),
         )
+
+    # --- robots that died or restarted --------------------------------------------------------------------------------
+
+    def bury(self, node: int) -> None:
+        """Forget a robot that is dead, and end the claims of its slot."""
+        self.path_vectors.forget(node, self._slot_of(node))
+        self.forget(node)
+
+    def restarted(self, node: int) -> None:
+        """Forget a robot that has lost its memory, and end the claims of its slot."""
+        self.path_vectors.forget(node, self._slot_of(node))
+        super().restarted(node)
+
+    def _slot_of(self, node: int) -> int:
+        state = self.states.get(node)
+        return NOWHERE if state is None else state.slot
 
     # --- slots change hands -------------------------------------------------------------------------------------------
 
@@ -113,13 +134,17 @@ class LocalMap(NeighbourTable):
 
     def occupy(self, slot: int) -> None:
         """Be the first robot at a new slot."""
+        self._take(slot)
+
+    def _take(self, slot: int, claims: int = 0) -> None:
         self.vacate()
         self.slot = slot
-        self.path_vectors.take_over(slot, Route(DOUBT_COST, (slot,)))
+        self.at_base = False
+        self.path_vectors.take_over(slot, Route(DOUBT_COST, (slot,)), claims)
 
     def inherit(self, memory: SlotMemory) -> None:
         """Take over a slot with its memory."""
-        self.occupy(memory.slot)
+        self._take(memory.slot, memory.claims)
         me = self.slot
         for each in memory.references:
             self._references[each.slot] = cmath.rect(1.0, each.direction_rad), each.count
@@ -216,6 +241,14 @@ class LocalMap(NeighbourTable):
         self._plan_basis = None
         self.change()
 
+    def reopen(self) -> None:
+        """Try again all that has failed: somebody is missing, and what was in the way then may be gone."""
+        log = self._planner.attempt_log
+        log.closed, log.failed, log.attempts = {}, {}, {}
+        log.blocked.clear()
+        self._plan_basis = None
+        self.change()
+
     def note_failure(self, plan: Plan, driven_m: float) -> None:
         """Record that a wall stopped a plan after `driven_m`."""
         self._planner.note_failure(plan, driven_m)
@@ -284,4 +317,5 @@ class LocalMap(NeighbourTable):
             tuple(sorted({(other_end(each.key, self.slot), each.key[2]) for each in self.plans})),
             NO_PATH_VECTOR,
             self.redundant,
+            self.guests,
         )

@@ -6,13 +6,14 @@ robot knows whether two views belong together.
 """
 
 import cmath
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
 import msgspec
 
 from zwerm.agents.sensor_coverage.frontier.directions import refined_heading
 from zwerm.agents.sensor_coverage.messages.beacons import FAR, NOWHERE, StateBeacon
+from zwerm.agents.sensor_coverage.messages.incarnations import first_count
 
 # Bound of the ticks that a slot may take to pass from one robot to the next.
 HANDOVER_TICKS_MAX: Final = 80
@@ -29,17 +30,20 @@ class NeighbourRecord(NamedTuple):
 class NeighbourTable:
     """One robot's table.
 
-    `slot` is where the robot stands. `redundant`: it has left the complex, and its body still stands there. `home` is
-    the number of hops to the base. `epoch` counts its drives, and `samples` its averages of bearings. `heading` [rad]
-    is in the base's frame, or None if unknown. `version` counts all changes: between two changes, no decision changes.
+    `at_base`: the robot stands at the base's own point, where it came out of the depot; None while it does not know,
+    which is so after a restart. `slot` is where the robot stands. `redundant`: it has left the complex, and its body
+    still stands there. `home` is the number of hops to the base. `epoch` counts its drives, and `samples` its averages
+    of bearings. `heading` [rad] is in the base's frame, or None if unknown. `version` counts all changes: between two
+    changes, no decision changes.
     """
 
-    def __init__(self, node: int) -> None:
+    def __init__(self, node: int, incarnation: int = 1) -> None:
         self.node = node
+        self.at_base = True if incarnation == 1 else None
         self.slot = NOWHERE
         self.redundant = False
         self.home = FAR
-        self.epoch = 0
+        self.epoch = first_count(incarnation)
         self.moving = False
         self.heading: float | None = None
         self.samples = 0
@@ -105,6 +109,17 @@ class NeighbourTable:
         self.heard.pop(node, None)
         self.change()
 
+    def bury(self, node: int) -> None:
+        """Forget a robot that is dead."""
+        self.forget(node)
+
+    def restarted(self, node: int) -> None:
+        """Forget a robot that has lost its memory, and where it was seen: it says anew where it stands."""
+        self.forget(node)
+        self.seen.pop(node, None)
+        self._backs.pop(node, None)
+        self._heard_in.pop(node, None)
+
     def at(self, slot: int) -> int | None:
         """Return the robot at a slot, or None if this robot has heard of none."""
         if slot == self.slot:
@@ -151,9 +166,36 @@ class NeighbourTable:
             self._heading_readings += 1
 
     def find_heading(self) -> None:
-        """Take the heading from the base if this robot stands at the base's point: both see the same directions."""
+        """Find the heading if it is unknown.
+
+        A robot at the base's point and the base see the same directions. A robot that has restarted elsewhere takes it
+        from reciprocal bearings, once it knows that it does not stand at the base's point.
+        """
+        if self.heading is not None or not self.samples:
+            return
+        if self.at_base:
+            self._heading_of_base()
+        elif self.at_base is False:
+            pairs = [
+                (back, each.bearing_rad) for node, each in self.seen.items() if (back := self._back(node)) is not None
+            ]
+            self.heading = refined_heading(0.0, 0, pairs)
+            if self.heading is not None:
+                self.change()
+
+    def find_whether_at_base(self, visible: Iterable[int]) -> None:
+        """After a restart, find out whether this robot stands at the base's point: the base knows its guests.
+
+        A robot there sees the base. So it waits until it has heard all `visible` robots.
+        """
+        if self.at_base is None and self.samples and all(node in self.states for node in visible):
+            base = next((state for state in self.states.values() if state.slot == 0), None)
+            self.at_base = base is not None and self.node in base.guests
+            self.change()
+
+    def _heading_of_base(self) -> None:
         base = next((state for state in self.states.values() if state.slot == 0), None)
-        if base is None or self.heading is not None or not self.samples:
+        if base is None:
             return
         there = {each.node: each for each in base.seen if each.slot != NOWHERE}
         off = 0j

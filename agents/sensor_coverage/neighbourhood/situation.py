@@ -32,11 +32,12 @@ class Situation:
         self, setup: Setup, parameters: RobotParameters, random: np.random.Generator, make_planner: MakePlanner
     ) -> None:
         self.node = setup.node
+        self.incarnation = setup.incarnation
         self.tick = 0
         self.motion = Locomotion(parameters, setup)
         self.motion.rest = 0.0, 0.0
         planner_parameters = PlannerParameters(link_m=parameters.link_m, margin_m=parameters.margin_m)
-        self.local_map = LocalMap(setup.node, planner_parameters, make_planner)
+        self.local_map = LocalMap(setup.node, planner_parameters, make_planner, setup.incarnation)
         self.mailbox = ReliableMailbox()
         self.failure_detector = FailureDetector()
         self.negotiation: LeaveNegotiation | None = None
@@ -123,7 +124,12 @@ class Situation:
     @property
     def waiting(self) -> bool:
         """Whether the robot stands at the base, ready to go."""
-        return self.local_map.slot == NOWHERE and self.idle
+        return self.local_map.slot == NOWHERE and self.idle and self.local_map.at_base is True
+
+    @property
+    def homeless(self) -> bool:
+        """Whether the robot has no slot, and is not ready at the base either: it has restarted, or has no heading."""
+        return self.local_map.slot == NOWHERE and not self.in_push and not self.waiting
 
     @property
     def displaced(self) -> bool:

@@ -3,6 +3,7 @@
 from typing import ClassVar, Final
 
 from zwerm.agents.sensor_coverage.messages.beacons import PathVector, StateBeacon
+from zwerm.agents.sensor_coverage.messages.incarnations import adopted_slot
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.component import Component
@@ -38,6 +39,11 @@ class Surveillance(Component):
         if local_map.receive(sender, message, tick):
             situation.motion.frame.forget((sender,))
 
+    def restarted(self, node: int, tick: int) -> None:
+        """Forget a robot that has lost its memory, and average its bearing again."""
+        self._situation.local_map.restarted(node)
+        self._situation.motion.frame.forget((node,))
+
     def poll(self, tick: int) -> None:
         """Update the local map if anything has changed; do nothing during a drive."""
         situation, local_map = self._situation, self._situation.local_map
@@ -66,6 +72,12 @@ class Surveillance(Component):
         times = (self._situation.local_map.handovers_until, doubt_at if doubt_at is None or doubt_at > tick else None)
         return min((each for each in times if each is not None), default=None)
 
+    def _find_slot(self) -> None:
+        """After a restart away from the base, take the place where the robot stands as a new slot."""
+        situation, local_map = self._situation, self._situation.local_map
+        if situation.homeless and local_map.at_base is False and local_map.heading is not None:
+            local_map.occupy(adopted_slot(situation.node, situation.incarnation))
+
     def _next_timer(self) -> int:
         situation = self._situation
         times = situation.failure_detector.due, situation.local_map.handovers_until, self._doubt_at
@@ -78,7 +90,9 @@ class Surveillance(Component):
         """
         situation, local_map = self._situation, self._situation.local_map
         local_map.resolve_duplicate()
+        local_map.find_whether_at_base(situation.bearings)
         local_map.find_heading()
+        self._find_slot()
         local_map.learn_references()
         situation.calm = situation.clear
         self._doubt_at = None if situation.calm else self._doubt_at or tick + DOUBT_TICKS

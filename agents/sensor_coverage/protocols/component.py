@@ -28,6 +28,10 @@ class Component(Protocol):
         """Take in a message of one of the accepted types."""
         return
 
+    def restarted(self, node: int, tick: int) -> None:
+        """Forget what a former incarnation of another robot said: it has lost its memory. Its first message follows."""
+        return
+
     def poll(self, tick: int) -> None:
         """Act on the state of this tick, after all messages have been received and the drive has gone on."""
         return

@@ -3,7 +3,10 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from zwerm.agents.sensor_coverage.protocols.component import Component
+from zwerm.agents.sensor_coverage.messages.incarnations import ANY, Incarnations
+from zwerm.agents.sensor_coverage.messages.peers import read_envelope, write
+from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
+from zwerm.agents.sensor_coverage.protocols.transport.loss_estimate import LossEstimate
 from zwerm.wire.messages import Packet, Transmission
 
 # Sender of a packet on a channel that does not tell it.
@@ -13,34 +16,61 @@ ANONYMOUS = -1
 class Codec(NamedTuple):
     """Functions that read (None: corrupt) and write the messages of one channel.
 
-    With `needs_sender` packets whose sender is not told are ignored.
+    With `in_envelopes` the messages are those between neighbours, in envelopes and in copies. Packets of such a channel
+    whose sender is not told are ignored.
     """
 
     read: Callable[[bytes], Any]
     write: Callable[[Any], bytes]
-    needs_sender: bool = False
+    in_envelopes: bool = False
 
 
 class ComponentLoop:
-    """Runs components in the given order; `codecs` has a codec for each radio channel that they use."""
+    """Runs components in the given order; `codecs` has a codec for each radio channel that they use.
 
-    def __init__(self, components: Sequence[Component], codecs: Mapping[str, Codec]) -> None:
+    `incarnation` is that of this node. Messages from or to former incarnations are dropped at the door.
+    """
+
+    def __init__(self, components: Sequence[Component], codecs: Mapping[str, Codec], incarnation: int = 1) -> None:
         self._components = components
         self._codecs = codecs
+        self.losses = LossEstimate()
+        self._incarnations = Incarnations(incarnation)
+        self._broadcasts = 0
         self._receivers: dict[type[Any], list[Component]] = {}
         for component in components:
             for kind in component.accepts:
                 self._receivers.setdefault(kind, []).append(component)
 
     def deliver(self, inbox: Iterable[Packet], tick: int) -> None:
-        """Read the packets of this tick, and dispatch their messages; corrupt packets are ignored."""
+        """Read the packets of this tick, and dispatch their messages; corrupt packets and copies are ignored."""
+        arrived: dict[tuple[int, bytes], int] = {}
         for packet in inbox:
             codec = self._codecs.get(packet.channel)
-            if codec is None or (codec.needs_sender and packet.sender is None):
+            sender = ANONYMOUS if packet.sender is None else packet.sender
+            if codec is None or (codec.in_envelopes and packet.sender is None):
                 continue
-            message = codec.read(packet.payload)
+            if codec.in_envelopes:
+                arrived[sender, packet.payload] = arrived.get((sender, packet.payload), 0) + 1
+            elif (message := codec.read(packet.payload)) is not None:
+                self.dispatch(sender, message, tick)
+        for (sender, payload), copies in arrived.items():
+            message = self._opened(sender, payload, copies, tick)
             if message is not None:
-                self.dispatch(ANONYMOUS if packet.sender is None else packet.sender, message, tick)
+                self.dispatch(sender, message, tick)
+
+    def _opened(self, sender: int, payload: bytes, arrived: int, tick: int) -> Any:
+        """Return the message in an envelope; None if it is corrupt, or from or to a former incarnation."""
+        envelope = read_envelope(payload)
+        if envelope is None or not self._incarnations.is_current(sender, envelope.sender, envelope.receiver):
+            return None
+        if self._incarnations.is_restart(sender, envelope.sender):
+            self.losses.forget(sender)
+            for component in self._components:
+                component.restarted(sender, tick)
+        if envelope.number:
+            self.losses.receive(sender, envelope.number, envelope.copies, arrived)
+        return envelope.message
 
     def dispatch(self, sender: int, message: Any, tick: int) -> None:
         """Give one message to every component that accepts its type."""
@@ -54,11 +84,24 @@ class ComponentLoop:
 
     def outbox(self) -> tuple[Transmission, ...]:
         """Return the packets to send in this tick."""
-        return tuple(
-            Transmission(component.channel, self._codecs[component.channel].write(each.message), each.to)
-            for component in self._components
-            for each in component.outgoing()
-        )
+        sent: list[Transmission] = []
+        for component in self._components:
+            for each in component.outgoing():
+                sent += self._transmissions(component.channel, each)
+        return tuple(sent)
+
+    def _transmissions(self, channel: str, outgoing: Outgoing) -> list[Transmission]:
+        """Return the packets of one message: in envelopes, as many copies as the radio's losses ask for."""
+        codec, (to, message) = self._codecs[channel], outgoing
+        if not codec.in_envelopes:
+            return [Transmission(channel, codec.write(message), to)]
+        known, copies = self._incarnations, self.losses.copies
+        if to is None:
+            self._broadcasts += 1
+            payload = write(message, known.own, ANY, self._broadcasts, copies)
+        else:
+            payload = write(message, known.own, known.of(to), 0, copies)
+        return [Transmission(channel, payload, to)] * copies
 
     def next_wake(self) -> int | None:
         """Return the earliest tick at which a component wants to be polled, or None."""

@@ -36,7 +36,7 @@ class Membership(Component):
         self._advice_client = advice_client
         self._judged: tuple[object, bool] = None, False  # basis of plans, whether the robot is redundant by it
         self._fenced: tuple[object, tuple[int, ...]] = None, ()  # basis of plans, robots at boundary edges by it
-        self._left = False
+        self._left = situation.incarnation > 1  # a former incarnation may have left, and did not tell that it is back
 
     def receive(self, sender: int, message: Any, tick: int) -> None:
         """Take in a message about neighbour lists and locks."""

@@ -5,7 +5,10 @@ slot, and when the frontier is cut off, costs stay bounded by the number of slot
 slots change hands, the announced route holds until the new occupant announces another.
 
 A robot that is no longer at the frontier announces that, and all routes that end there end with it. Otherwise robots
-would try all longer routes there, one after the other.
+would try all longer routes there, one after the other. The claims of a slot to be at the frontier are numbered, and the
+numbers pass from occupant to occupant with the slot. So claims are ordered without a clock. An occupant that hears of a
+claim of its slot which is newer than its own continues after that number. Neighbours end the claims of a slot whose
+occupant is dead, or has lost its memory.
 
 Routes become the shortest once every neighbour's latest message has arrived, in any order and any number of copies. A
 robot that repeats its route gets it through at any loss below 1.
@@ -18,7 +21,7 @@ from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, PathVector, R
 
 # Slot of the base, where pushes begin: no route leads through it.
 BASE: Final = 0
-# A robot at the frontier renews its claim after this many ticks: a new occupant may have missed that its route ended.
+# A robot at the frontier renews its claim after this many ticks of its own: others may have missed that it began.
 RENEW_TICKS: Final = 600
 # Bound of the ended slots that one message names.
 ENDED_MAX: Final = 6
@@ -36,38 +39,56 @@ class PathVectorProtocol:
         self.homes: dict[int, int] = {}
         self._numbers: dict[int, int] = {}  # robot: number of its newest message
         self._routes: dict[int, Route | None] = {}  # slot: the route that begins there
-        self._ended: dict[int, int] = {}  # slot: tick until which it was at the frontier, the newest last
+        self._claims: dict[int, int] = {}  # slot: the newest claim that was heard of
+        self._ended: dict[int, int] = {}  # slot: the newest claim that has ended, the latest news last
+        self._claimed_at = 0  # tick of this robot's newest claim
 
     def receive(self, sender: int, message: PathVector) -> None:
         """Take in a neighbour's route; an old or repeated message changes nothing."""
         if message.number <= self._numbers.get(sender, -1):
             return
         self._numbers[sender] = message.number
-        for slot, tick in message.ended:
-            self._end(slot, tick)
+        for slot, claim in message.ended:
+            self._end(slot, claim)
         self.homes[message.slot] = message.home
+        if message.route is not None:
+            self._hear(message.route)
         if message.slot != NOWHERE and self._routes.get(message.slot) != message.route:
             self._routes[message.slot] = message.route
             self.version += 1
 
-    def take_over(self, slot: int, default: Route | None) -> None:
-        """Continue the route that was announced of a slot, or `default` if none was."""
+    def forget(self, sender: int, slot: int) -> None:
+        """Forget a neighbour that is dead or lost its memory, and end the claims of its slot."""
+        self._numbers.pop(sender, None)
+        if slot != NOWHERE:
+            self._routes.pop(slot, None)
+            self._end(slot, self.newest_claim(slot))
+            self.version += 1
+
+    def newest_claim(self, slot: int) -> int:
+        """Return the number of the newest claim of a slot that was heard of."""
+        return self._claims.get(slot, 0)
+
+    def take_over(self, slot: int, default: Route | None, claims: int = 0) -> None:
+        """Continue the route that was announced of a slot, or `default` if none was; it has made `claims` so far."""
+        self._claims[slot] = max(claims, self.newest_claim(slot))
         self.route = self._routes[slot] = self._routes.get(slot) or default
 
     def claim(self, slot: int, cost: float | None, tick: int) -> None:
         """Claim that `slot` is at the frontier, at this cost; None ends the claim."""
-        own = self._own(slot)
-        if own is None or own.cost != cost:
-            if own is not None:
-                self._end(slot, tick - 1)
-            own = None if cost is None else Route(cost, (slot,), tick)
-        elif tick - own.since > RENEW_TICKS:
-            own = Route(own.cost, (slot,), tick)
-        self.route = self._routes[slot] = own
+        own, newest = self._own(slot), self.newest_claim(slot)
+        if own is not None and own.cost == cost and own.claim == newest and tick - self._claimed_at <= RENEW_TICKS:
+            self.route = own
+            return
+        if (own is None and newest > self._ended.get(slot, 0)) or (own is not None and own.cost != cost):
+            self._end(slot, newest)
+        self.route = self._routes[slot] = None if cost is None else Route(cost, (slot,), newest + 1)
+        if cost is not None:
+            self._claims[slot], self._claimed_at = newest + 1, tick
 
     @property
     def ended(self) -> tuple[tuple[int, int], ...]:
-        """Slots that are no longer at the frontier, with ticks, to announce to neighbours."""
+        """Slots with their newest claims that have ended, to announce to neighbours."""
         return tuple(self._ended.items())[-ENDED_MAX:]
 
     def choose(self, slot: int, cost: float | None, weights: Mapping[int, float], tick: int) -> None:
@@ -82,7 +103,7 @@ class PathVectorProtocol:
             route = self._routes.get(beside)
             if route is None or slot in route.slots or beside == BASE or not self._lasts(route):
                 continue
-            found = Route(route.cost + weight, (slot, *route.slots), route.since)
+            found = Route(route.cost + weight, (slot, *route.slots), route.claim)
             if best is None or _key(found) < _key(best):
                 best = found
         self.route = best
@@ -93,12 +114,19 @@ class PathVectorProtocol:
         return route if route is not None and len(route.slots) == 1 and self._lasts(route) else None
 
     def _lasts(self, route: Route) -> bool:
-        return route.since > self._ended.get(route.slots[-1], -1)
+        return route.claim > self._ended.get(route.slots[-1], -1)
 
-    def _end(self, slot: int, tick: int) -> None:
-        if tick > self._ended.get(slot, -1):
+    def _hear(self, route: Route) -> None:
+        """Take in the number of a claim."""
+        slot = route.slots[-1]
+        self._claims[slot] = max(route.claim, self.newest_claim(slot))
+
+    def _end(self, slot: int, claim: int) -> None:
+        """Record that a claim of a slot, and all before it, have ended."""
+        self._claims[slot] = max(claim, self.newest_claim(slot))
+        if claim > self._ended.get(slot, -1):
             self._ended.pop(slot, None)
-            self._ended[slot] = tick
+            self._ended[slot] = claim
             self.version += 1
 
 

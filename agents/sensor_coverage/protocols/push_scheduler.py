@@ -7,6 +7,7 @@ redundant robot that has offered itself. Without a route for some time the base 
 from typing import Any, ClassVar, Final
 
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
+from zwerm.agents.sensor_coverage.messages.incarnations import first_count
 from zwerm.agents.sensor_coverage.messages.pushes import (
     PushAborted,
     PushDone,
@@ -17,17 +18,14 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
 )
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
-from zwerm.agents.sensor_coverage.protocols.completion_census import CompletionProtocol
 from zwerm.agents.sensor_coverage.protocols.component import Component
+from zwerm.agents.sensor_coverage.protocols.ending.completion_census import CompletionProtocol
+from zwerm.agents.sensor_coverage.protocols.ending.release_roster import ReleaseRoster
+from zwerm.agents.sensor_coverage.protocols.ending.termination import Termination
 
-COVERED: Final = "covered"
-
-# Bounds of the ticks to wait: for a robot to come out, for a push to end, and without a frontier before the census.
+# Bounds of the ticks to wait: for a robot to come out, and for a push to end.
 RELEASE_TICKS_MAX: Final = 60
 PUSH_TICKS_MAX: Final = 2000
-QUIET_TICKS: Final = 60
-# Bound of the ticks to wait for a census that concludes.
-CENSUS_TICKS_MAX: Final = 6000
 # Ticks after a push to wait for news of an edge before gaps are expanded.
 GAP_TICKS: Final = 24
 # Bound of the ticks to wait for a robot that stands at the base and is not ready.
@@ -57,14 +55,13 @@ class PushScheduler(Component):
     def __init__(self, situation: Situation, beaconing: Beaconing, completion: CompletionProtocol) -> None:
         self.cycles = 0
         self.pushes = 0
-        self.released = 0
         self.outcome = ""
         self.release = False
         self._situation = situation
         self._map = situation.local_map
         self._beaconing = beaconing
-        self._completion = completion
-        self._known: dict[int, None] = {}  # robots that were ever visible
+        self._termination = Termination(completion)
+        self._roster = ReleaseRoster(situation.incarnation == 1)
         self._released_at: int | None = None
         self._released_before = -1  # robots that had come out when the latest one was released
         self._active: int | None = None  # the push that is active
@@ -73,8 +70,7 @@ class PushScheduler(Component):
         self._rear: int | None = None  # the robot that the active push takes from the base
         self._since = self._edges_since = 0
         self._not_ready_since = 0
-        self._quiet_since: int | None = None
-        self._tokens = 0
+        self._tokens = first_count(situation.incarnation)  # the number of a push is the name of a slot
         self._paused_at = 0
         self._paused_until: int | None = None
         self._offers: dict[int, tuple[int, ...]] = {}  # slot of a redundant robot: the slots from there to the base
@@ -85,22 +81,25 @@ class PushScheduler(Component):
         return self._active is None
 
     @property
+    def released(self) -> int:
+        """Number of robots that have come out of the depot."""
+        return len(self._roster.known)
+
+    @property
     def takes_census(self) -> bool:
         """Whether the base may begin waves of the census."""
-        waited = 0 if self._quiet_since is None else self._situation.tick - self._quiet_since
-        return waited > QUIET_TICKS + 4 * self._situation.motion.samples and not self.outcome
+        return self._termination.takes_census and not self.outcome
 
-    def count_released(self, visible: list[int]) -> None:
-        """Count the robots that have come out of the depot: those that are visible for the first time."""
-        for node in visible:
-            if node not in self._known:
-                self._known[node] = None
-                self.released += 1
+    def see(self, visible: list[int]) -> None:
+        """Take in the visible robots: a robot that comes out of the depot is one of them."""
+        self._roster.see(visible)
+        self._termination.let_out(self._roster.known)
 
     def receive(self, sender: int, message: Any, tick: int) -> None:
         """Take in a new neighbour's state, or a message of a push."""
         match message:
             case StateBeacon(slot=slot):
+                self._roster.hear(sender, message)
                 if sender not in self._map.states and slot == NOWHERE:
                     self._beaconing.repeat(tick)  # the new robot needs the base's view for its heading
             case PushToken(push):
@@ -116,6 +115,11 @@ class PushScheduler(Component):
             case _:
                 pass
 
+    def restarted(self, node: int, tick: int) -> None:
+        """End the active push if the robot that it took from the base has lost its memory."""
+        if self._active is not None and node == self._rear:
+            self._end(False)
+
     def poll(self, tick: int) -> None:
         """Give up a push whose first message was lost, and start the next push if it is time."""
         mailbox = self._situation.mailbox
@@ -125,11 +129,18 @@ class PushScheduler(Component):
                 self._end(False)
         mailbox.sent.clear()
         mailbox.lost.clear()
+        if self._map.guests != self._roster.guests:
+            self._map.guests = self._roster.guests
+            self._map.change()
         if not self.outcome:
             if self._active is not None:
                 self._watch_push(tick, self._active)
             else:
                 self._start_push(tick)
+        if not self.outcome:
+            self.outcome = self._termination.stalled(tick)
+            if self.outcome:
+                self._report_numbers()
 
     # --- one push -----------------------------------------------------------------------------------------------------
 
@@ -143,19 +154,19 @@ class PushScheduler(Component):
 
     def _start_push(self, tick: int) -> None:
         """Start the next push, or wait for its conditions."""
-        alone = not any(state.slot not in (0, NOWHERE) for state in self._map.states.values())
+        visible = self._situation.bearings
+        alone = not any(node in visible and each.slot not in (0, NOWHERE) for node, each in self._map.states.items())
         if not alone and not self._map.has_route:
             self._watch_quiet(tick)
             return
         if not alone and self._map.to_gap and tick - self._edges_since < GAP_TICKS:
             return  # news of an edge may be on its way
-        self._quiet_since = None
+        self._termination.disturb()
         if self._pauses(tick):
             return
         if not alone and self._offers:
             self._call(tick)
             return
-        visible = self._situation.motion.frame.seen
         waiting = [node for node, state in sorted(self._map.states.items()) if state.waiting and node in visible]
         if not waiting:
             if not self._not_ready(tick):
@@ -186,6 +197,8 @@ class PushScheduler(Component):
     def _end(self, tried: bool, done: bool = False) -> None:
         """Record that the active push has ended."""
         self._active = None
+        if tried or done:
+            self._termination.progress(self._situation.tick)
         if done or not self._to_gap:  # a failed push into a gap leaves the edges as they were
             self._edges_since = self._situation.tick
         self.cycles += tried or done
@@ -210,11 +223,15 @@ class PushScheduler(Component):
 
     def _not_ready(self, tick: int) -> bool:
         """Return whether a visible robot has no slot yet, and may be ready soon."""
-        states = self._map.states
-        homeless = [n for n in self._situation.bearings if n not in states or states[n].slot == NOWHERE]
+        homeless = self._homeless()
         if not homeless or self._released_at is not None:
             self._not_ready_since = tick
-        return tick - self._not_ready_since < READY_TICKS_MAX and bool(homeless) and self._released_at is None
+        return tick - self._not_ready_since < READY_TICKS_MAX and homeless and self._released_at is None
+
+    def _homeless(self) -> bool:
+        """Return whether a visible robot that is not dead has no slot."""
+        states = self._map.states
+        return any(node not in states or states[node].slot == NOWHERE for node in self._situation.bearings)
 
     def _rear_has_left(self) -> bool:
         """Return whether the robot that the push took from the base has its slot: the next robot has time to average."""
@@ -229,23 +246,19 @@ class PushScheduler(Component):
             self.release = True
             self._released_at = tick
             self._released_before = self.released
-        elif self.released == self._released_before and tick - self._released_at > RELEASE_TICKS_MAX:
-            self.outcome = "depot-dry: the depot is empty"
-            self._report_numbers()
+        elif self.released == self._released_before:
+            if tick - self._released_at > RELEASE_TICKS_MAX:
+                self.outcome = "depot-dry: the depot is empty"
+                self._report_numbers()
+        elif not self._homeless() or tick - self._released_at > READY_TICKS_MAX:
+            self._released_at = None  # the robot that came out is dead, or was never ready
 
     def _watch_quiet(self, tick: int) -> None:
-        """Conclude from the census, or from a very long time without a route to a frontier."""
+        """Conclude from the census once no path has led to a frontier for some time."""
         if not self._situation.clear or self._map.route is not None:
-            self._quiet_since = None
+            self._termination.disturb()
             return
-        if self._quiet_since is None:
-            self._quiet_since = tick
-        last = self._completion.last
-        if self.takes_census and self._completion.concluded:
-            self.outcome = COVERED
-        elif tick - self._quiet_since > CENSUS_TICKS_MAX:
-            claimed = last is not None and last.claims > 0
-            self.outcome = "cut-off: no way leads to the frontier" if claimed else COVERED
+        self.outcome = self._termination.quiet(tick, self._situation.motion.samples)
         if self.outcome:
             self._report_numbers()
 

@@ -95,6 +95,7 @@ class TokenPush:
         self._result = DriveResult(True)
         self._anchors: tuple[Sighting, ...] = ()
         self._leader_epoch = -1
+        self._lost: dict[int, None] = {}  # robots that have restarted since this robot takes part
 
     # --- events -------------------------------------------------------------------------------------------------------
 
@@ -121,6 +122,10 @@ class TokenPush:
         """Take in that the leader has left its slot."""
         if self.phase == "armed":
             self._call()
+
+    def member_lost(self, node: int) -> None:
+        """Take in that a robot has lost its memory: wait for it no longer."""
+        self._lost[node] = None
 
     def acknowledged(self, body: Body, lost: bool) -> None:
         """Take in that a message of this robot was acknowledged, or was given up."""
@@ -340,11 +345,15 @@ class TokenPush:
 
     def _wait_ticks(self, node: int | None) -> int:
         """Return the ticks to wait for a robot of the chain: few if it is not visible and so out of range."""
+        if node in self._lost:
+            return 0
         return WAVE_TICKS if node is not None and node in self._situation.bearings else LOST_TICKS
 
     def _leader_is_back(self) -> bool:
-        """Return whether the leader stands at its slot after a later drive than the one it announced."""
+        """Return whether the leader stands at its slot after a later drive than it announced, or lost its memory."""
         slot, leader = self._chain.leader
+        if leader in self._lost:
+            return True
         state = self._map.states.get(leader)
         return state is not None and not state.moving and state.slot == slot and state.epoch > self._leader_epoch
 

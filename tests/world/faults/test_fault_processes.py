@@ -102,13 +102,13 @@ def state_of(pid: int) -> str:
 
 
 def test_a_process_that_is_stopped_from_outside_ends_the_run_with_its_name(nothing_left: None) -> None:
-    chosen = scenario(time={"straggler_s": 0.5, "duration_s": 60.0})
+    chosen = scenario(time={"straggler_s": 2.0, "duration_s": 60.0})
     with LocalSwarm(new_run_id(), node_specs(chosen, 1)) as swarm:
         world = assemble(chosen, 1)
         swarm.pause(2)
         result = drive(world, swarm.link, 1, "processes", programs=swarm)
         assert result.outcome == "failed"
-        assert result.reason == str(StragglerError([2], 0, 0.5))
+        assert result.reason == str(StragglerError([2], 0, 2.0))
 
 
 def test_a_late_joiner_has_no_process_before_its_time(nothing_left: None) -> None:

@@ -115,7 +115,7 @@ def test_a_fault_that_never_began_is_counted_and_named_in_the_result() -> None:
     assert result.missed_faults == ["crash at 9 s", "blackout on a condition"]
     assert result.metrics["faults_missed"] == 2.0
     console = Console(width=80, record=True, file=io.StringIO())
-    print_result(console, result, ())
+    print_result(console, result)
     assert "faults that never came" in console.export_text()
     healthy = run(faulty(time={"duration_s": 0.5}), runner="inline")
     assert "faults_missed" not in healthy.metrics

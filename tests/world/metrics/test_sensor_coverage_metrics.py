@@ -5,12 +5,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_snapshot
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, MembershipSnapshot, encode_snapshot
+from zwerm.maths.keyed_random import Draws
 from zwerm.run.assembly import prepare
 from zwerm.scenario.load import load
+from zwerm.wire.messages import Command
 from zwerm.world.metrics import MetricContext, Truth
-from zwerm.world.metrics.sensor_coverage import Conclusion, Deployment
-from zwerm.world.tick.telemetry import TelemetryRecord
+from zwerm.world.metrics.sensor_coverage import Conclusion, Deployment, removals
+from zwerm.world.scene import Scene
+from zwerm.world.tick.telemetry import TelemetryRecord, TelemetrySink
 
 # Robots 0 to 29, of which 0 is the base station; the coordinator is node 30.
 SMALL = ("arena.size_m=[2.4,1.8]", "base.pose=[0.2,0.9,0.0]", "robots.count=30")
@@ -63,17 +66,51 @@ def test_a_snapshot_that_cannot_be_decoded_is_ignored_and_counted() -> None:
     assert metric.metrics() == {"undecodable_snapshots": 4.0}
 
 
-def test_a_conclusion_is_early_only_where_a_living_robot_claims_a_frontier() -> None:
-    def concluded(claims: dict[int, bool], dead: tuple[int, ...], completed: bool) -> float:
-        metric = Conclusion(None, context("services.path=gradient"))
-        for node, claim in claims.items():
-            metric.report(record(node, {"claims_frontier": not claim}))
-            metric.report(record(node, {"claims_frontier": claim}))
-        metric.sample(Truth(None, dead, completed))  # type: ignore[arg-type]
-        return metric.metrics()["concluded_early"]
+def truth_at(places: list[tuple[float, float]], dead: tuple[int, ...], completed: bool, telemetry: Any = None) -> Truth:
+    """The truth with robots at some places of the small hall."""
+    arena = prepare(load("sensor-coverage", SMALL)).arena
+    position, count = np.array(places, dtype=np.float64), len(places)
+    there, still = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    scene = Scene(7, 0.7, position, np.zeros(count), there, still, 0.07, arena, Draws(1))
+    return Truth(scene, dead, completed, TelemetrySink() if telemetry is None else telemetry)
 
-    assert concluded({3: True}, (), True) == 1.0
-    assert concluded({3: True}, (), False) == 0.0
-    assert concluded({3: True}, (3,), True) == 0.0
-    assert concluded({3: False}, (), True) == 0.0
+
+# A lattice that covers the hall, the base first.
+FULL = [(0.2 + 0.5 * x, 0.4 + 0.5 * y) for x in range(5) for y in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("claims", "dead", "completed", "places", "early"),
+    [
+        ({3: True}, (), True, FULL, 1.0),
+        ({3: True}, (), False, FULL, 0.0),
+        ({3: True}, (3,), True, FULL, 0.0),
+        ({3: False}, (), True, FULL, 0.0),
+        ({}, (), True, FULL[:2], 1.0),
+        ({}, (), False, FULL[:2], 0.0),
+        ({}, tuple(range(2, 15)), True, FULL, 1.0),
+    ],
+)
+def test_a_conclusion_is_early_where_a_living_robot_claims_or_the_hall_is_not_covered(
+    claims: dict[int, bool], dead: tuple[int, ...], completed: bool, places: list[tuple[float, float]], early: float
+) -> None:
+    metric = Conclusion(None, context("services.path=gradient"))
+    for node, claim in claims.items():
+        metric.report(record(node, {"claims_frontier": not claim}))
+        metric.report(record(node, {"claims_frontier": claim}))
+    metric.sample(truth_at(places, dead, completed))
+    assert metric.metrics() == {"concluded_early": early}
     assert Conclusion(None, context()).metrics() == {}
+
+
+@pytest.mark.parametrize(("down_then", "dead_later", "unsafe"), [((), (), 1.0), ((), (0,), 1.0), ((0,), (0,), 0.0)])
+def test_a_departure_is_judged_by_the_robots_that_ran_then(
+    down_then: tuple[int, ...], dead_later: tuple[int, ...], unsafe: float
+) -> None:
+    """Robot 1 connects 0 and 2. If 0 is down when 1 leaves, 2 is connected as before; a later death changes nothing."""
+    places = [(0.2, 0.9), (1.1, 0.9), (2.0, 0.9)]
+    scene = truth_at(places, (), False).scene
+    telemetry = TelemetrySink()
+    down = np.isin(np.arange(3), down_then)
+    telemetry.accept(scene, 1, Command(snapshot=encode_snapshot(MembershipSnapshot(False))), down)
+    assert removals(truth_at(places, dead_later, False, telemetry), 1.0) == {"removals": 1.0, "unsafe_removals": unsafe}

@@ -29,6 +29,7 @@ class Collision(RadioModel):
     """Drops packets that overlap with another transmission at their receiver."""
 
     cause: ClassVar[str] = "collision"
+    memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = CollisionTable
 
     def __init__(self, parameters: CollisionTable, context: ModelContext) -> None:

@@ -24,6 +24,7 @@ class CorruptionTable(RadioModelTable):
 class Corruption(RadioModel):
     """Flips bits of payloads; drops nothing."""
 
+    memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = CorruptionTable
 
     def __init__(self, parameters: CorruptionTable, context: ModelContext) -> None:

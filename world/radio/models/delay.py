@@ -32,6 +32,7 @@ class DelayTable(RadioModelTable):
 class Delay(RadioModel):
     """Delays every packet."""
 
+    memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = DelayTable
 
     def __init__(self, parameters: DelayTable, context: ModelContext) -> None:

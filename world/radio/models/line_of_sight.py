@@ -18,6 +18,7 @@ class LineOfSightModel(RadioModel):
     cause: ClassVar[str] = "no-line-of-sight"
     needs_positions: ClassVar[bool] = True
     out_of_reach: ClassVar[bool] = True
+    memoryless: ClassVar[bool] = True
 
     def __init__(self, parameters: RadioModelTable, context: ModelContext) -> None:
         self._blocked = StaticLinkValues(

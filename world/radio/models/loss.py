@@ -17,6 +17,7 @@ class Loss(RadioModel):
     """Drops each packet with probability `fraction`."""
 
     cause: ClassVar[str] = "loss"
+    memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = LossTable
 
     def __init__(self, parameters: LossTable, context: ModelContext) -> None:

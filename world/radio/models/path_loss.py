@@ -8,12 +8,17 @@ for the whole run; `fading_sd_db` adds a random number of its own to every packe
 `width_db`, the transitional region of Zuniga, Krishnamachari: Analyzing the transitional region in low power wireless
 links. SECON 2004.
 
+A broadcast beyond `reach_m` is dropped without a draw: its probability of reception is at most `negligible_probability`.
+
 The defaults are those of an IEEE 802.15.4 radio (0 dBm, -94 dBm) indoors.
 """
 
-from typing import ClassVar
+import math
+from statistics import NormalDist
+from typing import Annotated, ClassVar
 
 import numpy as np
+from pydantic import Field
 
 from zwerm.scenario.types import Finite, NonNegative, Positive
 from zwerm.world.radio import ModelContext, Packets, RadioModel, RadioModelTable, Transmissions, Verdict
@@ -31,6 +36,7 @@ class PathLossTable(RadioModelTable):
     fading_sd_db: NonNegative = 0.0
     sensitivity_dbm: Finite = -94.0
     width_db: Positive = 1.0
+    negligible_probability: Annotated[float, Field(gt=0, le=0.01)] = 1e-9
 
 
 class PathLoss(RadioModel):
@@ -38,14 +44,21 @@ class PathLoss(RadioModel):
 
     cause: ClassVar[str] = "weak-signal"
     needs_positions: ClassVar[bool] = True
+    memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = PathLossTable
 
     def __init__(self, parameters: PathLossTable, context: ModelContext) -> None:
         self._table = parameters
+        self._reach_m = reach_m(parameters)
         self._context = context
         self._random = context.link_random()
         self._fading = context.link_random("/fading")
         self._shadow_db = context.links.numbers(np.nan)
+
+    @property
+    def reach_m(self) -> float:
+        """The distance beyond which a packet passes with at most `negligible_probability` [m]."""
+        return self._reach_m
 
     def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
         """Compare one random number of each packet with its probability of reception."""
@@ -85,3 +98,19 @@ class PathLoss(RadioModel):
     def network_rule(cls, parameters: PathLossTable) -> None:
         """Raise ValueError: the probability of loss depends on the distance."""
         raise ValueError("its chance changes with every distance; say range and loss")
+
+
+def reach_m(table: PathLossTable) -> float:
+    """Return the distance [m] beyond which a packet passes with at most `negligible_probability`; infinite beyond any number.
+
+    Over the distances at which the mean power is `sensitivity_dbm` - margin: a normal random number above z deviations has
+    probability p / 2, and so has a draw below the logistic function at - width_db ln(2 / p).
+    """
+    half = table.negligible_probability / 2.0
+    deviation_db = math.hypot(table.shadowing_sd_db, table.fading_sd_db)
+    margin_db = -NormalDist().inv_cdf(half) * deviation_db - table.width_db * math.log(half)
+    budget_db = table.tx_power_dbm - table.reference_loss_db - table.sensitivity_dbm + margin_db
+    try:
+        return table.reference_m * max(1.0, math.pow(10.0, budget_db / (10.0 * table.exponent)))
+    except OverflowError:
+        return math.inf

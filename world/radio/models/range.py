@@ -24,6 +24,7 @@ class DiscRange(RadioModel):
     cause: ClassVar[str] = "out-of-range"
     needs_positions: ClassVar[bool] = True
     out_of_reach: ClassVar[bool] = True
+    memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = RangeTable
 
     def __init__(self, parameters: RangeTable, context: ModelContext) -> None:

@@ -58,6 +58,7 @@ class WallAttenuation(RadioModel):
     cause: ClassVar[str] = "walls"
     needs_positions: ClassVar[bool] = True
     out_of_reach: ClassVar[bool] = True
+    memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = WallAttenuationTable
 
     def __init__(self, parameters: WallAttenuationTable, context: ModelContext) -> None:

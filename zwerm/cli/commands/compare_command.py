@@ -8,7 +8,18 @@ import typer
 from zwerm.cli.options import Json, ScenarioName, Sets
 from zwerm.cli.output_files import PICTURES, OutputFile, check_outputs
 from zwerm.cli.terminal import err, errors_as_lines, out, print_json
-from zwerm.cli.trials import Jobs, Out, Retry, Seeds, exit_with, print_trial_counts, rows_file, study_extra, write_csv
+from zwerm.cli.trials import (
+    Jobs,
+    Out,
+    Retry,
+    Seeds,
+    Timeout,
+    exit_with,
+    print_trial_counts,
+    rows_file,
+    study_extra,
+    write_csv,
+)
 
 
 def compare(
@@ -59,6 +70,7 @@ def compare(
         ),
     ] = None,
     retry: Retry = False,
+    timeout: Timeout = None,
     as_json: Json = False,
 ) -> None:
     """Compare variants of a scenario, seed by seed: same seeds, same random draws, same faults.
@@ -107,6 +119,7 @@ def compare(
                 jobs=jobs,
                 sets=tuple(sets or ()),
                 retry=retry,
+                timeout_s=timeout,
                 runner="inline" if inline else "processes",
                 listener=progress,
             )

@@ -1,8 +1,11 @@
 """`zwerm list`: the catalogue of algorithms with their scenarios and studies, and of plug-ins."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.padding import Padding
+from rich.text import Text
 
 from zwerm.catalogue import ALGORITHMS, plugins, row_of
 from zwerm.cli.terminal import errors_as_lines, out, print_json
@@ -12,23 +15,54 @@ if TYPE_CHECKING:
 
 
 def list_catalogue(
-    text: Annotated[str, typer.Argument(help="Show only what has this text in its name or summary.")] = "",
+    text: Annotated[str, typer.Argument(help="Show what has this text in its name or summary, in full.")] = "",
+    whole: Annotated[bool, typer.Option("--all", help="Show every scenario and study with its summary.")] = False,
     kinds: Annotated[bool, typer.Option("--plugins", help="List the plug-ins of each kind instead.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """List the algorithms that ship with Zwerm, with their scenarios and studies.
 
-    Examples: [bold]zwerm list[/bold], [bold]zwerm list loss[/bold], [bold]zwerm list --plugins[/bold]
+    Examples: [bold]zwerm list[/bold], [bold]zwerm list loss[/bold], [bold]zwerm list --all[/bold], \
+[bold]zwerm list --plugins[/bold]
     """
-    with errors_as_lines():
-        algorithms = [] if kinds else _algorithms(text)
-    if as_json:
-        print_json({kind: dict(rows) for kind, rows in plugins().items()} if kinds else {"algorithms": algorithms})
-    elif kinds:
+    if kinds:
+        if as_json:
+            print_json({kind: dict(rows) for kind, rows in plugins().items()})
+            return
         for kind, rows in plugins().items():
             out.print(f"[bold]{kind}[/bold]: {', '.join(name for name in rows if text in name)}", highlight=False)
+    elif not (text or whole or as_json):
+        _print_names()
     else:
-        _print_algorithms(algorithms, whole=bool(text))
+        with errors_as_lines():
+            algorithms = _algorithms(text)
+        if as_json:
+            print_json({"algorithms": algorithms})
+        else:
+            _print_algorithms(algorithms, whole=bool(text))
+
+
+def _print_names() -> None:
+    """Print each algorithm with the names of its scenarios and the number of its studies; reads no file."""
+    scenarios, studies = (_names_in(folder) for folder in ("scenarios", "studies"))
+    for row in (*ALGORITHMS, None):
+        own = [name for name in scenarios if row_of(name) is row]
+        count = sum(row_of(name) is row for name in studies)
+        if own or count:
+            title = "Others" if row is None else row.title
+            with_studies = f", {count} {'study' if count == 1 else 'studies'}" if count else ""
+            out.print(f"[bold]{title}[/bold][dim]{with_studies}[/dim]", highlight=False)
+            out.print(Padding(Text(" ".join(own), style="cyan"), (0, 0, 0, 2)))
+    out.print(
+        "\nzwerm list TEXT: those with TEXT in the name, in full   zwerm list --all: all of them\n"
+        "zwerm show NAME: the file   zwerm run NAME   zwerm new DIR: a project of your own",
+        highlight=False,
+        style="dim",
+    )
+
+
+def _names_in(folder: str) -> list[str]:
+    return sorted(path.stem for path in (Path(__file__).parents[2] / folder).glob("*.toml"))
 
 
 def _algorithms(text: str) -> "list[dict[str, Any]]":

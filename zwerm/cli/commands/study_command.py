@@ -4,18 +4,37 @@ from typing import Annotated
 
 import typer
 
-from zwerm.cli.options import Json, Sets
+from zwerm.cli.options import Json, Sets, built_in_names
 from zwerm.cli.terminal import err, errors_as_lines, out, print_json
-from zwerm.cli.trials import Jobs, Out, Retry, Seeds, exit_with, print_trial_counts, rows_file, study_extra, write_csv
+from zwerm.cli.trials import (
+    Jobs,
+    Out,
+    Retry,
+    Seeds,
+    Timeout,
+    exit_with,
+    print_trial_counts,
+    rows_file,
+    study_extra,
+    write_csv,
+)
 
 
 def study(
-    study: Annotated[str, typer.Argument(metavar="STUDY", help="A built-in study (see `zwerm list`) or a TOML file.")],
+    study: Annotated[
+        str,
+        typer.Argument(
+            metavar="STUDY",
+            help="A built-in study (see `zwerm list`) or a TOML file.",
+            autocompletion=built_in_names("studies"),
+        ),
+    ],
     seeds: Seeds = None,
     jobs: Jobs = None,
     output: Out = None,
     sets: Sets = None,
     retry: Retry = False,
+    timeout: Timeout = None,
     as_json: Json = False,
 ) -> None:
     """Run a study: scenarios over a grid of settings and many seeds, compared with a paper's numbers.
@@ -41,7 +60,14 @@ def study(
         path = rows_file(output, loaded.name)
         with StudyProgress(err, loaded.name, quiet=as_json) as progress:
             result = run_study(
-                loaded, path, seeds=chosen, jobs=jobs, sets=tuple(sets or ()), retry=retry, listener=progress
+                loaded,
+                path,
+                seeds=chosen,
+                jobs=jobs,
+                sets=tuple(sets or ()),
+                retry=retry,
+                timeout_s=timeout,
+                listener=progress,
             )
         drawn = [draw_study(path.with_suffix(".png"), result.results)] if result.done else []
         drawn += write_csv(output, result)

@@ -7,9 +7,13 @@ import typer
 
 from zwerm.cli.options import (
     Animation,
+    Bare,
+    ColourBy,
     Json,
+    Links,
     Picture,
     PictureAt,
+    PictureSize,
     RadioTable,
     RealTime,
     Record,
@@ -32,6 +36,10 @@ def world(
     picture: Picture = None,
     picture_at: PictureAt = None,
     animate: Animation = None,
+    size: PictureSize = None,
+    bare: Bare = False,
+    colour_by: ColourBy = None,
+    links: Links = None,
     radio_table: RadioTable = None,
     as_json: Json = False,
 ) -> None:
@@ -49,7 +57,8 @@ def world(
     with errors_as_lines():
         for endpoint in listen:
             check_endpoint("--listen", endpoint)
-        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json, record)
+        moments = tuple(picture_at or ())
+        output = RunOutput(picture, moments, animate, radio_table, as_json, record, size, bare, colour_by, links)
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json) as progress:
             result = serve(loaded, seed, listen, credentials, realtime=realtime, watcher=progress, record=record)

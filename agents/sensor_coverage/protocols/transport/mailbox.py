@@ -71,6 +71,12 @@ class ReliableMailbox(Component):
             self.sent.append((sender, queue.bodies.popleft()))
             queue.tries = 0
 
+    def restarted(self, node: int, tick: int) -> None:
+        """Give up what was to be sent to a former incarnation, and number segments of the new one from the start."""
+        queue = self._queues.pop(node, None)
+        self.lost += [(node, body) for body in queue.bodies] if queue is not None else []
+        self._received.pop(node, None)
+
     def poll(self, tick: int) -> None:
         """Set the time of this tick."""
         self._tick = tick

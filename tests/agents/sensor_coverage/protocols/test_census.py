@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.sensor_coverage.messages.waves import CensusMessage, CensusTally, CensusWave
-from zwerm.agents.sensor_coverage.protocols.census import Census
-from zwerm.agents.sensor_coverage.protocols.completion_census import CompletionProtocol
+from zwerm.agents.sensor_coverage.protocols.ending.census import Census
+from zwerm.agents.sensor_coverage.protocols.ending.completion_census import CompletionProtocol
 
 POLL_S = 1.0
 EVERY_S = 10.0

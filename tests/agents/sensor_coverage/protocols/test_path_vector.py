@@ -228,7 +228,7 @@ def test_a_route_along_an_obstacle_edge_costs_more() -> None:
     network = Network(4, {(1, 2): 1.0, (2, 3): 1.0, (1, 4): 1.0, (3, 4): OBSTACLE_COST})
     network.roots[1] = None
     settled(network, 4)
-    assert network.robots[3].route == Route(2.0, (3, 2, 1), since=1)
+    assert network.robots[3].route == Route(2.0, (3, 2, 1), claim=1)
 
 
 def test_of_equal_routes_the_one_to_the_smallest_slot_wins_and_then_the_one_through_the_smallest() -> None:
@@ -297,23 +297,58 @@ def test_a_new_frontier_claim_of_a_robot_ends_its_earlier_claim() -> None:
     robot = PathVectorProtocol()
     robot.choose(2, 0.0, {}, 5)
     robot.choose(2, 0.0, {}, 6)
-    assert robot.route == Route(0.0, (2,), 5)
+    assert robot.route == Route(0.0, (2,), 1)
     robot.claim(2, 1000.0, 7)
-    assert (robot.route, robot.ended) == (Route(1000.0, (2,), 7), ((2, 6),))
+    assert (robot.route, robot.ended) == (Route(1000.0, (2,), 2), ((2, 1),))
     robot.choose(2, None, {}, 9)
-    assert (robot.route, robot.ended) == (None, ((2, 8),))
+    assert (robot.route, robot.ended) == (None, ((2, 2),))
 
 
-def test_a_robot_that_took_over_a_slot_and_missed_the_end_of_its_route_renews_its_claim() -> None:
+def test_a_claim_is_renewed_after_a_time_of_the_robots_own_clock() -> None:
+    robot = PathVectorProtocol()
+    for tick, claim in ((10_000, 1), (10_000 + RENEW_TICKS, 1), (10_001 + RENEW_TICKS, 2)):
+        robot.choose(2, 0.0, {}, tick)
+        assert robot.route == Route(0.0, (2,), claim)
+
+
+def test_claims_of_a_slot_go_on_counting_with_its_next_occupant() -> None:
     follower, other = PathVectorProtocol(), PathVectorProtocol()
-    follower.receive(4, PathVector(1, 2, Route(0.0, (2,), 5)))
     other.receive(4, PathVector(2, 2, None, ended=((2, 8),)))  # the follower has not heard that
-    follower.take_over(2, None)
-    for number, tick in ((1, 9), (2, 9 + RENEW_TICKS)):
-        follower.choose(2, 0.0, {}, tick)
-        other.receive(6, PathVector(number, 2, follower.route))
-        other.choose(3, None, {2: 1.0}, tick)
-        assert (other.route is not None) == (number == 2)
+    follower.take_over(2, None, claims=8)
+    follower.choose(2, 0.0, {}, 1)
+    other.receive(6, PathVector(1, 2, follower.route))
+    other.choose(3, None, {2: 1.0}, 1)
+    assert other.route == Route(1.0, (3, 2), 9)
+
+
+@pytest.mark.parametrize("rumour", [PathVector(7, 3, None, ended=((2, 8),)), PathVector(7, 3, Route(1.0, (3, 2), 8))])
+@pytest.mark.parametrize("cost", [0.0, None])
+def test_a_robot_overrules_a_newer_claim_of_its_slot_that_is_not_its_own(
+    rumour: PathVector, cost: float | None
+) -> None:
+    """An earlier occupant made it, or a former incarnation; no clock tells which is newer."""
+    robot, other = PathVectorProtocol(), PathVectorProtocol()
+    robot.choose(2, 0.0, {}, 5)
+    for each in (robot, other):
+        each.receive(3, rumour)
+    robot.choose(2, cost, {}, 6)
+    other.receive(4, PathVector(9, 2, robot.route, robot.ended))
+    other.choose(5, None, {2: 1.0, 3: 1.0}, 6)
+    assert other.route == (None if cost is None else Route(1.0, (5, 2), 9))
+
+
+def test_the_claim_of_a_neighbour_that_is_dead_or_lost_its_memory_ends() -> None:
+    robot, other = PathVectorProtocol(), PathVectorProtocol()
+    robot.receive(4, PathVector(7, 2, Route(0.0, (2,), 5)))
+    other.receive(1, PathVector(1, 3, Route(1.0, (3, 2), 5)))
+    robot.forget(4, 2)
+    other.receive(1, PathVector(2, 6, None, robot.ended))
+    for each in (robot, other):
+        each.choose(9, None, {2: 1.0, 3: 1.0}, 9)
+        assert each.route is None
+    robot.receive(4, PathVector(1, 2, Route(0.0, (2,), 6)))  # its next incarnation counts from the start
+    robot.choose(9, None, {2: 1.0}, 9)
+    assert robot.route == Route(1.0, (9, 2), 6)
 
 
 def test_a_path_vector_survives_the_wire() -> None:

@@ -1,6 +1,6 @@
 """The census as a component: the base begins waves, and every robot answers them."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from typing import ClassVar, Final
 
 import numpy as np
@@ -8,8 +8,8 @@ import numpy as np
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
 from zwerm.agents.sensor_coverage.messages.waves import CensusMessage, CensusTally, CensusWave
-from zwerm.agents.sensor_coverage.protocols.census import INCARNATIONS, Census
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
+from zwerm.agents.sensor_coverage.protocols.ending.census import INCARNATIONS, Census
 
 # Ticks between repeated questions of a robot, and between waves.
 POLL_TICKS: Final = 6
@@ -30,7 +30,7 @@ class CompletionProtocol(Component):
         self._census = Census(setup.node, POLL_TICKS * setup.dt_s, WAVE_TICKS * setup.dt_s, incarnation, base)
         self._asks = asks
         self._outbox: list[Outgoing] = []
-        self._updated: tuple[tuple[int, ...], int] | None = None
+        self._updated: tuple[tuple[int, ...], int, tuple[int, ...]] | None = None
         self._tick = 0
 
     @property
@@ -43,13 +43,40 @@ class CompletionProtocol(Component):
         """The tally of the latest wave that came back to the base."""
         return self._census.last
 
-    def update(self, tick: int, neighbours: Collection[int], claims: int, busy: bool) -> None:
-        """Take in the visible robots, the number of frontier claims, and whether the robot is busy; first in every tick."""
+    @property
+    def missing(self) -> tuple[int, ...]:
+        """The robots that were let out, and that the latest tally has neither as present nor as dead."""
+        return self._census.missing
+
+    @property
+    def search(self) -> int:
+        """The number of the latest search for missing robots."""
+        return self._census.search
+
+    def begin_search(self) -> None:
+        """At the base: have all robots try again what had failed, from the next wave on."""
+        self._census.search += 1
+
+    def let_out(self, robots: Iterable[int]) -> None:
+        """Add robots to the roster of those that were let out."""
+        self._census.let_out(robots)
+
+    def restarted(self, node: int, tick: int) -> None:
+        """Forget what a former incarnation of a neighbour answered."""
+        self._census.restarted(node)
+
+    def update(
+        self, tick: int, neighbours: Collection[int], claims: int, busy: bool, dead: Collection[int] = ()
+    ) -> None:
+        """Take in the visible robots, the number of frontier claims, and whether the robot is busy; first in every tick.
+
+        `dead` are visible robots that are declared dead; they are not in `neighbours`.
+        """
         self._tick = tick
-        updated = tuple(neighbours), claims
+        updated = tuple(neighbours), claims, tuple(dead)
         if busy or claims or updated != self._updated:
             self._updated = updated
-            self._census.update(updated[0], claims, busy)
+            self._census.update(updated[0], claims, busy, dead)
 
     def receive(self, sender: int, message: CensusMessage, tick: int) -> None:
         """Take in a message of the census."""

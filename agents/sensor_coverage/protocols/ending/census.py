@@ -11,11 +11,17 @@ first of which no robot was disturbed: between the two waves there was a moment 
 message in flight between two robots must keep one of them busy. So a conclusion is wrong only in two cases: a robot was
 no neighbour of any counted robot, or robots lost their memory in both waves and late messages of their earlier
 incarnations were accepted.
+
+A conclusion says nothing of robots that no wave reached. So tallies name the counted robots, and the robots that one of
+them declares dead: it sees the body, and asked in vain for longer than any living robot is silent. Whoever was let out
+and is neither is `missing`. Waves and tallies carry the roster of all robots that were let out, so that a base that lost
+its memory learns it from any of them.
 """
 
 from collections.abc import Iterable
 from typing import Final
 
+from zwerm.agents.sensor_coverage.messages.robot_sets import from_bytes, members, robot_set, to_bytes
 from zwerm.agents.sensor_coverage.messages.waves import CensusMessage, CensusTally, CensusWave
 from zwerm.agents.sensor_coverage.protocols.component import Outgoing
 
@@ -33,10 +39,12 @@ class Census:
     In every tick `update` comes first, then `receive` for each message, then `poll`. A robot that lacks an answer asks
     every `poll_s`. A wave begins every `every_s`. If the wave before has not come back, the interval doubles each time.
     `now_s` is the robot's own clock; that of the base must not be set back, not even by a restart. `incarnation` is a
-    random number, another one after each loss of memory.
+    random number, another one after each loss of memory. `search` is the number of the latest search for missing
+    robots; the base increases it.
     """
 
     def __init__(self, me: int, poll_s: float, every_s: float, incarnation: int, base: bool = False) -> None:
+        self.search = 0
         self._me = me
         self._incarnation = incarnation
         self._poll_s = poll_s
@@ -44,6 +52,9 @@ class Census:
         self._base = base
         self._listed: tuple[int, ...] = ()
         self._claims = 0
+        self._dead = 0
+        self._roster = 0
+        self._wave_roster = 0  # as the wave brought it
         self._number = 0
         self._parent: int | None = None
         self._joined: dict[int, None] = {}  # neighbours that have joined by another parent
@@ -71,8 +82,30 @@ class Census:
         """The tally of the latest wave that came back to the base."""
         return self._last
 
-    def update(self, neighbours: Iterable[int], claims: int, busy: bool) -> None:
-        """Take in the visible robots, the number of frontier claims, and whether the robot moves or waits for an answer."""
+    @property
+    def missing(self) -> tuple[int, ...]:
+        """The robots that were let out, and that the latest tally has neither as present nor as dead, ascending."""
+        last = self._last
+        found = 0 if last is None else from_bytes(last.present) | from_bytes(last.dead)
+        return members(self._roster & ~(found | robot_set([self._me])))
+
+    def let_out(self, robots: Iterable[int]) -> None:
+        """Add robots to the roster."""
+        self._roster |= robot_set(robots)
+
+    def restarted(self, node: int) -> None:
+        """Forget what a former incarnation of a neighbour answered; a moment without it was not quiet."""
+        self._joined.pop(node, None)
+        self._tallies.pop(node, None)
+        self._disturbed = self._number
+        self._concluded = False
+
+    def update(self, neighbours: Iterable[int], claims: int, busy: bool, dead: Iterable[int] = ()) -> None:
+        """Take in the visible robots, the number of frontier claims, and whether the robot moves or waits for an answer.
+
+        `dead` are visible robots that are declared dead; they are no neighbours.
+        """
+        self._dead = robot_set(dead)
         listed = tuple(sorted(neighbours))
         if listed != self._listed or claims or busy:
             self._disturbed = self._number
@@ -95,6 +128,7 @@ class Census:
             self._begun_s = now_s
             # Set back to zero when a wave comes back.
             self._doublings = min(self._doublings + 1, DOUBLINGS_MAX)
+            self._wave_roster = self._roster
             return self._join(max(self._number + 1, int(now_s * TICKS_PER_S)), None, now_s)
         if self._number == 0 or self._counted is not None or now_s < self._poll_at_s:
             return []
@@ -105,6 +139,9 @@ class Census:
     def _receive_wave(self, sender: int, wave: CensusWave, now_s: float) -> list[Outgoing]:
         mine = wave.parent == self._me
         if wave.number > self._number and self._me in wave.missing and not mine and not self._base:
+            self.search = max(self.search, wave.search)
+            self._wave_roster = from_bytes(wave.roster)
+            self._roster |= self._wave_roster
             return self._join(wave.number, sender, now_s)
         if wave.number != self._number:
             return []
@@ -114,7 +151,7 @@ class Census:
             sent = self._count()
         if wave.again and self._me in wave.missing:
             if sender != self._parent:
-                sent.append(Outgoing(sender, CensusWave(self._number, self._parent, (), False)))
+                sent.append(Outgoing(sender, self._wave((), again=False)))
             elif self._counted is not None and not sent:
                 sent.append(Outgoing(sender, self._counted))
         return sent
@@ -128,7 +165,10 @@ class Census:
 
     def _ask(self, again: bool, now_s: float) -> list[Outgoing]:
         self._poll_at_s = now_s + self._poll_s
-        return [Outgoing(None, CensusWave(self._number, self._parent, self._missing(), again))]
+        return [Outgoing(None, self._wave(self._missing(), again))]
+
+    def _wave(self, missing: tuple[int, ...], again: bool) -> CensusWave:
+        return CensusWave(self._number, self._parent, missing, again, to_bytes(self._roster), self.search)
 
     def _missing(self) -> tuple[int, ...]:
         return tuple(node for node in self._listed if node not in self._joined and node not in self._tallies)
@@ -138,12 +178,20 @@ class Census:
         if self._missing():
             return []
         tallies = list(self._tallies.values())
+        present, dead = robot_set([self._me]), self._dead
+        for each in tallies:
+            present |= from_bytes(each.present)
+            dead |= from_bytes(each.dead)
+            self._roster |= from_bytes(each.roster)
         counted = CensusTally(
             self._number,
             1 + sum(each.robots for each in tallies),
             self._claims + sum(each.claims for each in tallies),
             max([self._disturbed, *(each.disturbed for each in tallies)]),
             (self._incarnation + sum(each.incarnations for each in tallies)) % INCARNATIONS,
+            to_bytes(present),
+            to_bytes(dead),
+            b"" if self._roster == self._wave_roster else to_bytes(self._roster),
         )
         self._counted = counted
         if self._parent is not None:

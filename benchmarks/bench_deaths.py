@@ -1,0 +1,150 @@
+"""Deaths and restarts in decentralised sensor coverage: whether every run ends by itself, and `completed` is true.
+
+Each run has a schedule of faults that is drawn from its seed:
+
+    at-once     a tenth of the robots that are out dies at one time
+    one-by-one  as many robots die at times of their own
+    base        all robots in sight of the base die at one time
+    restart     one robot crashes, and returns without memory after up to 60 s
+    silence     no radio message passes to or from the base for 240 s
+
+The times are drawn over the whole deployment. A run is right if it is `completed` with a reachable coverage of at least
+0.98, and honest if it ends as `failed`. It is wrong if it is `completed` with less, or does not end by itself.
+"""
+
+import argparse
+from collections.abc import Sequence
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+from csv_rows import add_csv_option, write_csv
+
+from zwerm import RunResult, run
+from zwerm.scenario.tables import Scenario
+from zwerm.world.faults.programs.crash import Crash
+from zwerm.world.scene import Scene
+
+ENOUGH: Final = 0.98
+
+
+class Hall(msgspec.Struct, frozen=True):
+    """A hall: its settings, its robots as deployed without faults, and the time [s] after which it is covered then."""
+
+    settings: tuple[str, ...]
+    robots: int
+    covered_s: float
+
+
+HALLS: Final = {
+    "small": Hall(("arena.size_m=[2.6,2.0]", "base.pose=[0.2,1.0,0.0]", "robots.count=30"), 10, 130.0),
+    "medium": Hall(("arena.size_m=[4.4,3.6]", "base.pose=[0.2,1.8,0.0]", "robots.count=60"), 26, 350.0),
+}
+KINDS: Final = ("at-once", "one-by-one", "base", "restart", "silence")
+SHARE: Final = 0.1
+# Fewest robots that die one by one: in a small hall a tenth is one robot.
+DEATHS_MIN: Final = 2
+DOWN_S_MAX: Final = 60.0
+SILENT_S: Final = 240.0
+DURATION_S: Final = 8_000.0
+
+
+class CrashBesideBase(Crash):
+    """The robots in sight of the base crash for good."""
+
+    @classmethod
+    def check(cls, parameters: Any, scenario: Scenario) -> list[str]:
+        """Return no mistake."""
+        return []
+
+    def strike(self, scene: Scene, dead: Sequence[int]) -> Sequence[int]:
+        """Choose the robots within the range of the base, once there is one."""
+        if self.nodes:
+            return ()
+        robots = np.setdiff1d(scene.present_ids(), [0, *dead])
+        away_m = np.hypot(*(scene.position[robots] - scene.position[0]).T)
+        self.nodes = sorted(robots[away_m < 1.0].tolist())
+        return self.nodes
+
+
+def schedule(kind: str, hall: Hall, slower: float, seed: int) -> list[dict[str, Any]]:
+    """Return the faults of one run; `slower` is the factor by which the deployment takes longer than `covered_s`."""
+    random = np.random.Generator(np.random.Philox(key=[seed, KINDS.index(kind)]))
+    last_s = hall.covered_s * slower
+
+    def at_s() -> float:
+        return round(float(random.uniform(1.0, last_s)), 1)
+
+    if kind == "at-once":
+        return [{"kind": "crash", "fraction": SHARE, "at_s": at_s()}]
+    if kind == "one-by-one":
+        deaths = max(DEATHS_MIN, round(SHARE * hall.robots))
+        return [{"kind": "crash", "fraction": 0.001, "at_s": at_s()} for _ in range(deaths)]
+    if kind == "base":
+        return [{"kind": "bench_deaths:CrashBesideBase", "at_s": at_s()}]
+    if kind == "silence":
+        return [{"kind": "partition", "groups": [[0]], "at_s": at_s(), "for_s": SILENT_S}]
+    down_s = round(float(random.uniform(0.1, DOWN_S_MAX)), 1)
+    robot = int(random.integers(1, hall.robots))
+    return [{"kind": "crash", "nodes": [robot], "at_s": at_s(), "for_s": down_s}]
+
+
+def verdict(result: RunResult) -> str:
+    """Return whether a run is `right`, `honest`, or `wrong`, by the module's rule."""
+    if result.outcome == "completed":
+        return "right" if result.metrics["reachable_coverage_fraction"] >= ENOUGH else "wrong"
+    return "honest" if result.outcome == "failed" else "wrong"
+
+
+def one_run(name: str, kind: str, loss: float, seed: int, more: Sequence[str]) -> dict[str, str]:
+    """Carry out one run, and return its row."""
+    hall = HALLS[name]
+    faults = schedule(kind, hall, 1.0 + 2.0 * loss, seed)
+    settings = [*hall.settings, "services.path=gradient", f"radio.loss={loss}", f"time.duration_s={DURATION_S}", *more]
+    tables = ", ".join("{" + ", ".join(f"{k} = {_toml(v)}" for k, v in each.items()) + "}" for each in faults)
+    result = run("sensor-coverage", seed=seed, runner="inline", overrides=[*settings, f"faults=[{tables}]"])
+    found = result.metrics
+    return {
+        "hall": name,
+        "faults": kind,
+        "loss": f"{loss:g}",
+        "seed": str(seed),
+        "verdict": verdict(result),
+        "outcome": result.outcome,
+        "reachable_coverage": f"{found['reachable_coverage_fraction']:.4f}",
+        "concluded_early": f"{found['concluded_early']:g}",
+        "robots_released": f"{found.get('robots_released', 0.0):g}",
+        "duration_s": f"{found.get('sim_s', result.sim_s):.1f}",
+        "reason": result.reason,
+        "first_fault": tables,
+    }
+
+
+def _toml(value: Any) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+def main() -> None:
+    """Run every kind of schedule with every seed, print a row each, and how many runs were right."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--hall", choices=HALLS, nargs="+", default=["small"])
+    parser.add_argument("--kind", choices=KINDS, nargs="+", default=list(KINDS))
+    parser.add_argument("--loss", type=float, nargs="+", default=[0.0])
+    parser.add_argument("--seeds", type=int, nargs=2, default=[1, 3], metavar=("FIRST", "LAST"))
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="a setting of the scenario")
+    add_csv_option(parser)
+    asked = parser.parse_args()
+    rows = []
+    for name in asked.hall:
+        for kind in asked.kind:
+            for loss in asked.loss:
+                for seed in range(asked.seeds[0], asked.seeds[1] + 1):
+                    rows.append(one_run(name, kind, loss, seed, asked.set))
+                    print(*rows[-1].values(), sep="\t", flush=True)
+    counts = {each: sum(row["verdict"] == each for row in rows) for each in ("right", "honest", "wrong")}
+    print(f"{len(rows)} runs: " + ", ".join(f"{count} {word}" for word, count in counts.items()))
+    write_csv(asked.csv, rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,55 @@
+"""The result of a run is printed, whole and alone, whatever else is printed and whatever file cannot be written."""
+
+import json
+from pathlib import Path
+
+import pytest
+from command_line import zwerm
+from support import ROBOTS
+
+SHORT = ("--set", "time.duration_s=1", "--set", "robots.count=3")
+
+
+def test_the_json_object_is_printed_although_the_disk_is_full(tmp_path: Path) -> None:
+    for name in ("full.png", "full.mcap"):
+        (tmp_path / name).symlink_to("/dev/full")
+    ran = zwerm(
+        "run",
+        "computation-free",
+        "--inline",
+        "--json",
+        *SHORT,
+        "--picture",
+        "full.png",
+        "--record",
+        "full.mcap",
+        cwd=tmp_path,
+    )
+    assert ran.returncode == 2
+    assert json.loads(ran.stdout)["outcome"] == "time-limit"
+    assert "zwerm: full.mcap: the recording is incomplete: No space left on device" in ran.stderr
+    assert "zwerm: full.png: " in ran.stderr
+    assert "Traceback" not in ran.stderr
+
+
+@pytest.mark.parametrize("runner", ["--inline", "--processes"])
+def test_what_a_controller_prints_does_not_spoil_the_json_object(tmp_path: Path, runner: str) -> None:
+    for name in ("ends.py",):
+        (tmp_path / name).write_text((ROBOTS / name).read_text())
+    ran = zwerm(
+        "run", "computation-free", runner, "--json", *SHORT, "--set", "robots.controller=ends:Prints", cwd=tmp_path
+    )
+    assert json.loads(ran.stdout)["outcome"] == "time-limit"
+    prefix = "" if runner == "--inline" else "node 2: "
+    assert f"{prefix}I am 2" in ran.stderr.splitlines()
+
+
+def test_the_credentials_never_replace_a_file_that_exists(tmp_path: Path) -> None:
+    mine = tmp_path / "thesis.tex"
+    mine.write_text("years of work")
+    ran = zwerm(
+        "world", "computation-free", *SHORT, "--listen", "tcp/127.0.0.1:0", "--credentials", str(mine), cwd=tmp_path
+    )
+    assert ran.returncode == 2
+    assert f"zwerm: {mine}: cannot write credentials: File exists" in ran.stderr
+    assert mine.read_text() == "years of work"

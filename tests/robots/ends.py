@@ -1,0 +1,44 @@
+"""Controllers that print, hang, leave or crash together, for tests of what a run reports."""
+
+import os
+
+from zwerm.agents.runtime.contract import Controller
+from zwerm.wire.messages import Command, Observation, WheelSpeeds
+
+
+class Prints(Controller):
+    """Prints a line at every tick."""
+
+    def step(self, observation: Observation) -> Command:
+        print(f"I am {self.setup.node}")  # noqa: T201 - a newcomer's first means of debugging
+        return Command(drive=WheelSpeeds(0.1, 0.1))
+
+
+class Leaves(Controller):
+    """Robot 2 ends its process with exit code 9 at tick 5."""
+
+    def step(self, observation: Observation) -> Command:
+        if self.setup.node == 2 and observation.tick == 5:
+            os._exit(9)
+        return Command()
+
+
+class AllRaise(Controller):
+    """Every robot raises at tick 4, the ones with large ids first where they run as processes."""
+
+    def step(self, observation: Observation) -> Command:
+        if observation.tick == 4:
+            raise ValueError("no way")
+        return Command()
+
+
+class HangsInline(Controller):
+    """Robot 1 never answers the observation of tick 3, and catches every Exception."""
+
+    def step(self, observation: Observation) -> Command:
+        while self.setup.node == 1 and observation.tick == 3:
+            try:
+                sum(range(1_000))
+            except Exception:
+                continue
+        return Command()
