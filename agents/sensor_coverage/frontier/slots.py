@@ -13,7 +13,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_heading, refined_reference
-from zwerm.agents.sensor_coverage.messages.commands import Sighting
+from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
+from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
 
 class Slots:
@@ -21,7 +22,8 @@ class Slots:
 
     `occupant` has the robot at each slot. `heading` [rad] and `frame` are each robot's heading and the robot in whose
     frame it is. `view` has the bearings that each robot sees in its own frame. `walls` and `blocked` have, by slot, the
-    directions of walls, and of drives that a wall stopped.
+    directions of walls, and of drives that a wall stopped. `felt` has the directions of walls closer than a body.
+    `walks` are the walls that robots followed. `length_m` has the distances [m] between slots that are not a hop apart.
     """
 
     def __init__(self) -> None:
@@ -30,6 +32,9 @@ class Slots:
         self.view: dict[int, dict[int, float]] = {}
         self.walls: dict[int, list[float]] = {}
         self.blocked: dict[int, list[float]] = {}
+        self.felt: dict[int, list[float]] = {}
+        self.walks: list[Walk] = []
+        self.length_m: dict[tuple[int, int], float] = {}
         self.frame: dict[int, int] = {}
         self._heading_readings: dict[int, int] = {}
         self._reference: dict[tuple[int, int], Reference] = {}
@@ -61,6 +66,7 @@ class Slots:
         if robot is not None:
             self.view.pop(robot, None)
         self.walls.pop(slot, None)
+        self.felt.pop(slot, None)
 
     def take(self, robot: int, sightings: Iterable[Sighting]) -> None:
         """Store the bearings that a robot reports, in its own frame."""
@@ -126,13 +132,34 @@ class Slots:
                 self.heading[robot] += by
                 self.frame[robot] = new
         for slot in turned:
-            for known in (self.walls, self.blocked):
+            for known in (self.walls, self.blocked, self.felt):
                 if slot in known:
                     known[slot] = [each + by for each in known[slot]]
+        self.walks = [each.turned(new, by) if each.frame == old else each for each in self.walks]
         spin = cmath.exp(1j * by)
         for (a, b), (mean, count) in self._reference.items():
             if a in turned:
                 self._reference[a, b] = mean * spin, count
+
+    # --- walls that were followed -----------------------------------------------------------------------------------
+
+    def take_walk(self, robot: int, hand: int, waypoints: Iterable[Waypoint]) -> None:
+        """Store a walk of a robot along a wall, in sight of robots that stand at their slots."""
+        heading, frame, slot_of = self.heading[robot], self.frame[robot], self.slot_of()
+        standing = {node: slot for node, slot in slot_of.items() if node != robot and self.frame[node] == frame}
+        points = tuple(
+            WalkPoint(
+                {
+                    standing[node]: bearing + heading + math.pi
+                    for node, bearing in ((one.node, one.bearing_rad) for one in each.sightings)
+                    if node in standing
+                },
+                tuple(bearing + heading for bearing in each.touched),
+                tuple(standing[node] for node in each.robots if node in standing),
+            )
+            for each in waypoints
+        )
+        self.walks.append(Walk(frame, hand, points))
 
     # --- directions between slots -----------------------------------------------------------------------------------
 
