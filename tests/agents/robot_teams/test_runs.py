@@ -125,6 +125,26 @@ def test_a_partition_costs_no_coverage() -> None:
     check(cover(team(3, faults=[partition])))
 
 
+def test_parts_that_never_hear_each_other_again_are_each_complete_and_nobody_is_a_wreck() -> None:
+    partition = {"kind": "partition", "groups": [[0], [1, 2]], "at_s": 10.0, "for_s": 2000.0}
+    check(cover(team(3, faults=[partition])))
+
+
+@pytest.mark.parametrize("node", [0, 1])
+def test_a_robot_that_stood_still_for_a_minute_is_taken_in_again(node: int) -> None:
+    """Others may take it for a wreck meanwhile; the run ends only with its own certificate, after it returned."""
+    found = cover(team(2, faults=[{"kind": "pause", "nodes": [node], "at_s": 10.0, "for_s": 60.0}]))
+    check(found)
+    assert found.time_s > 70.0
+
+
+def test_a_robot_that_lost_its_memory_is_taken_in_again() -> None:
+    result = run(team(2, faults=[{"kind": "restart", "nodes": [1], "at_s": 15.0}]), 1, "inline")
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.999
+    assert result.restarted == [1]
+
+
 def test_two_teams_that_meet_head_on_in_a_slice_dance_around_each_other_and_finish_it() -> None:
     """They start on one slice, too far apart to hear each other: each is a team, and both sweep the slice."""
     poses = [[2.47, 1.0, 0.0], [2.47, 5.0, 0.0]]
