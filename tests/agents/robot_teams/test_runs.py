@@ -88,6 +88,12 @@ def test_random_arenas_are_covered(count: int, seed: int) -> None:
     check(cover(team(count, arena, poses)))
 
 
+def test_a_wall_almost_parallel_to_a_slice_is_no_trap() -> None:
+    """Here the ends that sweeps and traces measure on one wall are 0.8 m apart."""
+    arena, poses = random_arena(13, 1)
+    check(cover(team(1, arena, poses)))
+
+
 def test_two_robots_are_faster_than_one_and_repeat_more() -> None:
     wide = {"polygon": [[0.0, 0.0], [14.0, 0.0], [14.0, 5.0], [0.0, 5.0]], "obstacles": []}
     poses = [[0.6, 4.0, 0.0], [1.55, 4.0, 0.0]]
