@@ -41,6 +41,10 @@ REDUNDANT_COST: Final = -100.0
 # Pause [ticks] between scans while the coordinator watches a covered space.
 WATCH_TICKS: Final = 50
 
+# Largest snapshot of the complex [bytes], so that packets fit into the same command: that of about 1,500 robots. Pictures of
+# larger swarms have no complex.
+SNAPSHOT_BYTES_MAX: Final = 40_000
+
 # Explanations of the outcomes other than `covered`.
 GIVEN_UP: Final = {
     "depot-dry": "the depot is empty",
@@ -119,7 +123,7 @@ class SensorCoverageCoordinator:
         wake = next(self._routine, Wake())
         telemetry, self._telemetry = self._telemetry, {}
         snapshot, self._snapshot = self._snapshot, b""
-        outbox = self.mailbox.outgoing()
+        outbox = self.mailbox.outgoing(len(snapshot))
         repeat_s = None if self.outcome else self.mailbox.next_wake_s()
         if repeat_s is not None and (wake.at_s is None or repeat_s < wake.at_s):
             wake = Wake(at_s=repeat_s, on_packet=wake.on_packet)
@@ -364,7 +368,8 @@ class SensorCoverageCoordinator:
             obstacle=self._by_robot(self.services.frontier.obstacle),
             paths=tuple(tuple(self.slots.occupant[each] for each in plan.path) for plan in plans),
         )
-        self._snapshot = encode_snapshot(complex_)
+        snapshot = encode_snapshot(complex_)
+        self._snapshot = snapshot if len(snapshot) <= SNAPSHOT_BYTES_MAX else b""
 
     def _by_robot(self, edges: Iterable[Edge]) -> tuple[tuple[int, int], ...]:
         occupant = self.slots.occupant
