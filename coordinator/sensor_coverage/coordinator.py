@@ -31,6 +31,7 @@ from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecutio
 from zwerm.coordinator.sensor_coverage.quiescence import COVERED, QuiescenceDetector
 from zwerm.coordinator.sensor_coverage.relative_homology import RelativeHomology
 from zwerm.coordinator.sensor_coverage.sources import Sources
+from zwerm.coordinator.sensor_coverage.wall_walks import WallWalks
 from zwerm.maths.keyed_random import stream
 from zwerm.maths.simplicial import Edge, FlagComplex
 from zwerm.wire.messages import Command, Observation, Wake
@@ -52,6 +53,7 @@ GIVEN_UP: Final = {
     "source-lost": "no base station answers",
     "cut-off": "no path leads to the frontier",
     "no-end": "too many cycles",
+    "unproven": "a wall was not followed to its end",
 }
 
 
@@ -104,6 +106,8 @@ class SensorCoverageCoordinator:
             QuiescenceDetector(),
         )
         self.pushing = PushExecution(parameters, self.slots, self.mailbox, self.sources, planner)
+        self.walls = planner.walls
+        self.walking = WallWalks(self.slots, self.mailbox, self.sources, self.pushing, planner, planner.walls)
         self.scan = ScanResult({}, FlagComplex({}), ())
         self.redundant: tuple[int, ...] = ()
         self.outcome = ""
@@ -156,16 +160,26 @@ class SensorCoverageCoordinator:
             self._update_fence(scan)  # 4: [F, O] := FenceSubcomplex(R, {theta})
             plans: Sequence[Plan] = ()
             if stations := self._stations_without_robots():
-                pushes = [self.pushing.deploy_first(base) for base in stations]  # 1: deploy robot 1
+                pushes = [self._deploy_first(base) for base in stations]  # 1: deploy robot 1
             else:
                 if self._redundancy_is_due():
                     yield from self._find_redundant()  # 5: (periodically) identify redundant robots
                 plans = yield from self._find_paths()  # 6: find path in the 1-skeleton
-                pushes = [self.pushing.push(plan) for plan in plans]  # 7 and 8: push robots in path, deploy robot n + 1
+                pushes = [self._carry_out(plan) for plan in plans]  # 7 and 8: push robots in path, deploy robot n + 1
             self._report_complex(plans)
             self.outcome = self._judge(bool(pushes))  # 9: while F is not empty
             moved = [robot for each in (yield from run_concurrently(pushes)) for robot in each]
             yield from self._reconsider_outcome()
+
+    def _carry_out(self, plan: Plan) -> Routine[Moved]:
+        return self.walking.walk(plan, self.scan) if plan.walk else self.pushing.push(plan)
+
+    def _deploy_first(self, base: int) -> Routine[Moved]:
+        """Deploy a station's first robot; where walls stop it in every direction, let it follow them."""
+        moved = yield from self.pushing.deploy_first(base)
+        if self.parameters.walls == "followed" and base in self.sources.blocked:
+            moved = yield from self.walking.first(base)
+        return moved
 
     def _run(self) -> Routine[None]:
         """Call the roll, carry out the algorithm, and report the numbers."""
@@ -269,6 +283,9 @@ class SensorCoverageCoordinator:
     def _update_fence(self, scan: ScanResult) -> None:
         """Find the fence of the complex without robots that have left it; pushes may begin at those."""
         self.scan = self.pushing.scan = scan
+        self.walking.idle = {slot: None for slot in self.walking.idle if slot in self.slots.occupant}
+        if self.walking.idle:
+            self.scan = scan = scan._replace(complex_=scan.complex_.without(self.walking.idle))
         if self._redundancy == "link":
             self.redundant = self._leave_requests.redundant_slots(scan)
             if self.redundant:
@@ -316,7 +333,8 @@ class SensorCoverageCoordinator:
         services = self.services
         self.redundant = tuple(slot for slot in self.redundant if slot in self.slots.occupant)
         shut = self.scan.bases  # a station does not move
-        sources = dict.fromkeys(self.sources.available(), 0.0) | dict.fromkeys(self.redundant, REDUNDANT_COST)
+        redundant = (*self.redundant, *self.walking.idle)
+        sources = dict.fromkeys(self.sources.available(), 0.0) | dict.fromkeys(redundant, REDUNDANT_COST)
 
         def find_routes(complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
             return services.paths.routes(complex_, sources, services.frontier.obstacle, shut)
@@ -339,7 +357,7 @@ class SensorCoverageCoordinator:
             any(slot in stations for slot in piece) for piece in pieces
         )
         if not outcome or (outcome == COVERED and whole and not alone):
-            return outcome
+            return "unproven" if outcome and self.walls.unproven else outcome
         if not stations:
             return "source-lost"
         if sources.empty:

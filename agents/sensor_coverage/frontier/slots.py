@@ -14,7 +14,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from operator import itemgetter
 
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_heading, refined_reference
-from zwerm.agents.sensor_coverage.messages.commands import Sighting
+from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
+from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
 
 class Slots:
@@ -22,7 +23,8 @@ class Slots:
 
     `occupant` has the robot at each slot. `heading` [rad] and `frame` are each robot's heading and the robot in whose
     frame it is. `view` has the bearings that each robot sees in its own frame. `walls` and `blocked` have, by slot, the
-    directions of walls, and of drives that a wall stopped.
+    directions of walls, and of drives that a wall stopped. `felt` has the directions of walls closer than a body.
+    `walks` are the walls that robots followed. `length_m` has the distances [m] between slots that are not a hop apart.
     """
 
     def __init__(self) -> None:
@@ -31,6 +33,9 @@ class Slots:
         self.view: dict[int, dict[int, float]] = {}
         self.walls: dict[int, list[float]] = {}
         self.blocked: dict[int, list[float]] = {}
+        self.felt: dict[int, list[float]] = {}
+        self.walks: list[Walk] = []
+        self.length_m: dict[tuple[int, int], float] = {}
         self.frame: dict[int, int] = {}
         self._heading_readings: dict[int, int] = {}
         self._reference: dict[int, dict[int, Reference]] = {}  # by the slot that sees, then by the slot that it sees
@@ -62,6 +67,7 @@ class Slots:
         if robot is not None:
             self.view.pop(robot, None)
         self.walls.pop(slot, None)
+        self.felt.pop(slot, None)
 
     def take(self, robot: int, sightings: Iterable[Sighting]) -> None:
         """Store the bearings that a robot reports, in its own frame."""
@@ -127,13 +133,34 @@ class Slots:
                 self.heading[robot] += by
                 self.frame[robot] = new
         for slot in turned:
-            for known in (self.walls, self.blocked):
+            for known in (self.walls, self.blocked, self.felt):
                 if slot in known:
                     known[slot] = [each + by for each in known[slot]]
+        self.walks = [each.turned(new, by) if each.frame == old else each for each in self.walks]
         spin = cmath.exp(1j * by)
         for slot in turned:
             seen = self._reference.get(slot, {})
             seen |= {other: (mean * spin, count) for other, (mean, count) in seen.items()}
+
+    # --- walls that were followed -----------------------------------------------------------------------------------
+
+    def take_walk(self, robot: int, hand: int, waypoints: Iterable[Waypoint]) -> None:
+        """Store a walk of a robot along a wall, in sight of robots that stand at their slots."""
+        heading, frame, slot_of = self.heading[robot], self.frame[robot], self.slot_of()
+        standing = {node: slot for node, slot in slot_of.items() if node != robot and self.frame[node] == frame}
+        points = tuple(
+            WalkPoint(
+                {
+                    standing[node]: bearing + heading + math.pi
+                    for node, bearing in ((one.node, one.bearing_rad) for one in each.sightings)
+                    if node in standing
+                },
+                tuple(bearing + heading for bearing in each.touched),
+                tuple(standing[node] for node in each.robots if node in standing),
+            )
+            for each in waypoints
+        )
+        self.walks.append(Walk(frame, hand, points))
 
     # --- directions between slots -----------------------------------------------------------------------------------
 

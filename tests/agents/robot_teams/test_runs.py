@@ -125,6 +125,30 @@ def test_a_partition_costs_no_coverage() -> None:
     check(cover(team(3, faults=[partition])))
 
 
+def test_two_teams_that_meet_head_on_in_a_slice_dance_around_each_other_and_finish_it() -> None:
+    """They start on one slice, too far apart to hear each other: each is a team, and both sweep the slice."""
+    poses = [[2.47, 1.0, 0.0], [2.47, 5.0, 0.0]]
+    found = cover(team(2, HALL, poses, radio={"range_m": 1.0}))
+    check(found)
+    assert found.gap_m < 0.1, "they never met"
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_team_with_a_virtual_frontier_covers_the_hall(count: int) -> None:
+    wide = {
+        "polygon": [[0.0, 0.0], [12.0, 0.0], [12.0, 7.0], [0.0, 7.0]],
+        "obstacles": [[[2.6, 2.4], [5.1, 3.2], [2.9, 4.6]]],
+    }
+    poses = [[0.6 + 0.95 * i, 6.0, 0.0] for i in range(count)]
+    base = team(count, wide, poses)
+    parameters = base.robots.parameters | {"virtual_frontier": True}
+    scenario = base.model_copy(update={"robots": base.robots.model_copy(update={"parameters": parameters})})
+    result = run(scenario, 1, "inline")
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.999
+    assert result.metrics["telemetry.virtual_frontier_cuts"] > 0.0
+
+
 def test_the_trace_is_the_same_inline_and_in_processes_and_another_with_another_seed(nothing_left: None) -> None:
     scenario = team(2, time={"duration_s": 15.0}, radio={"loss": 0.3})
     inline = run(scenario, 1, "inline")
