@@ -18,7 +18,7 @@ from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS, Emerged, Report, RollCall, ScanRequest
-from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_snapshot
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_complex
 from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
 from zwerm.coordinator.sensor_coverage.command_mailbox import (
     ROLL_CALL_COPIES,
@@ -41,10 +41,6 @@ REDUNDANT_COST: Final = -100.0
 
 # Pause [ticks] between scans while the coordinator watches a covered space.
 WATCH_TICKS: Final = 50
-
-# Largest snapshot of the complex [bytes], so that packets fit into the same command: that of about 1,500 robots. Pictures of
-# larger swarms have no complex.
-SNAPSHOT_BYTES_MAX: Final = 40_000
 
 # Explanations of the outcomes other than `covered`.
 GIVEN_UP: Final = {
@@ -386,8 +382,7 @@ class SensorCoverageCoordinator:
             obstacle=self._by_robot(self.services.frontier.obstacle),
             paths=tuple(tuple(self.slots.occupant[each] for each in plan.path) for plan in plans),
         )
-        snapshot = encode_snapshot(complex_)
-        self._snapshot = snapshot if len(snapshot) <= SNAPSHOT_BYTES_MAX else b""
+        self._snapshot = encode_complex(complex_)
 
     def _by_robot(self, edges: Iterable[Edge]) -> tuple[tuple[int, int], ...]:
         occupant = self.slots.occupant

@@ -53,8 +53,7 @@ def unit(words: NDArray[np.uint64]) -> NDArray[np.float64]:
 def gaussian(words: NDArray[np.uint64]) -> NDArray[np.float64]:
     """Return the 64-bit words as standard normal numbers (Box and Muller 1958)."""
     # The first number is in (0, 1], so that the logarithm is finite.
-    first: NDArray[np.float64] = ((words >> _S11) + _ONE) * _TO_UNIT
-    return _normal(first, unit(splitmix64(words)))
+    return _normal(np.asarray(((words >> _S11) + _ONE) * _TO_UNIT, np.float64), unit(splitmix64(words)))
 
 
 def _normal(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
