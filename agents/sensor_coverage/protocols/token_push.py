@@ -42,6 +42,11 @@ from zwerm.agents.sensor_coverage.motion.push_geometry import direction_to
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, WAVE_TICKS, PushPart
 
+# A dead robot's body within this angle [rad] of a drive is expected to stop it, and within this angle of a drive that
+# something stopped without a touch it has stopped it.
+BODY_AHEAD_RAD: Final = 0.3
+BODY_BESIDE_RAD: Final = math.pi / 2.0
+
 
 class TokenPush(PushPart):
     """One robot's part in one push: what it does on messages, at the end of drives, and at the end of a wait."""
@@ -137,11 +142,17 @@ class TokenPush(PushPart):
         self._enter("deploying")
         parameters = self._map.parameters
         if self._first_bearings:
-            self._situation.deploy(self._first_bearings[0], parameters.hop_m, parameters.clear_m)
+            bearing_rad = self._first_bearings[0]
+            self._situation.deploy(bearing_rad, parameters.hop_m, self._clear_m(bearing_rad, parameters.clear_m))
         elif self._plan is not None:
             self._map.note_attempt(self._plan)
             bearing_rad = wrapped(self._plan.direction - self._heading)
-            self._situation.deploy(bearing_rad, self._plan.hop_m, self._plan.clear_m)
+            self._situation.deploy(bearing_rad, self._plan.hop_m, self._clear_m(bearing_rad, self._plan.clear_m))
+
+    def _clear_m(self, bearing_rad: float, wanted_m: float) -> float:
+        """Return how far [m] the leader has to get: less where a dead robot's body stands, which it sees past."""
+        in_the_way = self._situation.dead_ahead(bearing_rad, BODY_AHEAD_RAD)
+        return wanted_m if in_the_way is None else min(wanted_m, self._map.parameters.near_wall_m)
 
     def _deployed(self, result: DriveResult) -> None:
         if not result.ok:
@@ -159,7 +170,12 @@ class TokenPush(PushPart):
     def _blocked(self, result: DriveResult) -> None:
         """End the push after a test drive that met a wall; the first robot tries its other bearings before."""
         if self._plan is not None:
-            self._map.note_failure(self._plan, result.driven_m)
+            bearing_rad = wrapped(self._plan.direction - self._heading)
+            body = None if result.touched else self._situation.dead_ahead(bearing_rad, BODY_BESIDE_RAD)
+            if body is None:
+                self._map.note_failure(self._plan, result.driven_m)
+            else:
+                self._map.note_obstruction(self._plan, result.driven_m, body)
         elif len(self._first_bearings) > 1:
             del self._first_bearings[0]
             self._deploy()
