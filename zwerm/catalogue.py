@@ -190,6 +190,7 @@ COMMANDS: Final = {
     "check": "zwerm.cli.commands.check_command:check",
     "run": "zwerm.cli.commands.run_command:run",
     "world": "zwerm.cli.commands.world_command:world",
+    "keys": "zwerm.cli.commands.keys_command:keys",
     "robot": "zwerm.cli.commands.robot_command:robot",
     "twin": "zwerm.cli.commands.twin_command:twin",
     "shrink": "zwerm.cli.commands.shrink_command:shrink",
@@ -265,6 +266,10 @@ METRICS: Final = {
     "voronoi": "zwerm.world.metrics.voronoi_coverage:VoronoiMetrics",
     "sight_range_m": "zwerm.world.metrics.sight_coverage:SightCoverage",
 }
+
+
+# Layers of the pictures of every run, each of which applies only where it is asked for.
+PICTURE_LAYERS: Final = ("zwerm.view.radio_links:RadioLinks", "zwerm.view.telemetry_colours:TelemetryColours")
 
 
 def plugins() -> dict[str, Mapping[str, str]]:

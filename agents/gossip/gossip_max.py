@@ -33,10 +33,12 @@ class GossipMax(Controller):
         super().__init__(setup)
         self.largest = setup.node
         self.refused = 0
+        self._reported = -1
         self._channels = setup.channels
 
     def step(self, observation: Observation) -> Command:
         """Take in what was heard, and pass it on."""
+        before = self._reported
         for packet in observation.inbox:
             try:
                 (heard,) = _LAYOUT.unpack(unseal(packet.payload))
@@ -50,4 +52,6 @@ class GossipMax(Controller):
         if observation.tick % table.every_ticks == 0:
             frame = seal(_LAYOUT.pack(self.largest))
             outbox = tuple([Transmission(channel, frame) for channel in self._channels])
-        return Command(outbox=outbox, done=table.done_at is not None and self.largest >= table.done_at)
+        self._reported = self.largest
+        news = {"largest": float(self.largest)} if self.largest != before else {}
+        return Command(outbox=outbox, done=table.done_at is not None and self.largest >= table.done_at, telemetry=news)

@@ -51,6 +51,21 @@ Picture = Annotated[
         help="Where to draw the run: .png, .pdf or .svg; runs/SCENARIO-seedN.png by default. Settings are part of the name.",
     ),
 ]
+PictureSize = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--size", metavar="WIDTHxHEIGHT", help="Greatest size of the arena in pictures [inches], such as 3.4x3."
+    ),
+]
+Bare = Annotated[bool, typer.Option("--bare", help="Draw the arena only: no title, numbers, legend or curve.")]
+ColourBy = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--colour-by", "--color-by", metavar="NAME", help="Colour robots by this telemetry."),
+]
+Links = Annotated[
+    Optional[bool],  # noqa: UP045
+    typer.Option("--links/--no-links", help="Connect robots whose packets have arrived."),
+]
 PictureAt = Annotated[
     Optional[list[str]],  # noqa: UP045
     typer.Option(
@@ -74,6 +89,15 @@ Record = Annotated[
 RealTime = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option("--realtime", metavar="FACTOR", help="Pace the run at FACTOR times the wall clock."),
+]
+HostNames = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option("--name", metavar="HOST", help="A name or address of the world's machine, for its certificate."),
+]
+OUTAGE_S: Final = 10.0
+Outage = Annotated[
+    float,
+    typer.Option("--outage", min=1.0, metavar="S", help="A robot whose connection is silent for S seconds is lost."),
 ]
 RadioTable = Annotated[
     Optional[int],  # noqa: UP045

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 import typer
 
@@ -20,6 +20,7 @@ from zwerm.run.result import RunResult
 
 NO_PICTURE: Final = "no picture is drawn: matplotlib is not installed; pip install matplotlib"
 
+_SIZE: Final = re.compile(r"\d+(\.\d+)?x\d+(\.\d+)?")
 _MOMENT: Final = re.compile(r"(?P<cycle>\d+)|(?P<at_s>\d+(\.\d+)?)s")
 
 
@@ -37,6 +38,10 @@ class RunOutput:
     radio_table: int | None
     as_json: bool
     record: Path | None = None
+    size: str | None = None
+    bare: bool = False
+    colour_by: str | None = None
+    links: bool | None = None
 
     def __post_init__(self) -> None:
         diagnostics = [
@@ -44,6 +49,8 @@ class RunOutput:
             for each in self.moments
             if not _MOMENT.fullmatch(each)
         ]
+        if self.size is not None and (not _SIZE.fullmatch(self.size) or 0.0 in self._style["size_in"]):
+            diagnostics.append(f"--size: expected WIDTHxHEIGHT in inches, such as 3.4x3, got {self.size!r}")
         files = [
             OutputFile("--picture", self.picture, PICTURES, "matplotlib", "all"),
             OutputFile("--animate", self.animation, ANIMATIONS, "matplotlib", "all"),
@@ -57,6 +64,11 @@ class RunOutput:
             diagnostics += error.mistakes
         if diagnostics:
             raise ScenarioError(diagnostics)
+
+    @property
+    def _style(self) -> dict[str, Any]:
+        size = None if self.size is None else tuple(map(float, self.size.split("x")))
+        return {"size_in": size, "bare": self.bare, "colour_by": self.colour_by, "links": self.links}
 
     @property
     def draws_by_default(self) -> bool:
@@ -97,8 +109,8 @@ class RunOutput:
         if self.record is not None and not result.problems:
             files.append(partial(Path, self.record))
         if self.picture is not None or (self.draws_by_default and not self._lacks_matplotlib):
-            files.append(lambda: result.picture(path))
-        files += [partial(_draw_moment, result, path, moment) for moment in self.moments]
+            files.append(lambda: result.picture(path, **self._style))
+        files += [partial(_draw_moment, result, path, moment, self._style) for moment in self.moments]
         if result.scenario.random_faults is not None and not self.as_json:
             files.append(lambda: _write_faults(result))
         if self.animation is not None:
@@ -116,20 +128,20 @@ class RunOutput:
 
     def _animate(self, result: RunResult, path: Path) -> Path:
         with RunProgress(err, "animation", quiet=self.as_json) as progress:
-            return result.animate(path, progress.ticked)
+            return result.animate(path, progress.ticked, **self._style)
 
 
 def _stem(result: RunResult) -> str:
     return run_stem(result.scenario.name, result.seed, result.scenario.overrides)
 
 
-def _draw_moment(result: RunResult, final: Path, moment: str) -> Path:
+def _draw_moment(result: RunResult, final: Path, moment: str, style: dict[str, Any]) -> Path:
     """Draw the run at a moment; the file name is that of the final picture with the moment appended."""
     found = _MOMENT.fullmatch(moment)
     assert found is not None
     if found["cycle"] is not None:
-        return result.picture(final.with_stem(f"{final.stem}-cycle{moment}"), cycle=int(moment))
-    return result.picture(final.with_stem(f"{final.stem}-{moment}"), at_s=float(found["at_s"]))
+        return result.picture(final.with_stem(f"{final.stem}-cycle{moment}"), cycle=int(moment), **style)
+    return result.picture(final.with_stem(f"{final.stem}-{moment}"), at_s=float(found["at_s"]), **style)
 
 
 def _write_faults(result: RunResult) -> Path:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from zwerm.catalogue import layers_of
+from zwerm.catalogue import PICTURE_LAYERS, layers_of
 from zwerm.record.history import History
 from zwerm.run.frames import FrameKind, frame_of
 from zwerm.run.positions import Positions
@@ -19,6 +19,7 @@ from zwerm.world.tick.telemetry import TelemetryArrays, TelemetryRecord
 if TYPE_CHECKING:  # pictures need matplotlib
     from pandas import DataFrame
 
+    from zwerm.view.picture_style import PictureStyle
     from zwerm.view.run_view import RunView
 
 
@@ -112,22 +113,67 @@ class RunResult:
             "faults": self.faults,
         }
 
-    def picture(self, path: str | Path, cycle: int | None = None, at_s: float | None = None) -> Path:
-        """Draw the run at its end, at a deployment cycle or at a time [s] as a PNG at `path`, and return the path.
+    def picture(
+        self,
+        path: str | Path,
+        cycle: int | None = None,
+        at_s: float | None = None,
+        *,
+        size_in: tuple[float, float] | None = None,
+        bare: bool = False,
+        colour_by: str | None = None,
+        links: bool | None = None,
+    ) -> Path:
+        """Draw the run at its end, at a deployment cycle or at a time [s] at `path`, and return the path.
 
+        The suffix chooses the format: .png, .pdf or .svg. `size_in` is the greatest width and height [inches] of the arena. A
+        `bare` picture has no title, numbers, legend and curve. `colour_by` names the telemetry that colours robots, and `links`
+        connects robots whose packets have arrived; by default the scenario's `[pictures]` decides on both.
         Raises PictureError where the file cannot be written, or the moment is not of the run.
         """
         from zwerm.view.stills import draw_run
 
-        return draw_run(Path(path), self._view(), self.metrics, cycle, at_s)
+        style = self._style(size_in, bare, colour_by, links)
+        return draw_run(Path(path), self._view(style), self.metrics, cycle, at_s, style)
 
-    def animate(self, path: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
-        """Draw the run as an animation at `path`, .gif or .mp4, and return the path."""
+    def animate(
+        self,
+        path: str | Path,
+        progress: Callable[[int, int], None] | None = None,
+        *,
+        size_in: tuple[float, float] | None = None,
+        bare: bool = False,
+        colour_by: str | None = None,
+        links: bool | None = None,
+    ) -> Path:
+        """Draw the run as an animation at `path`, .gif or .mp4, and return the path. The rest is as in `picture`."""
         from zwerm.view.animation import animate_run
 
-        return animate_run(Path(path), self._view(), progress=progress)
+        style = self._style(size_in, bare, colour_by, links)
+        return animate_run(Path(path), self._view(style), progress=progress, style=style)
 
-    def _view(self) -> "RunView":
+    def _style(
+        self, size_in: tuple[float, float] | None, bare: bool, colour_by: str | None, links: bool | None
+    ) -> "PictureStyle":
+        from zwerm.view.picture_style import PictureStyle
+
+        chosen = self.scenario.pictures
+        return PictureStyle(
+            size_in,
+            bare,
+            chosen.colour_by if colour_by is None else colour_by,
+            chosen.links if links is None else links,
+        )
+
+    def _links(self) -> list[tuple[int, int]]:
+        """Return the pairs of robots, smaller id first, between which a packet has arrived on the robots' channel."""
+        columns = self.radio["channels"].get("robots", {}).get("links")
+        if not columns:
+            return []
+        rows = zip(columns["sender"], columns["receiver"], columns["delivered"], strict=True)
+        return sorted({(min(a, b), max(a, b)) for a, b, count in rows if count and max(a, b) < self.robots})
+
+    def _view(self, style: "PictureStyle") -> "RunView":
         from zwerm.view.run_view import RunView
 
         table = self.scenario.metrics
@@ -143,9 +189,12 @@ class RunResult:
             0 if self.scenario.base is None else self.scenario.base.stations,
             self.snapshots,
             {name: values.tolist() for name, values in self.series.items()},
-            (*layers_of(self.scenario.robots.controller), *self.scenario.pictures.layers),
+            (*layers_of(self.scenario.robots.controller), *PICTURE_LAYERS, *self.scenario.pictures.layers),
             None if self.scenario.coordinator is None else self.robots,
             self.scenario.landmarks,
+            self.telemetry,
+            style.colour_by,
+            self._links() if style.links else (),
         )
 
     @property

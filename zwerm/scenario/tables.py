@@ -265,9 +265,14 @@ def _metrics(given: Any, otherwise: ValidatorFunctionWrapHandler) -> Any:
 
 
 class PicturesTable(Table):
-    """Pictures and animations of the run: `layers`, as module:Class, are drawn over those of the algorithm."""
+    """Pictures and animations of the run: `layers`, as module:Class, are drawn over those of the algorithm.
+
+    `colour_by` names the telemetry by which robots are coloured. `links` connects robots whose packets have arrived.
+    """
 
     layers: list[str] = []
+    colour_by: str = ""
+    links: bool = False
 
 
 class Scenario(Table):

@@ -21,6 +21,7 @@ try:
     from zwerm.view.composition import Composition
     from zwerm.view.coverage_curve import draw_curve
     from zwerm.view.output import prepare
+    from zwerm.view.picture_style import PictureStyle
     from zwerm.view.run_view import RunView
 except ImportError as missing:
     raise PictureError(f"pictures need matplotlib ({missing}): pip install matplotlib") from None
@@ -29,6 +30,7 @@ Progress = Callable[[int, int], None]
 
 DPI: Final = 100
 INCHES: Final = (6.0, 5.0)
+DEFAULT: Final = PictureStyle()
 # Default duration of an animation [s], and the part of the run over which a path is shown behind a robot.
 DURATION_S: Final = 10.0
 TAIL_FRACTION: Final = 0.1
@@ -39,7 +41,12 @@ COLOURS: Final = ("white", BLUE, ORANGE, VERMILLION, WALL, YELLOW)
 
 
 def animate_run(
-    path: Path, view: RunView, fps: int = 20, speed_up: float | None = None, progress: Progress | None = None
+    path: Path,
+    view: RunView,
+    fps: int = 20,
+    speed_up: float | None = None,
+    progress: Progress | None = None,
+    style: PictureStyle = DEFAULT,
 ) -> Path:
     """Draw a run as an animation at `path`, a .gif, or an .mp4 where ffmpeg is installed, and return the path.
 
@@ -57,10 +64,12 @@ def animate_run(
     duration_s = max((kind.animation_s or DURATION_S for kind in run.layers), default=DURATION_S)
     speed_up = speed_up or max(1.0, (end_s - start_s) / duration_s)
     moments = np.append(np.arange(start_s, end_s, speed_up / fps), end_s)
-    with_plot = run.curve is not None
-    sheet = Sheet(view.arena, view.title, "", run.legend_entries(), with_plot, arena_inches=INCHES, dpi=DPI)
+    with_plot = run.curve is not None and not style.bare
+    title, entries = ("", 0) if style.bare else (view.title, run.legend_entries())
+    sheet = Sheet(view.arena, title, "", entries, with_plot, arena_inches=style.size_in or INCHES, dpi=DPI)
     swarm, layers = run.draw(sheet, tracks)
-    sheet.draw_legend([*swarm.legend(moving=True), *(entry for layer in layers for entry in layer.legend())])
+    if not style.bare:
+        sheet.draw_legend([*swarm.legend(moving=True), *(entry for layer in layers for entry in layer.legend())])
     moving = [*swarm.artists, *(artist for layer in layers for artist in layer.artists)]
     mark = draw_curve(sheet.plot, run.curve) if run.curve is not None and sheet.plot is not None else None
     if mark is not None:
@@ -79,7 +88,7 @@ def animate_run(
                 mark.set_xdata([run.curve.at(moment_s)[0]])
             words = run.moment_in_words(tracks, index, moment_s)
             clock = f"{moment_s:.1f} s, shown {speed_up:.3g} times as fast"
-            sheet.note.set_text(f"{clock}   {words}" if with_plot else clock)
+            sheet.note.set_text("" if style.bare else f"{clock}   {words}" if with_plot else clock)
             yield sheet.frame()
             if progress is not None:
                 progress(done, len(moments))

@@ -88,9 +88,9 @@ class Sheet:
         extent = (xmax - xmin + 2 * air, ymax - ymin + 2 * air)
         scale = min(arena_inches[0] / extent[0], arena_inches[1] / extent[1])
         width, height = extent[0] * scale, extent[1] * scale
-        inner = max(width, WIDTH_MIN)
-        heading = textwrap.wrap(title, int(inner / TITLE_CHARACTER))
-        lines = textwrap.wrap(text, int(inner / CHARACTER)) or [""]
+        inner = max(width, WIDTH_MIN) if title else width
+        heading = textwrap.wrap(title, max(1, int(inner / TITLE_CHARACTER)))
+        lines = textwrap.wrap(text, max(1, int(inner / CHARACTER))) or [""]
         columns = min(max(1, int(inner / LEGEND_COLUMN)), max(1, legend_entries))
         foot = MARGIN + LEGEND_ROW * math.ceil(legend_entries / columns)
         below = foot + AXIS_HEIGHT + (PLOT_HEIGHT + AXIS_HEIGHT if with_plot else 0.0)

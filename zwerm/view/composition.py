@@ -62,12 +62,15 @@ class Composition:
 
     def legend_entries(self, tracks: Tracks | None = None) -> int:
         """Return the number of entries that the legend needs at most; of a still with `tracks`, else of an animation."""
-        if self.layers:
-            return max(kind.legend_entries for kind in self.layers)
+        more = sum(kind.more_entries for kind in self.layers)
+        own = max((kind.legend_entries for kind in self.layers), default=0)
+        if own or len([kind for kind in self.layers if not kind.more_entries]):
+            return own + more
         if tracks is None:
-            return 4
+            return 4 + more
         view = self.view
-        return 3 + len(gone_at_the_end(tracks)) + (view.coverage_radius_m is not None) + (view.cells is not None)
+        gone = len(gone_at_the_end(tracks))
+        return 3 + gone + (view.coverage_radius_m is not None) + (view.cells is not None) + more
 
     def draw(self, sheet: Sheet, tracks: Tracks, names: bool = False) -> tuple[Swarm, list[Layer]]:
         """Put the swarm and the layers on the sheet; nothing is shown before their `show`."""

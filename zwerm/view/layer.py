@@ -44,6 +44,8 @@ class Layer(ABC):
     colours: ClassVar[Sequence[str]] = ()
     # Rows that the legend needs at most.
     legend_entries: ClassVar[int] = 0
+    # Rows of the legend that this layer adds to those of the swarm and of other layers.
+    more_entries: ClassVar[int] = 0
     # Duration of an animation [s], or None for the default.
     animation_s: ClassVar[float | None] = None
     # Metrics that are written above a picture, instead of all.

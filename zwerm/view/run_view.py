@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from zwerm.record.history import History
 from zwerm.world.arena.arena import Arena
-from zwerm.world.tick.telemetry import TelemetryRecord
+from zwerm.world.tick.telemetry import TelemetryArrays, TelemetryRecord
 
 
 @dataclass(frozen=True)
@@ -14,6 +14,7 @@ class RunView:
 
     `cells` is (columns, rows); `snapshots` and `series` are those of the run's result; `coordinator` is the id of its node.
     `landmarks` are places [m]. `layers` are classes of picture layers, as `module:Class`, drawn in this order over the arena.
+    `colour_by` names the telemetry that colours robots. `links` are pairs of robots to connect.
     """
 
     arena: Arena
@@ -30,6 +31,9 @@ class RunView:
     layers: Sequence[str] = ()
     coordinator: int | None = None
     landmarks: Sequence[tuple[float, float]] = ()
+    telemetry: TelemetryArrays = field(default_factory=TelemetryArrays.empty)
+    colour_by: str = ""
+    links: Sequence[tuple[int, int]] = ()
 
     @property
     def title(self) -> str:

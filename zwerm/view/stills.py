@@ -7,6 +7,7 @@ module needs matplotlib.
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Final
 
 from zwerm.errors import PictureError
 from zwerm.record.history import Tracks
@@ -17,9 +18,14 @@ try:
     from zwerm.view.coverage_curve import draw_curve
     from zwerm.view.layer import Stage
     from zwerm.view.output import prepare
+    from zwerm.view.picture_style import PictureStyle
     from zwerm.view.run_view import RunView
 except ImportError as missing:
     raise PictureError(f"pictures need matplotlib ({missing}): pip install matplotlib") from None
+
+
+ARENA_INCHES: Final = (8.0, 7.0)
+DEFAULT: Final = PictureStyle()
 
 
 def draw_run(
@@ -28,6 +34,7 @@ def draw_run(
     metrics: Mapping[str, float] | None = None,
     cycle: int | None = None,
     at_s: float | None = None,
+    style: PictureStyle = DEFAULT,
 ) -> Path:
     """Draw a run at its end, at a numbered stage or at a time [s] at `path` (.png, .pdf or .svg), and return the path.
 
@@ -40,17 +47,23 @@ def draw_run(
     now_s = None if at_end else float(tracks.time_s[-1])
     title = view.title if at_end else f"{view.name}: at {float(tracks.time_s[-1]):g} s"
     text = run.metrics_in_words(metrics or {}) if at_end else run.moment_in_words(tracks, -1, now_s)
-    sheet = Sheet(view.arena, title, text, run.legend_entries(tracks), with_plot=run.curve is not None)
+    entries, curve = run.legend_entries(tracks), run.curve
+    if style.bare:
+        title, text, entries, curve = "", "", 0, None
+    sheet = Sheet(
+        view.arena, title, text, entries, with_plot=curve is not None, arena_inches=style.size_in or ARENA_INCHES
+    )
     swarm, layers = run.draw(sheet, tracks, names=True)
     swarm.show_ends()
     swarm.show(len(tracks.time_s) - 1, since=0)
     for layer in layers:
         layer.show(tracks, -1, now_s)
-    if run.curve is not None and sheet.plot is not None:
-        mark = draw_curve(sheet.plot, run.curve)
-        mark.set_xdata([run.curve.at(float(tracks.time_s[-1]))[0]])
+    if curve is not None and sheet.plot is not None:
+        mark = draw_curve(sheet.plot, curve)
+        mark.set_xdata([curve.at(float(tracks.time_s[-1]))[0]])
         mark.set_visible(not at_end)
-    sheet.draw_legend([*swarm.legend(), *(entry for layer in layers for entry in layer.legend())])
+    if not style.bare:
+        sheet.draw_legend([*swarm.legend(), *(entry for layer in layers for entry in layer.legend())])
     try:
         sheet.figure.savefig(path)
     except OSError as error:

@@ -6,9 +6,13 @@ import typer
 
 from zwerm.cli.options import (
     Animation,
+    Bare,
+    ColourBy,
     Json,
+    Links,
     Picture,
     PictureAt,
+    PictureSize,
     Quiet,
     RadioTable,
     RealTime,
@@ -32,6 +36,10 @@ def run(
     picture: Picture = None,
     picture_at: PictureAt = None,
     animate: Animation = None,
+    size: PictureSize = None,
+    bare: Bare = False,
+    colour_by: ColourBy = None,
+    links: Links = None,
     radio_table: RadioTable = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -57,7 +65,8 @@ def run(
     from zwerm.scenario.load import load
 
     with errors_as_lines():
-        output = RunOutput(picture, tuple(picture_at or ()), animate, radio_table, as_json, record)
+        moments = tuple(picture_at or ())
+        output = RunOutput(picture, moments, animate, radio_table, as_json, record, size, bare, colour_by, links)
         loaded = load(scenario, tuple(sets or ()))
         with RunProgress(err, loaded.name, quiet=as_json or quiet) as progress, breakpoints(progress.suspend):
             result = run_scenario(

@@ -1,0 +1,88 @@
+"""What a user chooses of pictures: size, words, colours by telemetry, and radio links."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from zwerm.errors import PictureError
+from zwerm.run.result import RunResult
+from zwerm.run.runner import run
+from zwerm.view.picture_style import PictureStyle
+from zwerm.view.telemetry_colours import TelemetryColours
+
+# Two pairs, each out of reach of the other: 0 and 1 on the left, 2 and 3 on the right.
+POSES = "[[0.3,1.0,0.0],[0.7,1.0,0.0],[1.3,1.0,0.0],[1.7,1.0,0.0]]"
+
+
+@pytest.fixture(scope="module")
+def pairs() -> RunResult:
+    settings = [
+        "robots.count=4",
+        "arena.size_m=[2.0,2.0]",
+        f"robots.placement={{kind='poses',poses={POSES}}}",
+        "radio={range_m=0.5}",
+        "time.duration_s=2.0",
+        "robots.parameters.done_at=99",
+    ]
+    return run("gossip-max", 1, "inline", settings)
+
+
+def colour_at(picture: Path, x_m: float, y_m: float) -> tuple[int, ...]:
+    """Return the colour at a place of a bare picture whose arena is 2 m by 2 m."""
+    with Image.open(picture) as opened:
+        image = np.asarray(opened.convert("RGB"))
+    dark = (image == (0x22, 0x22, 0x22)).all(axis=2)
+    # The walls are the longest dark lines.
+    rows, columns = np.flatnonzero(dark.sum(axis=1) > 300), np.flatnonzero(dark.sum(axis=0) > 300)
+    left, right, top, bottom = columns[0], columns[-1], rows[0], rows[-1]
+    return tuple(map(int, image[round(bottom - (bottom - top) * y_m / 2.0), round(left + (right - left) * x_m / 2.0)]))
+
+
+def rgb(colour: str) -> tuple[int, ...]:
+    return tuple(int(colour[start : start + 2], 16) for start in (1, 3, 5))
+
+
+def test_robots_have_the_colour_of_what_they_have_reported_at_that_time(pairs: RunResult, tmp_path: Path) -> None:
+    least, greatest = rgb(TelemetryColours.colours[0]), rgb(TelemetryColours.colours[-1])
+    start = pairs.picture(tmp_path / "start.png", at_s=0.0, bare=True, links=False)
+    end = pairs.picture(tmp_path / "end.png", bare=True, links=False)
+    # Beside the centre: a line there shows the heading.
+    assert colour_at(start, 0.29, 0.985) == least  # robot 0 knows 0
+    assert colour_at(end, 0.29, 0.985) == rgb(TelemetryColours.colours[2])  # it has heard of 1, the largest of its pair
+    assert colour_at(start, 1.69, 0.985) == colour_at(end, 1.29, 0.985) == greatest  # 3, the largest of all
+
+
+def test_links_connect_robots_that_have_heard_each_other(pairs: RunResult, tmp_path: Path) -> None:
+    assert pairs._links() == [(0, 1), (2, 3)]
+    shown = pairs.picture(tmp_path / "links.png", bare=True)
+    hidden = pairs.picture(tmp_path / "none.png", bare=True, links=False)
+    assert colour_at(shown, 0.55, 1.0) != colour_at(hidden, 0.55, 1.0) == (255, 255, 255)
+    assert colour_at(shown, 1.0, 1.0) == (255, 255, 255)
+
+
+def test_a_name_that_nobody_reported_is_refused_in_one_line(pairs: RunResult, tmp_path: Path) -> None:
+    with pytest.raises(PictureError) as caught:
+        pairs.picture(tmp_path / "a.png", colour_by="larges")
+    assert str(caught.value) == "colour_by: expected a name of telemetry that the run has (largest), got 'larges'"
+
+
+def test_the_size_of_the_arena_is_that_asked_for(pairs: RunResult, tmp_path: Path) -> None:
+    sizes = []
+    for side in (2.0, 4.0):
+        with Image.open(pairs.picture(tmp_path / "a.png", size_in=(side, 9.0), bare=True)) as image:
+            sizes.append(image.size)
+    assert sizes[1][0] - sizes[0][0] == pytest.approx(300, abs=2)  # 2 inches more at 150 dots an inch
+    assert sizes[1][1] - sizes[0][1] == pytest.approx(300, abs=2)
+
+
+def test_a_bare_picture_has_no_words_and_an_animation_takes_the_same_choices(pairs: RunResult, tmp_path: Path) -> None:
+    full = pairs.picture(tmp_path / "full.svg").read_text()
+    bare = pairs.picture(tmp_path / "bare.svg", bare=True).read_text()
+    assert "gossip-max, seed 1" in full
+    assert "packets have arrived" in full
+    assert "gossip-max, seed 1" not in bare
+    assert "packets have arrived" not in bare
+    assert pairs.animate(tmp_path / "a.gif", size_in=(2.0, 2.0), bare=True).read_bytes().startswith(b"GIF89a")
+    assert pairs._style(None, False, None, None) == PictureStyle(None, False, "largest", True)

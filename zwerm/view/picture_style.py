@@ -1,0 +1,17 @@
+"""What a user chooses of pictures and animations: their size, their words, and what is drawn besides robots."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class PictureStyle:
+    """`size_in` is the greatest width and height [inches] of the arena in the picture; None for the default.
+
+    A `bare` picture has no title, no numbers, no legend and no curve. `colour_by` names the telemetry by which robots are
+    coloured, "" for none. `links` draws a line between robots that have heard each other.
+    """
+
+    size_in: tuple[float, float] | None = None
+    bare: bool = False
+    colour_by: str = ""
+    links: bool = False
