@@ -5,8 +5,8 @@ a bound.
 """
 
 import math
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Mapping
+from typing import Final, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.plan import Plan
@@ -14,7 +14,7 @@ from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import Body, Chain, SlotMemory
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
-from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
+from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 
 # Bounds of the ticks to wait: for the token, for another robot's drive, for the leader to leave or to give up, for the
@@ -33,6 +33,30 @@ VACANCY_PERIOD_TICKS: Final = 20
 BACK_RAD: Final = 0.3
 
 
+class Surroundings(Protocol):
+    """The part of a robot's situation that its part in a push depends on."""
+
+    @property
+    def node(self) -> int:
+        """The robot's id."""
+
+    @property
+    def tick(self) -> int:
+        """The number of the current tick."""
+
+    @property
+    def bearings(self) -> Mapping[int, float]:
+        """Bearings [rad] of the visible robots that are not declared dead."""
+
+    @property
+    def clear(self) -> bool:
+        """Whether the robot stands still, has averaged bearings, and no slot around it changes hands."""
+
+    @property
+    def local_map(self) -> NeighbourTable:
+        """The robot's neighbours."""
+
+
 class PushPart:
     """The state of one robot's part in one push. `over` once it has ended; `end` is its last message, as far as known.
 
@@ -42,7 +66,7 @@ class PushPart:
 
     def __init__(
         self,
-        situation: Situation,
+        situation: Surroundings,
         announce_vacated: Callable[[int], None],
         push: int,
         fresh: int,
@@ -54,8 +78,8 @@ class PushPart:
         self.phase = "link"
         self.over = False
         self.end: Body | None = None
-        self._situation = situation
-        self._map = situation.local_map
+        self._situation: Surroundings = situation
+        self._map: NeighbourTable = situation.local_map
         self._announce_vacated = announce_vacated
         self._since = situation.tick
         self._fresh = fresh
@@ -112,11 +136,6 @@ class PushPart:
 
     def _enter(self, phase: str) -> None:
         self.phase, self._since = phase, self._situation.tick
-
-    def _write(self, body: Body) -> None:
-        """Write to the robot behind, or to the sender of the token."""
-        if self._back is not None:
-            self._situation.mailbox.write(self._back, body)
 
     def _wake_after(self, ticks: int) -> int:
         """Return the tick after `ticks` of this phase, or the next tick if that has passed."""

@@ -39,6 +39,8 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
 )
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import direction_to
+from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
+from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, WAVE_TICKS, PushPart
 
@@ -50,6 +52,9 @@ BODY_BESIDE_RAD: Final = math.pi / 2.0
 
 class TokenPush(PushPart):
     """One robot's part in one push: what it does on messages, at the end of drives, and at the end of a wait."""
+
+    _situation: Situation
+    _map: LocalMap
 
     # --- events -------------------------------------------------------------------------------------------------------
 
@@ -291,6 +296,11 @@ class TokenPush(PushPart):
         if self.end is not None:
             self._write(self.end)
         self._enter("telling")
+
+    def _write(self, body: Body) -> None:
+        """Write to the robot behind, or to the sender of the token."""
+        if self._back is not None:
+            self._situation.mailbox.write(self._back, body)
 
     def _drop(self) -> None:
         """End without telling: the robot behind is out of range, and finds out by itself."""
