@@ -23,7 +23,9 @@ def modules() -> dict[str, Path]:
     if (ROOT / ".git").exists():
         files = subprocess.run(listing, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split()
     else:  # a source archive
-        files = sorted(str(path.relative_to(ROOT)) for part in ("zwerm", *PARTS) for path in (ROOT / part).rglob("*.py"))
+        files = sorted(
+            str(path.relative_to(ROOT)) for part in ("zwerm", *PARTS) for path in (ROOT / part).rglob("*.py")
+        )
     found: dict[str, Path] = {}
     for name in files:
         parts = Path(name).with_suffix("").parts
