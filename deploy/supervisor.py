@@ -84,7 +84,7 @@ class LocalSupervisor:
     ) -> None:
         self._endpoint = endpoint
         self._run = credentials.run
-        self._authority_pem = credentials.authority_pem
+        self._terms = credentials.terms
         self._credentials = {credential.node: credential for credential in credentials.nodes}
         self._order = list(self._credentials) if order is None else list(order)
         self._context = multiprocessing.get_context("forkserver")
@@ -202,7 +202,7 @@ class LocalSupervisor:
         process = self._context.Process(
             target=main,
             args=(
-                *(self._run, credential, self._endpoint, self._authority_pem, deadline_s, joined),
+                *(self._run, credential, self._endpoint, self._terms, deadline_s, joined),
                 self._stations.get(credential.node),
             ),
             name=f"node {credential.node}",

@@ -26,7 +26,7 @@ def random_arena(seed: int, robots: int) -> tuple[dict[str, Any], list[list[floa
         part = shapely.remove_repeated_points(part.simplify(0.02), 0.05)
         if not isinstance(part, Polygon) or not part.is_valid or part.area < 40.0:
             continue
-        poses = _line(random, part, robots)
+        poses = start_line(random, part, robots)
         if poses is not None:
             rings = [np.round(np.asarray(ring.coords)[:-1], 3).tolist() for ring in (part.exterior, *part.interiors)]
             return {"polygon": rings[0], "obstacles": rings[1:]}, poses
@@ -55,14 +55,16 @@ def _block(random: np.random.Generator, width: float, height: float) -> Polygon:
     return Polygon(np.column_stack([x, y])).buffer(0)
 
 
-def _line(random: np.random.Generator, free: Polygon, robots: int) -> list[list[float]] | None:
+def start_line(
+    random: np.random.Generator, free: Polygon, robots: int, origin_m: float = ORIGIN_M
+) -> list[list[float]] | None:
     """Return poses in a row, each near a slice of its own, or None where there is no room for such a row."""
     inner = free.buffer(-0.3)
     xmin, ymin, xmax, ymax = inner.bounds
     for _ in range(200):
-        first = math.ceil((random.uniform(xmin, xmax) - ORIGIN_M) / SPACING_M)
+        first = math.ceil((random.uniform(xmin, xmax) - origin_m) / SPACING_M)
         y = random.uniform(ymin, ymax)
-        places = [(ORIGIN_M + (first + i) * SPACING_M + 0.02, y) for i in range(robots)]
+        places = [(origin_m + (first + i) * SPACING_M + 0.02, y) for i in range(robots)]
         if all(inner.contains(Point(place)) for place in places):
             return [[round(x, 3), round(y, 3), 0.0] for x, y in places]
     return None

@@ -16,10 +16,13 @@ The world is deterministic: its state after a tick is a function of the scenario
 
 from collections.abc import Callable, Sequence
 
+from msgspec.structs import replace
+
 from zwerm.errors import ProtocolError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import BodyVelocity, Command, Failure, Transmission, WheelSpeeds
+from zwerm.wire.text import printable
 from zwerm.wire.trace import Trace
 from zwerm.world.arena.arena import Arena
 from zwerm.world.bodies.bodies import Bodies
@@ -153,7 +156,7 @@ class World:
         else:
             if type(answer) is not Failure:
                 return
-            self.status.failures[node] = answer
+            self.status.failures[node] = replace(answer, traceback=printable(answer.traceback))
             reason = answer.error
         self.bodies.advance_early()  # the motors stop after this tick, whether it was computed early or not
         self.crash(node, reason)
@@ -187,7 +190,7 @@ class World:
     def crash(self, node: int, reason: str) -> None:
         """Record that a node's program ended: its motors stop, it is never awaited again, its body stays where it is."""
         self.status.crash_ticks.setdefault(node, self.tick)
-        self._lifecycle.crash(node, reason)
+        self._lifecycle.crash(node, printable(reason))
 
     def withhold(self, node: int, withheld: bool) -> None:
         """Exclude a node from observation, or include it again."""

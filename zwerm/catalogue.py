@@ -203,6 +203,7 @@ COMMANDS: Final = {
     "check": "zwerm.cli.commands.check_command:check",
     "run": "zwerm.cli.commands.run_command:run",
     "world": "zwerm.cli.commands.world_command:world",
+    "keys": "zwerm.cli.commands.keys_command:keys",
     "robot": "zwerm.cli.commands.robot_command:robot",
     "twin": "zwerm.cli.commands.twin_command:twin",
     "shrink": "zwerm.cli.commands.shrink_command:shrink",

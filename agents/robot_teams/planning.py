@@ -79,7 +79,7 @@ def reservation(slice_map: SliceMap, plan: Plan) -> Reservation:
 def room(slice_map: SliceMap, task: Task, count: int) -> int:
     """Return for how many of `count` robots a corridor has room, as far as the map tells: at least one."""
     k, found = task.end.slice, 1 if task.own_slice else 0
-    if task.own_slice and slice_map.arc(task.end, task.direction) is not None:
+    if slice_map.is_virtual(task.end) or (task.own_slice and slice_map.arc(task.end, task.direction) is not None):
         return 1
     while found < count:
         k += task.direction

@@ -59,6 +59,7 @@ class TeamTable(Struct, frozen=True, forbid_unknown_fields=True):
     one_corridor: bool = False
     join_m: Annotated[float, Meta(gt=0.0)] = 6.0
     merge: bool = True
+    virtual_frontier: bool = False
 
 
 class TeamRobot(Controller):
@@ -95,6 +96,7 @@ class TeamRobot(Controller):
             merge=table.merge,
             one_corridor=table.one_corridor,
             join_m=table.join_m,
+            virtual_frontier=table.virtual_frontier,
         )
         self.refused = 0
         self._radius_m = body.radius_m

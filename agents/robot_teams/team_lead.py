@@ -17,10 +17,12 @@ from zwerm.agents.robot_teams.planning import (
     finder,
     free_members,
     latest_plans,
+    open_tasks,
     without_busy,
 )
 from zwerm.agents.robot_teams.protocols.team_membership import Membership
 from zwerm.agents.robot_teams.protocols.team_messages import Plan
+from zwerm.agents.robot_teams.virtual_frontier import Frontiers
 
 # How long a team waits for one with a smaller lead to unite them [s].
 MERGE_PATIENCE_S: Final = 30.0
@@ -39,6 +41,7 @@ def findings(slice_map: SliceMap, membership: Membership) -> dict[str, float | b
         "ends_without_mate": len(certificate.ends_without_mate),
         "open_ports": len(certificate.open_ports),
         "critical_points": len({arc.ports for arc in facts.arcs if arc.kind != PASSES}),
+        "virtual_frontier_cuts": len(facts.cuts),
         "wrecks": len({void.wreck.node for void in slice_map.voids}),
         "divisions": membership.divisions,
         "merges": membership.merges,
@@ -58,6 +61,7 @@ class TeamLead:
         merge: bool,
         one_corridor: bool,
         join_m: float,
+        virtual_frontier: bool = False,
     ) -> None:
         self.plans: tuple[Plan, ...] = ()
         self._map, self._membership, self._dt_s = slice_map, membership, dt_s
@@ -67,12 +71,15 @@ class TeamLead:
         self._judged: dict[int, Plan] = {}
         self._digests: dict[int, int] = {}
         self._made_tick = 0
+        self._frontiers = Frontiers(slice_map) if virtual_frontier else None
 
     def begin(self, tick: int) -> None:
         """Start anew in another view: plans hold within one view."""
         self._judged.clear()
         self._digests.clear()
         self._made_tick = tick
+        if self._frontiers is not None:
+            self._frontiers.drop()
         self.plans = tuple([plan for plan in self.plans if plan.epoch == self._membership.view.epoch])
 
     def follow(self, plans: Sequence[Plan]) -> None:
@@ -102,8 +109,16 @@ class TeamLead:
         idle_s = (tick - self._made_tick) * dt_s
         join_mm = self._join_mm if idle_s < FAR_AFTER_S else FAR
         plans = self.plans if idle_s < ANY_AFTER_S else without_busy(self.plans, free)
-        made = assign(self._map, view, self.plans, plans, statuses, self._skip, self._one_corridor, join_mm)
+        frontiers = self._frontiers
+        skip = dict(self._skip)
+        if frontiers is not None:
+            skip |= {task: tick for task in open_tasks(self._map) if frontiers.is_reserved(task.end)}
+        made = assign(self._map, view, self.plans, plans, statuses, skip, self._one_corridor, join_mm)
+        if frontiers is not None:
+            made = [frontiers.limited(plan) for plan in made]
         if not made:
+            if frontiers is not None and len(free) == len(view.members):
+                frontiers.drop()
             return False
         self._made_tick = tick
         self.plans = (*dict.fromkeys(latest_plans(self.plans, view).values()), *made)
@@ -121,6 +136,8 @@ class TeamLead:
             self._judged[plan.number] = plan
             if self._digests.pop(plan.number, None) == self._map.facts.digest:
                 self._skip[Task(plan.anchor, plan.direction, plan.own_slice)] = tick
+            if self._frontiers is not None:
+                self._frontiers.judge(plan)
             index = finder(plan.order, statuses) if self._divide and plan.anchor.side != LINK else None
             groups = None if index is None else division(view, plan.order, index)
             if groups is not None:

@@ -7,8 +7,8 @@ They add what they find to the map, and keep `at`, the end where the robot stand
 from collections.abc import Callable, Generator
 from typing import Final, Protocol
 
-from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, End, Fact, Segment
-from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
+from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, Cut, End, Fact, Segment
+from zwerm.agents.robot_teams.mapping.slice_map import ACROSS, SliceMap
 from zwerm.agents.robot_teams.motion.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
 from zwerm.agents.robot_teams.motion.senses import Senses
 from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, SWEEPS, TRAVELS, Plan
@@ -19,8 +19,14 @@ Story = Generator[Manoeuvre | None, None, None]
 STEPS_MAX: Final = 400
 # So often a step of a journey may lead elsewhere than the map says.
 ASTRAY_MAX: Final = 3
+# An end of the same slice that is nearer than this may be approached where no way leads to it [mm].
+STRAIGHT_MM: Final = 1_500
 # A robot farther than this from its end approaches it first [m].
 AT_END_M: Final = 0.06
+
+
+# A frontier nearer than this to where a sweep begins does not end it [mm].
+CUT_MM: Final = 300
 
 
 class NoWay(Exception):
@@ -102,13 +108,15 @@ class Work:
 
     # --- single steps -------------------------------------------------------------------------------------------------
 
-    def sweep(self) -> Story:
-        """Sweep the slice from the end where the robot is to the other end."""
+    def sweep(self, frontier_mm: int | None = None) -> Story:
+        """Sweep the slice from the end where the robot is to the other end, or to a virtual frontier in between."""
         start = self.at
         if start is None:
             raise Lost
         yield from self._approach(start)
-        sweep = Sweep(start.slice, -start.side, self._grid, self._step_m, self._parked)
+        ahead = frontier_mm is not None and (start.y_mm - frontier_mm) * start.side > CUT_MM
+        limit_mm = frontier_mm if ahead else None
+        sweep = Sweep(start.slice, -start.side, self._grid, self._step_m, self._parked, limit_mm)
         self.sweeping = start.slice
         yield sweep
         self.sweeping = None
@@ -118,6 +126,8 @@ class Work:
         low, high = sorted((start.y_mm, end.y_mm))
         if self._is_new(start, 0, end, bool(sweep.wrecks)):
             self._note(Segment(start.slice, low, high, tuple(sweep.wrecks)))
+            if sweep.is_cut:
+                self._note(Cut(end.slice, end.y_mm))
         self.at = self.map.end(end)
 
     def trace(self, direction: int) -> Generator[Manoeuvre | None, None, bool]:
@@ -143,8 +153,12 @@ class Work:
         return end.slice != start.slice
 
     def travel(self, stop: End) -> Story:
-        """Go to a known end by the shortest known way."""
-        astray = 0
+        """Go to a known end by the shortest known way, without the steps that led elsewhere before.
+
+        Where a wall is almost parallel to a slice, robots measure its end far apart, and no way may lead to one of them. An end
+        near by on the same slice is then approached straight.
+        """
+        astray: dict[tuple[End, int], None] = {}
         for _ in range(STEPS_MAX):
             start = self.here
             goal = self.map.end(stop)
@@ -153,19 +167,26 @@ class Work:
             self.at = start
             if start == goal:
                 return
-            route = self.map.route(start, goal)
+            route = self.map.route(start, goal, astray) if len(astray) <= ASTRAY_MAX else None
             if route is None:
-                raise NoWay
+                yield from self._go_straight(start, goal)
+                return
             step = route[0][1]
-            if step.direction == 0:
-                yield from self.sweep()
+            if step.direction == ACROSS:
+                self.at = step.stop
+            elif step.direction == 0:
+                yield from self.sweep(step.stop.y_mm if self.map.is_virtual(step.stop) else None)
             else:
                 yield from self.trace(step.direction)
             if self.here != self.map.end(step.stop):
-                astray += 1
-                if astray > ASTRAY_MAX:
-                    raise NoWay
+                astray[start, step.direction] = None
         raise NoWay
+
+    def _go_straight(self, start: End, goal: End) -> Story:
+        if start.slice != goal.slice or abs(start.y_mm - goal.y_mm) > STRAIGHT_MM:
+            raise NoWay
+        yield Approach(goal, self._grid, self._parked)
+        self.at = goal
 
     def _is_new(self, start: End, direction: int, stop: End, beside_wreck: bool) -> bool:
         """Tell whether no such way is known, or, beside a wreck, none that leads to `stop`."""
@@ -174,7 +195,8 @@ class Work:
             return True
         way = self.map.arc(known, direction) if direction else self.map.mate(known)
         found = self.map.end(stop)
-        return way is None or (not direction and found is None) or (beside_wreck and way.stop != found)
+        differs = way is not None and way.stop != found and (beside_wreck or self.map.is_virtual(way.stop))
+        return way is None or (not direction and found is None) or differs
 
     def _note(self, fact: Fact) -> None:
         if self.map.add(fact):
@@ -211,11 +233,11 @@ class Work:
             raise Lost
         self.phase, self.claim = SWEEPS, mine.slice
         if self.map.mate(mine) is None:
-            yield from self.sweep()
+            yield from self.sweep(plan.frontier_mm)
         self.phase = HUNTS
         while mates.awaits_predecessor():
             yield None
-        yield from self._hunt(mine.slice, plan.direction, mates.sweeping)
+        yield from self._hunt(mine.slice, plan.direction, mates.sweeping, plan.frontier_mm)
 
     def _take_slot(self, plan: Plan, mates: "Mates") -> Generator[Manoeuvre | None, None, bool]:
         """Trace forward, one slice a robot; tell whether there is a slice for this one.
@@ -246,7 +268,9 @@ class Work:
             else:
                 ends.append(at)
 
-    def _hunt(self, k: int, direction: int, swept_by_others: Callable[[int], bool]) -> Story:
+    def _hunt(
+        self, k: int, direction: int, swept_by_others: Callable[[int], bool], frontier_mm: int | None = None
+    ) -> Story:
         """Walk round the slab behind slice k, sweeping what is new, until the end reached is swept.
 
         Fig. 4 (i) and (ii) of the paper are both this loop.
@@ -256,7 +280,7 @@ class Work:
             if at is None:
                 raise Lost
             into = -direction if at.slice == k else direction
-            if self.map.arc(at, into) is not None:
+            if self.map.arc(at, into) is not None or self.map.is_virtual(at):
                 return
             yield from self.trace(into)
             at = self.at
@@ -270,5 +294,5 @@ class Work:
                 return
             if at.slice == k:
                 self.found = True
-            yield from self.sweep()
+            yield from self.sweep(frontier_mm)
         raise Lost

@@ -31,7 +31,7 @@ from zwerm.agents.runtime.node import Node
 from zwerm.errors import ControllerError, ZwermError
 from zwerm.link.node_link import ZenohNodeLink
 from zwerm.link.peer_radio import PeerRadio, Station, enter_namespace
-from zwerm.link.session import ONE_THREAD, TWO_THREADS, Credential, is_local, set_threads
+from zwerm.link.session import ONE_THREAD, TERMS, TWO_THREADS, Credential, Terms, is_local, set_threads
 from zwerm.wire.messages import REFUSABLE, Failure, Goodbye, Welcome, decode_to_node, encode
 
 EXIT_FAILED: Final = 1
@@ -49,7 +49,7 @@ def main(
     run: str,
     credential: Credential,
     endpoint: str,
-    authority_pem: str,
+    terms: Terms,
     deadline_s: float,
     joined: Connection,
     station: Station | None = None,
@@ -75,7 +75,7 @@ def main(
         if station is not None:
             enter_namespace(station.namespace)
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            code = runner.run(run_node(run, credential, endpoint, authority_pem, deadline_s, joined, station))
+            code = runner.run(run_node(run, credential, endpoint, terms, deadline_s, joined, station))
     except ZwermError as error:
         sys.stderr.write(f"zwerm: {error}\n")
         code = EXIT_REFUSED
@@ -112,7 +112,7 @@ async def run_node(
     run: str,
     credential: Credential,
     endpoint: str,
-    authority_pem: str = "",
+    terms: Terms = TERMS,
     deadline_s: float = 30.0,
     joined: Connection | None = None,
     station: Station | None = None,
@@ -170,7 +170,7 @@ async def run_node(
         run,
         credential,
         endpoint,
-        authority_pem=authority_pem,
+        terms=terms,
         deadline_s=deadline_s,
         on_lost=lambda: finish_from_thread(EXIT_LOST),
     )

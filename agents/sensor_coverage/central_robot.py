@@ -17,6 +17,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Correct,
     Deploy,
     Emerged,
+    FollowWall,
     Move,
     NegotiateLeave,
     Release,
@@ -25,6 +26,8 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     RollCall,
     ScanRequest,
     Sighting,
+    ToWall,
+    Walked,
     read_request,
     write,
 )
@@ -32,6 +35,7 @@ from zwerm.agents.sensor_coverage.motion.homing import Vector
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive, Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveToResult, correct, deploy, move
+from zwerm.agents.sensor_coverage.motion.wall_walk import DriveToWalk, WallWalk
 from zwerm.agents.sensor_coverage.protocols.component import Component
 from zwerm.agents.sensor_coverage.protocols.component_loop import Codec, ComponentLoop
 from zwerm.agents.sensor_coverage.protocols.transport.deduplication import RequestDeduplicator
@@ -52,6 +56,7 @@ class CentralRobot(Controller):
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
         self.motion = Locomotion(self.parameters, setup)
+        self.wall_walk = WallWalk(self.motion)
         self.commands = RequestDeduplicator(int(self.random.integers(1, INCARNATIONS)), self._on_command)
         self.components = ComponentLoop(self._make_components(), self._make_codecs(), setup.incarnation)
         self._activity: Drive | None = self._emerge()
@@ -106,6 +111,11 @@ class CentralRobot(Controller):
                 return self._drive(cycle, move(self.motion, bearing_rad, hop_m, landmarks))
             case Correct(cycle, anchors):
                 return self._drive(cycle, correct(self.motion, anchors))
+            case ToWall(cycle, bearing_rad, hop_m, feel_m, clear_m, hand):
+                return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, feel_m, clear_m, hand))
+            case FollowWall(cycle, length_m, hand, keep, meet):
+                margin_m = self.motion.parameters.margin_m
+                return self._walk(cycle, self.wall_walk.along(hand, length_m, keep, meet, margin_m))
             case Release() | NegotiateLeave():
                 return None
 
@@ -114,6 +124,12 @@ class CentralRobot(Controller):
         result = yield from drive
         self.motion.settle()
         self.commands.answer(Arrived(cycle, *result))
+
+    def _walk(self, cycle: int, walk: DriveToWalk) -> Drive:
+        """Drive to a wall or along it, and answer with the result."""
+        result = yield from walk
+        self.motion.settle()
+        self.commands.answer(Walked(cycle, *result))
 
     def _clear(self, cycle: int) -> None:
         self.commands.answer(Cleared(cycle))

@@ -15,7 +15,8 @@ class CheapestFirst:
     Each path has slots, and the slots that it uses as landmarks. Two pushes do not cross if no slot of one path is
     among those of the other. Then
     no robot takes a moving robot for a static landmark, and the new slots are far apart. A plan of lower priority is
-    assigned only where no plan of higher priority is reachable in the same component of the complex.
+    assigned only where no plan of higher priority is reachable in the same component of the complex. A walk along a wall
+    is assigned alone.
     """
 
     def __init__(self, slots: Slots, pushes_max: int) -> None:
@@ -33,12 +34,18 @@ class CheapestFirst:
         left, chosen = scan.complex_, list[Plan]()
         while len(chosen) < self._pushes_max:
             reached = [
-                (reach.cost[plan.mover], plan.mover, plan.key, plan) for plan in wanted if plan.mover in reach.cost
+                (plan.walk, reach.cost[plan.mover], plan.mover, plan.key, plan)
+                for plan in wanted
+                if plan.mover in reach.cost
             ]
             if not reached:
                 break
             plan = min(reached)[-1]
+            if plan.walk and chosen:
+                break  # a robot that follows a wall needs standing robots around
             chosen.append(plan._replace(path=reach.path(plan.mover)))
+            if plan.walk:
+                break
             left = left.without(self._around(self._around(chosen[-1].path, scan), scan))
             reach = find_routes(left, {slot: cost for slot, cost in sources.items() if slot in left.neighbours})
         return tuple(chosen)

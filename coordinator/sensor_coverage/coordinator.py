@@ -18,7 +18,7 @@ from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS, Emerged, Report, RollCall, ScanRequest
-from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_snapshot
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_complex
 from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
 from zwerm.coordinator.sensor_coverage.command_mailbox import (
     ROLL_CALL_COPIES,
@@ -31,6 +31,7 @@ from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecutio
 from zwerm.coordinator.sensor_coverage.quiescence import COVERED, QuiescenceDetector
 from zwerm.coordinator.sensor_coverage.relative_homology import RelativeHomology
 from zwerm.coordinator.sensor_coverage.sources import Sources
+from zwerm.coordinator.sensor_coverage.wall_walks import WallWalks
 from zwerm.maths.keyed_random import stream
 from zwerm.maths.simplicial import Edge, FlagComplex
 from zwerm.wire.messages import Command, Observation, Wake
@@ -48,6 +49,7 @@ GIVEN_UP: Final = {
     "source-lost": "no base station answers",
     "cut-off": "no path leads to the frontier",
     "no-end": "too many cycles",
+    "unproven": "a wall was not followed to its end",
 }
 
 
@@ -100,6 +102,8 @@ class SensorCoverageCoordinator:
             QuiescenceDetector(),
         )
         self.pushing = PushExecution(parameters, self.slots, self.mailbox, self.sources, planner)
+        self.walls = planner.walls
+        self.walking = WallWalks(self.slots, self.mailbox, self.sources, self.pushing, planner, planner.walls)
         self.scan = ScanResult({}, FlagComplex({}), ())
         self.redundant: tuple[int, ...] = ()
         self.outcome = ""
@@ -119,7 +123,7 @@ class SensorCoverageCoordinator:
         wake = next(self._routine, Wake())
         telemetry, self._telemetry = self._telemetry, {}
         snapshot, self._snapshot = self._snapshot, b""
-        outbox = self.mailbox.outgoing()
+        outbox = self.mailbox.outgoing(len(snapshot))
         repeat_s = None if self.outcome else self.mailbox.next_wake_s()
         if repeat_s is not None and (wake.at_s is None or repeat_s < wake.at_s):
             wake = Wake(at_s=repeat_s, on_packet=wake.on_packet)
@@ -152,16 +156,26 @@ class SensorCoverageCoordinator:
             self._update_fence(scan)  # 4: [F, O] := FenceSubcomplex(R, {theta})
             plans: Sequence[Plan] = ()
             if stations := self._stations_without_robots():
-                pushes = [self.pushing.deploy_first(base) for base in stations]  # 1: deploy robot 1
+                pushes = [self._deploy_first(base) for base in stations]  # 1: deploy robot 1
             else:
                 if self._redundancy_is_due():
                     yield from self._find_redundant()  # 5: (periodically) identify redundant robots
                 plans = yield from self._find_paths()  # 6: find path in the 1-skeleton
-                pushes = [self.pushing.push(plan) for plan in plans]  # 7 and 8: push robots in path, deploy robot n + 1
+                pushes = [self._carry_out(plan) for plan in plans]  # 7 and 8: push robots in path, deploy robot n + 1
             self._report_complex(plans)
             self.outcome = self._judge(bool(pushes))  # 9: while F is not empty
             moved = [robot for each in (yield from run_concurrently(pushes)) for robot in each]
             yield from self._reconsider_outcome()
+
+    def _carry_out(self, plan: Plan) -> Routine[Moved]:
+        return self.walking.walk(plan, self.scan) if plan.walk else self.pushing.push(plan)
+
+    def _deploy_first(self, base: int) -> Routine[Moved]:
+        """Deploy a station's first robot; where walls stop it in every direction, let it follow them."""
+        moved = yield from self.pushing.deploy_first(base)
+        if self.parameters.walls == "followed" and base in self.sources.blocked:
+            moved = yield from self.walking.first(base)
+        return moved
 
     def _run(self) -> Routine[None]:
         """Call the roll, carry out the algorithm, and report the numbers."""
@@ -265,6 +279,9 @@ class SensorCoverageCoordinator:
     def _update_fence(self, scan: ScanResult) -> None:
         """Find the fence of the complex without robots that have left it; pushes may begin at those."""
         self.scan = self.pushing.scan = scan
+        self.walking.idle = {slot: None for slot in self.walking.idle if slot in self.slots.occupant}
+        if self.walking.idle:
+            self.scan = scan = scan._replace(complex_=scan.complex_.without(self.walking.idle))
         if self._redundancy == "link":
             self.redundant = self._leave_requests.redundant_slots(scan)
             if self.redundant:
@@ -312,7 +329,8 @@ class SensorCoverageCoordinator:
         services = self.services
         self.redundant = tuple(slot for slot in self.redundant if slot in self.slots.occupant)
         shut = self.scan.bases  # a station does not move
-        sources = dict.fromkeys(self.sources.available(), 0.0) | dict.fromkeys(self.redundant, REDUNDANT_COST)
+        redundant = (*self.redundant, *self.walking.idle)
+        sources = dict.fromkeys(self.sources.available(), 0.0) | dict.fromkeys(redundant, REDUNDANT_COST)
 
         def find_routes(complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
             return services.paths.routes(complex_, sources, services.frontier.obstacle, shut)
@@ -335,7 +353,7 @@ class SensorCoverageCoordinator:
             any(slot in stations for slot in piece) for piece in pieces
         )
         if not outcome or (outcome == COVERED and whole and not alone):
-            return outcome
+            return "unproven" if outcome and self.walls.unproven else outcome
         if not stations:
             return "source-lost"
         if sources.empty:
@@ -364,7 +382,7 @@ class SensorCoverageCoordinator:
             obstacle=self._by_robot(self.services.frontier.obstacle),
             paths=tuple(tuple(self.slots.occupant[each] for each in plan.path) for plan in plans),
         )
-        self._snapshot = encode_snapshot(complex_)
+        self._snapshot = encode_complex(complex_)
 
     def _by_robot(self, edges: Iterable[Edge]) -> tuple[tuple[int, int], ...]:
         occupant = self.slots.occupant

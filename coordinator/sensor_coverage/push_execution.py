@@ -71,53 +71,37 @@ class PushExecution:
             if arrived[robot].ok:
                 del self._sources.waiting[base]
                 self._slots.add(robot)
-                yield from self._correct(robot, [(self._slots.occupant[base], bearing + math.pi)])
+                yield from self.correct(robot, [(self._slots.occupant[base], bearing + math.pi)])
                 return (robot,)
         self._sources.blocked[base] = None
         return ()
 
     def push(self, plan: Plan) -> Routine[Moved]:
         """Push along the plan's path, and return the robots that moved. Algorithm 1, lines 7 and 8."""
-        slots, path = self._slots, plan.path
-        base = path[0] if path[0] in self.scan.bases else None
+        slots = self._slots
         if plan.mover in self.scan.bases:
             return (yield from self._set_out(plan))
-        leader = slots.occupant[path[-1]]
+        leader = slots.occupant[plan.path[-1]]
         self._frontier.note_attempt(plan)
-        if base is not None and not any(each not in path for each in self.scan.views[base]):
-            # All robots that the station sees are about to move: the next robot must average bearings before.
-            yield from self._sources.let_out(base, self.cycle, self.scan.views[base], path)
+        yield from self.prepare(plan)
         there = yield from self._test_drive(plan, leader)
         if there is None:
             return (leader,)
-        followers = [slots.occupant[slot] for slot in path[:-1]]
-        if base is not None:
-            yield from self._sources.let_out(base, self.cycle, self.scan.views[base], path)
-            released = self._sources.waiting.pop(base, None)
-            if released is None:  # the depot is empty: the leader drives back
-                if not there:
-                    yield from self._arrivals([leader])
-                self._move([leader], [plan.mover], [plan.mover], {})
-                yield from self._arrivals([leader])
-                return (leader,)
-            followers[0] = released
-        going = list(path[1:])
-        self._move(followers, path[:-1], going, future_occupants(path, followers))
-        arrived = there | (yield from self._arrivals([*followers, *([] if there else [leader])]))
-        self.pushes += 1
-        if base is None:
-            slots.drop(path[0])
-        for slot, robot in zip(going, followers, strict=True):
-            slots.occupant[slot] = robot
-        slots.add(leader)
-        followers, going = self._without_lost(followers, going, arrived)
-        yield from self._straighten(followers, going, path[0], arrived)
-        yield from self._home_again(followers, going, arrived)
+        closed_up = yield from self.close_up(plan, leader, bool(there))
+        if closed_up is None:
+            return (leader,)
+        followers, arrived = closed_up
         anchors = [slots.occupant[each] for each in plan.anchors if each in slots.occupant]
-        if leader in arrived and anchors:
+        if arrived and anchors:
             back = plan.direction + math.pi - slots.heading[leader]
-            yield from self._correct(leader, [(each, back) for each in anchors])
+            yield from self.correct(leader, [(each, back) for each in anchors])
         return (*followers, leader)
+
+    def prepare(self, plan: Plan) -> Routine[None]:
+        """Release the next robot early if all robots in sight of its station are about to move: it averages bearings before."""
+        base = plan.path[0]
+        if base in self.scan.bases and not any(each not in plan.path for each in self.scan.views[base]):
+            yield from self._sources.let_out(base, self.cycle, self.scan.views[base], plan.path)
 
     def _set_out(self, plan: Plan) -> Routine[Moved]:
         """Deploy a robot from a station's own slot."""
@@ -138,8 +122,42 @@ class PushExecution:
         if robot in arrived:
             self.pushes += 1
             slots.add(robot)
-            yield from self._correct(robot, [(slots.occupant[base], plan.direction + math.pi - heading)])
+            yield from self.correct(robot, [(slots.occupant[base], plan.direction + math.pi - heading)])
         return (robot,)
+
+    def close_up(self, plan: Plan, leader: int, there: bool) -> Routine[tuple[list[int], bool] | None]:
+        """Move the robots behind the leader up by one slot, and give the leader a new slot.
+
+        Return the followers that have arrived, and whether the leader has; `there` if it has arrived before. None: the
+        depot is empty, and the leader drives back.
+        """
+        slots, path = self._slots, plan.path
+        base = path[0] if path[0] in self.scan.bases else None
+        followers = [slots.occupant[slot] for slot in path[:-1]]
+        if base is not None:
+            yield from self._sources.let_out(base, self.cycle, self.scan.views[base], path)
+            released = self._sources.waiting.pop(base, None)
+            if released is None:
+                if not there:
+                    yield from self._arrivals([leader])
+                self._move([leader], [plan.mover], [plan.mover], {})
+                yield from self._arrivals([leader])
+                return None
+            followers[0] = released
+        going = list(path[1:])
+        self._move(followers, path[:-1], going, future_occupants(path, followers))
+        arrived = yield from self._arrivals([*followers, *([] if there else [leader])])
+        self.pushes += 1
+        if base is None:
+            slots.drop(path[0])
+        for slot, robot in zip(going, followers, strict=True):
+            slots.occupant[slot] = robot
+        slots.add(leader)
+        there = there or leader in arrived
+        followers, going = self._without_lost(followers, going, arrived)
+        yield from self._straighten(followers, going, path[0], arrived)
+        yield from self._home_again(followers, going, arrived)
+        return followers, there
 
     # --- steps of a push ----------------------------------------------------------------------------------------------
 
@@ -169,7 +187,8 @@ class PushExecution:
         vacated = [slot for slot in origins if slot not in future and slot not in bases] if future else []
         for robot, origin, goal in zip(robots, origins, goals, strict=True):
             heading = slots.heading[robot]
-            direction, hop_m = slots.direction(origin, goal), self._parameters.hop_m
+            direction = slots.direction(origin, goal)
+            hop_m = slots.length_m.get((origin, goal), self._parameters.hop_m)
             if direction is None:
                 direction, hop_m = 0.0, 0.0
             landmarks = landmarks_for_move(
@@ -203,8 +222,10 @@ class PushExecution:
         slots = self._slots
         for robot, slot in zip(followers, going, strict=True):
             back = slots.direction(slot, rear)
-            if robot in arrived and arrived[robot].used_odometry and rear in slots.occupant and back is not None:
-                yield from self._correct(robot, [(slots.occupant[rear], back - slots.heading[robot])])
+            by_odometry = robot in arrived and arrived[robot].used_odometry
+            # Walls, and not the range of sight, determine a distance that was measured.
+            if by_odometry and (slot, rear) not in slots.length_m and rear in slots.occupant and back is not None:
+                yield from self.correct(robot, [(slots.occupant[rear], back - slots.heading[robot])])
             rear = slot
 
     def _home_again(self, robots: Sequence[int], goals: Sequence[int], arrived: Mapping[int, Arrived]) -> Routine[None]:
@@ -222,7 +243,7 @@ class PushExecution:
                     again[slot] = robot
             pending = again
 
-    def _correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Routine[None]:
+    def correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Routine[None]:
         """Correct a robot's scale by anchors with their approximate bearings [rad]."""
         sightings = tuple(Sighting(node, wrapped(there)) for node, there in anchors)
         self._mailbox.send(robot, Correct(self.cycle, sightings), drive=True)

@@ -42,3 +42,10 @@ class HangsInline(Controller):
             except Exception:
                 continue
         return Command()
+
+
+class Escapes(Controller):
+    """Raises an error that would clear the terminal."""
+
+    def step(self, observation: Observation) -> Command:
+        raise ValueError("\x1b[2J gone")

@@ -17,7 +17,9 @@ from zenoh.handlers import Callback, FifoChannel
 from zwerm.errors import LinkError
 from zwerm.link.admission import MEANINGS
 from zwerm.link.session import (
+    TERMS,
     Credential,
+    Terms,
     close_without_waiting,
     is_local,
     keep_thread,
@@ -49,7 +51,7 @@ class ZenohNodeLink:
         credential: Credential,
         endpoint: str,
         *,
-        authority_pem: str = "",
+        terms: Terms = TERMS,
         deadline_s: float = 30.0,
         on_lost: Callable[[], object] | None = None,
     ) -> None:
@@ -72,8 +74,8 @@ class ZenohNodeLink:
                 "connect/timeout_ms": round(1000 * deadline_s),
                 "connect/exit_on_failure": True,
                 "transport/auth/usrpwd": {"user": credential.user, "password": credential.password},
-                **transport_settings([endpoint]),
-                **trust_settings(authority_pem),
+                **transport_settings([endpoint], terms.lease_s),
+                **trust_settings(credential, terms),
             },
             f"{self._place}: no world answers there, or it does not take these credentials",
         )

@@ -96,6 +96,18 @@ class Void(NamedTuple):
         return (self.wreck,)
 
 
+class Cut(NamedTuple):
+    """A virtual frontier at height `y_mm` cuts slice `slice`: the free space goes on above and below."""
+
+    slice: int
+    y_mm: int
+
+    @property
+    def ends(self) -> tuple[End, End]:
+        """The end of the lower part, and that of the upper part."""
+        return End(self.slice, TOP, self.y_mm), End(self.slice, BOTTOM, self.y_mm)
+
+
 class Return(NamedTuple):
     """Robot `node` lived at `tick`: it was no wreck before."""
 
@@ -103,7 +115,7 @@ class Return(NamedTuple):
     tick: int
 
 
-Fact = Segment | Arc | Void | Return
+Fact = Segment | Arc | Void | Cut | Return
 
 
 class FactSet:
@@ -149,6 +161,11 @@ class FactSet:
     def voids(self) -> list[Void]:
         """What wrecks hide, sorted."""
         return sorted([fact for fact in self._facts if isinstance(fact, Void) and self._holds(fact.wrecks)])
+
+    @property
+    def cuts(self) -> list[Cut]:
+        """The cuts of slices by virtual frontiers, sorted."""
+        return sorted([fact for fact in self._facts if isinstance(fact, Cut)])
 
     @property
     def arcs(self) -> list[Arc]:

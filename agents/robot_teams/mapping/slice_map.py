@@ -14,6 +14,9 @@ ways from it reach has a mate and two arcs, none of them blocked.
 A slice may graze an obstacle: one robot stops there, and another sweeps past. An end that lies inside a swept segment
 is no end of anything that is left to cover, and counts for nothing either.
 
+A virtual frontier cuts a slice into two parts. The two ends there need mates, and have no ports: nothing of the boundary is
+there. A way leads across, from the one to the other. A later sweep past the frontier makes them count for nothing.
+
 Ends that two robots measured a little differently are one: those of one slice and side are joined where neighbours are at most
 `TOLERANCE_MM` apart. The joined ends are a function of the set of facts alone, so that merging maps needs no order.
 """
@@ -26,12 +29,15 @@ from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, Arc, End, Fact, 
 
 TOLERANCE_MM: Final = 120
 
+# The direction of the step across a virtual frontier.
+ACROSS: Final = 2
+
 # A port: an end, and the side on which the arc leaves.
 Port = tuple[End, int]
 
 
 class Step(NamedTuple):
-    """One way from an end to another: along the swept segment (`direction` 0), or along the arc on that side."""
+    """One way from an end to another: along the swept segment (`direction` 0), along the arc on that side, or `ACROSS`."""
 
     direction: int
     stop: End
@@ -62,6 +68,7 @@ class SliceMap:
         self._arcs: dict[Port, Step] = {}
         self._by_slice: dict[int, list[Segment]] = {}
         self._voids: list[Void] = []
+        self._across: dict[End, Step] = {}
         self._closed: dict[End, bool] = {}
         self._certificate = Certificate(0, (), ())
 
@@ -129,8 +136,13 @@ class SliceMap:
         return Certificate(
             len(ends),
             tuple([end for end in ends if end not in self._mates]),
-            tuple([(end, side) for end in ends for side in (LEFT, RIGHT) if (end, side) not in self._arcs]),
+            tuple([port for port in self._ports(ends) if port not in self._arcs]),
         )
+
+    def is_virtual(self, end: End) -> bool:
+        """Tell whether a known end is one at a virtual frontier."""
+        self._derive()
+        return end in self._across
 
     def _is_closed(self, at: End) -> bool:
         if at not in self._closed:
@@ -142,9 +154,12 @@ class SliceMap:
         """Return the length [mm] of the shortest known way from a known end to every end that can be reached."""
         return {end: length for end, (length, _) in self._shortest(start).items()}
 
-    def route(self, start: End, stop: End) -> list[tuple[End, Step]] | None:
-        """Return the shortest known way as (end, step) pairs; empty where start is stop, None where there is none."""
-        found = self._shortest(start)
+    def route(self, start: End, stop: End, avoid: Collection[Port] = ()) -> list[tuple[End, Step]] | None:
+        """Return the shortest known way as (end, step) pairs; empty where start is stop, None where there is none.
+
+        It leaves no end in a direction that `avoid` has for it.
+        """
+        found = self._shortest(start, avoid)
         if stop not in found:
             return None
         steps: list[tuple[End, Step]] = []
@@ -155,7 +170,7 @@ class SliceMap:
             stop = previous[0]
         return steps[::-1]
 
-    def _shortest(self, start: End) -> dict[End, tuple[int, tuple[End, Step] | None]]:
+    def _shortest(self, start: End, avoid: Collection[Port] = ()) -> dict[End, tuple[int, tuple[End, Step] | None]]:
         self._derive()
         found: dict[End, tuple[int, tuple[End, Step] | None]] = {start: (0, None)}
         heap = [(0, start)]
@@ -163,8 +178,13 @@ class SliceMap:
             length, end = heapq.heappop(heap)
             if length > found[end][0]:
                 continue
-            for step in (self._mates.get(end), self._arcs.get((end, LEFT)), self._arcs.get((end, RIGHT))):
-                if step is None:
+            for step in (
+                self._mates.get(end),
+                self._arcs.get((end, LEFT)),
+                self._arcs.get((end, RIGHT)),
+                self._across.get(end),
+            ):
+                if step is None or (avoid and (end, step.direction) in avoid):
                     continue
                 total = length + step.length_mm
                 if step.stop not in found or total < found[step.stop][0]:
@@ -182,6 +202,7 @@ class SliceMap:
         self._voids = voids
         measured = [end for arc in arcs for end in (arc.start, arc.stop)]
         measured += [end for segment in segments for end in segment.ends]
+        measured += [end for cut in self.facts.cuts for end in cut.ends]
         self._levels = _joined([end for end in measured if not any(_hides(void, end) for void in voids)])
         self._mates, self._arcs, self._by_slice = {}, {}, {}
         ends = sorted(end for level in self._levels.values() for _, _, end in level)
@@ -197,12 +218,12 @@ class SliceMap:
             found = [(self._known_end(end), side) for end, side in arc.ports]
             joined.update([(known, side) for known, side in found if known is not None])
             self._join(arc)
+        self._find_across()
         counting = [end for end in ends if not self._is_passed(end)]
-        sides = [(end, side) for end in counting for side in (LEFT, RIGHT)]
         self._certificate = Certificate(
             len(ends),
             tuple([end for end in counting if end not in mated]),
-            tuple([port for port in sides if port not in joined]),
+            tuple([port for port in self._ports(counting) if port not in joined]),
         )
 
     def _known_end(self, end: End) -> End | None:
@@ -211,6 +232,20 @@ class SliceMap:
             if low <= end.y_mm <= high:
                 return known
         return None
+
+    def _ports(self, ends: Iterable[End]) -> list[Port]:
+        return [(end, side) for end in ends if end not in self._across for side in (LEFT, RIGHT)]
+
+    def _find_across(self) -> None:
+        """Find the ways across frontiers: where both ends of a cut are joined with no measured end of the boundary."""
+        self._across = {}
+        for cut in self.facts.cuts:
+            lower, upper = cut.ends
+            levels = [(level, end) for end in (lower, upper) for level in self._levels.get((end.slice, end.side), ())]
+            alone = [level[2] for level, end in levels if level == (end.y_mm, end.y_mm, end)]
+            if len(alone) == 2:
+                self._across[lower] = Step(ACROSS, upper, 0)
+                self._across[upper] = Step(ACROSS, lower, 0)
 
     def _is_passed(self, end: End) -> bool:
         """Tell whether a robot swept past an end."""

@@ -100,9 +100,13 @@ class Approach:
 
 
 class Sweep:
-    """Move along a slice to the end of its segment on side `side`."""
+    """Move along a slice to the end of its segment on side `side`, or to the height `limit_mm` of a virtual frontier."""
 
-    def __init__(self, k: int, side: int, grid: Grid, step_m: float, parked: Parked) -> None:
+    def __init__(
+        self, k: int, side: int, grid: Grid, step_m: float, parked: Parked, limit_mm: int | None = None
+    ) -> None:
+        self._limit_mm = limit_mm
+        self.is_cut = False
         self.slice, self.side = k, side
         self._parked = parked
         self._x_m = grid.x_m(k)
@@ -126,6 +130,9 @@ class Sweep:
             if way is not None:
                 return way
             self._around, self._last_y_m = None, None
+        if self._limit_mm is not None and (1000.0 * senses.y_m - self._limit_mm) * side >= 0.0:
+            self.end, self.is_cut = End(self.slice, side, self._limit_mm), True
+            return None
         last, self._last_y_m = self._last_y_m, senses.y_m
         if any(ny * side > BLOCKS for _, ny in senses.walls):
             steep = max([ny * side for _, ny in senses.walls])

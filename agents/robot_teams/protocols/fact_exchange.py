@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from zwerm.agents.robot_teams.mapping.facts import Arc, Fact, Return, Segment, Void
+from zwerm.agents.robot_teams.mapping.facts import Arc, Cut, Fact, Return, Segment, Void
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.protocols.team_messages import Beacon
 
@@ -15,7 +15,7 @@ FACTS_MAX: Final = 800
 
 
 # Facts by kind, as a beacon carries them.
-Parcel = tuple[tuple[Segment, ...], tuple[Arc, ...], tuple[Void, ...], tuple[Return, ...]]
+Parcel = tuple[tuple[Segment, ...], tuple[Arc, ...], tuple[Void, ...], tuple[Return, ...], tuple[Cut, ...]]
 
 
 class FactExchange:
@@ -33,7 +33,7 @@ class FactExchange:
 
     def receive(self, beacon: Beacon, tick: int) -> None:
         """Take over the facts of a beacon, and note whether its sender lacks some of ours."""
-        self._map.merge((*beacon.segments, *beacon.arcs, *beacon.voids, *beacon.returns))
+        self._map.merge((*beacon.segments, *beacon.arcs, *beacon.voids, *beacon.returns, *beacon.cuts))
         if beacon.digest == self._map.facts.digest:
             self._differs_since.pop(beacon.sender, None)
         else:
@@ -71,4 +71,5 @@ def _sorted_out(facts: list[Fact]) -> Parcel:
         tuple([fact for fact in facts if isinstance(fact, Arc)]),
         tuple([fact for fact in facts if isinstance(fact, Void)]),
         tuple([fact for fact in facts if isinstance(fact, Return)]),
+        tuple([fact for fact in facts if isinstance(fact, Cut)]),
     )

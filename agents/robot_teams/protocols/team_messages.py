@@ -9,7 +9,7 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
-from zwerm.agents.robot_teams.mapping.facts import Arc, End, Return, Segment, Void
+from zwerm.agents.robot_teams.mapping.facts import Arc, Cut, End, Return, Segment, Void
 
 # The phases of a robot's work on its slice, in order.
 READY: Final = 0  # has finished the plan
@@ -29,7 +29,8 @@ class View(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
 class Plan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """One corridor: move over from the end `anchor` in x-direction `direction`, one slice a robot; `order` is lag to lead.
 
-    The lag's slice is the anchor's own if its segment is not swept (`own_slice`), else the next.
+    The lag's slice is the anchor's own if its segment is not swept (`own_slice`), else the next. Sweeps end at the height
+    `frontier_mm` of the team's virtual frontier, if there is one.
     """
 
     epoch: int
@@ -38,6 +39,7 @@ class Plan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     direction: int
     own_slice: bool
     order: tuple[int, ...]
+    frontier_mm: int | None = None
 
 
 class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -66,7 +68,7 @@ class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
 class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """What a robot broadcasts. `views` are its own team's, then those its lead has made of it, and teams that were met.
 
-    `digest` and `count` describe its facts, `segments`, `arcs`, `voids` and `returns` are some of them.
+    `digest` and `count` describe its facts, `segments`, `arcs`, `voids`, `returns` and `cuts` are some of them.
     """
 
     sender: int
@@ -80,6 +82,7 @@ class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     arcs: tuple[Arc, ...] = ()
     voids: tuple[Void, ...] = ()
     returns: tuple[Return, ...] = ()
+    cuts: tuple[Cut, ...] = ()
 
 
 class FoundSnapshot(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

@@ -21,7 +21,9 @@ class Plan(NamedTuple):
     """One deployment: the robot at `mover` drives along `direction` [rad], and the robots on the path follow.
 
     `key` names what is expanded: one side of an edge, or a gap around one slot. The new robot measures its distance to
-    the robots at the `anchors`. `path` leads from a source to the mover, once a path is assigned.
+    the robots at the `anchors`. `path` leads from a source to the mover, once a path is assigned. With `walk` the robot
+    drives to a wall and follows it, with the wall at its `hand` (+1 left, -1 right); with `beside` it stays in sight of the
+    mover's slot; it stops where it sees a slot of `meet`.
     """
 
     key: tuple[int, ...]
@@ -31,3 +33,7 @@ class Plan(NamedTuple):
     clear_m: float
     anchors: tuple[int, ...]
     path: tuple[int, ...] = ()
+    walk: bool = False
+    hand: int = 1
+    beside: bool = False
+    meet: tuple[int, ...] = ()

@@ -15,6 +15,7 @@ from zwerm.agents.sensor_coverage.frontier.holes import holes, is_bare, sides
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
 # Directions to try into a wide gap around one robot, as offsets from the bisector of the gap.
@@ -40,6 +41,7 @@ class Planner:
         self.frontier: tuple[Edge, ...] = ()
         self.obstacle: tuple[Edge, ...] = ()
         self._parameters = parameters
+        self.walls = WallPlans(parameters, slots)
         self._slots = slots
         self._views, self._complex, self._bases = ScanResult({}, FlagComplex({}), ())
         self._plans: list[Plan] = []
@@ -69,10 +71,17 @@ class Planner:
         self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in into_holes}))
         yield into_holes
         yield list(self._last_plans())
+        if self._parameters.walls == "followed":
+            along_walls = list(self.walls.plans(ScanResult(self._views, self._complex, self._bases)))
+            self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in along_walls}))
+            yield along_walls
 
     def note_attempt(self, plan: Plan) -> None:
         """Record that a plan is tried."""
-        self.attempt_log.note_attempt(plan.key)
+        if plan.walk:
+            self.walls.note_attempt(plan)
+        else:
+            self.attempt_log.note_attempt(plan.key)
 
     def note_failure(self, plan: Plan, driven_m: float) -> None:
         """Record that a wall stopped the plan's mover after `driven_m`."""

@@ -1,6 +1,6 @@
 """Parameters of the frontier planner and of the coordinator."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
@@ -12,7 +12,8 @@ class PlannerParameters(Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters that a scenario may set for the coordinator.
 
     `link_m` is r_v of the paper, and neighbours stand `margin_m` closer; both must agree with the robots' parameters.
-    The deployment does not end before `watch_until_s`.
+    The deployment does not end before `watch_until_s`. With `walls` "paper" two touches or failed drives make an edge an
+    obstacle; with "followed" robots follow the walls before the deployment ends.
     """
 
     link_m: Length = 1.0
@@ -29,6 +30,7 @@ class PlannerParameters(Struct, frozen=True, forbid_unknown_fields=True):
     survey_ticks_max: Count = 80
     drive_ticks_max: Count = 300
     cycles_max: Count = 2000
+    walls: Literal["paper", "followed"] = "paper"
     watch_until_s: Annotated[float, Meta(ge=0.0)] = 0.0
 
     def __post_init__(self) -> None:

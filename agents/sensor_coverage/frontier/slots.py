@@ -11,9 +11,11 @@ frame of one robot, at first the robot's own. Two frames that meet become one.
 import cmath
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from operator import itemgetter
 
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_heading, refined_reference
-from zwerm.agents.sensor_coverage.messages.commands import Sighting
+from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
+from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
 
 class Slots:
@@ -21,7 +23,8 @@ class Slots:
 
     `occupant` has the robot at each slot. `heading` [rad] and `frame` are each robot's heading and the robot in whose
     frame it is. `view` has the bearings that each robot sees in its own frame. `walls` and `blocked` have, by slot, the
-    directions of walls, and of drives that a wall stopped.
+    directions of walls, and of drives that a wall stopped. `felt` has the directions of walls closer than a body.
+    `walks` are the walls that robots followed. `length_m` has the distances [m] between slots that are not a hop apart.
     """
 
     def __init__(self) -> None:
@@ -30,9 +33,12 @@ class Slots:
         self.view: dict[int, dict[int, float]] = {}
         self.walls: dict[int, list[float]] = {}
         self.blocked: dict[int, list[float]] = {}
+        self.felt: dict[int, list[float]] = {}
+        self.walks: list[Walk] = []
+        self.length_m: dict[tuple[int, int], float] = {}
         self.frame: dict[int, int] = {}
         self._heading_readings: dict[int, int] = {}
-        self._reference: dict[tuple[int, int], Reference] = {}
+        self._reference: dict[int, dict[int, Reference]] = {}  # by the slot that sees, then by the slot that it sees
         self._next = 0
 
     # --- slots and occupants ----------------------------------------------------------------------------------------
@@ -61,6 +67,7 @@ class Slots:
         if robot is not None:
             self.view.pop(robot, None)
         self.walls.pop(slot, None)
+        self.felt.pop(slot, None)
 
     def take(self, robot: int, sightings: Iterable[Sighting]) -> None:
         """Store the bearings that a robot reports, in its own frame."""
@@ -126,25 +133,46 @@ class Slots:
                 self.heading[robot] += by
                 self.frame[robot] = new
         for slot in turned:
-            for known in (self.walls, self.blocked):
+            for known in (self.walls, self.blocked, self.felt):
                 if slot in known:
                     known[slot] = [each + by for each in known[slot]]
+        self.walks = [each.turned(new, by) if each.frame == old else each for each in self.walks]
         spin = cmath.exp(1j * by)
-        for (a, b), (mean, count) in self._reference.items():
-            if a in turned:
-                self._reference[a, b] = mean * spin, count
+        for slot in turned:
+            seen = self._reference.get(slot, {})
+            seen |= {other: (mean * spin, count) for other, (mean, count) in seen.items()}
+
+    # --- walls that were followed -----------------------------------------------------------------------------------
+
+    def take_walk(self, robot: int, hand: int, waypoints: Iterable[Waypoint]) -> None:
+        """Store a walk of a robot along a wall, in sight of robots that stand at their slots."""
+        heading, frame, slot_of = self.heading[robot], self.frame[robot], self.slot_of()
+        standing = {node: slot for node, slot in slot_of.items() if node != robot and self.frame[node] == frame}
+        points = tuple(
+            WalkPoint(
+                {
+                    standing[node]: bearing + heading + math.pi
+                    for node, bearing in ((one.node, one.bearing_rad) for one in each.sightings)
+                    if node in standing
+                },
+                tuple(bearing + heading for bearing in each.touched),
+                tuple(standing[node] for node in each.robots if node in standing),
+            )
+            for each in waypoints
+        )
+        self.walks.append(Walk(frame, hand, points))
 
     # --- directions between slots -----------------------------------------------------------------------------------
 
     def direction(self, a: int, b: int) -> float | None:
         """Return the reference direction [rad] from slot a to slot b, or None if there is none."""
-        known = self._reference.get((a, b))
+        known = self._reference.get(a, {}).get(b)
         return None if known is None else cmath.phase(known[0])
 
     def remember(self, a: int, b: int, direction: float) -> None:
         """Set the reference direction [rad] from slot a to slot b, as another robot remembers it."""
         mean = cmath.rect(1.0, direction)
-        self._reference[a, b], self._reference[b, a] = (mean, 1), (-mean, 1)
+        self._refer(a, b, (mean, 1))
 
     def learn_references(self, views: Mapping[int, Mapping[int, float]]) -> None:
         """Refine the reference directions of all slots that see each other."""
@@ -153,12 +181,16 @@ class Slots:
                 back = views.get(b, {}).get(a)
                 if back is None or b < a:
                     continue
-                mean, count = refined_reference(self._reference.get((a, b)), there, back)
-                self._reference[a, b] = mean, count
-                self._reference[b, a] = -mean, count
+                self._refer(a, b, refined_reference(self._reference.get(a, {}).get(b), there, back))
 
     def known_from(self, slot: int) -> Iterator[tuple[int, float]]:
         """Yield (slot, direction [rad]) of every occupied slot that was ever seen from this one, ascending."""
-        for (a, b), (mean, _) in sorted(self._reference.items()):
-            if a == slot and b in self.occupant:
-                yield b, cmath.phase(mean)
+        for other, (mean, _) in sorted(self._reference.get(slot, {}).items(), key=itemgetter(0)):
+            if other in self.occupant:
+                yield other, cmath.phase(mean)
+
+    def _refer(self, a: int, b: int, reference: Reference) -> None:
+        """Set the reference direction from slot a to slot b, and the opposite one."""
+        mean, count = reference
+        self._reference.setdefault(a, {})[b] = reference
+        self._reference.setdefault(b, {})[a] = -mean, count

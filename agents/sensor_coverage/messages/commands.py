@@ -17,6 +17,14 @@ from zwerm.wire.checksum import Sealed
 
 UPLINK: Final = "uplink"
 
+# Ends of drives to walls and along them. There is no wall; there is no way on; the drive has its length; no robot is in
+# sight further on; a robot to meet is in sight.
+OPEN: Final = "open"
+SHUT: Final = "shut"
+STRETCH: Final = "stretch"
+LOST: Final = "lost"
+MET: Final = "met"
+
 
 class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A part of a message."""
@@ -39,6 +47,19 @@ class Landmark(_Part, frozen=True):
     node: int
     bearing_rad: float
     still: bool
+
+
+class Waypoint(_Part, frozen=True):
+    """A point of a walk along walls: the position [m] by odometry, and the bearings [rad] of what the robot sees and touches.
+
+    `touched` are bearings of touched walls. `robots` are touched robots.
+    """
+
+    x_m: float
+    y_m: float
+    sightings: tuple[Sighting, ...]
+    touched: tuple[float, ...]
+    robots: tuple[int, ...]
 
 
 # --- to a robot -----------------------------------------------------------------------------------------------------
@@ -97,6 +118,33 @@ class Correct(_Message, frozen=True, tag="correct"):
     anchors: tuple[Sighting, ...]
 
 
+class ToWall(_Message, frozen=True, tag="to-wall"):
+    """Drive along a bearing [rad] to a wall within `hop_m`, and along it until `clear_m` from the start.
+
+    A wall within `feel_m` is only felt, and the robot returns. `hand` is +1 if the wall is on the left, else -1.
+    """
+
+    cycle: int
+    bearing_rad: float
+    hop_m: float
+    feel_m: float
+    clear_m: float
+    hand: int
+
+
+class FollowWall(_Message, frozen=True, tag="follow-wall"):
+    """Follow the wall in touch for `length_m`, in sight of a robot of `keep`, or of any robot if `keep` is empty.
+
+    Stop where a robot of `meet` is in sight, and one that is not of `meet`.
+    """
+
+    cycle: int
+    length_m: float
+    hand: int
+    keep: tuple[int, ...]
+    meet: tuple[int, ...]
+
+
 # --- from a robot ---------------------------------------------------------------------------------------------------
 
 
@@ -151,12 +199,25 @@ class Arrived(_Message, frozen=True, tag="arrived"):
     touched: tuple[float, ...]
 
 
+class Walked(_Message, frozen=True, tag="walked"):
+    """The end of a drive to a wall or along it, after `driven_m`; `end` is one of OPEN, SHUT, STRETCH, LOST and MET.
+
+    `touched` are bearings [rad] of the wall that stopped a drive to it.
+    """
+
+    cycle: int
+    end: str
+    driven_m: float
+    touched: tuple[float, ...]
+    waypoints: tuple[Waypoint, ...]
+
+
 class Ack(_Message, frozen=True, tag="ack"):
     """The command has arrived and is being carried out."""
 
 
-RobotCommand = RollCall | ScanRequest | NegotiateLeave | Release | Deploy | Move | Correct
-Answer = Report | LeftComplex | Released | Emerged | Cleared | Arrived | Ack
+RobotCommand = RollCall | ScanRequest | NegotiateLeave | Release | Deploy | Move | Correct | ToWall | FollowWall
+Answer = Report | LeftComplex | Released | Emerged | Cleared | Arrived | Walked | Ack
 
 # --- how they cross the radio ---------------------------------------------------------------------------------------
 

@@ -7,13 +7,21 @@ while this robot and they stand still.
 import cmath
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
-from zwerm.wire.messages import Observation
+from zwerm.wire.messages import Contact, Observation
 
 # A closed touch switch faces a robot, not a wall, if a robot is visible within this angle of the switch's sector.
 ROBOT_BESIDE_RAD = 0.2
 # Readings that an average needs before its spread is used.
 SPREAD_READINGS_MIN = 4
+
+
+class Touched(NamedTuple):
+    """A closed touch switch: the bearing [rad] of a wall; or of the robot `node`, which is visible in its sector."""
+
+    bearing_rad: float
+    node: int | None
 
 
 class OdometryFrame:
@@ -24,6 +32,7 @@ class OdometryFrame:
         self.y_m = 0.0
         self.turned_rad = 0.0
         self.seen: dict[int, float] = {}
+        self.contacts: tuple[Touched, ...] = ()
         self.touched: tuple[float, ...] = ()
         self._sums: dict[int, tuple[complex, int]] = {}
 
@@ -37,15 +46,16 @@ class OdometryFrame:
             self.turned_rad += moved.turn_rad
         turned = self.turned_rad
         self.seen = {each.node: each.bearing_rad + turned for each in observation.bearings or ()}
-        self.touched = tuple(
-            each.bearing_rad + turned
-            for each in observation.touch or ()
-            if not any(
-                abs(math.remainder(bearing - turned - each.bearing_rad, math.tau))
-                < each.half_width_rad + ROBOT_BESIDE_RAD
-                for bearing in self.seen.values()
-            )
-        )
+        self.contacts = tuple(self._contact(each, turned) for each in observation.touch or ())
+        self.touched = tuple(each.bearing_rad for each in self.contacts if each.node is None)
+
+    def _contact(self, contact: Contact, turned: float) -> Touched:
+        """Return what a closed switch faces: the visible robot nearest to its direction, or a wall."""
+        direction = contact.bearing_rad + turned
+        beside = contact.half_width_rad + ROBOT_BESIDE_RAD
+        off = [(abs(math.remainder(bearing - direction, math.tau)), node) for node, bearing in self.seen.items()]
+        nearest = min((each for each in off if each[0] < beside), default=None)
+        return Touched(direction, None) if nearest is None else Touched(self.seen[nearest[1]], nearest[1])
 
     # --- averages -----------------------------------------------------------------------------------------------------
 

@@ -95,12 +95,13 @@ def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequen
     start = motion.position
     ux, uy = unit(bearing_rad)
     goal = start[0] + ux * hop_m, start[1] + uy * hop_m
+    scale_m = min(hop_m, motion.hop_m) if hop_m > 0.0 else motion.hop_m
     noisy = motion.samples > 1
     near_m = NOISY_NEAR_M if noisy else p.tolerance_m
     lost = 0
     target = TargetPoint(0.0, 0.0)
     for _ in range(p.drive_ticks_max):
-        target = target_point(landmarks, frame.seen, _offset(motion, goal), motion.hop_m)
+        target = target_point(landmarks, frame.seen, _offset(motion, goal), scale_m)
         if target.distance_m < near_m:
             break
         lost = 0 if frame.seen else lost + 1
@@ -117,12 +118,12 @@ def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequen
         if target.distance_m > 0.5 * hop_m > 0.0:
             return DriveResult(False, target.used_odometry, target.used_moving_landmarks)
     if noisy and not target.used_moving_landmarks:
-        target = yield from _approach(motion, landmarks, goal)
+        target = yield from _approach(motion, landmarks, goal, scale_m)
     return DriveResult(True, target.used_odometry, target.used_moving_landmarks)
 
 
 def _approach(
-    motion: Locomotion, landmarks: Sequence[Landmark], goal: Vector
+    motion: Locomotion, landmarks: Sequence[Landmark], goal: Vector, scale_m: float
 ) -> Generator[BodyVelocity, None, TargetPoint]:
     """Stop, average, step, and repeat.
 
@@ -136,7 +137,7 @@ def _approach(
         for _ in range(p.stop_samples):
             yield STOP
             frame.average()
-        target = target_point(landmarks, frame.averages(), _offset(motion, goal), motion.hop_m)
+        target = target_point(landmarks, frame.averages(), _offset(motion, goal), scale_m)
         ex, ey = ex + (target.x - ex) / stop, ey + (target.y - ey) / stop
         sx, sy = slide(ex, ey, frame.touched)
         wanted = ((motion.bearing_noise_rad or 0.0) * motion.hop_m / p.tolerance_m) ** 2 * target.spread

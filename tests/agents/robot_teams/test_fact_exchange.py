@@ -44,7 +44,7 @@ def test_a_beacon_goes_back_to_saying_little_when_all_know_all() -> None:
     for k in range(20):
         slice_map.add(Segment(k, 0, 1_000))
     assert len(exchange.outgoing(0)[0]) == 20
-    assert exchange.outgoing(20) == ((), (), (), ())
+    assert exchange.outgoing(20) == ((), (), (), (), ())
 
 
 def test_a_large_map_is_sent_in_pages_to_a_robot_that_has_none() -> None:

@@ -1,0 +1,226 @@
+"""Following a wall in touch, by which a robot proves that a stretch of wall has no opening that its body fits through.
+
+The robot keeps a hand on the wall: of all directions that its contacts allow, it takes the one that turns most towards
+the hand. So it enters every opening that is wider than its body, and turns back at the end of every niche. Robots in
+its way are passed in the same manner, but the robot does not press against them.
+"""
+
+import math
+from collections.abc import Collection, Generator, Iterable, Sequence
+from typing import Final, NamedTuple
+
+from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
+from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
+from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
+from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
+from zwerm.wire.messages import BodyVelocity
+
+# The robot drives this much towards the wall, so that it stays in touch; half a switch's sector is 15 degrees.
+PRESS_RAD: Final = math.radians(20.0)
+# Turn towards the hand in each tick without a contact: a step of 0.05 m about a corner at a body's radius of 0.07 m.
+TURN_RAD: Final = math.radians(40.0)
+# The robot is lost in free space after so much turning without a contact.
+TURNS_RAD_MAX: Final = 3.0 * math.tau
+# A contact within this angle of the heading stops the way to the wall.
+AHEAD_RAD: Final = math.radians(75.0)
+# The way to a wall ends after this many ticks with less than this fraction of a full step.
+STUCK_TICKS: Final = 5
+STUCK_FRACTION: Final = 0.2
+# Distance [m] between waypoints while nothing else changes.
+SPACING_M: Final = 0.1
+# Way [m] in which a robot must get clear of its start.
+CLEARING_M_MAX: Final = 3.0
+
+
+class WalkResult(NamedTuple):
+    """The end of a walk; the fields have the meaning of `Walked`."""
+
+    end: str
+    driven_m: float = 0.0
+    touched: tuple[float, ...] = ()
+    waypoints: tuple[Waypoint, ...] = ()
+
+
+DriveToWalk = Generator[BodyVelocity, None, WalkResult]
+
+
+class WallWalk:
+    """The walk of one robot along walls, over several commands: its trail, and the direction of the wall it has in touch."""
+
+    def __init__(self, motion: Locomotion) -> None:
+        self._motion = motion
+        self._wall_rad = 0.0
+        self._trail: list[Vector] = []
+        self._blind_rad = 0.0
+
+    def to_wall(self, bearing_rad: float, hop_m: float, feel_m: float, clear_m: float, hand: int) -> DriveToWalk:
+        """Drive along a bearing to a wall, and along the wall until the start is `clear_m` away.
+
+        A wall within `feel_m` is only felt: the robot returns to its start. Ends: SHUT (felt, or no way to get clear),
+        OPEN (no wall within `hop_m`), STRETCH (at the wall and clear).
+        """
+        motion, frame = self._motion, self._motion.frame
+        frame.forget()
+        start = motion.position
+        self._trail = [start]
+        ux, uy = unit(bearing_rad)
+        done, stuck = 0.0, 0
+        while True:
+            ahead = [each for each in frame.contacts if _apart(each.bearing_rad, bearing_rad) < AHEAD_RAD]
+            now = (frame.x_m - start[0]) * ux + (frame.y_m - start[1]) * uy
+            stuck = stuck + 1 if now < done + STUCK_FRACTION * motion.step_m else 0
+            done = max(done, now)
+            if ahead or stuck > STUCK_TICKS:
+                break
+            if done >= hop_m - 1e-3:
+                return WalkResult(OPEN, done)
+            aside = (frame.y_m - start[1]) * ux - (frame.x_m - start[0]) * uy
+            left = min(hop_m - done, motion.step_m)
+            yield motion.velocity(ux * left + uy * aside * 0.5, uy * left - ux * aside * 0.5)
+        touched = tuple(each.bearing_rad for each in ahead if each.node is None)
+        if done < feel_m and touched:
+            yield from motion.drive_to(start)
+            return WalkResult(SHUT, done, touched)
+        self._wall_rad, self._blind_rad = bearing_rad, 0.0
+        way = 0.0
+        while math.hypot(frame.x_m - start[0], frame.y_m - start[1]) < clear_m:
+            if way > CLEARING_M_MAX or self._blind_rad > TURNS_RAD_MAX:
+                yield from motion.drive_to(start)
+                return WalkResult(SHUT, done, touched)
+            before = motion.position
+            yield self._step(hand)
+            way += math.dist(before, motion.position)
+            self._trail.append(motion.position)
+        return WalkResult(STRETCH, done, touched)
+
+    def along(
+        self, hand: int, length_m: float, keep: Collection[int], meet: Collection[int], margin_m: float
+    ) -> DriveToWalk:
+        """Follow the wall for `length_m`, in sight of a robot of `keep`, or of any robot if `keep` is empty.
+
+        Ends: STRETCH (`length_m` were followed), LOST (no such robot is in sight further on; the robot stands at the
+        last place with `margin_m` to spare), MET (a robot of `meet` and another one are in sight), SHUT (no wall any more).
+        """
+        motion, frame = self._motion, self._motion.frame
+        frame.forget()
+        yield from self._back_into_sight(keep)
+        if not self._sees(keep):
+            return WalkResult(LOST)
+        self._trail = [motion.position]
+        self._blind_rad = 0.0
+        points = [self._waypoint()]
+        seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
+        last, way = motion.position, 0.0
+        while way < length_m:
+            if self._meets(meet):
+                return WalkResult(MET, way, (), tuple(points))
+            if self._blind_rad > TURNS_RAD_MAX:
+                return WalkResult(SHUT, way, (), tuple(points))
+            before, before_point = motion.position, self._waypoint()
+            yield self._step(hand)
+            way += math.dist(before, motion.position)
+            if not self._sees(keep):
+                yield from self._back(margin_m, keep)
+                return WalkResult(LOST, way, (), tuple(points))
+            self._trail.append(motion.position)
+            now, touch = tuple(sorted(frame.seen)), _hands(frame.contacts)
+            if now != seen or touch != hands:
+                if before != last:
+                    points.append(before_point)
+                points.append(self._waypoint())
+                seen, hands, last = now, touch, motion.position
+            elif math.dist(last, motion.position) >= SPACING_M:
+                points.append(self._waypoint())
+                last = motion.position
+        return WalkResult(STRETCH, way, (), tuple(points))
+
+    # --- one step ---------------------------------------------------------------------------------------------------
+
+    def _step(self, hand: int) -> BodyVelocity:
+        """Return the velocity of the next step, and keep the direction of the wall."""
+        motion, contacts = self._motion, self._motion.frame.contacts
+        if not contacts:
+            self._wall_rad += hand * TURN_RAD
+            self._blind_rad += TURN_RAD
+            heading = self._wall_rad - hand * (math.pi / 2.0 - PRESS_RAD)
+        else:
+            self._blind_rad = 0.0
+            heading = swept(self._wall_rad, contacts, hand)
+            self._wall_rad = heading + hand * (math.pi / 2.0 - PRESS_RAD)
+        ux, uy = unit(heading)
+        return motion.velocity(ux * motion.step_m, uy * motion.step_m)
+
+    def _waypoint(self) -> Waypoint:
+        frame = self._motion.frame
+        return Waypoint(
+            frame.x_m,
+            frame.y_m,
+            tuple(Sighting(node, bearing) for node, bearing in sorted(frame.seen.items())),
+            tuple(each.bearing_rad for each in frame.contacts if each.node is None),
+            tuple(each.node for each in frame.contacts if each.node is not None),
+        )
+
+    # --- sight ------------------------------------------------------------------------------------------------------
+
+    def _sees(self, keep: Collection[int]) -> bool:
+        seen = self._motion.frame.seen
+        return any(each in seen for each in keep) if keep else bool(seen)
+
+    def _meets(self, meet: Collection[int]) -> bool:
+        seen = self._motion.frame.seen
+        return any(each in seen for each in meet) and any(each not in meet for each in seen)
+
+    def _back_into_sight(self, keep: Collection[int]) -> Generator[BodyVelocity, None, None]:
+        """Drive back on the trail until a robot is in sight."""
+        while not self._sees(keep) and self._trail:
+            yield from self._leg(self._trail.pop())
+
+    def _back(self, margin_m: float, keep: Collection[int]) -> Generator[BodyVelocity, None, None]:
+        """Drive back on the trail into sight, and `margin_m` further."""
+        yield from self._back_into_sight(keep)
+        way = 0.0
+        while way < margin_m and self._trail:
+            before = self._motion.position
+            yield from self._leg(self._trail.pop())
+            way += math.dist(before, self._motion.position)
+
+    def _leg(self, goal: Vector) -> Generator[BodyVelocity, None, None]:
+        """Drive to a point of the trail close by; a robot in the way ends the leg."""
+        motion = self._motion
+        for _ in range(STUCK_TICKS):
+            dx, dy = goal[0] - motion.frame.x_m, goal[1] - motion.frame.y_m
+            if math.hypot(dx, dy) < motion.parameters.tolerance_m:
+                return
+            yield motion.velocity(dx, dy)
+
+
+def swept(wall_rad: float, contacts: Sequence[Touched], hand: int) -> float:
+    """Return the heading [rad] that turns most towards the hand and that no contact blocks.
+
+    The sweep begins at the direction of the wall and turns away from the hand. A contact blocks the directions within
+    a right angle of it, less PRESS_RAD at a wall.
+    """
+    heading, turned = wall_rad, 0.0
+    for _ in range(2 * len(contacts) + 1):
+        jump = 0.0
+        for each in contacts:
+            limit = math.pi / 2.0 - (PRESS_RAD if each.node is None else 0.0)
+            off = math.remainder(each.bearing_rad - heading, math.tau)
+            if abs(off) < limit - 1e-6:
+                jump = max(jump, limit - hand * off)
+        if jump <= 0.0:
+            break
+        heading -= hand * jump
+        turned += jump
+        if turned > math.tau:
+            break
+    return heading
+
+
+def _hands(contacts: Iterable[Touched]) -> tuple[object, ...]:
+    """Return what decides whether a waypoint is new: the touched robots, and whether there is a wall."""
+    return (any(each.node is None for each in contacts), *(each.node for each in contacts if each.node is not None))
+
+
+def _apart(a_rad: float, b_rad: float) -> float:
+    return abs(math.remainder(a_rad - b_rad, math.tau))

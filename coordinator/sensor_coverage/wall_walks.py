@@ -1,0 +1,192 @@
+"""The execution of walks along walls: one robot drives to a wall and follows it, past all robots that stand there.
+
+The robots behind it close up first, so that every slot is occupied. The walk goes on until all that it can close is
+closed, or until no standing robot sees the walking robot further on: there it gets a slot, and the swarm goes on from it.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
+from zwerm.agents.sensor_coverage.frontier.directions import wrapped
+from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
+from zwerm.agents.sensor_coverage.messages.commands import (
+    LOST,
+    MET,
+    OPEN,
+    SHUT,
+    FollowWall,
+    RobotCommand,
+    ToWall,
+    Walked,
+    Waypoint,
+)
+from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
+from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine
+from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
+from zwerm.coordinator.sensor_coverage.sources import Sources
+
+# A wall within this way [m] is only felt: the space between it and the robot's slot is narrower than a body.
+FEEL_M: Final = 0.12
+# The walking robot leaves its slot by this distance [m] before the next robot takes it: two bodies and some space.
+CLEAR_M: Final = 0.3
+# Length [m] of one leg of a walk: the coordinator decides after each leg whether it goes on.
+LEG_M: Final = 3.0
+# A walk ends after so many legs in a row that closed nothing.
+IDLE_LEGS_MAX: Final = 2
+# A leg closes something if the open arcs become smaller by this [rad].
+PROGRESS_RAD: Final = 0.1
+# Longest way [m] of a station's first robot to a wall.
+FIRST_HOP_M: Final = 0.95
+# Rays to a robot that must differ by this [rad] to determine its distance.
+RAYS_RAD_MIN: Final = 0.3
+
+
+class WallWalks:
+    """Walks along walls. `idle` are the slots at which a robot stands after a walk, and is not needed."""
+
+    def __init__(
+        self,
+        slots: Slots,
+        mailbox: CommandMailbox,
+        sources: Sources,
+        pushing: PushExecution,
+        frontier: FrontierService,
+        walls: WallPlans,
+    ) -> None:
+        self.idle: dict[int, None] = {}
+        self.walks = 0
+        self._slots = slots
+        self._mailbox = mailbox
+        self._sources = sources
+        self._pushing = pushing
+        self._frontier = frontier
+        self._walls = walls
+
+    def walk(self, plan: Plan, scan: ScanResult) -> Routine[Moved]:
+        """Carry out a plan to follow walls, and return the robots that have moved; `scan` has no idle robots."""
+        slots, pushing = self._slots, self._pushing
+        self._frontier.note_attempt(plan)
+        station = plan.mover in pushing.scan.bases
+        if station:
+            yield from self._sources.let_out(plan.mover, pushing.cycle, pushing.scan.views[plan.mover], ())
+            waiting = self._sources.waiting.get(plan.mover)
+            if waiting is None:
+                return ()
+            leader = waiting
+        else:
+            leader = slots.occupant[plan.mover]
+            yield from pushing.prepare(plan)
+        heading = slots.heading[leader]
+        to_wall = ToWall(pushing.cycle, wrapped(plan.direction - heading), plan.hop_m, FEEL_M, CLEAR_M, -plan.hand)
+        walked = yield from self._order(leader, to_wall)
+        if walked is None:
+            return (leader,)
+        if walked.end == SHUT:
+            if walked.touched:
+                self._walls.note_wall(plan.mover, plan.direction)
+            for each in walked.touched:
+                self._walls.note_wall(plan.mover, each + heading)
+            return (leader,)
+        followers: Sequence[int] = ()
+        if station:
+            del self._sources.waiting[plan.mover]
+            pushing.pushes += 1
+            slots.add(leader)
+        else:
+            closed_up = yield from pushing.close_up(plan, leader, there=True)
+            if closed_up is None:
+                return (leader,)
+            followers = closed_up[0]
+        self.walks += 1
+        if walked.end == OPEN:
+            if plan.mover in slots.occupant:
+                back = plan.direction + math.pi - heading
+                yield from pushing.correct(leader, [(slots.occupant[plan.mover], back)])
+            return (*followers, leader)
+        keep = (slots.occupant[plan.mover],) if plan.beside and plan.mover in slots.occupant else ()
+        meet = tuple(slots.occupant[each] for each in plan.meet if each in slots.occupant)
+        yield from self._legs(leader, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
+        return (*followers, leader)
+
+    def first(self, base: int) -> Routine[Moved]:
+        """Let the robot that waits at a station follow walls, as far as the station sees it. Its heading is unknown."""
+        robot = self._sources.waiting[base]
+        cycle, station = self._pushing.cycle, self._slots.occupant[base]
+        for bearing in FIRST_BEARINGS_RAD:
+            to_wall = ToWall(cycle, bearing, FIRST_HOP_M, 0.0, 0.0, -1)
+            walked = yield from self._order(robot, to_wall)
+            if walked is None:
+                break
+            for hand in (1, -1):
+                walked = yield from self._order(robot, FollowWall(cycle, LEG_M, hand, (station,), ()))
+                if walked is None or walked.end == LOST:
+                    break
+            if walked is not None and walked.driven_m > CLEAR_M:
+                del self._sources.waiting[base], self._sources.blocked[base]
+                self._slots.add(robot)
+                return (robot,)
+        return ()
+
+    def _legs(self, leader: int, leg: FollowWall, scan: ScanResult) -> Routine[None]:
+        """Follow the wall, leg by leg. The robot got clear with the wall at its other hand: so it passes its first slot."""
+        slots, idle_legs = self._slots, 0
+        left = self._open(scan)
+        while (left > 0.0 or leg.meet) and idle_legs < IDLE_LEGS_MAX:
+            walked = yield from self._order(leader, leg)
+            if walked is None:
+                return
+            slots.take_walk(leader, leg.hand, walked.waypoints)
+            if walked.end in (LOST, MET):
+                self._measure(leader, walked.waypoints)
+                return
+            before, left = left, self._open(scan)
+            idle_legs = idle_legs + 1 if left > before - PROGRESS_RAD or walked.end == SHUT else 0
+        self.idle[slots.slot_of()[leader]] = None
+
+    def _open(self, scan: ScanResult) -> float:
+        """Return the sum of all open arcs [rad]."""
+        return sum(arc.width_rad for arcs in self._walls.open_arcs(scan).values() for arc in arcs)
+
+    def _measure(self, leader: int, waypoints: Sequence[Waypoint]) -> None:
+        """Find the distances of the leader's new slot to the robots in view, by their bearings along the walk and odometry."""
+        slot_of = self._slots.slot_of()
+        here = slot_of[leader]
+        if not waypoints:
+            return
+        end = waypoints[-1]
+        for node in (each.node for each in end.sightings):
+            rays = [
+                (each.x_m, each.y_m, one.bearing_rad)
+                for each in waypoints
+                for one in each.sightings
+                if one.node == node
+            ]
+            found = _crossing(rays)
+            if node in slot_of and found is not None:
+                length = math.hypot(found[0] - end.x_m, found[1] - end.y_m)
+                self._slots.length_m[here, slot_of[node]] = self._slots.length_m[slot_of[node], here] = length
+
+    def _order(self, robot: int, command: RobotCommand) -> Routine[Walked | None]:
+        """Return how a walk ended, or None if the robot does not answer."""
+        self._mailbox.send(robot, command, drive=True)
+        answers = yield from self._mailbox.answers([robot], Walked)
+        answer = answers.get(robot)
+        return answer if isinstance(answer, Walked) else None
+
+
+def _crossing(rays: Sequence[tuple[float, float, float]]) -> tuple[float, float] | None:
+    """Return the point [m] nearest to rays (x, y, bearing), or None if they are nearly parallel."""
+    sxx = sxy = syy = bx = by = 0.0
+    for x, y, bearing in rays:
+        nx, ny = -math.sin(bearing), math.cos(bearing)
+        off = nx * x + ny * y
+        sxx, sxy, syy = sxx + nx * nx, sxy + nx * ny, syy + ny * ny
+        bx, by = bx + nx * off, by + ny * off
+    det = sxx * syy - sxy * sxy
+    if det < (len(rays) * math.sin(RAYS_RAD_MIN) / 4.0) ** 2:
+        return None
+    return (syy * bx - sxy * by) / det, (sxx * by - sxy * bx) / det

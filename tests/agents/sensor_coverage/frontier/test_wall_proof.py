@@ -1,0 +1,86 @@
+"""The proof of coverage by arcs: what closes a direction, and what does not."""
+
+import math
+
+import pytest
+
+from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import open_arcs
+from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
+from zwerm.maths.simplicial import FlagComplex
+
+ALONE = {0: dict[int, float]()}
+
+
+def around(*degrees: float, hand: int, touched: bool = True) -> Walk:
+    """Return a walk around slot 0 that it sees in these directions."""
+    walls = (0.0,) if touched else ()
+    return Walk(0, hand, tuple(WalkPoint({0: math.radians(each)}, walls, ()) for each in degrees))
+
+
+def opened(*walks: Walk, walls: tuple[float, ...] = ()) -> list[tuple[int, int]]:
+    """Return the open arcs of slot 0 in whole degrees."""
+    arcs = open_arcs(ALONE, FlagComplex(ALONE), walks, {0: walls}).get(0, [])
+    return [(round(math.degrees(each.start_rad)), round(math.degrees(each.width_rad))) for each in arcs]
+
+
+def test_a_robot_alone_is_open_all_around() -> None:
+    assert opened() == [(0, 360)]
+
+
+def test_a_closed_walk_with_the_wall_outside_closes_the_full_turn() -> None:
+    assert opened(around(*range(0, 361, 20), hand=-1)) == []
+    assert opened(around(*range(360, -1, -20), hand=1)) == []
+
+
+def test_a_walk_around_the_robot_itself_closes_nothing() -> None:
+    """With the robot at the hand, free space is on the other side of the step."""
+    assert opened(around(*range(0, 361, 20), hand=1)) == [(0, 360)]
+
+
+def test_a_walk_without_touch_closes_nothing() -> None:
+    assert opened(around(*range(0, 361, 20), hand=-1, touched=False)) == [(0, 360)]
+
+
+def test_a_walk_closes_the_arc_that_it_was_seen_in() -> None:
+    assert opened(around(10, 40, 80, hand=-1)) == [(80, 290)]
+
+
+def test_the_arc_between_two_walks_stays_open() -> None:
+    assert opened(around(10, 60, hand=-1), around(80, 120, 170, 220, 300, 360, hand=-1)) == [(60, 20), (0, 10)]
+
+
+def test_a_wall_in_touch_closes_a_quarter_turn() -> None:
+    assert opened(walls=(math.pi / 2.0,)) == [(135, 270)]
+
+
+def test_a_triangle_closes_the_arc_between_its_robots() -> None:
+    views = {0: {1: 0.0, 2: math.pi / 3.0}, 1: {0: math.pi, 2: 2.0}, 2: {0: -2.0, 1: -1.0}}
+    arcs = open_arcs(views, FlagComplex(views), (), {})
+    assert arcs[0] == [pytest.approx((math.pi / 3.0, math.tau - math.pi / 3.0))]
+
+
+def test_a_walk_past_two_robots_closes_the_arc_between_robot_and_wall() -> None:
+    views = {0: {1: 0.0}, 1: {0: math.pi}}
+    walk = Walk(0, 1, (WalkPoint({0: -0.5, 1: math.pi + 0.5}, (-math.pi / 2.0,), ()),))
+    arcs = open_arcs(views, FlagComplex(views), (walk,), {})
+    assert arcs[0] == [pytest.approx((0.0, math.tau - 0.5))]
+
+
+def test_a_walk_that_touches_robot_and_wall_closes_the_pocket_between_them() -> None:
+    walk = Walk(0, 1, (WalkPoint({0: 0.0}, (math.pi / 2.0,), (0,)),))
+    assert opened(walk) == [(55, 305)]
+
+
+def test_walks_turn_with_the_frame_in_which_they_were_seen() -> None:
+    slots = Slots()
+    for robot in (7, 8):
+        slots.add(robot)
+    slots.take(7, ())
+    slots.take_walk(7, 1, (Waypoint(0.0, 0.0, (Sighting(8, 0.0),), (), ()),))
+    assert slots.walks[0].points[0].seen == {}, "robot 8 is in another frame"
+    slots.orient(8, 7, 0.5)
+    slots.take_walk(8, 1, (Waypoint(0.0, 0.0, (Sighting(7, 0.25),), (1.0,), (7,)),))
+    assert slots.walks[1] == Walk(7, 1, (WalkPoint({0: 0.75 + math.pi}, (1.5,), (0,)),))
+    assert slots.walks[1].turned(3, 1.0) == Walk(3, 1, (WalkPoint({0: 1.75 + math.pi}, (2.5,), (0,)),))

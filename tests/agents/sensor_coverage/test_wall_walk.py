@@ -1,0 +1,72 @@
+"""Following walls: the heading that contacts allow, and whole runs in buildings whose doors the paper's rules do not find."""
+
+import math
+
+import pytest
+
+from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
+from zwerm.agents.sensor_coverage.motion.wall_walk import swept
+from zwerm.run.runner import run
+
+PRESS_DEG = 20
+
+
+def heading_deg(wall_deg: float, contacts: list[tuple[float, int | None]], hand: int) -> int:
+    touched = [Touched(math.radians(each), node) for each, node in contacts]
+    return round(math.degrees(math.remainder(swept(math.radians(wall_deg), touched, hand), math.tau)))
+
+
+@pytest.mark.parametrize(("hand", "heading"), [(1, PRESS_DEG), (-1, 180 - PRESS_DEG)])
+def test_a_robot_follows_a_wall_and_presses_against_it(hand: int, heading: int) -> None:
+    assert heading_deg(90.0, [(90.0, None)], hand) == heading
+
+
+def test_a_robot_does_not_press_against_another_robot() -> None:
+    assert heading_deg(90.0, [(90.0, 5)], 1) == 0
+
+
+def test_a_robot_turns_away_from_its_hand_in_a_corner() -> None:
+    assert heading_deg(90.0, [(90.0, None), (0.0, None)], 1) == -90 + PRESS_DEG
+
+
+def test_a_robot_turns_round_at_a_dead_end() -> None:
+    assert heading_deg(90.0, [(90.0, None), (0.0, None), (-90.0, None)], 1) == -180 + PRESS_DEG
+
+
+def test_a_robot_goes_into_an_opening_at_its_hand() -> None:
+    """The corner of the opening is behind on the left: the sweep begins at the direction of the wall."""
+    assert heading_deg(90.0, [(150.0, None)], 1) == 80
+
+
+# --- whole runs -----------------------------------------------------------------------------------------------------
+
+FOLLOWED = 'coordinator.parameters.walls="followed"'
+PAPER = 'coordinator.parameters.walls="paper"'
+TWO_ROOMS = (
+    "arena.polygon=[[0,0],[2,0],[2,0.3],[2.1,0.3],[2.1,0],[4.1,0],[4.1,2],[2.1,2],[2.1,0.6],[2,0.6],[2,2],[0,2]]",
+    "base.pose=[0.3,1.0,0.4]",
+    "robots.count=40",
+)
+BENT_CORRIDOR = (
+    "arena.polygon=[[0,0],[3,0],[3,3],[2.6,3],[2.6,0.4],[0,0.4]]",
+    "base.pose=[0.2,0.2,0.0]",
+    "robots.count=30",
+)
+DEAD_END = (
+    "arena.polygon=[[0,0],[2.5,0],[2.5,0.9],[0,0.9],[0,0.5],[2.1,0.5],[2.1,0.4],[0,0.4]]",
+    "base.pose=[0.2,0.2,0.3]",
+    "robots.count=30",
+)
+
+
+@pytest.mark.parametrize("building", [TWO_ROOMS, BENT_CORRIDOR, DEAD_END], ids=["door of 0.3", "corner", "turn of 0.4"])
+def test_a_run_is_completed_only_where_all_is_seen(building: tuple[str, ...]) -> None:
+    result = run("sensor-coverage-narrow", 101, "inline", (*building, FOLLOWED))
+    assert result.outcome == "completed"
+    assert result.metrics["reachable_coverage_fraction"] > 0.99
+
+
+def test_the_rules_of_the_paper_miss_a_door() -> None:
+    result = run("sensor-coverage-narrow", 101, "inline", (*TWO_ROOMS, PAPER))
+    assert result.outcome == "completed"
+    assert result.metrics["reachable_coverage_fraction"] < 0.9
