@@ -1,5 +1,6 @@
 """Metrics of agreement, from what robots report: how far their values are apart, and how many lead at a time."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -21,8 +22,8 @@ class Spread(Metric):
         self._spread.append(max(values) - min(values) if values else float("nan"))
 
     def metrics(self) -> dict[str, float]:
-        """Return the spread at the end."""
-        return {"value_spread": self._spread[-1]}
+        """Return the spread at the end; nothing where no robot reports a value."""
+        return {} if math.isnan(self._spread[-1]) else {"value_spread": self._spread[-1]}
 
     def series(self) -> dict[str, list[float]]:
         """Return the spread over time."""
@@ -37,19 +38,24 @@ class Leaders(Metric):
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         self._leaders: list[int] = []
+        self._reported = False
         self._last_s = 0.0
         self._seconds = {0: 0.0, 2: 0.0}
 
     def sample(self, truth: Truth) -> None:
         """Count the robots that report to lead; the count holds since the sample before."""
-        leaders = round(sum(_newest(truth, "leader")))
+        reports = _newest(truth, "leader")
+        self._reported = self._reported or bool(reports)
+        leaders = round(sum(reports))
         elapsed_s, self._last_s = truth.time_s - self._last_s, truth.time_s
         if leaders != 1:
             self._seconds[min(leaders, 2)] += elapsed_s
         self._leaders.append(leaders)
 
     def metrics(self) -> dict[str, float]:
-        """Return the greatest number of leaders, and the durations [s]."""
+        """Return the greatest number of leaders, and the durations [s]; nothing where no robot reports whether it leads."""
+        if not self._reported:
+            return {}
         return {
             "leaders_max": float(max(self._leaders)),
             "leaderless_s": self._seconds[0],
