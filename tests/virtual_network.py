@@ -1,7 +1,7 @@
 """A simulated network: connections, clocks and deaths of robots as events in virtual time, each run a function of its seed.
 
-The drivers, the world, the nodes and the admission of nodes are the real ones. What the link, the transport and the processes do
-is replaced: latency, a cable that is cut and heals, a lease that ends, a process that is killed or hangs, a program that returns.
+The drivers, the world, the nodes and the admission of nodes are the real ones. Link, transport and processes are replaced:
+latency, a cable that is cut and heals, a lease that ends, a process that is killed or hangs, a program that returns.
 """
 
 import heapq
@@ -9,6 +9,7 @@ import itertools
 import random
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import pytest
 from network import NIL
@@ -85,8 +86,8 @@ class VirtualNetwork:
 
         self._at(at_s, begin)
         for node in nodes:
-            self._at(at_s + LEASE_S, lambda node=node: expire(node))
-            self._at(at_s + for_s, lambda node=node: mend(node))
+            self._at(at_s + LEASE_S, partial(expire, node))
+            self._at(at_s + for_s, partial(mend, node))
 
     def kill(self, node: int, at_s: float = -1.0) -> None:
         """Kill a node's process: the kernel closes its connection at once."""
@@ -129,6 +130,10 @@ class VirtualNetwork:
         """Return those of `nodes` that would leave when told to."""
         self.advance(self.now + timeout_s)
         return [node for node in nodes if node not in self._silent and node not in self._cut]
+
+    def evict(self, node: int) -> None:
+        """Lose a node."""
+        self._lose(node)
 
     def close(self) -> None:
         """Drop all events."""

@@ -13,6 +13,7 @@ from virtual_network import LEASE_S, VirtualNetwork
 from zwerm.errors import StragglerError
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import run
+from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.lockstep import CRASH_GRACE_S, LockStep
 from zwerm.world.drivers.realtime import RealTime
 from zwerm.world.world import World
@@ -23,7 +24,7 @@ SEEDS = range(150)
 NAMED_WITHIN_S = LEASE_S + 5.0  # the promise of docs/security.md
 
 
-def chosen(on_crash: str) -> object:
+def chosen(on_crash: str) -> Scenario:
     return scenario(robots={"count": ROBOTS, "on_crash": on_crash}, time={"straggler_s": STRAGGLER_S})
 
 

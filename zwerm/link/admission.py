@@ -18,6 +18,7 @@ INCARNATION: Final = "incarnation"
 JOINED: Final = "joined"
 RETURNED: Final = "returned"
 NOT_JOINED: Final = "not-joined"
+EVICTED: Final = "evicted"
 MEANINGS: Final[Mapping[str, str]] = {
     IDENTITY: "it says that it is another node",
     UNKNOWN: "the run has no such node",

@@ -56,7 +56,8 @@ class RunResult:
     faults: list[dict[str, Any]] = field(default_factory=list)
     missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
     series: dict[str, Floats] = field(default_factory=dict)
-    refused: dict[str, int] = field(default_factory=dict)
+    refused: dict[str, int] = field(default_factory=dict)  # messages by reason
+    refused_by: dict[int, dict[str, int]] = field(default_factory=dict)  # messages by node and reason
     problems: list[str] = field(default_factory=list)  # what could not be written during the run
     tracebacks: dict[int, str] = field(default_factory=dict)
     crash_reasons: dict[int, str] = field(
@@ -111,6 +112,10 @@ class RunResult:
                 "reasons": {str(node): reason for node, reason in sorted(self.crash_reasons.items())},
             },
             "faults": self.faults,
+            "refused": {
+                "reasons": self.refused,
+                "nodes": {str(node): reasons for node, reasons in self.refused_by.items()},
+            },
         }
 
     def picture(
