@@ -20,8 +20,9 @@ from zenoh.handlers import Callback
 
 from zwerm.errors import LinkError
 from zwerm.link import Arrival, arrival
-from zwerm.link.admission import EVICTED, IDENTITY, NOT_JOINED, Admission, ExpectedNode
+from zwerm.link.admission import EVICTED, IDENTITY, NOT_JOINED, SOFTWARE, Admission, ExpectedNode
 from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threads
+from zwerm.link.software import software
 from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
 from zwerm.wire.messages import REFUSABLE, Goodbye, Welcome, decode_hello, encode, refusal
 
@@ -39,7 +40,7 @@ class ZenohWorldLink:
         self.refused_by: dict[int, Counter[str]] = {}  # refusals by node and reason
         self._evicted: set[int] = set()
         self._run = run
-        self._members = Admission(members)
+        self._members = Admission(members, software())
         self._source_of: dict[str, int] = {}
         self._changed = threading.Condition()
         self._dismissed = False
@@ -216,12 +217,17 @@ class ZenohWorldLink:
             return Welcome(refused=refusal(error).reason)
         with self._changed:
             refused = self._members.greet(node, hello)
-            if refused or isinstance(hello, Goodbye):
+            if isinstance(hello, Goodbye):
                 return Welcome(refused=refused)
+            if refused:
+                differing = f"the world has {software()}; the node has {hello.software}" if refused == SOFTWARE else ""
+                return Welcome(refused=refused, detail=differing)
             member = self._members.expected(node)
             self._source_of[command_key(self._run, node)] = node
             self._changed.notify_all()
-        return Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced)
+        return Welcome(
+            controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced, code=member.code
+        )
 
 
 def _node_in(key: str) -> int:
