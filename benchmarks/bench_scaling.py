@@ -67,7 +67,7 @@ FAMILIES: Final[Mapping[str, Family]] = {
         math.pi / 5.0,
         (
             *("robots.parameters.speed_m_s=0.1", "robots.parameters.every_ticks=1000000", "arena.walls=[]"),
-            *("radio.models=[]", 'robots.sensors=[{kind="bearings", range_m=1.0}]', *HOLONOMIC),
+            *("radio.range_m=1.0", "radio.models=[]", 'robots.sensors=[{kind="bearings", range_m=1.0}]', *HOLONOMIC),
         ),
     ),
     "voronoi": Family("voronoi-coverage-table1", 0.0),
