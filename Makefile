@@ -16,7 +16,7 @@ COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generat
 .DEFAULT_GOAL := help
 APT_TOOLS := iproute2 nftables ffmpeg chromium
 
-.PHONY: help setup dev compile tools run test lint format pages docs bench fidelity lock clean
+.PHONY: help setup dev compile tools run test lint format pages docs bench fidelity package lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -68,6 +68,9 @@ bench: dev  ## run the benchmarks, Voronoi coverage compiled where there is a C 
 
 fidelity: dev  ## hold every model of the radio against its 99 % confidence interval, a million packets each
 	$(BIN)/python benchmarks/bench_fidelity.py
+
+package:  ## build the package, and try it in a fresh environment
+	@.ci/package
 
 lock:  ## resolve the dependencies anew (needs uv)
 	$(COMPILE) --upgrade --output-file requirements.txt

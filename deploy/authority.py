@@ -7,7 +7,6 @@ binds the node's keys to it. The private key of the authority is deleted at once
 
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Final
@@ -15,6 +14,7 @@ from typing import Final
 import msgspec
 
 from zwerm.deploy.identity import WorldIdentity
+from zwerm.deploy.runtime_directory import private_directory
 from zwerm.errors import LinkError
 from zwerm.link.session import Credentials
 
@@ -29,8 +29,8 @@ def certify(credentials: Credentials, names: Sequence[str]) -> tuple[WorldIdenti
     """
     if shutil.which("openssl") is None:
         raise LinkError("certificates need the command openssl, from the package openssl")
-    with tempfile.TemporaryDirectory(prefix="zwerm-") as directory:
-        authority = _Authority(Path(directory))
+    with private_directory() as directory:
+        authority = _Authority(directory)
         certificate, key = authority.sign("zwerm world", names, "serverAuth")
         nodes = []
         for node in credentials.nodes:

@@ -32,6 +32,7 @@ from zwerm.world.faults.schedule import Schedule, unite
 from zwerm.world.radio.medium import Medium
 from zwerm.world.scene import Scene
 from zwerm.world.sensors import Sensor
+from zwerm.world.tick.clocks import Clocks
 from zwerm.world.tick.command_intake import CommandIntake
 from zwerm.world.tick.completion import Completion, Ending
 from zwerm.world.tick.lifecycle import Lifecycle
@@ -70,6 +71,8 @@ class World:
             ""
         )  # where a node's controller answers: " (file.py:12, in C.step)"
         self._sensing = Sensing(sensors)
+        clock = scenario.robots.clock
+        self.clocks = None if clock is None else Clocks(clock, robots, nodes, draws)
         events = {each.field: WakeEvent(each.wake_event, each.signature) for each in sensors if each.wake_event}
         self._wakes = Wakes(nodes, dt_s, events)
         deadman_ticks = ticks(scenario.time.deadman_s, dt_s)
@@ -111,7 +114,8 @@ class World:
         readings = self._sensing.readings(scene, robots)
         inboxes = self.medium.deliver(nodes, tick) if receivers else None
         observations: list[bytes] = []
-        made = self._sensing.observations(scene, len(robots), len(nodes), readings, inboxes)
+        times = None if self.clocks is None else self.clocks.local_s(scene.time_s, nodes)
+        made = self._sensing.observations(scene, len(robots), len(nodes), readings, inboxes, times)
         for node, observation in zip(nodes, made, strict=True):
             observations.append(observation)
             if send is not None:
@@ -245,7 +249,8 @@ class World:
             if answer.outbox:
                 outboxes.append((node, answer.outbox))
             if answer.wake is not None:
-                self._wakes.sleep(node, answer.wake, tick)
+                wake = answer.wake if self.clocks is None else self.clocks.true_wake(node, answer.wake)
+                self._wakes.sleep(node, wake, tick)
             if answer.telemetry or answer.snapshot:
                 self.telemetry.accept(self.scene, node, answer, self.status.down)
             if answer.gave_up:

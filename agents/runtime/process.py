@@ -43,6 +43,7 @@ EXIT_LOST: Final = 3
 NICENESS: Final = 5
 
 _PR_SET_PDEATHSIG: Final = 1
+_PR_SET_DUMPABLE: Final = 4
 
 
 def main(
@@ -60,6 +61,9 @@ def main(
     """
     die_with_parent(_server)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.setsid()  # the session tells which processes a controller has started
+    os.register_at_fork(after_in_child=die_with_parent)
+    hide_memory()
     os.nice(NICENESS)
     parent = parent_process()
     if parent is not None and not parent.is_alive():  # where the kernel has no die_with_parent
@@ -229,6 +233,12 @@ def die_with_parent(parent: int | None = None) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if parent is not None and os.getppid() != parent:
             os._exit(EXIT_LOST)
+
+
+def hide_memory() -> None:
+    """Close this process's memory to other processes of the same user, and write no core dump (Linux only)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0)
 
 
 _server: int | None = None

@@ -37,7 +37,12 @@ def members(count: int, controller: str = ECHO) -> dict[int, tuple[str, Setup]]:
 
 def private_mb(pid: int) -> float:
     """Return the memory [MB] that a process shares with no other."""
-    fields = [line.split() for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:]]
+    try:
+        text = Path(f"/proc/{pid}/smaps_rollup").read_text()
+    except PermissionError:  # closed to all but root: the resident memory that no file backs is a little more
+        _, resident, shared, *_ = map(int, Path(f"/proc/{pid}/statm").read_text().split())
+        return (resident - shared) * os.sysconf("SC_PAGESIZE") / 2**20
+    fields = [line.split() for line in text.splitlines()[1:]]
     return sum(int(field[1]) for field in fields if field[0] in ("Private_Clean:", "Private_Dirty:")) / 1024
 
 

@@ -68,7 +68,7 @@ def test_a_hostile_map_is_refused_in_one_line(write: Callable[[Path], None], tmp
     write(path)
     found = scenario_mistakes("computation-free", (f"arena.map='{path}'",))
     assert found
-    assert str(path) in found[0]
+    assert any(str(path) in line for line in found)
     assert all(len(line) < 1_000 for line in found)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Sequence
 import numpy as np
 
 from zwerm.agents.runtime.contract import Setup
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Landmark, Sighting
@@ -88,8 +89,15 @@ class Situation:
 
     @property
     def claims(self) -> int:
-        """Number of frontier claims of this robot."""
-        return len(self.local_map.plans) + len(self.local_map.gaps)
+        """Number of frontier claims of this robot; what a dead robot's body closes is frontier, too."""
+        return len(self.local_map.plans) + len(self.local_map.gaps) + self.local_map.obstructed
+
+    def dead_ahead(self, bearing_rad: float, within_rad: float) -> int | None:
+        """Return the dead robot that is visible next to a bearing [rad] of this robot's frame, within an angle, or None."""
+        seen = self.motion.frame.seen
+        apart = {node: angle_between(seen[node], bearing_rad) for node in self.failure_detector.dead if node in seen}
+        body = min(apart, key=lambda node: apart[node], default=None)
+        return body if body is not None and apart[body] < within_rad else None
 
     @property
     def busy(self) -> bool:

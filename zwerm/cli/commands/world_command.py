@@ -5,31 +5,14 @@ from typing import Annotated, Optional
 
 import typer
 
-from zwerm.cli.options import (
-    OUTAGE_S,
-    Animation,
-    Bare,
-    ColourBy,
-    HostNames,
-    Json,
-    Links,
-    Outage,
-    Picture,
-    PictureAt,
-    PictureSize,
-    RadioTable,
-    RealTime,
-    Record,
-    ScenarioName,
-    Seed,
-    Sets,
-    check_endpoint,
-)
+from zwerm.cli.options import OUTAGE_S, HostNames, Outage, check_endpoint
+from zwerm.cli.run_options import RunOptions, with_run_options
 from zwerm.cli.terminal import err, errors_as_lines
 
 
+@with_run_options
 def world(
-    scenario: ScenarioName,
+    options: RunOptions,
     listen: Annotated[list[str], typer.Option("--listen", help="A Zenoh endpoint, such as tcp/0.0.0.0:7447.")],
     credentials: Annotated[
         Optional[Path],  # noqa: UP045
@@ -47,19 +30,6 @@ def world(
         bool,
         typer.Option("--plain", help="Allow tcp/ beyond this machine: anybody on the way can read and change all."),
     ] = False,
-    seed: Seed = 1,
-    sets: Sets = None,
-    realtime: RealTime = None,
-    record: Record = None,
-    picture: Picture = None,
-    picture_at: PictureAt = None,
-    animate: Animation = None,
-    size: PictureSize = None,
-    bare: Bare = False,
-    colour_by: ColourBy = None,
-    links: Links = None,
-    radio_table: RadioTable = None,
-    as_json: Json = False,
 ) -> None:
     """Run the world of a scenario and wait for robots on other machines to connect.
 
@@ -73,25 +43,21 @@ def world(
     [bold]zwerm world computation-free --listen tls/0.0.0.0:7447 --keys keys/world.key[/bold]
     """
     from zwerm.cli.console import RunProgress
-    from zwerm.cli.run_output import RunOutput
     from zwerm.run.runner import serve
-    from zwerm.scenario.load import load
 
     with errors_as_lines():
         for endpoint in listen:
             check_endpoint("--listen", endpoint)
-        moments = tuple(picture_at or ())
-        output = RunOutput(picture, moments, animate, radio_table, as_json, record, size, bare, colour_by, links)
-        loaded = load(scenario, tuple(sets or ()))
-        with RunProgress(err, loaded.name, quiet=as_json) as progress:
+        output, loaded = options.output(), options.load()
+        with RunProgress(err, loaded.name, quiet=options.shows_no_progress) as progress:
             result = serve(
                 loaded,
-                seed,
+                options.seed,
                 listen,
                 credentials,
-                realtime=realtime,
+                realtime=options.realtime,
                 watcher=progress,
-                record=record,
+                record=options.record,
                 keys_file=keys,
                 names=names or (),
                 lease_s=outage_s,
