@@ -26,6 +26,7 @@ from zwerm.world.faults.programs.crash import Crash
 from zwerm.world.scene import Scene
 
 ENOUGH: Final = 0.98
+VERDICTS: Final = ("right", "honest", "wrong")
 
 
 class Hall(msgspec.Struct, frozen=True):
@@ -120,6 +121,26 @@ def one_run(name: str, kind: str, loss: float, seed: int, more: Sequence[str]) -
     }
 
 
+def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
+    """Return one row for each hall, kind of schedule and loss: how many runs were right, honest or wrong."""
+    groups: dict[tuple[str, str, str], list[dict[str, str]]] = {}
+    for row in rows:
+        groups.setdefault((row["hall"], row["faults"], row["loss"]), []).append(row)
+    return [
+        {
+            "hall": hall,
+            "faults": kind,
+            "messages lost": loss,
+            "runs": str(len(group)),
+            **{each: str(sum(row["verdict"] == each for row in group)) for each in VERDICTS},
+            "least reachable coverage": min(row["reachable_coverage"] for row in group),
+            "mean duration [s]": f"{np.mean([float(row['duration_s']) for row in group]):.0f}",
+            "faults too late": str(sum(row["faults_missed"] != "0" for row in group)),
+        }
+        for (hall, kind, loss), group in groups.items()
+    ]
+
+
 def _toml(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value)
 
@@ -141,9 +162,9 @@ def main() -> None:
                 for seed in range(asked.seeds[0], asked.seeds[1] + 1):
                     rows.append(one_run(name, kind, loss, seed, asked.set))
                     print(*rows[-1].values(), sep="\t", flush=True)
-    counts = {each: sum(row["verdict"] == each for row in rows) for each in ("right", "honest", "wrong")}
+    counts = {each: sum(row["verdict"] == each for row in rows) for each in VERDICTS}
     print(f"{len(rows)} runs: " + ", ".join(f"{count} {word}" for word, count in counts.items()))
-    write_csv(asked.csv, rows)
+    write_csv(asked.csv, summary(rows))
 
 
 if __name__ == "__main__":

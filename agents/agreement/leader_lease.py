@@ -127,7 +127,7 @@ class LeaderLease(Controller):
         """Tell whether to ask now: a leader renews, others wait until their promise has ended and then a random time."""
         table: Any = self.parameters
         if now_s < self._leads_until_s:
-            return now_s >= self._stamp_s + table.renew_s
+            return bool(now_s >= self._stamp_s + table.renew_s)
         if now_s < self._promised_until_s and self._promised_to != self.setup.node:
             return False
         if self._ask_at_s is None:

@@ -26,7 +26,7 @@ def test_parts_of_a_partitioned_swarm_agree_apart_and_together_after_it() -> Non
     time_s, value = result.telemetry.time_s, result.telemetry.value
     left = result.telemetry.node < 4
 
-    def values(at_s: float, part: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    def values(at_s: float, part: np.ndarray) -> np.ndarray:
         return value[part & (np.abs(time_s - at_s) < 0.01)]
 
     assert np.ptp(values(0.0, left | ~left)) == 8.0
