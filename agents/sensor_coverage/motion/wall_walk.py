@@ -52,6 +52,13 @@ class WallWalk:
         self._wall_rad = 0.0
         self._trail: list[Vector] = []
         self._blind_rad = 0.0
+        self._start = motion.position
+
+    @property
+    def way(self) -> Vector:
+        """The way [m] by odometry from the place where the latest drive to a wall began."""
+        x, y = self._motion.position
+        return x - self._start[0], y - self._start[1]
 
     def to_wall(self, bearing_rad: float, hop_m: float, feel_m: float, clear_m: float, hand: int) -> DriveToWalk:
         """Drive along a bearing to a wall, and along the wall until the start is `clear_m` away.
@@ -61,7 +68,7 @@ class WallWalk:
         """
         motion, frame = self._motion, self._motion.frame
         frame.forget()
-        start = motion.position
+        start = self._start = motion.position
         self._trail = [start]
         ux, uy = unit(bearing_rad)
         done, stuck = 0.0, 0
