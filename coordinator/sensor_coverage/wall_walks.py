@@ -96,8 +96,6 @@ class WallWalks:
             self._sources.waiting.pop(plan.mover, None)
             return (leader,)
         if walked.end == SHUT:
-            if walked.touched:
-                self._walls.note_wall(plan.mover, plan.direction)
             for each in walked.touched:
                 self._walls.note_wall(plan.mover, each + heading)
             return (leader,)
