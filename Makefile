@@ -14,9 +14,9 @@ COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generat
 	--no-emit-index-url --no-annotate --no-header --no-config pyproject.toml --extra record --extra study --group build
 
 .DEFAULT_GOAL := help
-APT_TOOLS := iproute2 nftables ffmpeg
+APT_TOOLS := iproute2 nftables ffmpeg chromium
 
-.PHONY: help setup dev compile tools run test lint format pages docs bench fidelity lock clean
+.PHONY: help setup dev compile tools run test lint format pages docs bench fidelity package lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -29,8 +29,9 @@ compile: dev  ## make a C extension of the inner loop of Voronoi coverage (needs
 	ZWERM_COMPILE=1 $(BIN)/python setup.py -q build_ext --inplace
 	@echo "compile: done; what is changed in zwerm/maths/cached_voronoi_cell.py from now on counts after the next make compile or make clean"
 
-tools:  ## install what the twin on a real network and MP4 need (as root, where there is apt-get; else say so)
-	@if command -v ip >/dev/null && command -v tc >/dev/null && command -v nft >/dev/null && command -v ffmpeg >/dev/null; then echo "tools: all there"; \
+tools:  ## install what the twin on a real network, MP4 and the test of the search need (as root, with apt-get; else say so)
+	@missing=; for each in ip tc nft ffmpeg chromium; do command -v $$each >/dev/null || missing=1; done; \
+	if [ -z "$$missing" ]; then echo "tools: all there"; \
 	elif [ "$$(id -u)" != 0 ]; then echo "tools: skipped, because installing $(APT_TOOLS) needs root"; \
 	elif ! command -v apt-get >/dev/null; then echo "tools: skipped, because there is no apt-get: install $(APT_TOOLS)"; \
 	elif { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(APT_TOOLS); } \
@@ -67,6 +68,9 @@ bench: dev  ## run the benchmarks, Voronoi coverage compiled where there is a C 
 
 fidelity: dev  ## hold every model of the radio against its 99 % confidence interval, a million packets each
 	$(BIN)/python benchmarks/bench_fidelity.py
+
+package:  ## build the package, and try it in a fresh environment
+	@.ci/package
 
 lock:  ## resolve the dependencies anew (needs uv)
 	$(COMPILE) --upgrade --output-file requirements.txt

@@ -1,14 +1,42 @@
-"""Compiles, where it is asked for, the one module in which inline swarms spend most of their time; see docs/running.md.
+"""What pyproject.toml cannot say: the text of the package's page, the links of a source archive, and a C extension.
 
-`ZWERM_COMPILE=1` makes a C extension of it with mypyc, which needs mypy and a C compiler. The source stays the same, and so
-does every bit of what it computes: products and sums are rounded one by one, as Python does it.
+`ZWERM_COMPILE=1` makes a C extension of the one module in which inline swarms spend most of their time (docs/running.md) with
+mypyc, which needs mypy and a C compiler. The source stays the same, and so does every bit of what it computes: products and
+sums are rounded one by one, as Python does it.
 """
 
 import os
+import re
+import shutil
+from pathlib import Path
 
 from setuptools import setup
+from setuptools.command.sdist import sdist
 
 COMPILED = ["zwerm/maths/cached_voronoi_cell.py"]
+# The folders that zwerm/ holds links to.
+PARTS = ("agents", "world", "coordinator", "deploy", "scenarios", "studies")
+
+
+class SourceArchive(sdist):
+    """A source archive that is laid out as the source tree, so that its tests run."""
+
+    def make_release_tree(self, base_dir, files):
+        """Copy the files, and put links in the place of the copies of what they lead to."""
+        super().make_release_tree(base_dir, files)
+        for part in PARTS:
+            inside = Path(base_dir, "zwerm", part)
+            if inside.is_dir() and not inside.is_symlink():
+                shutil.rmtree(inside)
+                inside.symlink_to(Path("..", part))
+
+
+def description():
+    """Return README.md without pictures and without links to files, which no page of a package index has."""
+    text = Path(__file__).with_name("README.md").read_text(encoding="utf-8")
+    text = re.sub(r"^!\[[^]]*\]\((?!https?:)[^)]*\)\n+", "", text, flags=re.MULTILINE)
+    return re.sub(r"\[([^]]*)\]\((?!https?:)([^)]*)\)", r"\1 (`\2`)", text)
+
 
 extensions = []
 if os.environ.get("ZWERM_COMPILE") == "1":
@@ -19,4 +47,9 @@ if os.environ.get("ZWERM_COMPILE") == "1":
     for extension in extensions:
         extension.extra_compile_args.append("-ffp-contract=off")
 
-setup(ext_modules=extensions)
+setup(
+    ext_modules=extensions,
+    cmdclass={"sdist": SourceArchive},
+    long_description=description(),
+    long_description_content_type="text/markdown",
+)

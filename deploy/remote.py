@@ -3,10 +3,16 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Final
 
+from zwerm.deploy.endpoints import is_encrypted, is_loopback
 from zwerm.deploy.identity import load, slice_of
 from zwerm.deploy.supervisor import JOIN_DEADLINE_S, LocalSupervisor, prepare
 from zwerm.errors import LinkError
+
+# The largest id that is looked up. A longer range could fill the memory.
+ID_MAX: Final = 99_999
+_DIGITS_MAX: Final = 9
 
 
 def parse_ids(text: str) -> list[int]:
@@ -14,8 +20,12 @@ def parse_ids(text: str) -> list[int]:
     ids: set[int] = set()
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
-        if not first.isdigit() or (dash and not last.isdigit()) or (dash and int(last) < int(first)):
-            raise LinkError(f"--ids: expected ids such as 3, 0-24 or 0-4,10-14, got {text!r}")
+        if not first.isdigit() or (dash and not last.isdigit()):
+            raise LinkError(f"--ids: expected ids such as 3, 0-24 or 0-4,10-14, got {text!r:.80}")
+        if max(len(first), len(last)) > _DIGITS_MAX or max(int(first), int(last or first)) > ID_MAX:
+            raise LinkError(f"--ids: expected ids of at most {ID_MAX}, got {text!r:.80}")
+        if dash and int(last) < int(first):
+            raise LinkError(f"--ids: expected ids such as 3, 0-24 or 0-4,10-14, got {text!r:.80}")
         ids.update(range(int(first), int(last or first) + 1))
     return sorted(ids)
 
@@ -32,6 +42,8 @@ def run_robots(
     Raises LinkError if the file cannot be used, or a robot does not join within `deadline_s`.
     """
     credentials = load(credentials_file)
+    if credentials.authority_pem and not is_encrypted(endpoint) and not is_loopback(endpoint):
+        raise LinkError(f"{endpoint}: these credentials are for a tls/ or quic/ endpoint")
     if ids:
         credentials = slice_of(credentials, parse_ids(ids))
     prepare(len(credentials.nodes))

@@ -46,4 +46,4 @@ def sweep(home: Path) -> None:
 def _short_directory() -> Path:
     """Return the directory for temporary files, or /tmp if the path of a socket below it would be too long."""
     chosen = tempfile.gettempdir()
-    return Path(chosen if len(chosen) < _SOCKET_PATH_BYTES_MAX - len("/zwerm-12345678/router") else "/tmp")
+    return Path(chosen if len(chosen) < _SOCKET_PATH_BYTES_MAX - len("/zwerm-12345678/listener-12345678") else "/tmp")

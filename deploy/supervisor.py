@@ -4,8 +4,10 @@
 on Linux; elsewhere they exit by themselves. This module does not depend on the scenario or the world.
 """
 
+import atexit
 import contextlib
 import multiprocessing
+import multiprocessing.process
 import os
 import resource
 import signal
@@ -17,9 +19,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
+from pathlib import Path
 from typing import Any, Final
 
 from zwerm.agents.runtime.process import main
+from zwerm.deploy.runtime_directory import private_directory
 from zwerm.errors import LinkError
 from zwerm.link.peer_radio import Station
 from zwerm.link.session import Credential, Credentials
@@ -36,6 +40,9 @@ TERMINATE_PATIENCE_S: Final = 2.0
 _FILES_PER_ROBOT: Final = 3
 _FILES_MIN: Final = 16_384
 
+# The place of the session id in /proc/PID/stat, after the name.
+_SESSION: Final = 3
+
 Progress = Callable[[int, int], object]
 
 
@@ -47,6 +54,7 @@ def prepare(robots: int) -> None:
     later swarms. Raises LinkError if the limit cannot be raised far enough.
     """
     _raise_file_limit(robots * _FILES_PER_ROBOT + 200)
+    _use_short_directory()
     multiprocessing.set_forkserver_preload(["zwerm.deploy.preload"])
     resource_tracker.ensure_running()
     # The server and all robots inherit the mask: only this process handles Ctrl-C, and it ends them in order.
@@ -55,6 +63,16 @@ def prepare(robots: int) -> None:
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _use_short_directory() -> None:
+    """Give multiprocessing a directory for its sockets: with a short path, and removed by a later run if this one is killed."""
+    config: dict[str, Any] = vars(multiprocessing.process.current_process())["_config"]
+    if config.get("tempdir") is None:  # not chosen yet
+        directory = contextlib.ExitStack()
+        config["tempdir"] = str(directory.enter_context(private_directory()))
+        # Runs after the end functions of multiprocessing, which are registered later.
+        atexit.register(directory.close)
 
 
 def _raise_file_limit(needed: int) -> None:
@@ -84,7 +102,7 @@ class LocalSupervisor:
     ) -> None:
         self._endpoint = endpoint
         self._run = credentials.run
-        self._authority_pem = credentials.authority_pem
+        self._terms = credentials.terms
         self._credentials = {credential.node: credential for credential in credentials.nodes}
         self._order = list(self._credentials) if order is None else list(order)
         self._context = multiprocessing.get_context("forkserver")
@@ -129,6 +147,7 @@ class LocalSupervisor:
         process = self._processes[node]
         process.kill()
         process.join()
+        self._end_children([process])
 
     def end_of(self, node: int, wait_s: float) -> str:
         """Return how a robot's process ended, waiting at most `wait_s` for it: its signal or exit code; "" while it runs."""
@@ -159,15 +178,23 @@ class LocalSupervisor:
     def stop(self, patience_s: float = 0.0) -> None:
         """End all robots: wait as `wait` does, then send SIGTERM, then SIGKILL. Idempotent."""
         with interrupts_held():
-            if self.wait(patience_s):
-                return
-            for process in self._alive():
-                process.terminate()
-            if self.wait(TERMINATE_PATIENCE_S):
-                return
-            for process in self._alive():
-                process.kill()
-            self.wait(LEAVE_PATIENCE_S)
+            if not self.wait(patience_s):
+                for process in self._alive():
+                    process.terminate()
+                if not self.wait(TERMINATE_PATIENCE_S):
+                    for process in self._alive():
+                        process.kill()
+                    self.wait(LEAVE_PATIENCE_S)
+            self._end_children(list(self._processes.values()))
+
+    def _end_children(self, ended: Sequence[ForkServerProcess]) -> None:
+        """Kill what the controllers of robots that have `ended` started: each robot is the leader of a session of its own."""
+        sessions = {process.pid for process in ended}
+        for entry in Path("/proc").glob("[0-9]*/stat"):
+            with contextlib.suppress(OSError, ValueError):  # it has ended
+                session = int(entry.read_text().rpartition(")")[2].split()[_SESSION])
+                if session in sessions and int(entry.parent.name) not in sessions:
+                    os.kill(int(entry.parent.name), signal.SIGKILL)
 
     def _alive(self) -> list[ForkServerProcess]:
         return [process for process in self._processes.values() if process.exitcode is None]
@@ -202,7 +229,7 @@ class LocalSupervisor:
         process = self._context.Process(
             target=main,
             args=(
-                *(self._run, credential, self._endpoint, self._authority_pem, deadline_s, joined),
+                *(self._run, credential, self._endpoint, self._terms, deadline_s, joined),
                 self._stations.get(credential.node),
             ),
             name=f"node {credential.node}",

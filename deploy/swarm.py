@@ -8,15 +8,21 @@ Entering returns when every node has joined. Leaving, also by an exception, leav
 
 import contextlib
 import signal
+import socket
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple, Self
 
+import msgspec
+
 from zwerm.agents.runtime.contract import Setup
-from zwerm.deploy.identity import issue, renew, router_settings, save
+from zwerm.agents.runtime.controllers import code_of
+from zwerm.deploy.authority import certify
+from zwerm.deploy.endpoints import host_of, is_encrypted
+from zwerm.deploy.identity import WorldIdentity, WorldKeys, issue, renew, router_settings, save, slice_of
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.deploy.supervisor import (
     JOIN_DEADLINE_S,
@@ -26,10 +32,10 @@ from zwerm.deploy.supervisor import (
     interrupts_held,
     prepare,
 )
-from zwerm.errors import LinkError
+from zwerm.errors import ControllerError, LinkError
 from zwerm.link.admission import ExpectedNode
 from zwerm.link.peer_radio import Station
-from zwerm.link.session import UNIX_PROTOCOL, Credential, Credentials, close_without_waiting
+from zwerm.link.session import LEASE_REMOTE_S, UNIX_PROTOCOL, Credential, Credentials, close_without_waiting
 from zwerm.link.world_link import ZenohWorldLink
 from zwerm.wire.messages import encode
 
@@ -45,6 +51,11 @@ class Certificate(NamedTuple):
     certificate: Path
     private_key: Path
     authority: Path
+
+    def identity(self) -> WorldIdentity:
+        """Return the identity that these files hold. Nodes need no certificates. Raises OSError."""
+        certificate, key, authority = (each.read_text() for each in self)
+        return WorldIdentity(certificate, key, authority, mutual=False)
 
 
 class _Swarm(ABC):
@@ -80,15 +91,11 @@ class _Swarm(ABC):
         with interrupts_held():
             self._stack.close()
 
-    def _listen(self, directory: Path, endpoints: list[str], tls: Certificate | None = None) -> None:
-        """Issue credentials, and open the world's end of the link on `endpoints`."""
-        self.credentials = issue(self._run, self._members, tls.authority.read_text() if tls else "")
+    def _listen(self, directory: Path, endpoints: list[str], identity: WorldIdentity | None = None) -> None:
+        """Open the world's end of the link on `endpoints`, for the nodes in `self.credentials`."""
         members = {credential.node: self._member(credential) for credential in self.credentials.nodes}
         passwords = directory / "passwords"
-        settings = router_settings(self.credentials, endpoints, passwords)
-        if tls:
-            settings["transport/link/tls/listen_certificate"] = str(tls.certificate)
-            settings["transport/link/tls/listen_private_key"] = str(tls.private_key)
+        settings = router_settings(self.credentials, endpoints, passwords, identity)
         try:
             self.link = ZenohWorldLink(self._run, members, settings)
         finally:
@@ -142,6 +149,7 @@ class LocalSwarm(_Swarm):
     def _open(self, directory: Path) -> None:
         prepare(len(self._members))
         endpoint = f"{UNIX_PROTOCOL}/{directory}/router"
+        self.credentials = issue(self._run, self._members)
         self._listen(directory, [endpoint])
         self._current = {credential.node: credential for credential in self.credentials.nodes}
         self.supervisor = LocalSupervisor(endpoint, self.credentials, order=self._order, stations=self._stations)
@@ -206,7 +214,10 @@ class LocalSwarm(_Swarm):
 
 
 class RemoteSwarm(_Swarm):
-    """A swarm whose processes are started elsewhere, with the credentials in the file `credentials_file`."""
+    """A swarm whose processes are started elsewhere, with the credentials in the file `credentials_file`, or those of `keys`.
+
+    Endpoints of TLS and QUIC get a new authority, and certificates for world and nodes, unless `keys` or `tls` say others.
+    """
 
     def __init__(
         self,
@@ -214,23 +225,55 @@ class RemoteSwarm(_Swarm):
         members: Members,
         *,
         listen: Sequence[str],
-        credentials_file: Path,
+        credentials_file: Path | None = None,
+        keys: WorldKeys | None = None,
+        names: Sequence[str] = (),
+        lease_s: float = LEASE_REMOTE_S,
         tls: Certificate | None = None,
         progress: Progress | None = None,
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
     ) -> None:
-        """`listen` are Zenoh endpoints, such as `tcp/0.0.0.0:7447`. All nodes must join within `deadline_s`."""
+        """`listen` are Zenoh endpoints, such as `tls/0.0.0.0:7447`. All nodes must join within `deadline_s`.
+
+        `names` are further host names and addresses of this machine, for its certificate. A node whose connection is silent for
+        `lease_s` is lost. Exactly one of `credentials_file` and `keys` is needed.
+        """
         super().__init__(run, members, progress, deadline_s, paced)
         self._endpoints = list(listen)
         self._credentials_file = credentials_file
+        self._keys = keys
+        self._names = names
+        self._lease_s = lease_s
         self._tls = tls
 
     def _open(self, directory: Path) -> None:
-        self._listen(directory, self._endpoints, self._tls)
-        save(self.credentials, self._credentials_file)
-        self._stack.callback(self._credentials_file.unlink, missing_ok=True)
+        self._listen(directory, self._endpoints, self._take_credentials())
+        if self._credentials_file is not None:
+            save(self.credentials, self._credentials_file)
+            self._stack.callback(self._credentials_file.unlink, missing_ok=True)
         self._stack.callback(self._end)
+
+    def _member(self, credential: Credential) -> ExpectedNode:
+        controller, _ = self._members[credential.node]
+        return msgspec.structs.replace(super()._member(credential), code=cached_code(controller))
+
+    def _take_credentials(self) -> WorldIdentity | None:
+        """Set the credentials, and return the identity for TLS and QUIC, if an endpoint needs one."""
+        if self._keys is not None:
+            self.credentials = slice_of(self._keys.credentials, self._members)
+            self._run = self.credentials.run
+            return self._keys.identity
+        if self._tls is not None:
+            identity = self._tls.identity()
+            self.credentials = issue(self._run, self._members, identity.authority_pem, self._lease_s)
+            return identity
+        self.credentials = issue(self._run, self._members, lease_s=self._lease_s)
+        if not any(is_encrypted(endpoint) for endpoint in self._endpoints):
+            return None
+        names = dict.fromkeys([*map(host_of, self._endpoints), *self._names, "localhost", socket.gethostname()])
+        made, self.credentials = certify(self.credentials, list(names))
+        return made
 
     def _gather(self) -> None:
         total = len(self._members)
@@ -251,6 +294,15 @@ class RemoteSwarm(_Swarm):
         count = len(self.link.joined)
         while count and self.link.wait_joined(partial(_changed, count), LEAVE_PATIENCE_S):
             count = len(self.link.joined)
+
+
+@cache
+def cached_code(controller: str) -> str:
+    """Return the digest of a controller's file, read once: hosts that run other code are refused."""
+    try:
+        return code_of(controller)
+    except ControllerError:  # each node reports it
+        return ""
 
 
 def _changed(count: int, joined: Collection[int]) -> bool:

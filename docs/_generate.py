@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import msgspec
 import typer
+from _objects import object_fields, public_names
 from pydantic import BaseModel
 
 from zwerm.agents.runtime import controllers
@@ -350,6 +351,8 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
     "faults": fault_list,
     "gallery": gallery,
     "messages": messages,
+    "object-fields": object_fields,
+    "public-names": public_names,
     "metrics": metric_list,
     "parts": part_list,
     "radio-models": radio_models,

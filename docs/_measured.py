@@ -32,8 +32,8 @@ Row = dict[str, str]
 class Measurement:
     """One stored measurement.
 
-    `plan` is its table in plan.toml, `metrics` the labels of all metrics there, `origin` its table in index.toml, and
-    `rows` the lines of its CSV file.
+    `name` is that of its CSV file. `plan` is its table in plan.toml, `metrics` the labels of all metrics there, `origin` its
+    table in index.toml, and `rows` the lines of its CSV file.
     """
 
     name: str
@@ -64,11 +64,13 @@ def load(name: str) -> Measurement:
     plan = plans()
     if name not in plan["tables"]:
         raise KeyError(f"{name}: plan.toml has no such table")
-    if name not in origins() or not (STORE / f"{name}.csv").exists():
-        raise KeyError(f"{name}: not measured yet, run: python docs/measure.py {name}")
-    with (STORE / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+    table = plan["tables"][name]
+    stored = table.get("of", name)
+    if stored not in origins() or not (STORE / f"{stored}.csv").exists():
+        raise KeyError(f"{name}: not measured yet, run: python docs/measure.py {stored}")
+    with (STORE / f"{stored}.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    return Measurement(name, plan["tables"][name], plan["metrics"], origins()[name], rows)
+    return Measurement(stored, table, plan["metrics"], origins()[stored], rows)
 
 
 def render(name: str, to_store: str = "measurements") -> str:

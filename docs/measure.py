@@ -1,6 +1,6 @@
 """Measure a table of the documentation anew: `python docs/measure.py hall --seeds 20`; without a name, list them.
 
-Runs the command that `measurements/plan.toml` has for it (`zwerm study`, `zwerm compare` or a benchmark), writes
+Runs the command that `measurements/plan.toml` has for it (`zwerm study`, `compare` or `twin`, or a benchmark), writes
 `measurements/NAME.csv` and its provenance in `measurements/index.toml`, and fills in the pages (`docs/pages.py`).
 """
 
@@ -49,7 +49,7 @@ def main() -> None:
             parser.error(f"{name}: expected one of {', '.join(each for each in tables if 'command' in tables[each])}")
     if not names:
         for name, plan in tables.items():
-            print(f"{name:32} {shown(plan, plan.get('seeds')) if 'command' in plan else plan['recorded_command']}")
+            print(f"{name:32} {shown(plan, plan.get('seeds')) if 'command' in plan else 'shows ' + plan['of']}")
     failed = [name for name in names if not measure(name, tables[name], options.seeds, options.jobs)]
     if names:
         subprocess.run([sys.executable, str(Path(__file__).with_name("pages.py"))], check=True)
@@ -64,6 +64,8 @@ def measure(name: str, plan: Mapping[str, Any], seeds: str | None, jobs: int | N
     print(f"{name}: {shown(plan, seeds)}", flush=True)
     if is_benchmark(plan):
         rows, trials = benchmark(plan), plan.get("trials", "")
+    elif plan["command"][0] == "twin":
+        rows, trials = twin(plan), plan.get("trials", "")
     else:
         rows = study(name, plan, seeds, jobs, commit)
         trials = trials_of(rows)
@@ -201,6 +203,48 @@ def benchmark(plan: Mapping[str, Any]) -> list[dict[str, Any]]:
         return []
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
+
+
+# --- twins ----------------------------------------------------------------------------------------------------------
+
+
+def twin(plan: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Run `zwerm twin` over both transports, and return one row for each quantity; none where it failed."""
+    command = [sys.executable, "-m", "zwerm", *plan["command"], "--json"]
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode or not done.stdout:
+        return []
+    udp, tcp = (json.loads(done.stdout)["transports"][name] for name in ("udp", "tcp"))
+
+    def row(quantity: str, udp_value: Any, tcp_value: Any, modelled: Any = None) -> dict[str, Any]:
+        return {"quantity": quantity, "modelled": modelled, "real, UDP": udp_value, "real, TCP": tcp_value}
+
+    def real(quantity: str, *keys: str) -> dict[str, Any]:
+        return row(quantity, *(each["real"][keys[0]][keys[1]] for each in (udp, tcp)))
+
+    times = [each["real"]["heard_after_mean_s"] for each in (udp, tcp)]
+    return [
+        row("packets sent", udp["real"]["sent"], tcp["real"]["sent"], udp["modelled"]["sent"]),
+        row(
+            "fraction that got through",
+            *(each["real"]["passed_fraction"] for each in (udp, tcp)),
+            udp["modelled"]["passed_fraction"],
+        ),
+        row("difference to the model", udp["difference"], tcp["difference"]),
+        row("half its 99 % interval", udp["half_width"], tcp["half_width"]),
+        row(
+            "links, and those that agree",
+            *(f"{len(each['links']['sender'])}, {each['links_that_agree']}" for each in (udp, tcp)),
+        ),
+        row("from sending to receiving, mean [s]", *times, udp["modelled"]["heard_after_mean_s"]),
+        real("delay of the network, median [s]", "delay_s", "median"),
+        real("delay of the network, most [s]", "delay_s", "max"),
+        row(
+            "TCP segments, and those sent again",
+            "",
+            f"{tcp['real']['tcp_segments']}, {tcp['real']['tcp_segments_sent_again']}",
+        ),
+    ]
 
 
 # --- the store ------------------------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """A world's end of a link with access control, and sessions of well-behaved and of hostile nodes, for tests."""
 
 import contextlib
+import socket
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -8,12 +9,13 @@ from typing import Any, NamedTuple
 import zenoh
 
 from zwerm.deploy.identity import issue, router_settings
+from zwerm.link import Arrival, WorldLink
 from zwerm.link.admission import ExpectedNode
 from zwerm.link.node_link import ZenohNodeLink
 from zwerm.link.session import TWO_THREADS, Credential, Credentials, open_session, set_threads
 from zwerm.link.world_link import ZenohWorldLink
 from zwerm.wire.keys import hello_key
-from zwerm.wire.messages import Hello, encode
+from zwerm.wire.messages import Hello, Observation, encode
 
 RUN = "test"
 NIL = b"\xc0"
@@ -75,3 +77,18 @@ def ask(session: zenoh.Session, node: int, payload: bytes) -> list[bytes]:
 def hello(node: int, incarnation: int = 1) -> bytes:
     """Return an encoded hello."""
     return encode(Hello(node, incarnation))
+
+
+def tick(link: WorldLink, nodes: range, number: int) -> dict[int, Arrival]:
+    """Send every node an observation, and return what arrives, by node."""
+    for node in nodes:
+        link.send(node, encode(Observation(number, 0.0)))
+    arrivals = [link.receive(20.0) for _ in nodes]
+    return {arrival.node: arrival for arrival in arrivals if arrival is not None}
+
+
+def free_port() -> int:
+    """Return a port of this machine without a TCP listener; most probably without a UDP one."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

@@ -39,9 +39,7 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ): "what was recorded goes to the disk twice a second; the run does not see it",
     ("zwerm/link/node_link.py", "wall_clock"): "joining has a deadline; observations and commands do not look at it",
 }
-LONG_FILES: dict[str, str] = {
-    "agents/sensor_coverage/protocols/token_push.py": "the table of a push's phases names the methods of the class it drives",
-}
+LONG_FILES: dict[str, str] = {}
 
 
 def sources(*folders: str) -> list[Path]:

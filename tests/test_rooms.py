@@ -20,7 +20,12 @@ DEPTH_MAX = 6
 def modules() -> dict[str, Path]:
     """Return every module of the package by its dotted name."""
     listing = ["git", "-c", "safe.directory=*", "ls-files", "-co", "--exclude-standard", "*.py"]
-    files = subprocess.run(listing, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split()
+    if (ROOT / ".git").exists():
+        files = subprocess.run(listing, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split()
+    else:  # a source archive
+        files = sorted(
+            str(path.relative_to(ROOT)) for part in ("zwerm", *PARTS) for path in (ROOT / part).rglob("*.py")
+        )
     found: dict[str, Path] = {}
     for name in files:
         parts = Path(name).with_suffix("").parts

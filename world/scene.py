@@ -20,15 +20,15 @@ class Scene:
     `present` marks the robots with a body in the arena, `moved` those whose pose differs from the previous scene's.
     """
 
-    tick: int
-    time_s: float
+    tick: int  # number of the tick, from 0
+    time_s: float  # virtual time [s]
     position: Floats  # (n, 2) [m]
     heading: Floats  # (n,) [rad], not wrapped
     present: Bools  # (n,)
     moved: Bools  # (n,)
-    radius_m: float
-    arena: Arena
-    draws: Draws
+    radius_m: float  # of all robots [m]
+    arena: Arena  # walls and free space
+    draws: Draws  # keyed random numbers of the run
 
     def present_ids(self) -> Ints:
         """Return the ids of the robots in the arena, ascending."""

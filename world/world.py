@@ -15,11 +15,15 @@ The world is deterministic: its state after a tick is a function of the scenario
 """
 
 from collections.abc import Callable, Sequence
+from typing import Final
+
+from msgspec.structs import replace
 
 from zwerm.errors import ProtocolError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import BodyVelocity, Command, Failure, Transmission, WheelSpeeds
+from zwerm.wire.text import printable
 from zwerm.wire.trace import Trace
 from zwerm.world.arena.arena import Arena
 from zwerm.world.bodies.bodies import Bodies
@@ -29,6 +33,7 @@ from zwerm.world.faults.schedule import Schedule, unite
 from zwerm.world.radio.medium import Medium
 from zwerm.world.scene import Scene
 from zwerm.world.sensors import Sensor
+from zwerm.world.tick.clocks import Clocks
 from zwerm.world.tick.command_intake import CommandIntake
 from zwerm.world.tick.completion import Completion, Ending
 from zwerm.world.tick.lifecycle import Lifecycle
@@ -38,6 +43,10 @@ from zwerm.world.tick.telemetry import TelemetrySink
 from zwerm.world.tick.wakes import WakeEvent, Wakes
 
 Send = Callable[[int, bytes], object]
+
+
+# A node with this many refused messages is given up: a sound program has none, and each costs the world time.
+FLOOD: Final = 1_000
 
 
 class World:
@@ -63,10 +72,13 @@ class World:
         self.intake = CommandIntake(self.bodies.drives.kind, scenario.robots.body.kind, fixed, self.medium)
         self.telemetry = TelemetrySink(dt_s)
         self.trace = Trace()
+        self.on_flood: Callable[[int], object] = lambda node: None  # stops the messages of a node that floods the world
         self.place_of: Callable[[int], str] = lambda node: (
             ""
         )  # where a node's controller answers: " (file.py:12, in C.step)"
         self._sensing = Sensing(sensors)
+        clock = scenario.robots.clock
+        self.clocks = None if clock is None else Clocks(clock, robots, nodes, draws)
         events = {each.field: WakeEvent(each.wake_event, each.signature) for each in sensors if each.wake_event}
         self._wakes = Wakes(nodes, dt_s, events)
         deadman_ticks = ticks(scenario.time.deadman_s, dt_s)
@@ -108,7 +120,8 @@ class World:
         readings = self._sensing.readings(scene, robots)
         inboxes = self.medium.deliver(nodes, tick) if receivers else None
         observations: list[bytes] = []
-        made = self._sensing.observations(scene, len(robots), len(nodes), readings, inboxes)
+        times = None if self.clocks is None else self.clocks.local_s(scene.time_s, nodes)
+        made = self._sensing.observations(scene, len(robots), len(nodes), readings, inboxes, times)
         for node, observation in zip(nodes, made, strict=True):
             observations.append(observation)
             if send is not None:
@@ -138,18 +151,22 @@ class World:
         raised has crashed. So has one whose answer is refused: it gives no other.
         """
         if node in self.status.crashed:  # a program that the run has given up acts for no body
-            self.intake.refused["crashed"] += 1
+            self.intake.note_refusal(node, "crashed")
             raise ProtocolError("crashed", f"node {node} crashed at tick {self.status.crash_ticks[node]}")
         try:
             answer = self.intake.accept(node, payload, late_allowed)
         except ProtocolError as error:
+            if self.intake.refused_by[node].total() == FLOOD:
+                self.bodies.advance_early()
+                self.crash(node, f"flood: {FLOOD} of its messages were refused, the last one as {error}")
+                self.on_flood(node)
             if error.stray or not (late_allowed or self.intake.is_pending(node)):
                 raise
             reason = f"its command was refused: {error}{self.place_of(node)}"
         else:
             if type(answer) is not Failure:
                 return
-            self.status.failures[node] = answer
+            self.status.failures[node] = replace(answer, traceback=printable(answer.traceback))
             reason = answer.error
         self.bodies.advance_early()  # the motors stop after this tick, whether it was computed early or not
         self.crash(node, reason)
@@ -183,7 +200,7 @@ class World:
     def crash(self, node: int, reason: str) -> None:
         """Record that a node's program ended: its motors stop, it is never awaited again, its body stays where it is."""
         self.status.crash_ticks.setdefault(node, self.tick)
-        self._lifecycle.crash(node, reason)
+        self._lifecycle.crash(node, printable(reason))
 
     def withhold(self, node: int, withheld: bool) -> None:
         """Exclude a node from observation, or include it again."""
@@ -193,9 +210,9 @@ class World:
         """Stop a robot's motors until its next command."""
         self.bodies.stop(node)
 
-    def refuse_stale(self) -> None:
+    def refuse_stale(self, node: int) -> None:
         """Count a message that a former incarnation of a node sent."""
-        self.intake.refused["stale-incarnation"] += 1
+        self.intake.note_refusal(node, "stale-incarnation")
 
     # --- the truth --------------------------------------------------------------------------------------------------
 
@@ -242,7 +259,8 @@ class World:
             if answer.outbox:
                 outboxes.append((node, answer.outbox))
             if answer.wake is not None:
-                self._wakes.sleep(node, answer.wake, tick)
+                wake = answer.wake if self.clocks is None else self.clocks.true_wake(node, answer.wake)
+                self._wakes.sleep(node, wake, tick)
             if answer.telemetry or answer.snapshot:
                 self.telemetry.accept(self.scene, node, answer, self.status.down)
             if answer.gave_up:

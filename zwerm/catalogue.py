@@ -175,6 +175,19 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         scenarios=("robot-teams*",),
     ),
     Algorithm(
+        name="agreement",
+        title="Agreement for teaching: averages, and leaders by leases",
+        page="agreement.md",
+        controllers={
+            ROBOT: {
+                "averaging": "zwerm.agents.agreement:Averaging",
+                "leader-lease": "zwerm.agents.agreement:LeaderLease",
+            }
+        },
+        metrics=("zwerm.world.metrics.agreement:Spread", "zwerm.world.metrics.agreement:Leaders"),
+        scenarios=("agreement-*",),
+    ),
+    Algorithm(
         name="gossip",
         title="Demonstrations of the radio: gossip and beacons",
         controllers={ROBOT: {"beacon": "zwerm.agents.gossip:Beacon", "gossip-max": "zwerm.agents.gossip:GossipMax"}},
@@ -190,6 +203,7 @@ COMMANDS: Final = {
     "check": "zwerm.cli.commands.check_command:check",
     "run": "zwerm.cli.commands.run_command:run",
     "world": "zwerm.cli.commands.world_command:world",
+    "keys": "zwerm.cli.commands.keys_command:keys",
     "robot": "zwerm.cli.commands.robot_command:robot",
     "twin": "zwerm.cli.commands.twin_command:twin",
     "shrink": "zwerm.cli.commands.shrink_command:shrink",

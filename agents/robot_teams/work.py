@@ -19,6 +19,8 @@ Story = Generator[Manoeuvre | None, None, None]
 STEPS_MAX: Final = 400
 # So often a step of a journey may lead elsewhere than the map says.
 ASTRAY_MAX: Final = 3
+# An end of the same slice that is nearer than this may be approached where no way leads to it [mm].
+STRAIGHT_MM: Final = 1_500
 # A robot farther than this from its end approaches it first [m].
 AT_END_M: Final = 0.06
 
@@ -151,8 +153,12 @@ class Work:
         return end.slice != start.slice
 
     def travel(self, stop: End) -> Story:
-        """Go to a known end by the shortest known way."""
-        astray = 0
+        """Go to a known end by the shortest known way, without the steps that led elsewhere before.
+
+        Where a wall is almost parallel to a slice, robots measure its end far apart, and no way may lead to one of them. An end
+        near by on the same slice is then approached straight.
+        """
+        astray: dict[tuple[End, int], None] = {}
         for _ in range(STEPS_MAX):
             start = self.here
             goal = self.map.end(stop)
@@ -161,9 +167,10 @@ class Work:
             self.at = start
             if start == goal:
                 return
-            route = self.map.route(start, goal)
+            route = self.map.route(start, goal, astray) if len(astray) <= ASTRAY_MAX else None
             if route is None:
-                raise NoWay
+                yield from self._go_straight(start, goal)
+                return
             step = route[0][1]
             if step.direction == ACROSS:
                 self.at = step.stop
@@ -172,10 +179,14 @@ class Work:
             else:
                 yield from self.trace(step.direction)
             if self.here != self.map.end(step.stop):
-                astray += 1
-                if astray > ASTRAY_MAX:
-                    raise NoWay
+                astray[start, step.direction] = None
         raise NoWay
+
+    def _go_straight(self, start: End, goal: End) -> Story:
+        if start.slice != goal.slice or abs(start.y_mm - goal.y_mm) > STRAIGHT_MM:
+            raise NoWay
+        yield Approach(goal, self._grid, self._parked)
+        self.at = goal
 
     def _is_new(self, start: End, direction: int, stop: End, beside_wreck: bool) -> bool:
         """Tell whether no such way is known, or, beside a wreck, none that leads to `stop`."""

@@ -22,11 +22,11 @@ class NoParameters(Struct, frozen=True, forbid_unknown_fields=True):
 class Body(Struct, frozen=True, forbid_unknown_fields=True):
     """The body of a robot, as the robot knows it."""
 
-    kind: str
-    radius_m: float
-    max_speed_m_s: float
-    max_turn_rad_s: float
-    wheel_base_m: float = 0.0
+    kind: str  # the drive: differential, holonomic or module:Class
+    radius_m: float  # of the round body [m]
+    max_speed_m_s: float  # of a wheel, or of the body where it has none [m/s]
+    max_turn_rad_s: float  # of a body without wheels [rad/s]
+    wheel_base_m: float = 0.0  # distance of the wheels [m]; 0 without wheels
 
 
 class Setup(Struct, frozen=True, forbid_unknown_fields=True):
@@ -36,17 +36,17 @@ class Setup(Struct, frozen=True, forbid_unknown_fields=True):
     lost its memory is a later `incarnation`.
     """
 
-    node: int
-    role: str
-    dt_s: float
-    sensors: tuple[str, ...]
-    stream_key: bytes
-    body: Body | None = None
-    channels: tuple[str, ...] = ()
-    parameters: dict[str, Any] = {}
-    bases: tuple[int, ...] = ()
-    services: dict[str, str] = {}
-    incarnation: int = 1
+    node: int  # id: robots from 0, base stations first, then the coordinator
+    role: str  # robot, base or coordinator
+    dt_s: float  # duration of a tick [s]
+    sensors: tuple[str, ...]  # kinds of the sensors that it has
+    stream_key: bytes  # key of its own random numbers
+    body: Body | None = None  # None for a coordinator
+    channels: tuple[str, ...] = ()  # radio channels that it may send on
+    parameters: dict[str, Any] = {}  # from the scenario, typed by Parameters
+    bases: tuple[int, ...] = ()  # ids of base stations; only for a coordinator
+    services: dict[str, str] = {}  # provider of each service, by name
+    incarnation: int = 1  # 1, and one more after each restart
 
 
 class Stepper(Protocol):

@@ -23,6 +23,7 @@ from zwerm.wire.messages import (
     encode,
     encode_command,
 )
+from zwerm.wire.text import printable
 
 if TYPE_CHECKING:
     from zwerm.link.peer_radio import PeerRadio
@@ -93,8 +94,8 @@ class Node:
         return encode(
             Failure(
                 tick,
-                _printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX] + self._place(error),
-                _printable("".join(_formatted(error)))[-TRACEBACK_CHARS_MAX:],
+                printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX] + self._place(error),
+                printable("".join(_formatted(error)))[-TRACEBACK_CHARS_MAX:],
             )
         )
 
@@ -113,7 +114,3 @@ def _formatted(error: BaseException) -> list[str]:
     if trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     return traceback.format_exception(type(error), error, trace)
-
-
-def _printable(text: str) -> str:
-    return text.encode(errors="backslashreplace").decode()

@@ -27,11 +27,12 @@ import msgspec
 import uvloop
 
 from zwerm.agents.runtime.contract import Setup
+from zwerm.agents.runtime.controllers import code_of
 from zwerm.agents.runtime.node import Node
 from zwerm.errors import ControllerError, ZwermError
 from zwerm.link.node_link import ZenohNodeLink
 from zwerm.link.peer_radio import PeerRadio, Station, enter_namespace
-from zwerm.link.session import ONE_THREAD, TWO_THREADS, Credential, is_local, set_threads
+from zwerm.link.session import ONE_THREAD, TERMS, TWO_THREADS, Credential, Terms, is_local, set_threads
 from zwerm.wire.messages import REFUSABLE, Failure, Goodbye, Welcome, decode_to_node, encode
 
 EXIT_FAILED: Final = 1
@@ -43,13 +44,14 @@ EXIT_LOST: Final = 3
 NICENESS: Final = 5
 
 _PR_SET_PDEATHSIG: Final = 1
+_PR_SET_DUMPABLE: Final = 4
 
 
 def main(
     run: str,
     credential: Credential,
     endpoint: str,
-    authority_pem: str,
+    terms: Terms,
     deadline_s: float,
     joined: Connection,
     station: Station | None = None,
@@ -60,6 +62,9 @@ def main(
     """
     die_with_parent(_server)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.setsid()  # the session tells which processes a controller has started
+    os.register_at_fork(after_in_child=die_with_parent)
+    hide_memory()
     os.nice(NICENESS)
     parent = parent_process()
     if parent is not None and not parent.is_alive():  # where the kernel has no die_with_parent
@@ -75,7 +80,7 @@ def main(
         if station is not None:
             enter_namespace(station.namespace)
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            code = runner.run(run_node(run, credential, endpoint, authority_pem, deadline_s, joined, station))
+            code = runner.run(run_node(run, credential, endpoint, terms, deadline_s, joined, station))
     except ZwermError as error:
         sys.stderr.write(f"zwerm: {error}\n")
         code = EXIT_REFUSED
@@ -112,7 +117,7 @@ async def run_node(
     run: str,
     credential: Credential,
     endpoint: str,
-    authority_pem: str = "",
+    terms: Terms = TERMS,
     deadline_s: float = 30.0,
     joined: Connection | None = None,
     station: Station | None = None,
@@ -170,7 +175,7 @@ async def run_node(
         run,
         credential,
         endpoint,
-        authority_pem=authority_pem,
+        terms=terms,
         deadline_s=deadline_s,
         on_lost=lambda: finish_from_thread(EXIT_LOST),
     )
@@ -207,6 +212,8 @@ async def run_node(
 
 def _node(welcome: Welcome, radio: PeerRadio | None, on_failure: Callable[[], object]) -> Node:
     """Make the node that the world describes. Raises ControllerError if the controller is not found."""
+    if welcome.code and code_of(welcome.controller) != welcome.code:
+        raise ControllerError(f"{welcome.controller}: its file here differs from the world's; install the same on both")
     node = Node(welcome.controller, msgspec.msgpack.decode(welcome.setup, type=Setup), on_failure)
     if radio is not None:
         node.use_radio(radio)
@@ -229,6 +236,12 @@ def die_with_parent(parent: int | None = None) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if parent is not None and os.getppid() != parent:
             os._exit(EXIT_LOST)
+
+
+def hide_memory() -> None:
+    """Close this process's memory to other processes of the same user, and write no core dump (Linux only)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0)
 
 
 _server: int | None = None

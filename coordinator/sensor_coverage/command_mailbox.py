@@ -24,12 +24,12 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     write,
 )
 from zwerm.coordinator.sensor_coverage.retry_policy import BUSY_TICKS, REPEAT_TICKS, RetryPolicy
-from zwerm.wire.messages import Packet, Transmission, Wake
+from zwerm.wire.messages import MESSAGE_BYTES_MAX, Packet, Transmission, Wake
 
 T = TypeVar("T")
 Routine = Generator[Wake, None, T]
 # A robot and its answer.
-Letter = tuple[int, Answer]
+ReceivedAnswer = tuple[int, Answer]
 
 # If this many robots, and this fraction of all, fall silent together, the radio is jammed: wait longer by this factor.
 JAMMED_MIN: Final = 3
@@ -45,6 +45,9 @@ OVERDUE_DIVISOR: Final = 4
 # Recovery burst of a coordinator that starts again, until its first request after the roll call is heard: copies of the
 # roll call, and copies of each request in every tick if messages are lost.
 ROLL_CALL_COPIES: Final = 8
+# Bytes of a command that are kept free for everything but packets and snapshot, and bytes of a packet beside its payload.
+COMMAND_BYTES_FREE: Final = 2_048
+PACKET_BYTES: Final = 40
 RECOVERY_COPIES: Final = 3
 
 
@@ -76,7 +79,7 @@ class CommandMailbox:
         self._incarnation = incarnation
         self._dt_s = dt_s
         self._ticks = survey_ticks, drive_ticks
-        self._unread: list[Letter] = []
+        self._unread: list[ReceivedAnswer] = []
         self._outbox: list[Transmission] = []
         self._pending: dict[int, _PendingRequest] = {}
         self._number: dict[int, int] = {}
@@ -145,8 +148,8 @@ class CommandMailbox:
         jammed = silent >= max(JAMMED_MIN, JAMMED_FRACTION * len(self.incarnations))
         if pending.heard and pending.tries <= 2:
             return waited >= STUCK_FACTOR * pending.ticks_max
-        patience = pending.ticks_max * (JAMMED_FACTOR if jammed else 1)
-        return waited >= patience and pending.tries >= self.retry_policy.tries_max
+        limit = pending.ticks_max * (JAMMED_FACTOR if jammed else 1)
+        return waited >= limit and pending.tries >= self.retry_policy.tries_max
 
     # --- sending ----------------------------------------------------------------------------------------------------
 
@@ -214,8 +217,11 @@ class CommandMailbox:
         """Do not repeat the request to a robot."""
         self._pending.pop(node, None)
 
-    def outgoing(self) -> tuple[Transmission, ...]:
-        """Return the packets to send now: new requests, and repeated ones."""
+    def outgoing(self, bytes_taken: int = 0) -> tuple[Transmission, ...]:
+        """Return the packets to send now: new requests, and repeated ones.
+
+        What does not fit into one command, of which something else takes `bytes_taken`, is sent at the next ticks.
+        """
         if self._second_roll_call_tick is not None and self.tick >= self._second_roll_call_tick:
             self._call_again()
         for node, pending in self._pending.items():
@@ -223,11 +229,20 @@ class CommandMailbox:
                 self._transmit(node, pending)
                 urgent = pending.tries > URGENT_TRIES or self._copies > 1
                 pending.due = self.tick + (1 if urgent else self.retry_policy.repeat_ticks)
-        outbox, self._outbox = tuple(self._outbox), []
+        left = MESSAGE_BYTES_MAX - COMMAND_BYTES_FREE - bytes_taken
+        fitting = 0
+        for packet in self._outbox:
+            left -= len(packet.payload) + PACKET_BYTES
+            if left < 0 and fitting:
+                break
+            fitting += 1
+        outbox, self._outbox = tuple(self._outbox[:fitting]), self._outbox[fitting:]
         return outbox
 
     def next_wake_s(self) -> float | None:
-        """Return the time of the next repetition, or of the end of a ping."""
+        """Return the time of the next repetition, or of the end of a ping; the next tick while packets wait to be sent."""
+        if self._outbox:
+            return self.now_s + self._dt_s
         due = [each.since + each.ticks_max if each.ping else each.due for each in self._pending.values()]
         return min(due) * self._dt_s if due else None
 
@@ -251,7 +266,7 @@ class CommandMailbox:
 
     # --- waiting ----------------------------------------------------------------------------------------------------
 
-    def take_unread(self) -> list[Letter]:
+    def take_unread(self) -> list[ReceivedAnswer]:
         """Return and drop the answers that no routine has taken."""
         unread, self._unread = self._unread, []
         return unread
@@ -260,7 +275,7 @@ class CommandMailbox:
         """Wait until each robot has given an answer of these types or was given up; return the answers by robot."""
         found: dict[int, Answer] = {}
         while True:
-            unread: list[Letter] = []
+            unread: list[ReceivedAnswer] = []
             for node, answer in self._unread:
                 if node in nodes and node not in found and isinstance(answer, kinds):
                     found[node] = answer
@@ -273,7 +288,7 @@ class CommandMailbox:
 
     def first(
         self, wanted: Callable[[int, Answer], bool], node: int, ticks: int | None = None
-    ) -> Routine[Letter | None]:
+    ) -> Routine[ReceivedAnswer | None]:
         """Wait for the first wanted answer, until the request to `node` has ended, or for `ticks`."""
         until_s = None if ticks is None else self.now_s + ticks * self._dt_s
         while True:

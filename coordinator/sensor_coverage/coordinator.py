@@ -18,7 +18,7 @@ from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS, Emerged, Report, RollCall, ScanRequest
-from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_snapshot
+from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_complex
 from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
 from zwerm.coordinator.sensor_coverage.command_mailbox import (
     ROLL_CALL_COPIES,
@@ -123,7 +123,7 @@ class SensorCoverageCoordinator:
         wake = next(self._routine, Wake())
         telemetry, self._telemetry = self._telemetry, {}
         snapshot, self._snapshot = self._snapshot, b""
-        outbox = self.mailbox.outgoing()
+        outbox = self.mailbox.outgoing(len(snapshot))
         repeat_s = None if self.outcome else self.mailbox.next_wake_s()
         if repeat_s is not None and (wake.at_s is None or repeat_s < wake.at_s):
             wake = Wake(at_s=repeat_s, on_packet=wake.on_packet)
@@ -385,7 +385,7 @@ class SensorCoverageCoordinator:
             obstacle=self._by_robot(self.services.frontier.obstacle),
             paths=tuple(tuple(self.slots.occupant[each] for each in plan.path) for plan in plans),
         )
-        self._snapshot = encode_snapshot(complex_)
+        self._snapshot = encode_complex(complex_)
 
     def _by_robot(self, edges: Iterable[Edge]) -> tuple[tuple[int, int], ...]:
         occupant = self.slots.occupant

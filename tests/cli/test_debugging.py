@@ -74,7 +74,7 @@ def test_an_error_of_many_robots_is_printed_once_with_the_line_of_the_user(tmp_p
         f'  File "{tmp_path / "debugged.py"}", line 12, in step'
     ]
     assert said.count("ValueError: no luck for 0") == 1
-    assert said[-1] == "zwerm: node 0 crashed at tick 3: ValueError: no luck for 0"
+    assert said[-1] == "zwerm: node 0 crashed at tick 3: ValueError: no luck for 0 (debugged.py:12, in step)"
 
 
 def test_errors_from_different_lines_or_of_different_kinds_are_apart() -> None:

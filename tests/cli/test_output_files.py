@@ -57,7 +57,7 @@ def test_files_are_checked_before_the_run_and_all_at_once(tmp_path: Path) -> Non
 def test_the_table_names_every_file_and_settings_are_part_of_names(tmp_path: Path) -> None:
     ran = zwerm(*SHORT, "--record", "r.mcap", "--animate", "a.gif", "--set", "robots.count=3", cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr
-    rows = dict(line.split(None, 1) for line in ran.stdout.splitlines() if len(line.split()) == 2)
+    rows = dict(line.split(": ", 1) for line in ran.stdout.splitlines() if line.count(": ") == 1)
     assert rows["recording"].strip() == "r.mcap"
     assert rows["animation"].strip() == "a.gif"
     assert rows["picture"].strip() == "runs/computation-free-seed1-time.duration_s=0.3-robots.count=3.png"

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from network import free_port, tick
 from support import ROBOTS, ROOT, children_of, gone, until
 
 from zwerm.agents.runtime.contract import Setup
@@ -20,7 +21,7 @@ from zwerm.deploy.remote import run_robots
 from zwerm.deploy.supervisor import interrupts_held
 from zwerm.deploy.swarm import Certificate, LocalSwarm, RemoteSwarm
 from zwerm.errors import LinkError
-from zwerm.link import Arrival, WorldLink
+from zwerm.link import Arrival
 from zwerm.wire.messages import Failure, Observation, encode, open_answer
 
 ECHO = "small_controllers:Echo"
@@ -34,17 +35,14 @@ def members(count: int, controller: str = ECHO) -> dict[int, tuple[str, Setup]]:
     return {node: (controller, Setup(node, "robot", 0.1, (), bytes(16))) for node in range(count)}
 
 
-def tick(link: WorldLink, nodes: range, number: int) -> dict[int, Arrival]:
-    """Send every node an observation, and return what arrives, by node."""
-    for node in nodes:
-        link.send(node, encode(Observation(number, 0.0)))
-    arrivals = [link.receive(20.0) for _ in nodes]
-    return {arrival.node: arrival for arrival in arrivals if arrival is not None}
-
-
 def private_mb(pid: int) -> float:
     """Return the memory [MB] that a process shares with no other."""
-    fields = [line.split() for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:]]
+    try:
+        text = Path(f"/proc/{pid}/smaps_rollup").read_text()
+    except PermissionError:  # closed to all but root: the resident memory that no file backs is a little more
+        _, resident, shared, *_ = map(int, Path(f"/proc/{pid}/statm").read_text().split())
+        return (resident - shared) * os.sysconf("SC_PAGESIZE") / 2**20
+    fields = [line.split() for line in text.splitlines()[1:]]
     return sum(int(field[1]) for field in fields if field[0] in ("Private_Clean:", "Private_Dirty:")) / 1024
 
 
@@ -325,13 +323,6 @@ def test_a_world_that_cannot_listen_is_an_error_of_one_line(private_tmp: Path) -
             RemoteSwarm("run", members(1), listen=[endpoint], credentials_file=private_tmp / "keys").__enter__()
     assert "\n" not in str(refused.value)
     assert list(private_tmp.iterdir()) == []
-
-
-def free_port() -> int:
-    """Return a port of this machine without a TCP listener; most probably without a UDP one."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 ORPHAN = """

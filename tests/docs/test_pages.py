@@ -9,6 +9,8 @@ from types import ModuleType
 import pytest
 from support import ROOT, script
 
+from zwerm import RunResult, Setup
+
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 NUMBER = re.compile(r"[≥≤±+\-−]?\d[\d,.]*( ?(%|s|ms|µs|m|mm|MB|GB|robots))?")
@@ -238,3 +240,17 @@ def test_a_plan_that_is_not_known_is_refused_by_name(
         measure.main()
     assert left.value.code == 2
     assert "no-such-table: expected one of " in capsys.readouterr().err
+
+
+def test_a_field_without_a_meaning_is_found() -> None:
+    objects = script(DOCS / "_objects.py")
+
+    class Bare:
+        """A class."""
+
+        speed: float = 1.0
+
+    with pytest.raises(KeyError, match=r"Bare\.speed: no comment says what it means"):
+        list(objects.field_rows(Bare))
+    assert [name for name, _, _ in objects.field_rows(RunResult)] == list(RunResult.__dataclass_fields__)
+    assert [name for name, _, _ in objects.field_rows(Setup)] == list(Setup.__struct_fields__)

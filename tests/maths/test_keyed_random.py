@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy import stats
 
 from zwerm.maths.keyed_random import Draws, splitmix64, stream
@@ -133,3 +135,13 @@ def test_a_stream_is_named_by_its_key_and_every_node_has_its_own() -> None:
         values = other.random(1000)
         assert (values != mine).all()
         assert abs(np.corrcoef(values, mine)[0, 1]) < 4.0 / np.sqrt(1000)
+
+
+@given(seed=st.integers(0, 2**64), tick=st.integers(0, 2**40), ids=st.lists(st.integers(0, 2**40), max_size=20))
+def test_few_draws_are_those_of_many(seed: int, tick: int, ids: list[int]) -> None:
+    draws = Draws(seed)
+    few = np.array(ids, dtype=np.int64)
+    many = np.array([*ids, *range(40)], dtype=np.int64)
+    for draw in (draws.bits, draws.uniform, draws.normal):
+        assert (draw("purpose", tick, few) == draw("purpose", tick, many)[: len(ids)]).all()
+        assert (draw("purpose", tick, few) == draw("purpose", np.full(len(ids), tick), few)).all()

@@ -1,6 +1,9 @@
 """Controllers that print, hang, leave or crash together, for tests of what a run reports."""
 
 import os
+import signal
+import subprocess
+from pathlib import Path
 
 from zwerm.agents.runtime.contract import Controller
 from zwerm.wire.messages import Command, Observation, WheelSpeeds
@@ -41,4 +44,24 @@ class HangsInline(Controller):
                 sum(range(1_000))
             except Exception:
                 continue
+        return Command()
+
+
+class Escapes(Controller):
+    """Raises an error that would clear the terminal."""
+
+    def step(self, observation: Observation) -> Command:
+        raise ValueError("\x1b[2J gone")
+
+
+class Forks(Controller):
+    """Starts two processes that never end, by fork and as a command, and writes their ids."""
+
+    def step(self, observation: Observation) -> Command:
+        if self.setup.node == 1 and observation.tick == 2:
+            forked = os.fork()
+            if forked == 0:
+                signal.pause()
+            command = subprocess.Popen(["sleep", "3600"])
+            Path(os.environ["FORKED"]).write_text(f"{forked} {command.pid}")
         return Command()

@@ -14,7 +14,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import LineString, MultiPolygon, Polygon
 
+from zwerm.errors import ScenarioError
 from zwerm.scenario.tables import ArenaTable
+from zwerm.scenario.types import COORDINATE_MAX_M
 from zwerm.world.arena.shapes import read_shape
 from zwerm.world.geometry.wall_index import WallIndex
 
@@ -73,7 +75,11 @@ class Arena:
 
         Raises ScenarioError with every mistake, each `arena.key: rule, got value`.
         """
-        return cls(*read_shape(table, folder))
+        free, walls = read_shape(table, folder)
+        largest = max(map(abs, free.bounds), default=0.0)
+        if not largest <= COORDINATE_MAX_M:
+            raise ScenarioError([f"arena: expected coordinates of at most {COORDINATE_MAX_M:g} m, got {largest:g}"])
+        return cls(free, walls)
 
     def blocked(self, start: Floats, end: Floats) -> Bools:
         """Return (k,) whether a wall crosses or touches each line from start (k, 2) to end (k, 2), its ends excluded."""

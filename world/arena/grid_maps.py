@@ -24,7 +24,9 @@ from shapely.geometry import Polygon, box
 
 from zwerm.errors import ScenarioError
 from zwerm.scenario.tables import ArenaTable, PlacementTable
+from zwerm.scenario.types import is_file
 from zwerm.world.arena.raster import component
+from zwerm.world.arena.yaml_text import parse_yaml
 
 Bools = NDArray[np.bool_]
 Cell = tuple[int, int]
@@ -92,7 +94,7 @@ def root_placement(placement: PlacementTable, arena: ArenaTable, folder: Path, c
     if arena.free_area_m2 is not None:
         raise ScenarioError([f"{place}: roots goes with arena.scale, and not with free_area_m2"])
     path = folder / arena.map
-    grid = read_grid_map(path if path.is_file() else Path(arena.map))
+    grid = read_grid_map(path if is_file(path) else Path(arena.map))
     if len(grid.roots) < count:
         raise ScenarioError([f"{place}: {arena.map} has {len(grid.roots)} start cells, got {count} robots"])
     cell_m, rows = arena.resolution_m * arena.scale, len(grid.free)
@@ -132,7 +134,7 @@ def _number(path: Path, line: str, index: int, word: str) -> int:
 
 def _instance(path: Path) -> dict[str, Any]:
     try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
+        found = parse_yaml(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError):
         raise ScenarioError([f"arena.map: {path}: cannot be read as YAML"]) from None
     missing = [key for key in ("map", "root") if not isinstance(found, dict) or key not in found]
@@ -143,7 +145,7 @@ def _instance(path: Path) -> dict[str, Any]:
 
 def _map_of(path: Path, name: object) -> Path:
     for folder in (path.parent, path.parent / "gridmaps", path.parent.parent / "gridmaps"):
-        if (folder / f"{name}.map").is_file():
+        if is_file(folder / f"{name}.map"):
             return folder / f"{name}.map"
     raise ScenarioError([f"arena.map: {path}: map: no such file, got {name}.map"])
 

@@ -8,21 +8,23 @@ polygon. Every mistake is one line that names the file.
 import math
 import warnings
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 from PIL import Image
 from pydantic import BaseModel, Field, ValidationError
+from scipy import ndimage
 from shapely.affinity import affine_transform
 from shapely.geometry import Polygon
 
 from zwerm.errors import ScenarioError
 from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.tables import ArenaTable
-from zwerm.scenario.types import Finite, Fraction, Point, Positive
+from zwerm.scenario.types import COORDINATE_MAX_M, Finite, Fraction, Point, Positive, is_file
 from zwerm.world.arena.raster import component, outline
+from zwerm.world.arena.yaml_text import parse_yaml
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -31,12 +33,19 @@ _ROS_SUFFIXES = (".yaml", ".yml")
 _SIXTEEN_BIT = ("I", "I;16", "I;16B", "I;16L", "I;16N")
 
 
+Coordinate = Annotated[float, Field(ge=-COORDINATE_MAX_M, le=COORDINATE_MAX_M)]
+
+# The largest image that is decoded, and the most separate obstacles: more take minutes and gigabytes.
+PIXELS_MAX: Final = 16_000_000
+HOLES_MAX: Final = 20_000
+
+
 class RosMap(BaseModel):
     """A map_server YAML. Other keys are ignored, as in map_server."""
 
     image: str
     resolution: Positive
-    origin: tuple[Finite, Finite, Finite]
+    origin: tuple[Coordinate, Coordinate, Finite]
     negate: Annotated[int, Field(ge=0, le=1)]
     occupied_thresh: Fraction
     free_thresh: Fraction
@@ -75,6 +84,9 @@ def read_map(path: Path, table: ArenaTable) -> Polygon:
         kept = component(grid.free, None if table.start is None else grid.cell_at(table.start))
     except ValueError:
         raise ScenarioError([f"arena.start: expected a place in the map's free space, got {table.start}"]) from None
+    holes = ndimage.label(~kept)[1]
+    if holes > HOLES_MAX:
+        raise ScenarioError([f"arena.map: {path}: expected at most {HOLES_MAX} separate obstacles, got {holes}"])
     return grid.place(outline(kept))
 
 
@@ -92,7 +104,7 @@ def _ros_map(path: Path, table: ArenaTable) -> Grid:
         got = f"{described.free_thresh:g} > {described.occupied_thresh:g}"
         wrong.append(f"arena.map: {path}: free_thresh: expected at most occupied_thresh, got {got}")
     image = path.parent / described.image
-    if not image.is_file():
+    if not is_file(image):
         wrong.append(f"arena.map: {path}: image: no such file, got {described.image}")
     if wrong:
         raise ScenarioError(wrong)
@@ -102,7 +114,7 @@ def _ros_map(path: Path, table: ArenaTable) -> Grid:
 
 def _yaml(path: Path) -> object:
     try:
-        tables = yaml.safe_load(path.read_text(encoding="utf-8"))
+        tables = parse_yaml(path.read_text(encoding="utf-8"))
     except yaml.MarkedYAMLError as error:
         where = "" if error.problem_mark is None else f" in line {error.problem_mark.line + 1}"
         raise ScenarioError([f"arena.map: {path}: not YAML: {error.problem}{where}"]) from None
@@ -150,6 +162,9 @@ def _shades(path: Path) -> tuple[Floats, Floats | None]:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(path) as image:
+                if image.width * image.height > PIXELS_MAX:
+                    size = f"{image.width} x {image.height}"
+                    raise ScenarioError([f"arena.map: {path}: expected at most {PIXELS_MAX} pixels, got {size}"])
                 if image.mode in _SIXTEEN_BIT:
                     return np.asarray(image, dtype=np.float64) / 65535.0, None
                 pixels = np.asarray(image.convert("RGBA"), dtype=np.float64) / 255.0

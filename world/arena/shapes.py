@@ -16,7 +16,7 @@ from shapely.geometry import LineString, MultiPolygon, Polygon, box
 
 from zwerm.errors import ScenarioError
 from zwerm.scenario.tables import ArenaTable
-from zwerm.scenario.types import Point
+from zwerm.scenario.types import Point, is_file
 from zwerm.world.arena.grid_maps import SUFFIXES, grid_space
 from zwerm.world.arena.maps import read_map
 
@@ -102,7 +102,7 @@ def _space(table: ArenaTable, folder: Path) -> Space:
 
 def _find(name: str, folder: Path, place: str) -> Path:
     for path in (folder / name, Path(name)):
-        if path.is_file():
+        if is_file(path):
             return path
     raise ScenarioError([f"{place}: no such file, got {name}"])
 

@@ -45,10 +45,10 @@ class Truth:
     transmissions of all nodes so far.
     """
 
-    scene: Scene
+    scene: Scene  # the robots at this tick
     dead: Sequence[int] = ()
     completed: bool = False
-    telemetry: TelemetrySink = field(default_factory=TelemetrySink)
+    telemetry: TelemetrySink = field(default_factory=TelemetrySink)  # the reports of nodes
     messages: int = 0
 
     @property

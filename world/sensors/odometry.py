@@ -41,17 +41,22 @@ class Odometry(Sensor):
         self._known = np.zeros(surroundings.count, dtype=np.bool_)
         self._position = np.zeros((surroundings.count, 2))
         self._heading = np.zeros(surroundings.count)
-        self._before = (self._known, self._position, self._heading)  # that reading
+        # The robots of the newest reading, and what was known of them before it.
+        nobody = np.zeros(0, dtype=np.int64)
+        self._before = (nobody, self._known[nobody], self._position[nobody], self._heading[nobody])
 
     def read(self, scene: Scene, robots: Ints) -> list[Displacement]:
         """Return the motion of each of `robots` since it was last read."""
-        if scene.tick != self._tick:
-            self._tick, self._before = scene.tick, (self._known, self._position, self._heading)
-        known, position, heading = self._before
-        self._known, self._position, self._heading = known.copy(), position.copy(), heading.copy()
+        if scene.tick == self._tick:  # the same tick again: as if it had not been read
+            last, *before = self._before
+            self._known[last], self._position[last], self._heading[last] = before
+        self._tick = scene.tick
         self._known &= scene.present
-        new = robots[~self._known[robots]]
-        self._position[new], self._heading[new], self._known[new] = scene.position[new], scene.heading[new], True
+        known = self._known[robots]
+        self._before = (robots, known, self._position[robots], self._heading[robots])
+        if not known.all():
+            new = robots[~known]
+            self._position[new], self._heading[new], self._known[new] = scene.position[new], scene.heading[new], True
         dx, dy = (scene.position[robots] - self._position[robots]).T
         forward, left = in_body_frames(dx, dy, self._heading, robots)
         turn = scene.heading[robots] - self._heading[robots]

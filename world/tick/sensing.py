@@ -1,6 +1,6 @@
 """Sensing: reads all sensors of a swarm and makes the encoded observations of one tick."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, repeat
 from typing import Any
 
@@ -46,19 +46,28 @@ class Sensing:
         return read(sensor, self.faults, scene, robots) if self.faults else sensor.read(scene, robots)
 
     def observations(
-        self, scene: Scene, robots: int, nodes: int, readings: Readings, inboxes: Inboxes | None
+        self,
+        scene: Scene,
+        robots: int,
+        nodes: int,
+        readings: Readings,
+        inboxes: Inboxes | None,
+        times_s: Sequence[float] | None = None,
     ) -> Iterator[bytes]:
         """Yield the encoded observation of each node: `robots` robots, and after them nodes without sensors up to `nodes`.
 
-        `inboxes` holds the packets of each node; None means that nobody receives any.
+        `inboxes` holds the packets of each node; None means that nobody receives any. `times_s` are the readings of
+        their clocks; None means that all are exact.
         """
         columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]
-        ticks, times = repeat(scene.tick, robots), repeat(scene.time_s)
+        ticks = repeat(scene.tick, robots)
+        times: Iterable[float] = repeat(scene.time_s) if times_s is None else times_s
         packets: Any = repeat(()) if inboxes is None else inboxes
         made: Iterator[Observation] = map(Observation, ticks, times, packets, *columns)
         if robots < nodes:
             rest = [()] * (nodes - robots) if inboxes is None else inboxes[robots:]
-            made = chain(made, (Observation(scene.tick, scene.time_s, inbox) for inbox in rest))
+            last = [scene.time_s] * len(rest) if times_s is None else times_s[robots:]
+            made = chain(made, map(Observation, repeat(scene.tick), last, rest))
         return map(encode, made)
 
     def _read_all(self, scene: Scene, robots: Ints) -> Readings:

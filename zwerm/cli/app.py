@@ -19,7 +19,7 @@ import typer
 from typer.core import TyperGroup
 
 from zwerm.catalogue import COMMANDS
-from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, reserve_stdout
+from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_USER_ERROR, err, reserve_stdout
 from zwerm.version import __version__
 
 HELP: Final = (
@@ -89,7 +89,11 @@ def _interrupt(signum: int, frame: FrameType | None) -> None:
 
 def main() -> None:
     """Run the command line. Modules in the current directory are importable: a scenario or a command can name them."""
-    sys.path.insert(0, str(Path.cwd()))
+    try:
+        sys.path.insert(0, str(Path.cwd()))
+    except FileNotFoundError:
+        err.print("zwerm: the working directory was deleted; change to another one", style="red")
+        sys.exit(EXIT_USER_ERROR)
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores hang-ups
             signal.signal(number, _interrupt)

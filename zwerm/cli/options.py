@@ -90,6 +90,15 @@ RealTime = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option("--realtime", metavar="FACTOR", help="Pace the run at FACTOR times the wall clock."),
 ]
+HostNames = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option("--name", metavar="HOST", help="A name or address of the world's machine, for its certificate."),
+]
+OUTAGE_S: Final = 10.0
+Outage = Annotated[
+    float,
+    typer.Option("--outage", min=1.0, metavar="S", help="A robot whose connection is silent for S seconds is lost."),
+]
 RadioTable = Annotated[
     Optional[int],  # noqa: UP045
     typer.Option(

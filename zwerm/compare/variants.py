@@ -12,6 +12,7 @@ from decimal import Decimal, InvalidOperation
 from typing import Any, Final, NamedTuple
 
 from zwerm.errors import ScenarioError
+from zwerm.scenario.toml_text import parse_toml
 from zwerm.study.study_tables import Setting, VariantTable
 
 _OPENING, _CLOSING = "[{", "]}"
@@ -101,6 +102,6 @@ def _count(parts: Sequence[str], text: str) -> list[Setting]:
 def _value(part: str) -> Any:
     """Return a TOML value, or the text itself if it is not TOML."""
     try:
-        return tomllib.loads(f"value = {part}")["value"]
+        return parse_toml(f"value = {part}")["value"]
     except tomllib.TOMLDecodeError:
         return part

@@ -38,7 +38,7 @@ UNIX_PROTOCOL: Final = "unixsock-stream"
 # On one machine the kernel reports the end of a process at once. So the lease only limits how long a stopped process
 # (SIGSTOP, a debugger) counts as connected. Over a network it is the time until a broken connection is detected.
 LEASE_LOCAL_MS: Final = 600_000
-LEASE_REMOTE_MS: Final = 10_000
+LEASE_REMOTE_S: Final = 10.0
 
 # Zenoh's threads, read from the environment once per process. Most of a message's cost is switches between threads, so
 # there are as few as possible: one thread receives, answers and sends. A second thread sends in the world, and in nodes
@@ -51,21 +51,43 @@ _THREADS_VARIABLE: Final = "ZENOH_RUNTIME"
 
 
 class Credential(Struct, frozen=True, forbid_unknown_fields=True):
-    """Credential of one node. The router admits `user` only from the session with the Zenoh id `zid`."""
+    """Credential of one node. The router admits `user` only from the session with the Zenoh id `zid`.
+
+    For TLS and QUIC with certificates on both sides it holds the node's own certificate, whose common name is `user`, and its
+    private key, as PEM texts.
+    """
 
     node: int
     incarnation: int
     user: str
     password: str
     zid: str
+    certificate_pem: str = ""
+    key_pem: str = ""
 
 
 class Credentials(Struct, frozen=True, forbid_unknown_fields=True):
-    """Credentials of some nodes of a run. `authority_pem` is the certificate authority for TLS and QUIC."""
+    """Credentials of some nodes of a run, and the terms of their connection: the fields of `Terms`."""
 
     run: str
     nodes: tuple[Credential, ...]
     authority_pem: str = ""
+    lease_s: float = LEASE_REMOTE_S
+
+    @property
+    def terms(self) -> "Terms":
+        """The terms on which every node connects."""
+        return Terms(self.authority_pem, self.lease_s)
+
+
+class Terms(Struct, frozen=True):
+    """The authority that signs the world's certificate (PEM), and how long a connection over a network may be silent."""
+
+    authority_pem: str = ""
+    lease_s: float = LEASE_REMOTE_S
+
+
+TERMS: Final = Terms()
 
 
 def is_local(endpoint: str) -> bool:
@@ -78,17 +100,32 @@ def set_threads(threads: str) -> None:
     os.environ[_THREADS_VARIABLE] = threads
 
 
-def transport_settings(endpoints: list[str]) -> dict[str, Any]:
+def transport_settings(endpoints: list[str], lease_s: float = LEASE_REMOTE_S) -> dict[str, Any]:
     """Return the lease of a silent transport to or from `endpoints`."""
     local = all(is_local(endpoint) for endpoint in endpoints)
-    return {"transport/link/tx/lease": LEASE_LOCAL_MS if local else LEASE_REMOTE_MS}
+    return {"transport/link/tx/lease": LEASE_LOCAL_MS if local else round(1000 * lease_s)}
 
 
-def trust_settings(authority_pem: str) -> dict[str, Any]:
-    """Return the settings of a node that trusts certificates signed by `authority_pem`, if there is one."""
-    if not authority_pem:
+def trust_settings(credential: Credential, terms: Terms) -> dict[str, Any]:
+    """Return the settings of a node that connects by TLS or QUIC on these terms; {} without an authority."""
+    if not terms.authority_pem:
         return {}
-    return {"transport/link/tls/root_ca_certificate_base64": base64.b64encode(authority_pem.encode()).decode()}
+    tls: dict[str, Any] = {
+        "root_ca_certificate_base64": pem_base64(terms.authority_pem),
+        "verify_name_on_connect": True,
+    }
+    if credential.certificate_pem:
+        tls |= {
+            "enable_mtls": True,
+            "connect_certificate_base64": pem_base64(credential.certificate_pem),
+            "connect_private_key_base64": pem_base64(credential.key_pem),
+        }
+    return {f"transport/link/tls/{name}": value for name, value in tls.items()}
+
+
+def pem_base64(pem: str) -> str:
+    """Return a PEM text as Zenoh's configuration takes it, so that no file is needed."""
+    return base64.b64encode(pem.encode()).decode()
 
 
 def open_session(settings: Mapping[str, Any], purpose: str) -> zenoh.Session:

@@ -5,7 +5,9 @@ finaliser of SplitMix64 (Steele, Lea, Flood 2014), chained over the parts of the
 Controllers receive a numpy Generator over Philox, keyed in the same way. It is not fit for cryptography.
 """
 
+from collections.abc import Sequence
 from hashlib import blake2b
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +19,8 @@ _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(
 _ONE = np.uint64(1)
 _TO_UNIT = 2.0**-53
 _WORD = 2**64 - 1
+# Up to this many words are computed one by one, without the overhead of arrays.
+_FEW_WORDS = 8
 _GOLDEN_INT, _MIX_1_INT, _MIX_2_INT = int(_GOLDEN), int(_MIX_1), int(_MIX_2)
 
 
@@ -48,8 +52,12 @@ def unit(words: NDArray[np.uint64]) -> NDArray[np.float64]:
 
 def gaussian(words: NDArray[np.uint64]) -> NDArray[np.float64]:
     """Return the 64-bit words as standard normal numbers (Box and Muller 1958)."""
-    u = ((words >> _S11) + _ONE) * _TO_UNIT  # (0, 1], so that the logarithm is finite
-    draw: NDArray[np.float64] = np.sqrt(-2.0 * np.log(u)) * np.cos(2.0 * np.pi * unit(splitmix64(words)))
+    # The first number is in (0, 1], so that the logarithm is finite.
+    return _normal(np.asarray(((words >> _S11) + _ONE) * _TO_UNIT, np.float64), unit(splitmix64(words)))
+
+
+def _normal(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    draw: NDArray[np.float64] = np.sqrt(-2.0 * np.log(first)) * np.cos(2.0 * np.pi * second)
     return draw
 
 
@@ -69,23 +77,41 @@ class Draws:
 
         `splitmix64(splitmix64(states(purpose, a) ^ key_part(b)))` is `bits(purpose, a, b)`.
         """
-        word = self._roots.get(purpose)
-        if word is None:
-            word = self._roots[purpose] = int.from_bytes(self._digest(purpose)[:8], "little")
         # Single numbers at the head of the key, such as the tick, are mixed without the overhead of arrays.
-        head = 0
-        while head < len(ids) and type(part := ids[head]) is int:
-            if part < 0:
-                raise OverflowError(f"expected a non-negative id, got {part}")
-            word = _mixed(word ^ _mixed(part * _GOLDEN_INT & _WORD))
-            head += 1
-        state = np.array([word], dtype=np.uint64)
+        head = next((at for at, part in enumerate(ids) if type(part) is not int), len(ids))
+        state = np.array([self._head(purpose, ids[:head])], dtype=np.uint64)
         for each in ids[head:]:
             state = splitmix64(state ^ key_part(each))
         return state
 
+    def _head(self, purpose: str, ids: Sequence[Any]) -> int:
+        """Return the state of the chain after single numbers."""
+        word = self._roots.get(purpose)
+        if word is None:
+            word = self._roots[purpose] = int.from_bytes(self._digest(purpose)[:8], "little")
+        for part in ids:
+            if part < 0:
+                raise OverflowError(f"expected a non-negative id, got {part}")
+            word = _mixed(word ^ _mixed(part * _GOLDEN_INT & _WORD))
+        return word
+
+    def _few(self, purpose: str, ids: Sequence[Any]) -> list[int] | None:
+        """Return the words for a key that ends with a short array of ids, after single numbers; None for any other key."""
+        if not ids:
+            return None
+        *first, last = ids
+        if type(last) is not np.ndarray or last.ndim != 1 or last.size > _FEW_WORDS:
+            return None
+        if any(type(part) is not int for part in first):
+            return None
+        head = self._head(purpose, first)
+        return [_mixed(_mixed(head ^ _mixed(int(each) * _GOLDEN_INT & _WORD))) for each in last.tolist()]
+
     def bits(self, purpose: str, *ids: ArrayLike) -> NDArray[np.uint64]:
         """Return one 64-bit word per broadcast element of `ids` (non-negative integers)."""
+        few = self._few(purpose, ids)
+        if few is not None:
+            return np.array(few, dtype=np.uint64)
         shape = np.broadcast_shapes(*(np.shape(part) for part in ids))
         return splitmix64(self.states(purpose, *ids)).reshape(shape)
 
@@ -95,6 +121,12 @@ class Draws:
 
     def normal(self, purpose: str, *ids: ArrayLike) -> NDArray[np.float64]:
         """Return standard normal draws, one per broadcast element of `ids`."""
+        few = self._few(purpose, ids)
+        if few is not None:
+            return _normal(
+                np.array([((word >> 11) + 1) * _TO_UNIT for word in few]),
+                np.array([(_mixed(word) >> 11) * _TO_UNIT for word in few]),
+            )
         draw = gaussian(np.atleast_1d(self.bits(purpose, *ids)))
         return draw.reshape(np.broadcast_shapes(*(np.shape(part) for part in ids)))
 

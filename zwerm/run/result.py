@@ -29,41 +29,39 @@ class RunResult:
 
     `metrics` are the values at the end by name. `series` are the metrics that were sampled during the run, as arrays
     (k,) by name, `time_s` among them. `telemetry` are the numbers that nodes reported. `snapshots` are records for the
-    algorithm's own
-    pictures. `history` is what pictures are drawn from; `positions` gives it as arrays.
+    algorithm's own pictures. `history` is what pictures are drawn from; `positions` gives it as arrays.
     """
 
-    scenario: Scenario
-    seed: int
-    runner: str
-    outcome: str
-    reason: str
-    trace: str
-    ticks: int
-    sim_s: float
-    wall_s: float
-    robots: int
-    robot_ticks: int
-    metrics: dict[str, float]
-    radio: dict[str, Any]
-    middleware_lost: int
-    crashed: list[int]
-    restarted: list[int]
-    arena: Arena
-    history: History
-    cell_counts: Ints | None = None
-    hindered: dict[str, list[int]] = field(default_factory=dict)
-    faults: list[dict[str, Any]] = field(default_factory=list)
+    scenario: Scenario  # the scenario, with its settings
+    seed: int  # of the run
+    runner: str  # inline, processes or remote
+    outcome: str  # completed, time-limit, failed or interrupted
+    reason: str  # why it failed or was interrupted, in words
+    trace: str  # hash of all observations and commands
+    ticks: int  # number of ticks
+    sim_s: float  # virtual time at the end [s]
+    wall_s: float  # wall-clock time [s]
+    robots: int  # number of robots
+    robot_ticks: int  # number of observations
+    metrics: dict[str, float]  # values at the end, by name
+    radio: dict[str, Any]  # the radio's ledger: totals, and channels by name
+    middleware_lost: int  # messages that the middleware lost
+    crashed: list[int]  # ids of nodes that crashed, ascending
+    restarted: list[int]  # ids of nodes that were restarted
+    arena: Arena  # walls and free space
+    history: History  # what pictures are drawn from
+    cell_counts: Ints | None = None  # (rows, columns) robots at the end; None without metrics.cells
+    hindered: dict[str, list[int]] = field(default_factory=dict)  # ids that were paused, slow or late
+    faults: list[dict[str, Any]] = field(default_factory=list)  # the faults of the run, as [[faults]] tables
     missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
-    series: dict[str, Floats] = field(default_factory=dict)
-    refused: dict[str, int] = field(default_factory=dict)
+    series: dict[str, Floats] = field(default_factory=dict)  # (k,) samples by name, time_s among them
+    refused: dict[str, int] = field(default_factory=dict)  # refused messages, by reason
+    refused_by: dict[int, dict[str, int]] = field(default_factory=dict)  # of them, by node and reason
     problems: list[str] = field(default_factory=list)  # what could not be written during the run
-    tracebacks: dict[int, str] = field(default_factory=dict)
-    crash_reasons: dict[int, str] = field(
-        default_factory=dict
-    )  # "tick 5: ..." by node, of programs that ended on their own
-    telemetry: TelemetryArrays = field(default_factory=TelemetryArrays.empty)
-    snapshots: list[TelemetryRecord] = field(default_factory=list)
+    tracebacks: dict[int, str] = field(default_factory=dict)  # of controllers that raised, by node
+    crash_reasons: dict[int, str] = field(default_factory=dict)  # "tick 5: ..." of programs that ended, by node
+    telemetry: TelemetryArrays = field(default_factory=TelemetryArrays.empty)  # numbers that nodes reported
+    snapshots: list[TelemetryRecord] = field(default_factory=list)  # records for the algorithm's own pictures
 
     @property
     def ok(self) -> bool:
@@ -111,6 +109,10 @@ class RunResult:
                 "reasons": {str(node): reason for node, reason in sorted(self.crash_reasons.items())},
             },
             "faults": self.faults,
+            "refused": {
+                "reasons": self.refused,
+                "nodes": {str(node): reasons for node, reasons in self.refused_by.items()},
+            },
         }
 
     def picture(

@@ -150,11 +150,16 @@ def serve(
     scenario: Scenario,
     seed: int,
     listen: Sequence[str],
-    credentials_file: Path,
+    credentials_file: Path | None = None,
     realtime: float | None = None,
     watcher: ProgressListener | None = None,
     record: Path | None = None,
     deadline_s: float = 600.0,
+    *,
+    keys_file: Path | None = None,
+    names: Sequence[str] = (),
+    lease_s: float = 10.0,
+    plain: bool = False,
 ) -> RunResult:
     """Run a world whose robots are started elsewhere, with the credentials that are written to `credentials_file`.
 
@@ -165,7 +170,14 @@ def serve(
         raise ScenarioError(
             [f"{scenario.place}: faults: robots that run elsewhere cannot be killed, started or paused"]
         )
+    from zwerm.deploy.endpoints import check_encryption
+    from zwerm.deploy.identity import load_world_keys
     from zwerm.deploy.swarm import RemoteSwarm
+
+    if not plain:
+        check_encryption(listen)
+    if (credentials_file is None) == (keys_file is None):
+        raise ScenarioError(["credentials: expected either a file to write them to, or the keys of a world"])
 
     watcher = watcher or NullProgress()
     with RemoteSwarm(
@@ -173,6 +185,9 @@ def serve(
         node_specs(scenario, seed),
         listen=listen,
         credentials_file=credentials_file,
+        keys=None if keys_file is None else load_world_keys(keys_file),
+        names=names,
+        lease_s=lease_s,
         progress=watcher.joined,
         deadline_s=deadline_s,
         paced=realtime is not None,
@@ -295,6 +310,12 @@ class ExchangeObserver:
         self._scene = world.scene
 
 
+def _refusals(*counts: Mapping[int, Counter[str]]) -> dict[int, dict[str, int]]:
+    """Return the sum of refusals by node and reason, ascending."""
+    nodes = sorted({node for each in counts for node in each})
+    return {node: dict(sum((each.get(node, Counter()) for each in counts), Counter())) for node in nodes}
+
+
 @contextmanager
 def _collecting_seldom() -> Iterator[None]:
     """Let Python search for garbage cycles 100 times less often: messages form no cycles, and most objects are messages."""
@@ -352,6 +373,7 @@ def _result(
         history=sampling.history,
         cell_counts=counts,
         refused=dict(intake.refused + Counter(getattr(link, "refused", {}))),
+        refused_by=_refusals(intake.refused_by, getattr(link, "refused_by", {})),
         series={name: np.array(values) for name, values in sampling.observers.series().items()},
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,

@@ -14,7 +14,8 @@ from zwerm.scenario.nearest import nearest
 from zwerm.scenario.overrides import blame, override
 from zwerm.scenario.renamed import rename
 from zwerm.scenario.tables import Scenario
-from zwerm.scenario.types import OpenTable
+from zwerm.scenario.toml_text import parse_toml
+from zwerm.scenario.types import OpenTable, is_file
 
 BUILT_IN = Path(__file__).parents[1] / "scenarios"
 STUDIES = Path(__file__).parents[1] / "studies"
@@ -33,9 +34,9 @@ def locate(name: str) -> Path:
     if name in built_in():
         return built_in()[name]
     path = Path(name)
-    if path.is_file():
+    if is_file(path):
         return path
-    if (STUDIES / f"{name}.toml").is_file():
+    if is_file(STUDIES / f"{name}.toml"):
         raise ScenarioError([f"{name}: is a study and no scenario; run it with: zwerm study {name}"])
     hint = "" if path.suffix == ".toml" else suggestion(name, built_in(), "zwerm list")
     raise ScenarioError([f"{name}: expected a scenario file or the name of a built-in one{hint}"])
@@ -53,7 +54,7 @@ def read(path: Path) -> dict[str, Any]:
     Raises ScenarioError where it is no TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return parse_toml(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ScenarioError([f"{path}: not TOML: {error}"]) from None
     except OSError as error:

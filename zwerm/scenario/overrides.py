@@ -2,10 +2,15 @@
 
 import tomllib
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, Final
 
 from zwerm.errors import ScenarioError
 from zwerm.scenario.renamed import renamed_path
+from zwerm.scenario.toml_text import parse_toml
+
+# A longer text that is no TOML is a mistake, such as a number of thousands of digits.
+_BARE_CHARS_MAX: Final = 4_000
+_SHOWN_CHARS_MAX: Final = 200
 
 
 def override(tables: dict[str, Any], assignment: str) -> None:
@@ -17,8 +22,12 @@ def override(tables: dict[str, Any], assignment: str) -> None:
     if not equals or not path.strip():
         raise ScenarioError([f"--set {assignment}: expected path=value"])
     try:
-        value = tomllib.loads(f"value = {text}")["value"] if "\n" not in text else text
+        value = parse_toml(f"value = {text}")["value"] if "\n" not in text else text
     except tomllib.TOMLDecodeError:
+        if len(text) > _BARE_CHARS_MAX:
+            raise ScenarioError(
+                [f"--set {assignment:.60}...: expected TOML, or a bare text of fewer characters"]
+            ) from None
         value = text
     *parents, last = renamed_path(path.strip()).split(".")
     place: Any = tables
@@ -40,9 +49,13 @@ def blame(lines: Iterable[str], place: str, overrides: Sequence[str]) -> list[st
         if colon and line.startswith(f"{place}: "):
             guilty = [each for each in overrides if f"{path}.".startswith(f"{_path_of(each)}.")]
             if guilty:
-                line = f"--set {guilty[-1]}{line[len(place) :]}"
+                line = f"--set {_short(guilty[-1])}{line[len(place) :]}"
         found.append(line)
     return found
+
+
+def _short(assignment: str) -> str:
+    return assignment if len(assignment) <= _SHOWN_CHARS_MAX else f"{assignment[:_SHOWN_CHARS_MAX]}..."
 
 
 def _path_of(assignment: str) -> str:

@@ -115,6 +115,17 @@ class EntranceTable(Table):
     exit_m: Rectangle | None = None
 
 
+class ClockTable(Table):
+    """Clocks that differ: each robot's reads (1 + drift) * t + offset, both drawn from the seed.
+
+    The offset is uniform in +-`offset_s_max`, the drift in +-`drift_ppm_max` millionths. A robot's `time_s` and its wakes are
+    by its own clock; the tick of an observation is not.
+    """
+
+    offset_s_max: NonNegative = 0.0
+    drift_ppm_max: Annotated[float, Field(ge=0, lt=1e6)] = 0.0
+
+
 class RobotsTable(Table):
     """The swarm: how many, what they are, what they sense, what runs on them."""
 
@@ -126,6 +137,7 @@ class RobotsTable(Table):
     entrance: EntranceTable | None = None
     sensors: list[OpenTable] = []
     on_crash: Literal["fail", "continue"] = "fail"
+    clock: ClockTable | None = None
 
 
 class BaseTable(Table):

@@ -1,9 +1,13 @@
 """Types of the values in a scenario's tables: numbers with bounds, points, names, and the two kinds of table."""
 
 import re
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+# The largest coordinate of an arena. Beyond it distances lose the precision that robots need.
+COORDINATE_MAX_M: Final = 1e6
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -53,3 +57,11 @@ class OpenTable(BaseModel):
     def parameters(self) -> dict[str, Any]:
         """The keys besides `kind`, for the plug-in to type."""
         return dict(self.__pydantic_extra__ or {})
+
+
+def is_file(path: Path) -> bool:
+    """Tell whether `path` is a file. A name that the system does not allow, such as one of 300 characters, is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False

@@ -5,6 +5,7 @@ atomically by one with all rows. One study at a time writes to a file.
 """
 
 import fcntl
+import os
 from collections.abc import Iterable, Sequence
 from csv import writer as csv_writer
 from pathlib import Path
@@ -100,6 +101,7 @@ class Rows:
     def add(self, row: Row) -> None:
         """Store a row."""
         self._journal.write(msgspec.json.encode(row) + b"\n")
+        os.fsync(self._journal.fileno())
         self.held[key_of(row)] = row
 
     def merge(self, axes: Sequence[str], superseded: Iterable[Key] = ()) -> None:
@@ -111,7 +113,9 @@ class Rows:
             schema = _schema(rows, axes)
             fresh = self.path.with_name(self.path.name + ".new")
             pq.write_table(pa.Table.from_pylist([_fitted(row, schema) for row in rows], schema), fresh)
+            _sync(fresh)
             fresh.replace(self.path)
+            _sync(self.path.parent)
         self._journal_path.unlink()
 
     def _replay(self) -> None:
@@ -126,6 +130,15 @@ class Rows:
             raise ScenarioError([f"{self._journal_path}: expected the journal of a study's results"]) from None
         if whole < len(text):
             self._journal.truncate(whole)
+
+
+def _sync(path: Path) -> None:
+    """Return when a file, or the names in a folder, are on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _order(row: Row, axes: Sequence[str]) -> tuple[Any, ...]:

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 
@@ -206,6 +206,11 @@ def check_study(tables: dict[str, Any], path: Path) -> Study:
     return study
 
 
+# The most seeds of a study: each is a run. A seed has at most as many digits as fit into 63 bits.
+SEEDS_MAX: Final = 1_000_000
+_SEED_DIGITS_MAX: Final = 18
+
+
 def parse_seeds(text: str) -> list[int]:
     """Return the seeds of `N` (1 to N) or `FIRST-LAST`.
 
@@ -213,11 +218,13 @@ def parse_seeds(text: str) -> list[int]:
     """
     first, dash, last = text.partition("-")
     ends = (first, last) if dash else ("1", first)
-    if all(each.isascii() and each.isdigit() for each in ends):
+    if all(each.isascii() and each.isdigit() and len(each) <= _SEED_DIGITS_MAX for each in ends):
+        if int(ends[1]) - int(ends[0]) >= SEEDS_MAX:
+            raise ScenarioError([f"seeds: expected at most {SEEDS_MAX}, got {text!r}"])
         seeds = list(range(int(ends[0]), int(ends[1]) + 1))
         if seeds:
             return seeds
-    raise ScenarioError([f"seeds: expected a count, or FIRST-LAST, got {text!r}"])
+    raise ScenarioError([f"seeds: expected a count, or FIRST-LAST, got {text!r:.80}"])
 
 
 def _contradictions(table: StudyTable) -> Iterator[str]:

@@ -1,12 +1,10 @@
 """Run the twin of a scenario over each transport, and print the comparison with the models."""
 
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from enum import StrEnum
 from typing import Any
 
-import msgspec
 from rich.console import Console
 
 from zwerm.deploy.network.impairments import supported
@@ -35,15 +33,16 @@ def run_and_report(
     scenario: Scenario,
     seed: int,
     transports: Sequence[Transport],
-    as_json: bool,
+    write_json: Callable[[dict[str, Any]], object] | None,
     out: Console,
     err: Console,
     progress: Callable[[str], AbstractContextManager[ProgressListener]],
 ) -> set[str]:
-    """Run a scenario's twin over each transport, print the comparison on `out` or as JSON, and return the outcomes.
+    """Run a scenario's twin over each transport, print the comparison on `out`, and return the outcomes.
 
-    `progress` returns the progress listener of a run from its name. Raises LinkError if this machine cannot create network
-    namespaces, and ScenarioError for a scenario that a real network cannot reproduce.
+    With `write_json` that gets the comparison instead, as one object. `progress` returns the progress listener of a run
+    from its name. Raises LinkError if this machine cannot create network namespaces, and ScenarioError for a scenario that
+    a real network cannot reproduce.
     """
     require_namespaces()
     assemble(scenario, seed)  # reports errors also in models that may be skipped
@@ -57,9 +56,8 @@ def run_and_report(
             err.print(f"zwerm: {result.reason}", style="red", markup=False, highlight=False, soft_wrap=True)
         if result.outcome == "interrupted":
             break
-    if as_json:
-        report = {"scenario": scenario.name, "seed": seed, "skipped": skipped, "transports": found}
-        sys.stdout.write(msgspec.json.encode(report).decode() + "\n")
+    if write_json is not None:
+        write_json({"scenario": scenario.name, "seed": seed, "skipped": skipped, "transports": found})
     else:
         print_twin(out, f"{scenario.name}, seed {seed}: its twin on a real network", found, skipped)
     return {each["outcome"] for each in found.values()}

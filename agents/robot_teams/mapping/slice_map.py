@@ -154,9 +154,12 @@ class SliceMap:
         """Return the length [mm] of the shortest known way from a known end to every end that can be reached."""
         return {end: length for end, (length, _) in self._shortest(start).items()}
 
-    def route(self, start: End, stop: End) -> list[tuple[End, Step]] | None:
-        """Return the shortest known way as (end, step) pairs; empty where start is stop, None where there is none."""
-        found = self._shortest(start)
+    def route(self, start: End, stop: End, avoid: Collection[Port] = ()) -> list[tuple[End, Step]] | None:
+        """Return the shortest known way as (end, step) pairs; empty where start is stop, None where there is none.
+
+        It leaves no end in a direction that `avoid` has for it.
+        """
+        found = self._shortest(start, avoid)
         if stop not in found:
             return None
         steps: list[tuple[End, Step]] = []
@@ -167,7 +170,7 @@ class SliceMap:
             stop = previous[0]
         return steps[::-1]
 
-    def _shortest(self, start: End) -> dict[End, tuple[int, tuple[End, Step] | None]]:
+    def _shortest(self, start: End, avoid: Collection[Port] = ()) -> dict[End, tuple[int, tuple[End, Step] | None]]:
         self._derive()
         found: dict[End, tuple[int, tuple[End, Step] | None]] = {start: (0, None)}
         heap = [(0, start)]
@@ -181,7 +184,7 @@ class SliceMap:
                 self._arcs.get((end, RIGHT)),
                 self._across.get(end),
             ):
-                if step is None:
+                if step is None or (avoid and (end, step.direction) in avoid):
                     continue
                 total = length + step.length_mm
                 if step.stop not in found or total < found[step.stop][0]:

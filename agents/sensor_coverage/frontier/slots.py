@@ -11,6 +11,7 @@ frame of one robot, at first the robot's own. Two frames that meet become one.
 import cmath
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from operator import itemgetter
 
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_heading, refined_reference
 from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
@@ -37,7 +38,7 @@ class Slots:
         self.length_m: dict[tuple[int, int], float] = {}
         self.frame: dict[int, int] = {}
         self._heading_readings: dict[int, int] = {}
-        self._reference: dict[tuple[int, int], Reference] = {}
+        self._reference: dict[int, dict[int, Reference]] = {}  # by the slot that sees, then by the slot that it sees
         self._next = 0
 
     # --- slots and occupants ----------------------------------------------------------------------------------------
@@ -137,9 +138,9 @@ class Slots:
                     known[slot] = [each + by for each in known[slot]]
         self.walks = [each.turned(new, by) if each.frame == old else each for each in self.walks]
         spin = cmath.exp(1j * by)
-        for (a, b), (mean, count) in self._reference.items():
-            if a in turned:
-                self._reference[a, b] = mean * spin, count
+        for slot in turned:
+            seen = self._reference.get(slot, {})
+            seen |= {other: (mean * spin, count) for other, (mean, count) in seen.items()}
 
     # --- walls that were followed -----------------------------------------------------------------------------------
 
@@ -165,13 +166,13 @@ class Slots:
 
     def direction(self, a: int, b: int) -> float | None:
         """Return the reference direction [rad] from slot a to slot b, or None if there is none."""
-        known = self._reference.get((a, b))
+        known = self._reference.get(a, {}).get(b)
         return None if known is None else cmath.phase(known[0])
 
     def remember(self, a: int, b: int, direction: float) -> None:
         """Set the reference direction [rad] from slot a to slot b, as another robot remembers it."""
         mean = cmath.rect(1.0, direction)
-        self._reference[a, b], self._reference[b, a] = (mean, 1), (-mean, 1)
+        self._refer(a, b, (mean, 1))
 
     def learn_references(self, views: Mapping[int, Mapping[int, float]]) -> None:
         """Refine the reference directions of all slots that see each other."""
@@ -180,12 +181,16 @@ class Slots:
                 back = views.get(b, {}).get(a)
                 if back is None or b < a:
                     continue
-                mean, count = refined_reference(self._reference.get((a, b)), there, back)
-                self._reference[a, b] = mean, count
-                self._reference[b, a] = -mean, count
+                self._refer(a, b, refined_reference(self._reference.get(a, {}).get(b), there, back))
 
     def known_from(self, slot: int) -> Iterator[tuple[int, float]]:
         """Yield (slot, direction [rad]) of every occupied slot that was ever seen from this one, ascending."""
-        for (a, b), (mean, _) in sorted(self._reference.items()):
-            if a == slot and b in self.occupant:
-                yield b, cmath.phase(mean)
+        for other, (mean, _) in sorted(self._reference.get(slot, {}).items(), key=itemgetter(0)):
+            if other in self.occupant:
+                yield other, cmath.phase(mean)
+
+    def _refer(self, a: int, b: int, reference: Reference) -> None:
+        """Set the reference direction from slot a to slot b, and the opposite one."""
+        mean, count = reference
+        self._reference.setdefault(a, {})[b] = reference
+        self._reference.setdefault(b, {})[a] = -mean, count

@@ -35,7 +35,10 @@ class ReferenceBearing(_Part, frozen=True):
 
 
 class SlotMemory(_Part, frozen=True):
-    """The memory of a slot, which the next occupant inherits. `claims` is the number of its newest claim."""
+    """The memory of a slot, which the next occupant inherits.
+
+    `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
+    """
 
     slot: int
     references: tuple[ReferenceBearing, ...]
@@ -45,6 +48,7 @@ class SlotMemory(_Part, frozen=True):
     attempts: tuple[tuple[tuple[int, ...], int], ...]
     blocked: tuple[float, ...]
     claims: int = 0
+    obstructed: tuple[tuple[tuple[int, ...], int], ...] = ()
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).

@@ -33,8 +33,17 @@ class MembershipSnapshot(Struct, frozen=True, array_like=True, forbid_unknown_fi
 
 Snapshot = ComplexSnapshot | MembershipSnapshot
 
+# Largest snapshot of a complex [bytes], so that packets fit into the same command: that of about 1,500 robots.
+COMPLEX_BYTES_MAX: Final = 40_000
+
 encode_snapshot: Final[Callable[[Snapshot], bytes]] = msgspec.msgpack.Encoder().encode
 _decode: Final = msgspec.msgpack.Decoder(Snapshot).decode
+
+
+def encode_complex(snapshot: ComplexSnapshot) -> bytes:
+    """Return the encoded snapshot; of a larger complex than a command can hold, nothing: its pictures lack this cycle."""
+    encoded = encode_snapshot(snapshot)
+    return encoded if len(encoded) <= COMPLEX_BYTES_MAX else b""
 
 
 def decode_snapshot(payload: bytes) -> Snapshot | None:

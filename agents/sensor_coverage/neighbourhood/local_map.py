@@ -10,7 +10,14 @@ from itertools import islice
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
-from zwerm.agents.sensor_coverage.frontier.directions import Reference, add_wall, refined_reference, wrapped
+from zwerm.agents.sensor_coverage.frontier.directions import (
+    Reference,
+    add_wall,
+    angle_between,
+    refined_reference,
+    wrapped,
+)
+from zwerm.agents.sensor_coverage.frontier.fence import VERTEX_BESIDE_RAD, wedges
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
@@ -27,15 +34,18 @@ DOUBT_COST: Final = 1_000.0
 # Added cost of a route to a robot at a gap: gaps are expanded when no edge can be expanded and no robot is in doubt.
 GAP_COST: Final = 10_000.0
 
+# A body is seen from the other side if the directions to it differ by more than this [rad].
+BEHIND_RAD: Final = math.pi / 2.0
+
 MakePlanner = Callable[[PlannerParameters, Slots], FrontierService]
 
 
 class LocalMap(NeighbourTable):
     """One robot's neighbourhood.
 
-    `plans` expand edges and `gaps` expand gaps around this robot. `obstacle` has the obstacle edges here.
-    `path_vectors` has the routes to the frontier. `plan_count` counts the times that plans were made. A base station sets
-    `guests`.
+    `plans` expand edges and `gaps` expand gaps around this robot. `obstacle` has the obstacle edges here, and
+    `obstructed` counts the sides and gaps that the body of a dead robot closes. `path_vectors` has the routes to the
+    frontier. `plan_count` counts the times that plans were made. A base station sets `guests`.
     """
 
     def __init__(
@@ -48,6 +58,9 @@ class LocalMap(NeighbourTable):
         self.gaps: list[Plan] = []
         self.path_vectors = PathVectorProtocol()
         self.obstacle: dict[Edge, None] = {}
+        self.obstructed = 0
+        self._obstructed: dict[tuple[int, ...], int] = {}  # key of an attempt: the dead robot whose body stopped it
+        self._finished: dict[int, None] = {}  # dead robots that claimed no frontier when they died
         self.plan_count = 0
         self._make_planner = make_planner
         self._references: dict[int, Reference] = {}
@@ -98,13 +111,17 @@ class LocalMap(NeighbourTable):
             tuple(log.attempts.items()),
             tuple(log.blocked.get(me, ())),
             self.path_vectors.newest_claim(me),
+            tuple(self._obstructed.items()),
         )
 
     # --- robots that died or restarted --------------------------------------------------------------------------------
 
     def bury(self, node: int) -> None:
         """Forget a robot that is dead, and end the claims of its slot."""
-        self.path_vectors.forget(node, self._slot_of(node))
+        slot = self._slot_of(node)
+        if slot != NOWHERE and not self.states[node].moving and not self.path_vectors.is_claimed(slot):
+            self._finished[node] = None
+        self.path_vectors.forget(node, slot)
         self.forget(node)
 
     def restarted(self, node: int) -> None:
@@ -126,7 +143,8 @@ class LocalMap(NeighbourTable):
         self._learned.clear()
         self._slots = Slots()
         self._planner = self._make_planner(self.parameters, self._slots)
-        self.plans, self.gaps, self.obstacle = [], [], {}
+        self.plans, self.gaps, self.obstacle, self.obstructed = [], [], {}, 0
+        self._obstructed = {}
         self._plan_basis = None
         self._led = None
         self._handovers = {}
@@ -154,11 +172,12 @@ class LocalMap(NeighbourTable):
         log.failed = dict.fromkeys((key, me) for key in memory.failed)
         log.attempts = dict(memory.attempts)
         log.blocked[me] = list(memory.blocked)
+        self._obstructed = dict(memory.obstructed)
 
     def leave_complex(self) -> None:
         """Leave the complex; the body stays at the slot."""
         self.redundant = True
-        self.plans, self.gaps, self.obstacle = [], [], {}
+        self.plans, self.gaps, self.obstacle, self.obstructed = [], [], {}, 0
         self.change()
 
     def abandon_push(self, fresh: int, follower: int | None) -> None:
@@ -210,6 +229,34 @@ class LocalMap(NeighbourTable):
         self.obstacle = dict.fromkeys(
             (*found.corners, *(side.edge for side in found.sides if (side.edge, side.sign) not in could))
         )
+        self.obstructed = self._count_obstructed(scan)
+
+    def _count_obstructed(self, scan: ScanResult) -> int:
+        """Return how many sides and gaps are open here, and closed only by a body behind which nobody has looked.
+
+        Nobody has to look behind a robot that did not claim a frontier when it died, or whose body a neighbour sees
+        from the other side.
+        """
+        if not self._obstructed:
+            return 0
+        me = self.slot
+        sides = {(*side.edge, side.sign) for side in self._planner.fence.sides}
+        around = {(me, a) for _, a, _, gap in wedges(scan.views, scan.complex_, [me]) if gap >= 2.0 * VERTEX_BESIDE_RAD}
+        return sum(
+            (key[:3] in sides or (key[2] == 0 and key[:2] in around)) and not self._is_seen_past(body)
+            for key, body in self._obstructed.items()
+        )
+
+    def _is_seen_past(self, body: int) -> bool:
+        seen = self.seen.get(body)
+        if body in self._finished or seen is None:
+            return True
+        here = seen.bearing_rad + (self.heading or 0.0)
+        return any(
+            each.node == body and angle_between(each.direction_rad, here) > BEHIND_RAD
+            for state in self.mutual().values()
+            for each in state.seen
+        )
 
     def scan(self) -> ScanResult:
         """Return the views of this robot and its neighbours as a scan, by this robot's slot."""
@@ -246,8 +293,20 @@ class LocalMap(NeighbourTable):
         log = self._planner.attempt_log
         log.closed, log.failed, log.attempts = {}, {}, {}
         log.blocked.clear()
+        self._obstructed = {}
         self._plan_basis = None
         self.change()
+
+    def note_obstruction(self, plan: Plan, driven_m: float, body: int) -> None:
+        """Record that a dead robot's body stopped a plan after `driven_m`: this robot does not know what is behind it."""
+        self._obstructed[plan.key] = body
+        self.note_failure(plan, driven_m)
+
+    def unblock(self, node: int) -> None:
+        """Try again what had failed, if a robot was in the way that is alive again."""
+        self._finished.pop(node, None)
+        if node in self._obstructed.values():
+            self.reopen()
 
     def note_failure(self, plan: Plan, driven_m: float) -> None:
         """Record that a wall stopped a plan after `driven_m`."""

@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Callable, Generator, Sequence
+from typing import Final
 
 import numpy as np
 
 from zwerm.agents.runtime.contract import Setup
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Landmark, Sighting
@@ -18,6 +20,9 @@ from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap, MakeP
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 from zwerm.agents.sensor_coverage.protocols.transport.mailbox import ReliableMailbox
 from zwerm.wire.messages import BodyVelocity, Observation
+
+# A robot within this distance [m] of the point where it came out of the depot still stands there.
+AT_BASE_M: Final = 0.05
 
 
 class Situation:
@@ -88,8 +93,15 @@ class Situation:
 
     @property
     def claims(self) -> int:
-        """Number of frontier claims of this robot."""
-        return len(self.local_map.plans) + len(self.local_map.gaps)
+        """Number of frontier claims of this robot; what a dead robot's body closes is frontier, too."""
+        return len(self.local_map.plans) + len(self.local_map.gaps) + self.local_map.obstructed
+
+    def dead_ahead(self, bearing_rad: float, within_rad: float) -> int | None:
+        """Return the dead robot that is visible next to a bearing [rad] of this robot's frame, within an angle, or None."""
+        seen = self.motion.frame.seen
+        apart = {node: angle_between(seen[node], bearing_rad) for node in self.failure_detector.dead if node in seen}
+        body = min(apart, key=lambda node: apart[node], default=None)
+        return body if body is not None and apart[body] < within_rad else None
 
     @property
     def busy(self) -> bool:
@@ -177,6 +189,7 @@ class Situation:
 
     def stand(self) -> None:
         """End a drive: the robot stands still, for neighbours to average its bearing."""
+        self._check_at_base()
         self.local_map.end_drive()
         self.motion.frame.forget()
 
@@ -193,3 +206,14 @@ class Situation:
 
     def _recover(self, rest: Vector) -> Drive:
         self.motion.rest = yield from self.motion.return_to_rest(rest)
+        self._check_at_base()
+
+    def _check_at_base(self) -> None:
+        """Find out whether the robot was pushed off the base's point, or did not get back onto it after a drive.
+
+        Then it does not see what the base sees, and takes a slot of its own.
+        """
+        away_m = math.hypot(self.motion.frame.x_m, self.motion.frame.y_m)
+        if self.local_map.at_base and self.local_map.heading is not None and away_m > AT_BASE_M:
+            self.local_map.at_base = False
+            self.local_map.change()

@@ -33,6 +33,7 @@ class Surveillance(Component):
             return
         local_map.path_vectors.receive(sender, message.path_vector)
         if situation.failure_detector.answered(sender):
+            local_map.unblock(sender)
             local_map.change()
         if local_map.missed(sender, message):
             self._beaconing.missed(tick)

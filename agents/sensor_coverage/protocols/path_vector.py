@@ -65,6 +65,10 @@ class PathVectorProtocol:
             self._end(slot, self.newest_claim(slot))
             self.version += 1
 
+    def is_claimed(self, slot: int) -> bool:
+        """Return whether a slot is at the frontier, or in doubt, by the latest news of it."""
+        return self._own(slot) is not None
+
     def newest_claim(self, slot: int) -> int:
         """Return the number of the newest claim of a slot that was heard of."""
         return self._claims.get(slot, 0)

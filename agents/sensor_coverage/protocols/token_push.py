@@ -1,11 +1,13 @@
 """One push, as one robot of its path takes part in it: a token searches the leader, and robots move up behind it.
 
-    token       base to leader, hop by hop: the token locks the path, rear to front ready       leader to its follower:
-    the memory of the leader's slot; then the leader drives into unknown space abort       leader to base: a wall was in
-    the way, and no robot has moved vacated     the leader is far enough away; neighbours forward it, because the
-    follower is out of range take        front to rear, each to its follower: the memory of the slot it leaves; each
-    drives once that is acknowledged standing    front to rear: all robots ahead of you stand still settled     rear to
-    front: all robots behind you have reached their slots done        front to rear, and to the base
+    token     base to leader, hop by hop: the token locks the path, rear to front
+    ready     leader to its follower: the memory of the leader's slot; then the leader drives into unknown space
+    abort     leader to base: a wall was in the way, and no robot has moved
+    vacated   the leader is far enough away; neighbours forward it, because the follower is out of range
+    take      front to rear, each to its follower: the memory of the slot it leaves; each drives once that is acknowledged
+    standing  front to rear: all robots ahead of you stand still
+    settled   rear to front: all robots behind you have reached their slots
+    done      front to rear, and to the base
 
 Messages are repeated until they are acknowledged. A robot that waits too long continues alone. That may leave a hole,
 which becomes frontier again. If a leader is back and its follower has come all the same, they occupy the old and the
@@ -21,81 +23,38 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrapped
-from zwerm.agents.sensor_coverage.frontier.plan import Plan
+from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import (
     AllSettled,
     AllStanding,
     Body,
-    Chain,
     LeaderReady,
     PushAborted,
     PushDone,
     PushMessage,
     PushToken,
-    SlotMemory,
     TakeSlot,
 )
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
-from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
+from zwerm.agents.sensor_coverage.motion.push_geometry import direction_to
+from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
+from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, WAVE_TICKS, PushPart
 
-# Bounds of the ticks to wait: for the token, for another robot's drive, for the leader to leave or to give up, for the
-# leader's neighbours to agree, for a robot out of range, and for this robot's neighbours to agree at the end.
-LINK_TICKS: Final = 1000
-WAVE_TICKS: Final = 600
-VACATED_TICKS: Final = 80
-ARMED_TICKS: Final = 300
-HOLD_TICKS: Final = 600
-LOST_TICKS: Final = 100
-CLOSE_TICKS: Final = 80
-TELL_TICKS: Final = 4
-# After VACATED_TICKS a follower checks this often [ticks] whether the leader's slot is vacant.
-VACANCY_PERIOD_TICKS: Final = 20
-# A leader that is visible within this angle [rad] of its slot's direction is still there, or back.
-BACK_RAD: Final = 0.3
+# A dead robot's body within this angle [rad] of a drive is expected to stop it, and within this angle of a drive that
+# something stopped without a touch it has stopped it.
+BODY_AHEAD_RAD: Final = 0.3
+BODY_BESIDE_RAD: Final = math.pi / 2.0
 
 
-class TokenPush:
-    """One robot's part in one push. `over` once it has ended; `end` is its last message, as far as this robot knows.
+class TokenPush(PushPart):
+    """One robot's part in one push: what it does on messages, at the end of drives, and at the end of a wait."""
 
-    `chain` are the robots of the push, rear to front, each with its slot before the push. `back` is the robot or base
-    that sent the token. `first`: no robot has left the base yet.
-    """
-
-    def __init__(
-        self,
-        situation: Situation,
-        announce_vacated: Callable[[int], None],
-        push: int,
-        fresh: int,
-        chain: Chain,
-        back: int | None,
-        first: bool = False,
-    ) -> None:
-        self.id = push
-        self.phase = "link"
-        self.over = False
-        self.end: Body | None = None
-        self._situation = situation
-        self._map = situation.local_map
-        self._announce_vacated = announce_vacated
-        self._since = situation.tick
-        self._fresh = fresh
-        self._chain = PushChain(chain, situation.node)
-        self._back = back if self._chain.is_rear else self._chain.behind
-        self._memory: SlotMemory | None = None
-        self._plan: Plan | None = None
-        self._first_bearings = list(FIRST_BEARINGS_RAD) if first else []
-        self._vacated = False
-        self._ahead_stands = self._behind_settled = False
-        self._result = DriveResult(True)
-        self._anchors: tuple[Sighting, ...] = ()
-        self._leader_epoch = -1
-        self._lost: dict[int, None] = {}  # robots that have restarted since this robot takes part
+    _situation: Situation
+    _map: LocalMap
 
     # --- events -------------------------------------------------------------------------------------------------------
 
@@ -188,11 +147,17 @@ class TokenPush:
         self._enter("deploying")
         parameters = self._map.parameters
         if self._first_bearings:
-            self._situation.deploy(self._first_bearings[0], parameters.hop_m, parameters.clear_m)
+            bearing_rad = self._first_bearings[0]
+            self._situation.deploy(bearing_rad, parameters.hop_m, self._clear_m(bearing_rad, parameters.clear_m))
         elif self._plan is not None:
             self._map.note_attempt(self._plan)
             bearing_rad = wrapped(self._plan.direction - self._heading)
-            self._situation.deploy(bearing_rad, self._plan.hop_m, self._plan.clear_m)
+            self._situation.deploy(bearing_rad, self._plan.hop_m, self._clear_m(bearing_rad, self._plan.clear_m))
+
+    def _clear_m(self, bearing_rad: float, wanted_m: float) -> float:
+        """Return how far [m] the leader has to get: less where a dead robot's body stands, which it sees past."""
+        in_the_way = self._situation.dead_ahead(bearing_rad, BODY_AHEAD_RAD)
+        return wanted_m if in_the_way is None else min(wanted_m, self._map.parameters.near_wall_m)
 
     def _deployed(self, result: DriveResult) -> None:
         if not result.ok:
@@ -210,7 +175,12 @@ class TokenPush:
     def _blocked(self, result: DriveResult) -> None:
         """End the push after a test drive that met a wall; the first robot tries its other bearings before."""
         if self._plan is not None:
-            self._map.note_failure(self._plan, result.driven_m)
+            bearing_rad = wrapped(self._plan.direction - self._heading)
+            body = None if result.touched else self._situation.dead_ahead(bearing_rad, BODY_BESIDE_RAD)
+            if body is None:
+                self._map.note_failure(self._plan, result.driven_m)
+            else:
+                self._map.note_obstruction(self._plan, result.driven_m, body)
         elif len(self._first_bearings) > 1:
             del self._first_bearings[0]
             self._deploy()
@@ -327,65 +297,15 @@ class TokenPush:
             self._write(self.end)
         self._enter("telling")
 
-    def _drop(self) -> None:
-        """End without telling: the robot behind is out of range, and finds out by itself."""
-        self._situation.mailbox.drop(self.id)
-        self.over = True
-
-    # --- conditions ---------------------------------------------------------------------------------------------------
-
-    @property
-    def _waited(self) -> int:
-        """Ticks since the present phase began."""
-        return self._situation.tick - self._since
-
-    @property
-    def _heading(self) -> float:
-        return self._map.heading or 0.0
-
-    def _wait_ticks(self, node: int | None) -> int:
-        """Return the ticks to wait for a robot of the chain: few if it is not visible and so out of range."""
-        if node in self._lost:
-            return 0
-        return WAVE_TICKS if node is not None and node in self._situation.bearings else LOST_TICKS
-
-    def _leader_is_back(self) -> bool:
-        """Return whether the leader stands at its slot after a later drive than it announced, or lost its memory."""
-        slot, leader = self._chain.leader
-        if leader in self._lost:
-            return True
-        state = self._map.states.get(leader)
-        return state is not None and not state.moving and state.slot == slot and state.epoch > self._leader_epoch
-
-    def _leader_is_gone(self) -> bool:
-        """Return whether the leader is not visible, or visible beside its slot: its announcement was lost."""
-        memory, (_, leader) = self._memory, self._chain.leader
-        if memory is None or leader not in self._situation.bearings:
-            return True
-        back_rad = direction_to(memory, self._chain.origin)
-        seen_rad = self._situation.bearings[leader] + self._heading
-        return back_rad is not None and angle_between(back_rad + math.pi, seen_rad) > BACK_RAD
-
-    def _vacancy_check_due(self) -> bool:
-        return self._waited > VACATED_TICKS and self._waited % VACANCY_PERIOD_TICKS == 1
-
-    # --- helpers ------------------------------------------------------------------------------------------------------
-
-    def _enter(self, phase: str) -> None:
-        self.phase, self._since = phase, self._situation.tick
-
     def _write(self, body: Body) -> None:
         """Write to the robot behind, or to the sender of the token."""
         if self._back is not None:
             self._situation.mailbox.write(self._back, body)
 
-    def _wake_after(self, ticks: int) -> int:
-        """Return the tick after `ticks` of this phase, or the next tick if that has passed."""
-        return max(self._situation.tick + 1, self._since + ticks + 1)
-
-    def _next_vacancy_check(self) -> int:
-        checks = self._waited // VACANCY_PERIOD_TICKS + 1
-        return self._since + max(VACATED_TICKS + 1, checks * VACANCY_PERIOD_TICKS + 1)
+    def _drop(self) -> None:
+        """End without telling: the robot behind is out of range, and finds out by itself."""
+        self._situation.mailbox.drop(self.id)
+        self.over = True
 
 
 class Phase(NamedTuple):
@@ -400,49 +320,16 @@ class Phase(NamedTuple):
     wake: Callable[[TokenPush], int] = lambda push: push._since + WAVE_TICKS + 1
 
 
-def _next_tick(push: TokenPush) -> int:
-    return push._situation.tick + 1
-
-
-def _wake_for_ahead(push: TokenPush) -> int:
-    return push._wake_after(push._wait_ticks(push._chain.ahead))
-
-
-def _wake_for_behind(push: TokenPush) -> int:
-    return push._wake_after(push._wait_ticks(push._chain.behind))
-
-
-def _waited_for_ahead(push: TokenPush) -> bool:
-    return push._waited > push._wait_ticks(push._chain.ahead)
-
-
-def _settled_behind(push: TokenPush) -> bool:
-    return push._behind_settled or push._waited > push._wait_ticks(push._chain.behind)
-
-
-def _may_offer(push: TokenPush) -> bool:
-    return push._situation.clear or push._waited > HOLD_TICKS
-
-
-def _may_finish(push: TokenPush) -> bool:
-    # Neighbours hear of the end of the leader's drive one tick later.
-    return (push._situation.clear and push._waited > push._chain.leads) or push._waited > CLOSE_TICKS
-
-
-def _out_of_range(push: TokenPush) -> bool:
-    return not push._chain.is_rear and push._waited > TELL_TICKS and push._back not in push._situation.bearings
-
-
 # fmt: off
 PHASES: Final[Mapping[str, Phase]] = {
     # The token passes on along the path.
     "link": Phase(((lambda push: push._waited > LINK_TICKS, TokenPush._finish),),
                   wake=lambda push: push._since + LINK_TICKS + 1),
     # Leader: wait until the local map is right, offer the slot, drive, and wait for the followers.
-    "holding": Phase(((_may_offer, TokenPush._offer),), wake=_next_tick),
+    "holding": Phase(((TokenPush._may_offer, TokenPush._offer),), wake=TokenPush._next_tick),
     "offering": Phase(),
     "deploying": Phase(arrived=TokenPush._deployed),
-    "out": Phase(((_settled_behind, TokenPush._correct),), wake=_wake_for_behind),
+    "out": Phase(((TokenPush._settled_behind, TokenPush._correct),), wake=TokenPush._wake_for_behind),
     "correcting": Phase(arrived=lambda push, _: push._settled()),
     # Follower of the leader: wait until the leader's slot is vacant.
     "armed": Phase(((lambda push: push._leader_is_back() or push._waited > ARMED_TICKS,
@@ -452,14 +339,15 @@ PHASES: Final[Mapping[str, Phase]] = {
     # Followers: let the next one come, drive, and wait until all ahead stand and all behind have settled.
     "calling": Phase(),
     "following": Phase(arrived=TokenPush._followed),
-    "there": Phase(((lambda push: push._ahead_stands or _waited_for_ahead(push), TokenPush._report_standing),),
-                   wake=_wake_for_ahead),
-    "standing": Phase(((_settled_behind, TokenPush._straighten),), wake=_wake_for_behind),
+    "there": Phase(((lambda push: push._ahead_stands or push._waited_for_ahead(), TokenPush._report_standing),),
+                   wake=TokenPush._wake_for_ahead),
+    "standing": Phase(((TokenPush._settled_behind, TokenPush._straighten),), wake=TokenPush._wake_for_behind),
     "straightening": Phase(arrived=lambda push, _: push._home()),
     "homing": Phase(arrived=lambda push, _: push._settled()),
-    "await": Phase(((_waited_for_ahead, lambda push: push.close(PushDone(push.id))),), wake=_wake_for_ahead),
+    "await": Phase(((TokenPush._waited_for_ahead, lambda push: push.close(PushDone(push.id))),),
+                   wake=TokenPush._wake_for_ahead),
     # All: wait until the view agrees with the neighbours, tell the robot behind, and end.
-    "closing": Phase(((_may_finish, TokenPush._finish),), wake=_next_tick),
-    "telling": Phase(((_out_of_range, TokenPush._drop),), wake=_next_tick),
+    "closing": Phase(((TokenPush._may_finish, TokenPush._finish),), wake=TokenPush._next_tick),
+    "telling": Phase(((TokenPush._out_of_range, TokenPush._drop),), wake=TokenPush._next_tick),
 }
 # fmt: on

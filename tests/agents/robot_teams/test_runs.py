@@ -88,6 +88,12 @@ def test_random_arenas_are_covered(count: int, seed: int) -> None:
     check(cover(team(count, arena, poses)))
 
 
+def test_a_wall_almost_parallel_to_a_slice_is_no_trap() -> None:
+    """Here the ends that sweeps and traces measure on one wall are 0.8 m apart."""
+    arena, poses = random_arena(13, 1)
+    check(cover(team(1, arena, poses)))
+
+
 def test_two_robots_are_faster_than_one_and_repeat_more() -> None:
     wide = {"polygon": [[0.0, 0.0], [14.0, 0.0], [14.0, 5.0], [0.0, 5.0]], "obstacles": []}
     poses = [[0.6, 4.0, 0.0], [1.55, 4.0, 0.0]]
@@ -123,6 +129,26 @@ def test_the_rest_covers_what_a_dead_robot_left(node: int, at_s: float) -> None:
 def test_a_partition_costs_no_coverage() -> None:
     partition = {"kind": "partition", "groups": [[0], [1, 2]], "at_s": 10.0, "for_s": 60.0}
     check(cover(team(3, faults=[partition])))
+
+
+def test_parts_that_never_hear_each_other_again_are_each_complete_and_nobody_is_a_wreck() -> None:
+    partition = {"kind": "partition", "groups": [[0], [1, 2]], "at_s": 10.0, "for_s": 2000.0}
+    check(cover(team(3, faults=[partition])))
+
+
+@pytest.mark.parametrize("node", [0, 1])
+def test_a_robot_that_stood_still_for_a_minute_is_taken_in_again(node: int) -> None:
+    """Others may take it for a wreck meanwhile; the run ends only with its own certificate, after it returned."""
+    found = cover(team(2, faults=[{"kind": "pause", "nodes": [node], "at_s": 10.0, "for_s": 60.0}]))
+    check(found)
+    assert found.time_s > 70.0
+
+
+def test_a_robot_that_lost_its_memory_is_taken_in_again() -> None:
+    result = run(team(2, faults=[{"kind": "restart", "nodes": [1], "at_s": 15.0}]), 1, "inline")
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] >= 0.999
+    assert result.restarted == [1]
 
 
 def test_two_teams_that_meet_head_on_in_a_slice_dance_around_each_other_and_finish_it() -> None:

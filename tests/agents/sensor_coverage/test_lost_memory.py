@@ -198,6 +198,21 @@ def test_robots_that_die_are_replaced_and_do_not_keep_the_run_from_ending() -> N
     assert is_covered(result)
 
 
+def test_a_body_in_a_passage_that_nobody_can_look_behind_is_a_frontier() -> None:
+    """The first robot of a single file dies, and no other robot gets past its body."""
+    passage = ("arena.size_m=[4.4,0.22]", "base.pose=[0.2,0.11,0.0]", "robots.count=10", "services.path=gradient")
+    result = with_faults(passage, '{kind="crash", nodes=[1], at_s=34.0}')
+    assert result.metrics["reachable_coverage_fraction"] < 0.98
+    assert result.outcome == "failed"
+    assert "cut-off" in result.reason
+    assert result.metrics["concluded_early"] == 0.0
+
+
+def test_a_swarm_in_a_corridor_that_a_death_has_parted_is_joined_again() -> None:
+    corridor = ("arena.size_m=[4.0,0.5]", "base.pose=[0.2,0.25,0.0]", "robots.count=12", "services.path=gradient")
+    assert is_covered(with_faults(corridor, '{kind="crash", nodes=[3], at_s=60.0}'))
+
+
 def test_the_base_waits_for_robots_that_it_does_not_hear() -> None:
     """It hears nobody for four minutes; then the others are there as before."""
     result = with_faults(SMALL, '{kind="partition", groups=[[0]], at_s=30.0, for_s=240.0}')

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import typer
 
 from zwerm.cli.options import Json, ScenarioName, Seed, Sets
-from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, errors_as_lines, out
+from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, errors_as_lines, out, print_json
 
 
 def twin(
@@ -40,7 +40,7 @@ def twin(
             loaded,
             seed,
             Transports(transport).chosen(),
-            as_json,
+            print_json if as_json else None,
             out,
             err,
             lambda name: RunProgress(err, name, quiet=as_json),

@@ -1,0 +1,171 @@
+"""What one robot of a push knows of it, and the conditions under which it goes on: who stands, and how long it waits.
+
+A robot of the chain that is out of range, has lost its memory, or is dead does not keep the others: each waiting time has
+a bound.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Final, Protocol
+
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between
+from zwerm.agents.sensor_coverage.frontier.plan import Plan
+from zwerm.agents.sensor_coverage.messages.commands import Sighting
+from zwerm.agents.sensor_coverage.messages.pushes import Body, Chain, SlotMemory
+from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
+from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
+from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
+from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
+
+# Bounds of the ticks to wait: for the token, for another robot's drive, for the leader to leave or to give up, for the
+# leader's neighbours to agree, for a robot out of range, and for this robot's neighbours to agree at the end.
+LINK_TICKS: Final = 1000
+WAVE_TICKS: Final = 600
+VACATED_TICKS: Final = 80
+ARMED_TICKS: Final = 300
+HOLD_TICKS: Final = 600
+LOST_TICKS: Final = 100
+CLOSE_TICKS: Final = 80
+TELL_TICKS: Final = 4
+# After VACATED_TICKS a follower checks this often [ticks] whether the leader's slot is vacant.
+VACANCY_PERIOD_TICKS: Final = 20
+# A leader that is visible within this angle [rad] of its slot's direction is still there, or back.
+BACK_RAD: Final = 0.3
+
+
+class Surroundings(Protocol):
+    """The part of a robot's situation that its part in a push depends on."""
+
+    @property
+    def node(self) -> int:
+        """The robot's id."""
+
+    @property
+    def tick(self) -> int:
+        """The number of the current tick."""
+
+    @property
+    def bearings(self) -> Mapping[int, float]:
+        """Bearings [rad] of the visible robots that are not declared dead."""
+
+    @property
+    def clear(self) -> bool:
+        """Whether the robot stands still, has averaged bearings, and no slot around it changes hands."""
+
+    @property
+    def local_map(self) -> NeighbourTable:
+        """The robot's neighbours."""
+
+
+class PushPart:
+    """The state of one robot's part in one push. `over` once it has ended; `end` is its last message, as far as known.
+
+    `chain` are the robots of the push, rear to front, each with its slot before the push. `back` is the robot or base
+    that sent the token. `first`: no robot has left the base yet.
+    """
+
+    def __init__(
+        self,
+        situation: Surroundings,
+        announce_vacated: Callable[[int], None],
+        push: int,
+        fresh: int,
+        chain: Chain,
+        back: int | None,
+        first: bool = False,
+    ) -> None:
+        self.id = push
+        self.phase = "link"
+        self.over = False
+        self.end: Body | None = None
+        self._situation: Surroundings = situation
+        self._map: NeighbourTable = situation.local_map
+        self._announce_vacated = announce_vacated
+        self._since = situation.tick
+        self._fresh = fresh
+        self._chain = PushChain(chain, situation.node)
+        self._back = back if self._chain.is_rear else self._chain.behind
+        self._memory: SlotMemory | None = None
+        self._plan: Plan | None = None
+        self._first_bearings = list(FIRST_BEARINGS_RAD) if first else []
+        self._vacated = False
+        self._ahead_stands = self._behind_settled = False
+        self._result = DriveResult(True)
+        self._anchors: tuple[Sighting, ...] = ()
+        self._leader_epoch = -1
+        self._lost: dict[int, None] = {}  # robots that have restarted since this robot takes part
+
+    # --- conditions ---------------------------------------------------------------------------------------------------
+
+    @property
+    def _waited(self) -> int:
+        """Ticks since the present phase began."""
+        return self._situation.tick - self._since
+
+    @property
+    def _heading(self) -> float:
+        return self._map.heading or 0.0
+
+    def _wait_ticks(self, node: int | None) -> int:
+        """Return the ticks to wait for a robot of the chain: few if it is not visible and so out of range."""
+        if node in self._lost:
+            return 0
+        return WAVE_TICKS if node is not None and node in self._situation.bearings else LOST_TICKS
+
+    def _leader_is_back(self) -> bool:
+        """Return whether the leader stands at its slot after a later drive than it announced, or lost its memory."""
+        slot, leader = self._chain.leader
+        if leader in self._lost:
+            return True
+        state = self._map.states.get(leader)
+        return state is not None and not state.moving and state.slot == slot and state.epoch > self._leader_epoch
+
+    def _leader_is_gone(self) -> bool:
+        """Return whether the leader is not visible, or visible beside its slot: its announcement was lost."""
+        memory, (_, leader) = self._memory, self._chain.leader
+        if memory is None or leader not in self._situation.bearings:
+            return True
+        back_rad = direction_to(memory, self._chain.origin)
+        seen_rad = self._situation.bearings[leader] + self._heading
+        return back_rad is not None and angle_between(back_rad + math.pi, seen_rad) > BACK_RAD
+
+    def _vacancy_check_due(self) -> bool:
+        return self._waited > VACATED_TICKS and self._waited % VACANCY_PERIOD_TICKS == 1
+
+    # --- phases ------------------------------------------------------------------------------------------------------
+
+    def _enter(self, phase: str) -> None:
+        self.phase, self._since = phase, self._situation.tick
+
+    def _wake_after(self, ticks: int) -> int:
+        """Return the tick after `ticks` of this phase, or the next tick if that has passed."""
+        return max(self._situation.tick + 1, self._since + ticks + 1)
+
+    def _next_vacancy_check(self) -> int:
+        checks = self._waited // VACANCY_PERIOD_TICKS + 1
+        return self._since + max(VACATED_TICKS + 1, checks * VACANCY_PERIOD_TICKS + 1)
+
+    def _next_tick(self) -> int:
+        return self._situation.tick + 1
+
+    def _wake_for_ahead(self) -> int:
+        return self._wake_after(self._wait_ticks(self._chain.ahead))
+
+    def _wake_for_behind(self) -> int:
+        return self._wake_after(self._wait_ticks(self._chain.behind))
+
+    def _waited_for_ahead(self) -> bool:
+        return self._waited > self._wait_ticks(self._chain.ahead)
+
+    def _settled_behind(self) -> bool:
+        return self._behind_settled or self._waited > self._wait_ticks(self._chain.behind)
+
+    def _may_offer(self) -> bool:
+        return self._situation.clear or self._waited > HOLD_TICKS
+
+    def _may_finish(self) -> bool:
+        # Neighbours hear of the end of the leader's drive one tick later.
+        return (self._situation.clear and self._waited > self._chain.leads) or self._waited > CLOSE_TICKS
+
+    def _out_of_range(self) -> bool:
+        return not self._chain.is_rear and self._waited > TELL_TICKS and self._back not in self._situation.bearings
