@@ -33,7 +33,7 @@ class Unlocked(LeaveLock):
         return self.wants and self._stands and self.redundant()
 
 
-class Patience:
+class RequestPacing:
     """Back-off between a robot's attempts to leave: the interval grows until the robot leaves."""
 
     def __init__(self, random: np.random.Generator) -> None:
@@ -184,7 +184,7 @@ def freed_by_neighbours(
     random = np.random.Generator(np.random.Philox(seed))
     radio = Radio(random, loss, delay_ticks=1, copies=0.0)
     robots = {node: LeaveLock(node, LEASE_S, -LEASE_S) for node in lists}
-    patience = {node: Patience(random) for node in lists}
+    pacing = {node: RequestPacing(random) for node in lists}
     left: list[int] = []
     tick = last = 0
     while tick - last < 1_500:
@@ -211,7 +211,7 @@ def freed_by_neighbours(
                 left.append(node)
                 last = tick
                 del robots[node]
-            elif (tick + node) % 3 == 0 if robot.wants else robot.redundant() and patience[node].is_over(tick):
+            elif (tick + node) % 3 == 0 if robot.wants else robot.redundant() and pacing[node].is_over(tick):
                 outbox = robot.request(now_s)
             radio.send(tick, node, around, outbox)
         tick += 1

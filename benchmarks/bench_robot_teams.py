@@ -155,7 +155,7 @@ def measure(arena: str, setting: str, robots: int, seed: int) -> dict[str, str]:
 def summary(rows: Sequence[dict[str, str]]) -> Iterator[dict[str, str]]:
     """Return one row for each arena, setting and number of robots: the worst coverage, and means over the runs.
 
-    `time_over_one_robot` and `time_over_none` are medians, of pairs of runs of the same seed.
+    The time over one robot's, and over the undisturbed team's, are medians over pairs of runs of the same seed.
     """
     times = {key(row): float(row["completion_time_s"]) for row in rows}
 
@@ -175,16 +175,15 @@ def summary(rows: Sequence[dict[str, str]]) -> Iterator[dict[str, str]]:
             "robots": str(robots),
             "runs": str(len(runs)),
             "completed": str(sum(run["outcome"] == "completed" for run in runs)),
-            "coverage_least": f"{min(float(run['coverage_fraction']) for run in runs):.4f}",
-            "coverage_below_0.999": str(sum(float(run["coverage_fraction"]) < 0.999 for run in runs)),
-            "gap_least_m": f"{min(gaps):.3f}" if gaps else "",
-            "time_s": f"{np.mean([float(run['completion_time_s']) for run in runs]):.0f}",
-            "time_over_one_robot": f"{np.median(alone):.2f}" if alone else "",
-            "time_over_none": f"{np.median(calm):.2f}" if calm and setting else "",
-            "time_over_lower_bound": f"{np.mean([times[key(r)] / b for r, b in zip(runs, bound, strict=True)]):.2f}",
-            "repeat_coverage": f"{np.mean([float(run['repeat_coverage_fraction']) for run in runs]):.2f}",
-            "messages_per_robot": f"{np.mean([int(run['messages']) for run in runs]) / robots:.0f}",
-            "real_time_factor": f"{np.median([times[key(r)] / float(r['processor_s']) for r in runs]):.0f}",
+            "least coverage": f"{min(float(run['coverage_fraction']) for run in runs):.4f}",
+            "least gap [m]": f"{min(gaps):.3f}" if gaps else "",
+            "time [s]": f"{np.mean([float(run['completion_time_s']) for run in runs]):.0f}",
+            "time / one robot's": f"{np.median(alone):.2f}" if alone else "",
+            "time / undisturbed": f"{np.median(calm):.2f}" if calm and setting else "",
+            "time / lower bound": f"{np.mean([times[key(r)] / b for r, b in zip(runs, bound, strict=True)]):.2f}",
+            "repeat coverage": f"{np.mean([float(run['repeat_coverage_fraction']) for run in runs]):.2f}",
+            "messages per robot": f"{np.mean([int(run['messages']) for run in runs]) / robots:.0f}",
+            "times real time": f"{np.median([times[key(r)] / float(r['processor_s']) for r in runs]):.0f}",
         }
 
 

@@ -72,8 +72,8 @@ class Explorer:
         self.kind = kind
         self._objects: list[LeaveLock] = []
         self._numbers: dict[Any, int] = {}
-        self._letters: list[tuple[int, int, LockProtocolMessage]] = []
-        self._letter_numbers: dict[Any, int] = {}
+        self._messages: list[tuple[int, int, LockProtocolMessage]] = []
+        self._message_numbers: dict[Any, int] = {}
         self._done: dict[Any, tuple[int, tuple[Any, ...]]] = {}
         self._useless: dict[tuple[int, int], bool] = {}
         self._bare: dict[int, int] = {}
@@ -118,7 +118,7 @@ class Explorer:
 
     def _events(self, state: State) -> Iterator[State]:
         for number in bits(state.sent):
-            sender, receiver, message = self._letters[number]
+            sender, receiver, message = self._messages[number]
             if not self._only_forbids(state, sender, receiver, message):
                 yield self._after(state, receiver, "receive", sender, message)
         for node in self.graph:
@@ -195,7 +195,7 @@ class Explorer:
     def _after(self, state: State, node: int, event: str, *what: Any) -> State:
         number, sent = self._try(state, node, event, *what)
         robots = [*state.robots[:node], number, *state.robots[node + 1 :]]
-        letters = state.sent
+        messages = state.sent
         for to, message in sent:
             for receiver in self._graph(state)[node] if to is None else (to,):
                 if isinstance(message, LockGrant):
@@ -204,8 +204,8 @@ class Explorer:
                 if isinstance(message, NeighbourList):
                     message = NeighbourList(message.version, message.listed)
                 if not isinstance(message, LockDenial):
-                    letters |= 1 << self._letter(node, receiver, message)
-        return state._replace(robots=tuple(robots), sent=letters)
+                    messages |= 1 << self._message(node, receiver, message)
+        return state._replace(robots=tuple(robots), sent=messages)
 
     def _forgotten(self, state: State) -> State:
         """Return the state without messages that cannot matter any more."""
@@ -216,7 +216,7 @@ class Explorer:
         )
         left = 0
         for number in bits(state.sent):
-            sender, receiver, message = self._letters[number]
+            sender, receiver, message = self._messages[number]
             if self._still_matters(state, sender, receiver, message):
                 key = number, robots[receiver]
                 if key not in self._useless:
@@ -257,11 +257,11 @@ class Explorer:
                 return known is not None and message.version <= known.version
         return False
 
-    def _letter(self, *letter: Any) -> int:
-        if letter not in self._letter_numbers:
-            self._letter_numbers[letter] = len(self._letters)
-            self._letters.append(letter)
-        return self._letter_numbers[letter]
+    def _message(self, *sent: Any) -> int:
+        if sent not in self._message_numbers:
+            self._message_numbers[sent] = len(self._messages)
+            self._messages.append(sent)
+        return self._message_numbers[sent]
 
     def _try(self, state: State, node: int, event: str, *what: Any) -> tuple[int, tuple[Any, ...]]:
         return self._step(state.robots[node], state.now, self._in_sight(state, node), event, *what)

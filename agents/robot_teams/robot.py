@@ -130,7 +130,7 @@ class TeamRobot(Controller):
         self._watch(senses)
         membership = self.membership
         if tick == round(MUSTER_S / self.setup.dt_s):
-            membership.muster(tick)
+            membership.meet_first(tick)
         membership.poll(tick)
         if membership.view != self._view:
             self._view = membership.view

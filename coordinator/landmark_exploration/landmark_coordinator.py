@@ -99,7 +99,7 @@ class _Robot:
     landmarks: tuple[int, ...] = ()
     entries: int = 0
     consider_at: int = 0
-    patience_ticks: int = RETRY_TICKS
+    retry_ticks: int = RETRY_TICKS
 
 
 class LandmarkCoordinator:
@@ -268,10 +268,10 @@ class LandmarkCoordinator:
         """
         if choice is None:
             robot = self._robots[node]
-            robot.consider_at = self._tick + robot.patience_ticks
-            robot.patience_ticks = min(2 * robot.patience_ticks, RETRY_TICKS_MAX)
+            robot.consider_at = self._tick + robot.retry_ticks
+            robot.retry_ticks = min(2 * robot.retry_ticks, RETRY_TICKS_MAX)
             if cut_off and (robot.task is None or (robot.task.key is None and not robot.task.walk)):
-                self._order(node, ExplorationTask(None, walk=True), patience=robot.patience_ticks)
+                self._order(node, ExplorationTask(None, walk=True), retry_ticks=robot.retry_ticks)
             return
         status = ABANDONED if self.map.frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
         self._order(node, ExplorationTask(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status))
@@ -323,10 +323,10 @@ class LandmarkCoordinator:
             for node, robot in robots.items()
         )
 
-    def _order(self, node: int, task: ExplorationTask, patience: int = RETRY_TICKS) -> None:
+    def _order(self, node: int, task: ExplorationTask, retry_ticks: int = RETRY_TICKS) -> None:
         robot = self._robots[node]
         robot.order += 1
-        robot.task, robot.free, robot.patience_ticks = task, False, patience
+        robot.task, robot.free, robot.retry_ticks = task, False, retry_ticks
         self._say(node, robot)
 
     def _say(self, node: int, robot: _Robot) -> None:

@@ -29,7 +29,7 @@ from zwerm.wire.messages import MESSAGE_BYTES_MAX, Packet, Transmission, Wake
 T = TypeVar("T")
 Routine = Generator[Wake, None, T]
 # A robot and its answer.
-Letter = tuple[int, Answer]
+ReceivedAnswer = tuple[int, Answer]
 
 # If this many robots, and this fraction of all, fall silent together, the radio is jammed: wait longer by this factor.
 JAMMED_MIN: Final = 3
@@ -79,7 +79,7 @@ class CommandMailbox:
         self._incarnation = incarnation
         self._dt_s = dt_s
         self._ticks = survey_ticks, drive_ticks
-        self._unread: list[Letter] = []
+        self._unread: list[ReceivedAnswer] = []
         self._outbox: list[Transmission] = []
         self._pending: dict[int, _PendingRequest] = {}
         self._number: dict[int, int] = {}
@@ -148,8 +148,8 @@ class CommandMailbox:
         jammed = silent >= max(JAMMED_MIN, JAMMED_FRACTION * len(self.incarnations))
         if pending.heard and pending.tries <= 2:
             return waited >= STUCK_FACTOR * pending.ticks_max
-        patience = pending.ticks_max * (JAMMED_FACTOR if jammed else 1)
-        return waited >= patience and pending.tries >= self.retry_policy.tries_max
+        limit = pending.ticks_max * (JAMMED_FACTOR if jammed else 1)
+        return waited >= limit and pending.tries >= self.retry_policy.tries_max
 
     # --- sending ----------------------------------------------------------------------------------------------------
 
@@ -266,7 +266,7 @@ class CommandMailbox:
 
     # --- waiting ----------------------------------------------------------------------------------------------------
 
-    def take_unread(self) -> list[Letter]:
+    def take_unread(self) -> list[ReceivedAnswer]:
         """Return and drop the answers that no routine has taken."""
         unread, self._unread = self._unread, []
         return unread
@@ -275,7 +275,7 @@ class CommandMailbox:
         """Wait until each robot has given an answer of these types or was given up; return the answers by robot."""
         found: dict[int, Answer] = {}
         while True:
-            unread: list[Letter] = []
+            unread: list[ReceivedAnswer] = []
             for node, answer in self._unread:
                 if node in nodes and node not in found and isinstance(answer, kinds):
                     found[node] = answer
@@ -288,7 +288,7 @@ class CommandMailbox:
 
     def first(
         self, wanted: Callable[[int, Answer], bool], node: int, ticks: int | None = None
-    ) -> Routine[Letter | None]:
+    ) -> Routine[ReceivedAnswer | None]:
         """Wait for the first wanted answer, until the request to `node` has ended, or for `ticks`."""
         until_s = None if ticks is None else self.now_s + ticks * self._dt_s
         while True:

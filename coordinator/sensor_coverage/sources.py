@@ -79,13 +79,13 @@ class Sources:
     def _release_one(self, station: int, cycle: int) -> Routine[int | None]:
         """Release a robot, and return it once it has reported; None if no robot came out, or it died."""
         self._mailbox.send(station, Release(cycle))
-        letter = yield from self._mailbox.first(
+        received = yield from self._mailbox.first(
             lambda node, answer: self._is_new(node, answer) or (node == station and isinstance(answer, Released)),
             station,
         )
-        if letter is None:
+        if received is None:
             return None
-        robot, answer = letter
+        robot, answer = received
         if isinstance(answer, Released):
             if answer.robot is None:
                 return None
@@ -97,20 +97,20 @@ class Sources:
 
     def _first_report(self, robot: int, cycle: int) -> Routine[int | None]:
         """Wait until a released robot reports, and ask it if its report may have been lost."""
-        letter = None
+        received = None
         if not self._mailbox.retry_policy.lossy:
-            letter = yield from self._mailbox.first(
+            received = yield from self._mailbox.first(
                 lambda node, answer: node == robot and isinstance(answer, Emerged), robot, EMERGENCE_TICKS_MAX
             )
-        if letter is None:
+        if received is None:
             self._mailbox.send(robot, ScanRequest(cycle, ()))
-            letter = yield from self._mailbox.first(
+            received = yield from self._mailbox.first(
                 lambda node, answer: node == robot and isinstance(answer, Emerged | Report), robot
             )
-        if letter is None:
+        if received is None:
             return None
         self._mailbox.cancel(robot)
-        answer = letter[1]
+        answer = received[1]
         return self._admit(robot, answer.sightings or () if isinstance(answer, Emerged | Report) else ())
 
     def _admit(self, robot: int, sightings: Collection[Sighting]) -> int:

@@ -28,7 +28,7 @@ class CoordinatedMembership(Membership):
             if self.node in view.members and later(view, self.view):
                 self._adopt(view, tick)
 
-    def muster(self, tick: int) -> None:
+    def meet_first(self, tick: int) -> None:
         """Wait for the coordinator's view."""
 
     def poll(self, tick: int) -> None:

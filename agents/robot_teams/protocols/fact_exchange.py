@@ -53,8 +53,8 @@ class FactExchange:
         # Everything that came after the newest count that is old enough.
         old = self._told[0][1] if self._told[0][0] <= tick - self._new_ticks else 0
         send = facts.since(old)
-        owing = any(tick - since >= self._different_ticks for since in self._differs_since.values())
-        if owing and tick - self._all_tick >= self._all_every_ticks:
+        pending = any(tick - since >= self._different_ticks for since in self._differs_since.values())
+        if pending and tick - self._all_tick >= self._all_every_ticks:
             self._all_tick = tick
             send = facts.since(0)
             if len(send) > FACTS_MAX:

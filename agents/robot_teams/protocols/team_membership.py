@@ -95,7 +95,7 @@ class Membership:
         """Tell whether facts and plans of a sender are taken over: those of teammates are."""
         return sender in self.view.members
 
-    def muster(self, tick: int) -> None:
+    def meet_first(self, tick: int) -> None:
         """Found the first team: the smallest of all robots that hear each other at the start leads them."""
         heard = sorted(self.roster.statuses.keys() | {self.node})
         if heard[0] == self.node and len(heard) > 1 and self.view.epoch == 1:
@@ -178,8 +178,8 @@ class Membership:
         status, own = self.roster.statuses.get(node), self.view
         if status is None or status.team == (own.epoch, own.lead):
             return False
-        patience = self._left_ticks if status.team[0] > own.epoch else self._silence_ticks
-        return tick - self._since > patience
+        limit = self._left_ticks if status.team[0] > own.epoch else self._silence_ticks
+        return tick - self._since > limit
 
     _since = 0
 

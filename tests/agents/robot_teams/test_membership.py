@@ -29,7 +29,7 @@ class Team:
                 for receiver in range(count):
                     self.deliver(self.beacon(sender), receiver, near=False)
             for robot in self.robots:
-                robot.muster(0)
+                robot.meet_first(0)
             self.heal(2)
 
     def beacon(self, node: int) -> Beacon:

@@ -52,7 +52,7 @@ def drive(scenario: Scenario) -> tuple[str, World, list[LocalRobot], dict[str, f
     return driver.run(), world, out(), measure(world, observers)
 
 
-# --- words and letters ----------------------------------------------------------------------------------------------
+# --- segments and acknowledgements --------------------------------------------------------------------------------------
 
 
 def test_a_corrupt_message_is_ignored() -> None:

@@ -45,6 +45,13 @@ def test_without_the_uplink_nothing_is_called_complete() -> None:
     assert result.metrics["certificate_satisfied"] == 0.0
 
 
+def test_the_trace_is_the_same_inline_and_in_processes_and_another_with_another_seed(nothing_left: None) -> None:
+    scenario = hall(2, uplink={"loss": 0.3}, time={"dt_s": 0.05, "duration_s": 10.0})
+    inline = run(scenario, 1, "inline")
+    assert run(scenario, 1, "processes").trace == inline.trace
+    assert run(scenario, 2, "inline").trace != inline.trace
+
+
 # --- membership -------------------------------------------------------------------------------------------------------
 
 COORDINATOR = 3

@@ -274,8 +274,8 @@ class Swarm:
             advice.update(tick, standing)
             for _, report in advice.outgoing():
                 self.send(tick, node, None, write(report))
-            for to, letter in leaving.outgoing():
-                self.air += [(node, each, letter) for each in (sight if to is None else [to])]
+            for to, message in leaving.outgoing():
+                self.air += [(node, each, message) for each in (sight if to is None else [to])]
 
     def leave(self, node: int, tick: int) -> None:
         there = {
