@@ -26,6 +26,8 @@ T = TypeVar("T")
 
 PRIVATE_FILE_MODE: Final = 0o600
 SECRET_BYTES: Final = 24
+PENDING_MAX: Final = 4_000
+ACCEPT_TIMEOUT_MS: Final = 5_000
 
 # The router discards a longer message. The receiver refuses and counts messages between MESSAGE_BYTES_MAX and this size.
 _MESSAGE_BYTES_MAX: Final = 16 * MESSAGE_BYTES_MAX
@@ -89,7 +91,9 @@ def router_settings(
     return {
         "listen/endpoints": endpoints,
         "listen/exit_on_failure": True,
-        "transport/unicast/accept_pending": 2 * capacity + 100,
+        # Connections that say nothing must not keep nodes from joining: many may wait, and none for long.
+        "transport/unicast/accept_pending": 2 * capacity + PENDING_MAX,
+        "transport/unicast/accept_timeout": ACCEPT_TIMEOUT_MS,
         "transport/unicast/max_sessions": 2 * capacity + 100,
         "transport/auth/usrpwd/dictionary_file": str(dictionary),
         "transport/link/rx/max_message_size": _MESSAGE_BYTES_MAX,

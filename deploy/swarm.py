@@ -12,11 +12,14 @@ import socket
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple, Self
 
+import msgspec
+
 from zwerm.agents.runtime.contract import Setup
+from zwerm.agents.runtime.controllers import code_of
 from zwerm.deploy.authority import certify
 from zwerm.deploy.endpoints import host_of, is_encrypted
 from zwerm.deploy.identity import WorldIdentity, WorldKeys, issue, renew, router_settings, save, slice_of
@@ -29,7 +32,7 @@ from zwerm.deploy.supervisor import (
     interrupts_held,
     prepare,
 )
-from zwerm.errors import LinkError
+from zwerm.errors import ControllerError, LinkError
 from zwerm.link.admission import ExpectedNode
 from zwerm.link.peer_radio import Station
 from zwerm.link.session import LEASE_REMOTE_S, UNIX_PROTOCOL, Credential, Credentials, close_without_waiting
@@ -251,6 +254,10 @@ class RemoteSwarm(_Swarm):
             self._stack.callback(self._credentials_file.unlink, missing_ok=True)
         self._stack.callback(self._end)
 
+    def _member(self, credential: Credential) -> ExpectedNode:
+        controller, _ = self._members[credential.node]
+        return msgspec.structs.replace(super()._member(credential), code=cached_code(controller))
+
     def _take_credentials(self) -> WorldIdentity | None:
         """Set the credentials, and return the identity for TLS and QUIC, if an endpoint needs one."""
         if self._keys is not None:
@@ -287,6 +294,15 @@ class RemoteSwarm(_Swarm):
         count = len(self.link.joined)
         while count and self.link.wait_joined(partial(_changed, count), LEAVE_PATIENCE_S):
             count = len(self.link.joined)
+
+
+@cache
+def cached_code(controller: str) -> str:
+    """Return the digest of a controller's file, read once: hosts that run other code are refused."""
+    try:
+        return code_of(controller)
+    except ControllerError:  # each node reports it
+        return ""
 
 
 def _changed(count: int, joined: Collection[int]) -> bool:

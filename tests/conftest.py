@@ -3,6 +3,7 @@
 import multiprocessing.util
 import shutil
 import signal
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,8 +21,16 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(autouse=True)
-def _robots_importable(monkeypatch: pytest.MonkeyPatch) -> None:
+def _robots_importable(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let tests import robots, and forget what a test has imported from its temporary folder.
+
+    Another test may write a module of the same name, which would be refused as mixed up with the first.
+    """
     monkeypatch.syspath_prepend(str(ROBOTS))
+    yield
+    for name, module in list(sys.modules.items()):
+        if "/pytest-of-" in (getattr(module, "__file__", None) or ""):
+            del sys.modules[name]
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ The world is deterministic: its state after a tick is a function of the scenario
 """
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -44,6 +45,10 @@ from zwerm.world.tick.wakes import WakeEvent, Wakes
 Send = Callable[[int, bytes], object]
 
 
+# A node with this many refused messages is given up: a sound program has none, and each costs the world time.
+FLOOD: Final = 1_000
+
+
 class World:
     """One run's world. Every robot carries the `sensors`; `seed` keys all randomness.
 
@@ -67,6 +72,7 @@ class World:
         self.intake = CommandIntake(self.bodies.drives.kind, scenario.robots.body.kind, fixed, self.medium)
         self.telemetry = TelemetrySink(dt_s)
         self.trace = Trace()
+        self.on_flood: Callable[[int], object] = lambda node: None  # stops the messages of a node that floods the world
         self.place_of: Callable[[int], str] = lambda node: (
             ""
         )  # where a node's controller answers: " (file.py:12, in C.step)"
@@ -145,11 +151,15 @@ class World:
         raised has crashed. So has one whose answer is refused: it gives no other.
         """
         if node in self.status.crashed:  # a program that the run has given up acts for no body
-            self.intake.refused["crashed"] += 1
+            self.intake.note_refusal(node, "crashed")
             raise ProtocolError("crashed", f"node {node} crashed at tick {self.status.crash_ticks[node]}")
         try:
             answer = self.intake.accept(node, payload, late_allowed)
         except ProtocolError as error:
+            if self.intake.refused_by[node].total() == FLOOD:
+                self.bodies.advance_early()
+                self.crash(node, f"flood: {FLOOD} of its messages were refused, the last one as {error}")
+                self.on_flood(node)
             if error.stray or not (late_allowed or self.intake.is_pending(node)):
                 raise
             reason = f"its command was refused: {error}{self.place_of(node)}"
@@ -200,9 +210,9 @@ class World:
         """Stop a robot's motors until its next command."""
         self.bodies.stop(node)
 
-    def refuse_stale(self) -> None:
+    def refuse_stale(self, node: int) -> None:
         """Count a message that a former incarnation of a node sent."""
-        self.intake.refused["stale-incarnation"] += 1
+        self.intake.note_refusal(node, "stale-incarnation")
 
     # --- the truth --------------------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 import inspect
 import traceback
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,15 @@ def make(name: str, setup: Setup) -> Stepper:
         where = f"{last.filename}:{last.lineno}"
         raise ControllerError(f"{name}: its constructor raised {type(error).__name__}: {error} ({where})") from error
     return controller
+
+
+def code_of(name: str) -> str:
+    """Return a digest of the file that defines a controller, or "" where it has none. Raises ControllerError."""
+    try:
+        file = inspect.getsourcefile(find(name))
+    except TypeError:
+        return ""
+    return "" if file is None else blake2b(Path(file).read_bytes(), digest_size=16).hexdigest()
 
 
 def step_place(found: type[Any]) -> str:

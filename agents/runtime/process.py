@@ -27,6 +27,7 @@ import msgspec
 import uvloop
 
 from zwerm.agents.runtime.contract import Setup
+from zwerm.agents.runtime.controllers import code_of
 from zwerm.agents.runtime.node import Node
 from zwerm.errors import ControllerError, ZwermError
 from zwerm.link.node_link import ZenohNodeLink
@@ -211,6 +212,8 @@ async def run_node(
 
 def _node(welcome: Welcome, radio: PeerRadio | None, on_failure: Callable[[], object]) -> Node:
     """Make the node that the world describes. Raises ControllerError if the controller is not found."""
+    if welcome.code and code_of(welcome.controller) != welcome.code:
+        raise ControllerError(f"{welcome.controller}: its file here differs from the world's; install the same on both")
     node = Node(welcome.controller, msgspec.msgpack.decode(welcome.setup, type=Setup), on_failure)
     if radio is not None:
         node.use_radio(radio)

@@ -115,7 +115,7 @@ def test_json_prints_one_object_with_exactly_the_documented_keys(tmp_path: Path)
     found = json.loads(ran.stdout)
     assert list(found) == [
         "scenario", "seed", "runner", "outcome", "trace", "ticks", "sim_s", "wall_s", "robots", "robot_ticks", "metrics",
-        "radio", "middleware_lost", "nodes", "faults",
+        "radio", "middleware_lost", "nodes", "faults", "refused",
     ]  # fmt: skip
     assert (found["scenario"], found["seed"], found["runner"]) == ("computation-free", 2, "inline")
     assert (found["outcome"], found["ticks"], found["sim_s"], found["robot_ticks"]) == ("time-limit", 10, 1.0, 250)

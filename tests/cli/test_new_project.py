@@ -13,7 +13,8 @@ from zwerm.cli.project_files import FILES
 from zwerm.scenario.load import built_in
 from zwerm.study.study_tables import built_in as built_in_studies
 
-SCREEN = (24, 80)
+# Lines and columns of a small window. There is room for some more scenarios.
+SCREEN = (30, 80)
 
 
 def test_a_new_project_runs_and_its_tests_pass(tmp_path: Path) -> None:

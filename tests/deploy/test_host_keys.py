@@ -9,6 +9,7 @@ import msgspec
 import pytest
 from command_line import zwerm
 from network import free_port, tick
+from support import until
 
 from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.endpoints import check_encryption
@@ -18,8 +19,10 @@ from zwerm.deploy.remote import parse_ids, run_robots
 from zwerm.deploy.supervisor import prepare
 from zwerm.deploy.swarm import RemoteSwarm
 from zwerm.errors import LinkError
+from zwerm.link.admission import ExpectedNode
 from zwerm.link.node_link import ZenohNodeLink
 from zwerm.link.session import Credential, Terms
+from zwerm.wire.messages import Failure, open_answer
 
 ECHO = "small_controllers:Echo"
 
@@ -169,3 +172,32 @@ def test_ids_without_end_are_refused(ids: str) -> None:
 def test_a_folder_that_exists_gets_no_keys(tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="cannot make a new folder: File exists"):
         write_host_keys(tmp_path, range(2), [], [], 10.0)
+
+
+def test_a_host_with_another_file_of_the_controller_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, nothing_left: None
+) -> None:
+    other = msgspec.structs.replace(ExpectedNode(1, ECHO, b"\xc0"), code="0" * 32)
+    monkeypatch.setattr(RemoteSwarm, "_member", lambda self, credential: other)
+    credentials, endpoint = tmp_path / "robots.key", f"tcp/127.0.0.1:{free_port()}"
+    prepare(1)
+    codes: dict[int, int] = {}
+    errors: list[str] = []
+
+    def robot() -> None:
+        until(lambda: credentials.exists() and credentials.stat().st_size, "credentials written")
+        try:
+            codes.update(run_robots(endpoint, credentials, "0", deadline_s=20.0))
+        except LinkError as error:
+            errors.append(str(error))
+
+    starting = threading.Thread(target=robot)
+    starting.start()
+    with RemoteSwarm("run", {0: members()[0]}, listen=[endpoint], credentials_file=credentials) as swarm:
+        said = swarm.link.receive(20.0)
+        assert said is not None
+        failure = open_answer(said.payload or b"")
+        assert isinstance(failure, Failure)
+        assert failure.error == f"{ECHO}: its file here differs from the world's; install the same on both"
+        starting.join(20.0)
+    assert errors == ["node 0 ended with exit code 2 before it joined"]

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import socket
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +14,7 @@ from network import RUN, Network, ask, hello, network
 from support import children_of
 
 from zwerm.agents.runtime.contract import Setup
-from zwerm.deploy.identity import issue, load, save, slice_of
+from zwerm.deploy.identity import ACCEPT_TIMEOUT_MS, issue, load, save, slice_of
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError
 from zwerm.link import Arrival
@@ -239,3 +240,14 @@ def test_no_secret_is_on_a_command_line_in_an_environment_or_in_a_file(nothing_l
         files = [path for path in directory.iterdir() if path.is_file()]
         assert not any(secret in path.read_bytes() for path in files for secret in secrets)
         assert "passwords" not in {path.name for path in directory.iterdir()}
+
+
+def test_connections_that_say_nothing_do_not_keep_a_node_from_joining(private_tmp: Path) -> None:
+    with network(private_tmp) as net, contextlib.ExitStack() as open_sockets:
+        for _ in range(500):
+            idle = open_sockets.enter_context(socket.socket(socket.AF_UNIX))
+            idle.connect(net.endpoint.partition("/")[2])
+        # The deadline is shorter than the time that the router gives such a connection.
+        own = net.credentials.nodes[0]
+        with contextlib.closing(ZenohNodeLink(RUN, own, net.endpoint, deadline_s=ACCEPT_TIMEOUT_MS / 1_250)) as node:
+            assert node.join().refused == ""

@@ -19,11 +19,13 @@ from zwerm.errors import LinkError
 from zwerm.link import Answer, Arrival, WorldLink
 from zwerm.link.admission import ExpectedNode
 from zwerm.link.memory import MemoryLink
+from zwerm.link.software import software
 from zwerm.wire.keys import command_key
 from zwerm.wire.messages import (
     MESSAGE_BYTES_MAX,
     Command,
     Goodbye,
+    Hello,
     Observation,
     Packet,
     Welcome,
@@ -423,3 +425,16 @@ def test_a_node_that_was_lost_is_told_that_it_is_not_taken_back(net: Network) ->
     assert net.link.refused["returned"] == 1
     again.close()
     other.close()
+
+
+def test_a_node_with_other_releases_is_told_both(net: Network) -> None:
+    session = net.session(net.credentials.nodes[0])
+    [answer] = ask(session, 0, encode(Hello(0, 1, "zwerm 9.9")))
+    welcome = decode_welcome(answer)
+    assert welcome.refused == "software"
+    assert welcome.detail == f"the world has {software()}; the node has zwerm 9.9"
+    assert software().startswith("zwerm ")
+    assert "numpy " in software()
+    [answer] = ask(session, 0, encode(Hello(0, 1, software())))
+    assert decode_welcome(answer).refused == ""
+    session.close()

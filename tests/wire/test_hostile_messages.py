@@ -177,6 +177,21 @@ def test_a_robot_that_babbles_over_zenoh_changes_nothing_and_is_counted(tmp_path
     assert result.middleware_lost == 0
 
 
+def test_a_robot_that_floods_the_world_is_given_up_and_counted(tmp_path: Path) -> None:
+    stray = encode(Command(tick=2**62))
+
+    def flood(node: Node, seen: bytes) -> list[bytes]:
+        return [stray] * 1_500 + [node.answer(seen)]
+
+    result = run_with_a_stranger(tmp_path, flood, robots={"on_crash": "continue"})
+    assert (result.outcome, result.crashed) == ("time-limit", [0])
+    assert result.crash_reasons[0].startswith(
+        "tick 0: flood: 1000 of its messages were refused, the last one as out-of-order: "
+    )
+    assert result.as_json()["refused"]["nodes"]["0"]["out-of-order"] == 1_000
+    assert result.refused["out-of-order"] == 1_000
+
+
 def test_a_robot_that_answers_with_no_command_crashes_at_once(tmp_path: Path) -> None:
     result = run_with_a_stranger(tmp_path, lambda node, seen: [b"\xc1"], time={"straggler_s": 60.0})
     assert result.outcome == "failed"

@@ -31,6 +31,8 @@ class Driver(ABC):
         self._link = link
         self._observers = tuple(observers)
         self._programs = programs
+        self._evicted = False  # whether a node was evicted since this was last set to false
+        world.on_flood = self._stop_flood
         self.reason = ""
 
     def run(self) -> str:
@@ -45,6 +47,13 @@ class Driver(ABC):
                     observe(world)
         self.reason = ending.reason
         return ending.outcome
+
+    def _stop_flood(self, node: int) -> None:
+        """Drop what a node sends from now on where it arrives, and end its program where that runs on this machine."""
+        self._evicted = True
+        self._link.evict(node)
+        if self._programs is not None:
+            self._programs.kill(node)
 
     def _lose(self, node: int, wait_s: float) -> None:
         """Tell the world that a node is lost, and how its program ended, as far as that is known within `wait_s`."""

@@ -83,6 +83,8 @@ class LockStep(Driver):
                 with contextlib.suppress(ProtocolError):  # the world has counted it
                     accept(node, payload)
                     missing -= 1
+            if self._evicted:
+                missing, self._evicted = len(world.awaited()), False
             if not fatal and world.ending(within_tick=True) is not None:
                 fatal = True
                 deadline = min(deadline, time.monotonic() + CRASH_GRACE_S)

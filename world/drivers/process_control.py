@@ -98,7 +98,7 @@ class ProcessController:
             if arrival.node != node:
                 self._take(arrival)
             elif arrival.payload is not None:
-                self._world.refuse_stale()
+                self._world.refuse_stale(node)
 
     def _await_exit(self, node: int) -> None:
         """Return when the link has reported the node lost. Raises LinkError after EXIT_DEADLINE_S."""
@@ -109,5 +109,5 @@ class ProcessController:
             elif arrival.payload is None:
                 return
             else:
-                self._world.refuse_stale()
+                self._world.refuse_stale(node)
         raise LinkError(f"node {node} was killed, and the link did not report its end within {EXIT_DEADLINE_S:g} s")

@@ -119,7 +119,7 @@ class RealTime(Driver):
             if payload is None:
                 self._dying[node] -= 1
             else:
-                self._world.refuse_stale()
+                self._world.refuse_stale(node)
             return
         if payload is None:
             self._lose(node, EXIT_CODE_S)

@@ -54,6 +54,7 @@ class CommandIntake:
         """A body of kind `body` takes the drive type `drive`; the nodes in `fixed` have no body that moves."""
         self.exchange = Exchange(-1, (), (), (), ())
         self.refused: Counter[str] = Counter()
+        self.refused_by: dict[int, Counter[str]] = {}  # refusals by node and reason
         self.late_count = 0
         self.observed_count = 0
         self._drive = drive
@@ -93,7 +94,7 @@ class CommandIntake:
             ):
                 self._check_content(node, answer)
         except ProtocolError as error:
-            self.refused[error.reason] += 1
+            self.note_refusal(node, error.reason)
             raise
         if late:
             self._late.append((node, answer))
@@ -106,6 +107,13 @@ class CommandIntake:
         if late_allowed:
             self._newest[node] = answer.tick
         return answer
+
+    def note_refusal(self, node: int, reason: str) -> int:
+        """Count a refused message of a node, and return how many there are of this node."""
+        self.refused[reason] += 1
+        reasons = self.refused_by.setdefault(node, Counter())
+        reasons[reason] += 1
+        return reasons.total()
 
     def is_pending(self, node: int) -> bool:
         """Tell whether a node's answer to the observation of this tick has not been accepted."""

@@ -38,6 +38,9 @@ class WorldLink(Protocol):
         Their programs are not busy: the observation or the answer was lost on the way.
         """
 
+    def evict(self, node: int) -> None:
+        """Drop all messages of a node from now on."""
+
     def close(self) -> None:
         """Release all resources of the link; idempotent."""
 

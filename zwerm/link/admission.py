@@ -18,12 +18,15 @@ INCARNATION: Final = "incarnation"
 JOINED: Final = "joined"
 RETURNED: Final = "returned"
 NOT_JOINED: Final = "not-joined"
+SOFTWARE: Final = "software"
+EVICTED: Final = "evicted"
 MEANINGS: Final[Mapping[str, str]] = {
     IDENTITY: "it says that it is another node",
     UNKNOWN: "the run has no such node",
     INCARNATION: "the run expects another incarnation of it",
     JOINED: "it has joined already, and that connection is not given up as lost yet",
     RETURNED: "the run has given it up as lost, and takes no lost node back; it stays where it was",
+    SOFTWARE: "its releases differ from the world's",
     NOT_JOINED: "it has not joined",
 }
 
@@ -35,12 +38,17 @@ class ExpectedNode(Struct, frozen=True):
     controller: str
     setup: bytes
     paced: bool = False
+    code: str = ""
 
 
 class Admission:
-    """The admission to a run that expects `members`. `joined` holds the incarnation of each node that has joined."""
+    """The admission to a run that expects `members`. `joined` holds the incarnation of each node that has joined.
 
-    def __init__(self, members: Mapping[int, ExpectedNode]) -> None:
+    A node that names its releases must have those of `software`.
+    """
+
+    def __init__(self, members: Mapping[int, ExpectedNode], software: str = "") -> None:
+        self._software = software
         self.joined: dict[int, int] = {}
         self._expected = dict(members)
         self._ended: dict[int, int] = {}
@@ -56,6 +64,8 @@ class Admission:
             return UNKNOWN
         if message.incarnation != expected.incarnation:
             return INCARNATION
+        if message.software and self._software and message.software != self._software:
+            return SOFTWARE
         if node in self.joined:
             return JOINED
         if self._ended.get(node, 0) >= message.incarnation:

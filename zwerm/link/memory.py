@@ -50,6 +50,9 @@ class MemoryLink:
         """Return no node: in memory nothing is lost."""
         return []
 
+    def evict(self, node: int) -> None:
+        """Do nothing: a node in memory sends one answer to each message."""
+
     def close(self) -> None:
         """Drop everything that has not been received; idempotent."""
         self._unanswered.clear()

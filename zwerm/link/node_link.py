@@ -27,6 +27,7 @@ from zwerm.link.session import (
     transport_settings,
     trust_settings,
 )
+from zwerm.link.software import software
 from zwerm.wire.keys import alive_key, command_key, hello_key, observation_key
 from zwerm.wire.messages import REFUSABLE, Goodbye, Hello, Welcome, decode_welcome, encode, refusal
 
@@ -57,6 +58,7 @@ class ZenohNodeLink:
     ) -> None:
         """Connect. Raises LinkError if it does not succeed within `deadline_s` seconds."""
         self._run = run
+        self._software = "" if is_local(endpoint) else software()
         self._credential = credential
         self._place = f"node {credential.node} at {endpoint}"
         self._deadline_s = time.monotonic() + deadline_s
@@ -104,7 +106,7 @@ class ZenohNodeLink:
         # Kept as an attribute, because Zenoh withdraws an unreferenced token. Declared before hello, so that the world
         # knows the token when it answers.
         self._token = self._session.liveliness().declare_token(alive_key(self._run, node))
-        hello = encode(Hello(node, self._credential.incarnation))
+        hello = encode(Hello(node, self._credential.incarnation, self._software))
         while (left_s := self._deadline_s - time.monotonic()) > 0:
             replies = self._session.get(
                 hello_key(self._run, node), FifoChannel(1), payload=hello, timeout=left_s, express=True
@@ -158,7 +160,7 @@ class ZenohNodeLink:
             raise LinkError(f"{self._place}: the world's welcome is {refusal(error)}") from None
         if welcome.refused:
             meaning = MEANINGS.get(welcome.refused)
-            reason = welcome.refused if meaning is None else f"{welcome.refused}: {meaning}"
+            reason = ": ".join(filter(None, (welcome.refused, meaning, welcome.detail)))
             raise LinkError(f"{self._place}: the world refuses it: {reason}")
         return welcome
 

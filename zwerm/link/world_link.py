@@ -20,8 +20,9 @@ from zenoh.handlers import Callback
 
 from zwerm.errors import LinkError
 from zwerm.link import Arrival, arrival
-from zwerm.link.admission import IDENTITY, NOT_JOINED, Admission, ExpectedNode
+from zwerm.link.admission import EVICTED, IDENTITY, NOT_JOINED, SOFTWARE, Admission, ExpectedNode
 from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threads
+from zwerm.link.software import software
 from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
 from zwerm.wire.messages import REFUSABLE, Goodbye, Welcome, decode_hello, encode, refusal
 
@@ -36,8 +37,10 @@ class ZenohWorldLink:
     def __init__(self, run: str, members: Mapping[int, ExpectedNode], settings: Mapping[str, Any]) -> None:
         """Open the router's session, without waiting for nodes. Raises LinkError if it cannot listen."""
         self.refused: Counter[str] = Counter()
+        self.refused_by: dict[int, Counter[str]] = {}  # refusals by node and reason
+        self._evicted: set[int] = set()
         self._run = run
-        self._members = Admission(members)
+        self._members = Admission(members, software())
         self._source_of: dict[str, int] = {}
         self._changed = threading.Condition()
         self._dismissed = False
@@ -115,6 +118,12 @@ class ZenohWorldLink:
         answered = {arrival.node for arrival in self.receive_many(0, 0.0) if arrival.payload is not None}
         return [node for node in left if node not in answered]
 
+    def evict(self, node: int) -> None:
+        """Drop all messages of a node that arrive from now on."""
+        with self._changed:
+            self._evicted.add(node)
+            self._source_of.pop(command_key(self._run, node), None)
+
     def close(self) -> None:
         """Release all resources of the link; idempotent."""
         self._dismissed = True
@@ -158,14 +167,22 @@ class ZenohWorldLink:
         keep_thread()
         node = self._source_of.get(str(sample.key_expr))
         if node is None:
-            with self._changed:
-                self.refused[NOT_JOINED] += 1
+            self._refuse_command(node_of(str(sample.key_expr)))
             return
         self._arrivals.append(arrival((node, sample.payload.to_bytes())))
         if len(self._arrivals) >= self._wanted:
             with self._changed:
                 self._changed.notify_all()
                 self._changed.wait_for(lambda: len(self._arrivals) < CAPACITY or self._closed)
+
+    def _refuse_command(self, node: int) -> None:
+        """Count a command of a node that has not joined or was evicted."""
+        with self._changed:
+            self._note_refusal(node, EVICTED if node in self._evicted else NOT_JOINED)
+
+    def _note_refusal(self, node: int, reason: str) -> None:
+        self.refused[reason] += 1
+        self.refused_by.setdefault(node, Counter())[reason] += 1
 
     def _on_liveliness(self, sample: zenoh.Sample) -> None:
         """Handle a liveliness token; it vanishes after the node's last message. Runs in a thread of its own."""
@@ -189,7 +206,7 @@ class ZenohWorldLink:
                 welcome = Welcome(refused=IDENTITY)
             if welcome.refused:
                 with self._changed:
-                    self.refused[welcome.refused] += 1
+                    self._note_refusal(_node_in(key), welcome.refused)
             query.reply(key, encode(welcome))
 
     def _welcome(self, node: int, payload: bytes) -> Welcome:
@@ -200,9 +217,22 @@ class ZenohWorldLink:
             return Welcome(refused=refusal(error).reason)
         with self._changed:
             refused = self._members.greet(node, hello)
-            if refused or isinstance(hello, Goodbye):
+            if isinstance(hello, Goodbye):
                 return Welcome(refused=refused)
+            if refused:
+                differing = f"the world has {software()}; the node has {hello.software}" if refused == SOFTWARE else ""
+                return Welcome(refused=refused, detail=differing)
             member = self._members.expected(node)
             self._source_of[command_key(self._run, node)] = node
             self._changed.notify_all()
-        return Welcome(controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced)
+        return Welcome(
+            controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced, code=member.code
+        )
+
+
+def _node_in(key: str) -> int:
+    """Return the node that a key names, or -1 for none."""
+    try:
+        return node_of(key)
+    except ValueError:
+        return -1

@@ -310,6 +310,12 @@ class ExchangeObserver:
         self._scene = world.scene
 
 
+def _refusals(*counts: Mapping[int, Counter[str]]) -> dict[int, dict[str, int]]:
+    """Return the sum of refusals by node and reason, ascending."""
+    nodes = sorted({node for each in counts for node in each})
+    return {node: dict(sum((each.get(node, Counter()) for each in counts), Counter())) for node in nodes}
+
+
 @contextmanager
 def _collecting_seldom() -> Iterator[None]:
     """Let Python search for garbage cycles 100 times less often: messages form no cycles, and most objects are messages."""
@@ -367,6 +373,7 @@ def _result(
         history=sampling.history,
         cell_counts=counts,
         refused=dict(intake.refused + Counter(getattr(link, "refused", {}))),
+        refused_by=_refusals(intake.refused_by, getattr(link, "refused_by", {})),
         series={name: np.array(values) for name, values in sampling.observers.series().items()},
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,

@@ -208,10 +208,14 @@ class Failure(_Message, frozen=True, tag=f"failure/{PROTOCOL_VERSION}"):
 
 
 class Hello(_Message, frozen=True, tag=f"hello/{PROTOCOL_VERSION}"):
-    """A node asks to join under the incarnation it was started with."""
+    """A node asks to join under the incarnation it was started with.
+
+    `software` names its releases (`zwerm.link.software`); a node on the world's own machine leaves it empty.
+    """
 
     node: int
     incarnation: int
+    software: str = ""
 
 
 class Welcome(_Message, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
@@ -224,6 +228,8 @@ class Welcome(_Message, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
     controller: str = ""
     setup: msgspec.Raw = msgspec.Raw(b"\xc0")
     paced: bool = False
+    detail: str = ""  # of a refusal
+    code: str = ""  # a digest of the controller's file in the world, to be compared with the node's
 
 
 class Goodbye(_Message, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):

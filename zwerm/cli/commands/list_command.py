@@ -54,8 +54,8 @@ def _print_names() -> None:
             out.print(f"[bold]{title}[/bold][dim]{with_studies}[/dim]", highlight=False)
             out.print(Padding(Text(" ".join(own), style="cyan"), (0, 0, 0, 2)))
     out.print(
-        "\nzwerm list TEXT: those with TEXT in the name, in full   zwerm list --all: all of them\n"
-        "zwerm show NAME: the file   zwerm run NAME   zwerm new DIR: a project of your own",
+        "\nzwerm list TEXT, zwerm list --all: with summaries   zwerm show NAME: the file\n"
+        "zwerm run NAME: run it   zwerm new DIR: a project of your own",
         highlight=False,
         style="dim",
     )
