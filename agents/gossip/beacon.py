@@ -40,17 +40,18 @@ class Beacon(Controller):
 
     def step(self, observation: Observation) -> Command:
         """Count what was heard, and send the next beacon if it is time."""
+        heard, missed, following = self.heard, self.missed, self._next
         for packet in observation.inbox:
             try:
                 sender, number = _LAYOUT.unpack_from(unseal(packet.payload))
             except ProtocolError:
                 self.refused += 1
                 continue
-            self.heard[sender] = self.heard.get(sender, 0) + 1
-            expected = self._next.get(sender, number)
+            heard[sender] = heard.get(sender, 0) + 1
+            expected = following.get(sender, number)
             if number >= expected:
-                self.missed[sender] = self.missed.get(sender, 0) + number - expected
-                self._next[sender] = number + 1
+                missed[sender] = missed.get(sender, 0) + number - expected
+                following[sender] = number + 1
         table: Any = self.parameters
         if observation.tick % table.every_ticks:
             return Command(drive=self._drive)

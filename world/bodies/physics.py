@@ -117,7 +117,8 @@ class Physics:
         idle = not (forward_m_s.any() or turn_rad_s.any() or (left_m_s is not None and left_m_s.any()))
         if idle and self._resting and self._arranged:
             return moved
-        if len(self._bodies) > FEW_BODIES or self._parking.in_use:
+        may_park = len(self._bodies) > FEW_BODIES or self._parking.in_use
+        if may_park:
             self._park(forward_m_s, left_m_s, turn_rad_s)
         if not self._arranged:
             self._arrange()
@@ -158,7 +159,8 @@ class Physics:
         self.position[ids] = place
         self.heading[ids] = angle
         self._resting = not moved.any()
-        self._parking.note_moved(moved)
+        if may_park:
+            self._parking.note_moved(moved)
         return moved
 
 

@@ -104,7 +104,7 @@ class Channel:
         faults: Sequence[PacketJudge] = (),
     ) -> None:
         """Judge every packet that the nodes sent on this channel at this tick; (node, outbox) are in id order."""
-        name, ledger, center = self.name, self.ledger, self._center
+        name, center = self.name, self._center
         senders: list[int] = []
         ranks: list[int] = []
         payloads: list[bytes] = []
@@ -119,13 +119,12 @@ class Channel:
                     ranks.append(rank)
                     payloads.append(message.payload)
                     addressees.append(everyone if message.to is None else message.to)
-                    ledger.node_bytes[node] += len(message.payload)
                     rank += 1
-            ledger.node_messages[node] += rank - sent.get(node, 0)
             sent[node] = rank
         if not senders:
             return
         traffic = Transmissions(scene, self.dt_s, np.array(senders), np.array(ranks), payloads)
+        self.ledger.transmit(traffic.sender, traffic.sizes())
         bound = None if faults and not self._bound_leads else self._bound
         link, transmission = self._links_of(traffic, np.array(addressees), absent, off, bound)
         key = key_part(_stamp(traffic))[transmission]
@@ -246,10 +245,16 @@ class Channel:
 
 
 def _shortest(models: Sequence[PacketJudge]) -> PacketJudge | None:
-    """Return the model with the shortest reach among those that no model with a memory precedes, or None without a bound."""
+    """Return the model with the shortest reach among those that may judge before all others, or None without a bound.
+
+    These are the models that no model with a memory precedes. A model that finds receivers out of reach must not judge
+    before one that loses packets: the losses are those of the earlier model.
+    """
     found: PacketJudge | None = None
+    leading = True
     for model in models:
-        if _reach_m(model) < _reach_m(found):
+        leading = leading and model.out_of_reach
+        if _reach_m(model) < _reach_m(found) and (leading or not model.out_of_reach):
             found = model
         if not getattr(model, "memoryless", False):
             break

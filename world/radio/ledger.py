@@ -50,6 +50,11 @@ class Ledger:
         self._age_peak = links.numbers()
         self._age_ticks = links.integers()
 
+    def transmit(self, sender: Ints, sizes: Ints) -> None:
+        """Count one transmission of each of `sender` (t,), with payloads of so many bytes (t,)."""
+        np.add.at(self.node_messages, sender, 1)
+        np.add.at(self.node_bytes, sender, sizes)
+
     def send(self, link: Ints, addressed: bool = False) -> None:
         """Count packets sent on `link` (k,): broadcast ones, or ones with an addressee and copies."""
         np.add.at(self._sent.values, link, 1)

@@ -4,7 +4,7 @@ A frame is the CRC-32 of the payload (zlib's polynomial; 4 bytes, big-endian) fo
 up to 3 bits in payloads of this length, and all other errors but one in 4e9. It does not authenticate the sender.
 """
 
-from struct import pack, unpack_from
+from struct import Struct
 from typing import Any, Final
 from zlib import crc32
 
@@ -13,12 +13,13 @@ import msgspec
 from zwerm.errors import ProtocolError
 from zwerm.wire.messages import REFUSABLE
 
-HEAD_BYTES: Final = 4
+_HEAD: Final = Struct(">I")
+HEAD_BYTES: Final = _HEAD.size
 
 
 def seal(payload: bytes) -> bytes:
     """Return the frame that holds `payload`."""
-    return pack(">I", crc32(payload)) + payload
+    return _HEAD.pack(crc32(payload)) + payload
 
 
 def unseal(frame: bytes) -> bytes:
@@ -26,7 +27,7 @@ def unseal(frame: bytes) -> bytes:
     if len(frame) < HEAD_BYTES:
         raise ProtocolError("damaged", f"a frame of {len(frame)} bytes, at least {HEAD_BYTES}")
     payload = frame[HEAD_BYTES:]
-    if unpack_from(">I", frame)[0] != crc32(payload):
+    if _HEAD.unpack_from(frame)[0] != crc32(payload):
         raise ProtocolError("damaged", "the checksum does not fit")
     return payload
 

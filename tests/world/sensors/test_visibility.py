@@ -149,3 +149,22 @@ def test_sightings_are_both_directions_of_the_pairs_by_observer_and_seen(make_sc
     expected = sorted([(i, j) for i, j in pairs if i in robots] + [(j, i) for i, j in pairs if j in robots])
     assert list(zip(observer.tolist(), seen.tolist(), strict=True)) == expected
     assert np.diff(ends, prepend=0).tolist() == [sum(i == robot for i, _ in expected) for robot in robots]
+
+
+@given(seed=st.integers(0, 2**32), sight=sight, few=st.integers(1, 10))
+@settings(max_examples=60, deadline=None)
+def test_few_observers_see_what_they_see_among_all_pairs(make_scene, walled, seed, sight, few):
+    random = np.random.Generator(np.random.Philox(seed))
+    remembering = Visibility()
+    poses = [(x, y, 0.0) for x, y in random.uniform(0.05, 2.95, (40, 2)).tolist()]
+    for _ in range(3):
+        scene = make_scene(poses, walled, (random.random(40) < 0.9).tolist(), radius_m=0.1)
+        robots = np.sort(random.permutation(scene.present_ids())[:few])
+        found = remembering.sightings(scene, robots, *sight)
+        pairs = Visibility().pairs(scene, *sight).tolist()
+        both = sorted([*map(tuple, pairs), *((j, i) for i, j in pairs)])
+        expected = [each for each in both if each[0] in robots]
+        assert list(zip(found.observer.tolist(), found.seen.tolist(), strict=True)) == expected
+        assert found.ends.tolist() == [sum(1 for i, _ in expected if i <= robot) for robot in robots.tolist()]
+        moved = int(random.integers(40))
+        poses[moved] = (*random.uniform(0.05, 2.95, 2).tolist(), 0.0)
