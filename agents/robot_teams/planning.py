@@ -143,14 +143,14 @@ def assign(
     plans: Sequence[Plan],
     reserving: Sequence[Plan],
     statuses: Mapping[int, Status],
-    skip: Collection[Task],
+    skip: Collection[tuple[Task, int]],
     one_corridor: bool,
     join_mm: int,
 ) -> list[Plan]:
     """Return new plans for the free members. With `one_corridor` the whole team forms one corridor at a time.
 
     While others are busy, no robot travels farther than `join_mm`: its turn comes nearer. The busy plans among `reserving`
-    keep others out of their cells.
+    keep others out of their cells. `skip` has the tasks that brought nothing new lately, each with a robot that tried.
     """
     free = free_members(view, plans, statuses)
     if not free or (one_corridor and len(free) < len(view.members)):
@@ -169,7 +169,7 @@ def assign(
     # From where nothing open can be reached, what blocks the way is explored: a wreck, or a wrong measurement.
     for node in [node for node in distances if tasks and not any(task.end in distances[node] for task in tasks)]:
         tasks += _tasks(slice_map, slice_map.openings(distances[node]))
-    tasks = [task for task in dict.fromkeys(tasks) if task not in skip]
+    tasks = list(dict.fromkeys(tasks))
     tasks = [task for task in tasks if not (task.own_slice and task.end.slice in swept)]
     made: list[Plan] = []
     limit = join_mm if active else FAR - 1
@@ -183,7 +183,7 @@ def assign(
                 turns = int(before is not None and before.direction != task.direction)
                 if far > limit or (best is not None and (far, turns) > best[:2]):
                     continue
-                if any(each.holds(task) for each in reserved):
+                if (task, node) in skip or any(each.holds(task) for each in reserved):
                     continue
                 rank = (far, turns, -node, task)
                 if best is None or rank < best:
@@ -194,7 +194,7 @@ def assign(
         # The nearest goes first, and so farthest: single file. The last in the order is the lead.
         near = sorted(waiting, key=lambda each: (distances[each].get(task.end, FAR), each))
         reach = max(join_mm, best[0])
-        near = [each for each in near if distances[each].get(task.end, FAR) <= reach]
+        near = [each for each in near if distances[each].get(task.end, FAR) <= reach and (task, each) not in skip]
         near = near[: room(slice_map, task, len(waiting))]
         number += 1
         plan = Plan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(reversed(near)))

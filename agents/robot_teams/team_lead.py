@@ -26,7 +26,7 @@ from zwerm.agents.robot_teams.virtual_frontier import Frontiers
 
 # How long a team waits for one with a smaller lead to unite them [s].
 MERGE_PATIENCE_S: Final = 30.0
-# For how long a task that brought nothing new is passed over [s].
+# For how long a robot passes over a task at which it found nothing new [s].
 SKIP_S: Final = 30.0
 # After so long without a new corridor free robots take tasks however far, and then in cells where others work [s].
 FAR_AFTER_S: Final = 20.0
@@ -67,7 +67,7 @@ class TeamLead:
         self._map, self._membership, self._dt_s = slice_map, membership, dt_s
         self._divide, self._merge, self._one_corridor = divide, merge, one_corridor
         self._join_mm = round(1000.0 * join_m)
-        self._skip: dict[Task, int] = {}
+        self._skip: dict[tuple[Task, int], int] = {}
         self._judged: dict[int, Plan] = {}
         self._digests: dict[int, int] = {}
         self._made_tick = 0
@@ -112,7 +112,8 @@ class TeamLead:
         frontiers = self._frontiers
         skip = dict(self._skip)
         if frontiers is not None:
-            skip |= {task: tick for task in open_tasks(self._map) if frontiers.is_reserved(task.end)}
+            later = [task for task in open_tasks(self._map) if frontiers.is_reserved(task.end)]
+            skip |= {(task, node): tick for task in later for node in free}
         made = assign(self._map, view, self.plans, plans, statuses, skip, self._one_corridor, join_mm)
         if frontiers is not None:
             made = [frontiers.limited(plan) for plan in made]
@@ -135,7 +136,9 @@ class TeamLead:
                 continue
             self._judged[plan.number] = plan
             if self._digests.pop(plan.number, None) == self._map.facts.digest:
-                self._skip[Task(plan.anchor, plan.direction, plan.own_slice)] = tick
+                # Another robot may succeed: one that failed may be kept off by one that waits there.
+                task = Task(plan.anchor, plan.direction, plan.own_slice)
+                self._skip |= {(task, node): tick for node in plan.order}
             if self._frontiers is not None:
                 self._frontiers.judge(plan)
             index = finder(plan.order, statuses) if self._divide and plan.anchor.side != LINK else None

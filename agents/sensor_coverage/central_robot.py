@@ -129,7 +129,8 @@ class CentralRobot(Controller):
         """Drive to a wall or along it, and answer with the result."""
         result = yield from walk
         self.motion.settle()
-        self.commands.answer(Walked(cycle, *result))
+        x_m, y_m = self.wall_walk.way
+        self.commands.answer(Walked(cycle, result.end, x_m, y_m, result.driven_m, result.touched, result.waypoints))
 
     def _clear(self, cycle: int) -> None:
         self.commands.answer(Cleared(cycle))

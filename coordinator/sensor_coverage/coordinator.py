@@ -172,8 +172,11 @@ class SensorCoverageCoordinator:
 
     def _deploy_first(self, base: int) -> Routine[Moved]:
         """Deploy a station's first robot; where walls stop it in every direction, let it follow them."""
-        moved = yield from self.pushing.deploy_first(base)
-        if self.parameters.walls == "followed" and base in self.sources.blocked:
+        if self.parameters.walls == "paper":
+            return (yield from self.pushing.deploy_first(base))
+        bearings = yield from self.walking.axis(base)
+        moved = yield from self.pushing.deploy_first(base, bearings)
+        if base in self.sources.blocked:
             moved = yield from self.walking.first(base)
         return moved
 

@@ -56,12 +56,12 @@ class PushExecution:
 
     # --- kinds of deployment ------------------------------------------------------------------------------------------
 
-    def deploy_first(self, base: int) -> Routine[Moved]:
-        """Deploy a station's first robot, open loop. Algorithm 1, line 1."""
+    def deploy_first(self, base: int, bearings: Sequence[float] = FIRST_BEARINGS_RAD) -> Routine[Moved]:
+        """Deploy a station's first robot along one of some bearings [rad], open loop. Algorithm 1, line 1."""
         robot = yield from self._sources.release(base, self.cycle)
         if robot is None:
             return ()
-        for bearing in FIRST_BEARINGS_RAD:
+        for bearing in bearings:
             command = Deploy(self.cycle, bearing, self._parameters.hop_m, self._parameters.clear_m)
             self._mailbox.send(robot, command, drive=True)
             arrived = yield from self._arrivals([robot])

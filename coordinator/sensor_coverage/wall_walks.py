@@ -18,7 +18,10 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     MET,
     OPEN,
     SHUT,
+    STRETCH,
+    Arrived,
     FollowWall,
+    Move,
     RobotCommand,
     ToWall,
     Walked,
@@ -39,6 +42,12 @@ LEG_M: Final = 3.0
 IDLE_LEGS_MAX: Final = 2
 # A leg closes something if the open arcs become smaller by this [rad].
 PROGRESS_RAD: Final = 0.1
+# A station's first robot follows a wall within the first length [m] for the second length [m], to learn its direction.
+AXIS_HOP_M: Final = 1.5
+AXIS_M: Final = 0.8
+# So many waypoints, off a line by less than this [m] (root mean square), show the direction of a wall.
+LINE_POINTS_MIN: Final = 4
+LINE_OFF_M: Final = 0.02
 # Longest way [m] of a station's first robot to a wall.
 FIRST_HOP_M: Final = 0.95
 # Rays to a robot that must differ by this [rad] to determine its distance.
@@ -83,11 +92,10 @@ class WallWalks:
         heading = slots.heading[leader]
         to_wall = ToWall(pushing.cycle, wrapped(plan.direction - heading), plan.hop_m, FEEL_M, CLEAR_M, -plan.hand)
         walked = yield from self._order(leader, to_wall)
-        if walked is None:
+        if walked is None:  # dead
+            self._sources.waiting.pop(plan.mover, None)
             return (leader,)
         if walked.end == SHUT:
-            if walked.touched:
-                self._walls.note_wall(plan.mover, plan.direction)
             for each in walked.touched:
                 self._walls.note_wall(plan.mover, each + heading)
             return (leader,)
@@ -112,6 +120,38 @@ class WallWalks:
         yield from self._legs(leader, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
         return (*followers, leader)
 
+    def axis(self, base: int) -> Routine[Sequence[float]]:
+        """Return bearings [rad] for a station's first robot, parallel to a wall nearby: lattices along walls need fewer robots.
+
+        The robot drives to a wall, follows it for a short stretch, and returns. The bearings are in its own frame. They
+        begin with the one away from the wall.
+        """
+        robot = yield from self._sources.release(base, self._pushing.cycle)
+        if robot is None:
+            return FIRST_BEARINGS_RAD
+        cycle = self._pushing.cycle
+        for bearing in FIRST_BEARINGS_RAD[::-1]:
+            walked = yield from self._order(robot, ToWall(cycle, bearing, AXIS_HOP_M, 0.0, 0.0, 1))
+            if walked is None:
+                break
+            way = there = walked.x_m, walked.y_m
+            found = None
+            if walked.end == STRETCH:
+                walked = yield from self._order(robot, FollowWall(cycle, AXIS_M, 1, (), ()))
+                if walked is None:
+                    break
+                way, found = (walked.x_m, walked.y_m), _line(walked.waypoints)
+            back = Move(cycle, math.atan2(-way[1], -way[0]), math.hypot(*way), ())
+            self._mailbox.send(robot, back, drive=True)
+            yield from self._mailbox.answers([robot], Arrived)
+            if found is not None:
+                away = min(
+                    (found + turn for turn in FIRST_BEARINGS_RAD),
+                    key=lambda each: math.cos(each - math.atan2(there[1], there[0])),
+                )
+                return [away + turn for turn in FIRST_BEARINGS_RAD]
+        return FIRST_BEARINGS_RAD
+
     def first(self, base: int) -> Routine[Moved]:
         """Let the robot that waits at a station follow walls, as far as the station sees it. Its heading is unknown."""
         robot = self._sources.waiting[base]
@@ -119,13 +159,14 @@ class WallWalks:
         for bearing in FIRST_BEARINGS_RAD:
             to_wall = ToWall(cycle, bearing, FIRST_HOP_M, 0.0, 0.0, -1)
             walked = yield from self._order(robot, to_wall)
-            if walked is None:
-                break
-            for hand in (1, -1):
+            for hand in (1, -1) if walked is not None else ():
                 walked = yield from self._order(robot, FollowWall(cycle, LEG_M, hand, (station,), ()))
                 if walked is None or walked.end == LOST:
                     break
-            if walked is not None and walked.driven_m > CLEAR_M:
+            if walked is None:  # dead: the next cycle releases another robot
+                del self._sources.waiting[base], self._sources.blocked[base]
+                return ()
+            if walked.driven_m > CLEAR_M:
                 del self._sources.waiting[base], self._sources.blocked[base]
                 self._slots.add(robot)
                 return (robot,)
@@ -176,6 +217,21 @@ class WallWalks:
         answers = yield from self._mailbox.answers([robot], Walked)
         answer = answers.get(robot)
         return answer if isinstance(answer, Walked) else None
+
+
+def _line(waypoints: Sequence[Waypoint]) -> float | None:
+    """Return the direction [rad] of the line that waypoints lie on, or None if they do not lie on one."""
+    touching = [(each.x_m, each.y_m) for each in waypoints if each.touched]
+    if len(touching) < LINE_POINTS_MIN:
+        return None
+    mx, my = (sum(each) / len(touching) for each in zip(*touching, strict=True))
+    xx = sum((x - mx) ** 2 for x, _ in touching)
+    yy = sum((y - my) ** 2 for _, y in touching)
+    xy = sum((x - mx) * (y - my) for x, y in touching)
+    middle, half = (xx + yy) / 2.0, math.hypot((xx - yy) / 2.0, xy)
+    if middle - half > len(touching) * LINE_OFF_M**2:
+        return None
+    return 0.5 * math.atan2(2.0 * xy, xx - yy)
 
 
 def _crossing(rays: Sequence[tuple[float, float, float]]) -> tuple[float, float] | None:

@@ -38,7 +38,7 @@ from zwerm.scenario.load import load
         (
             "coordinator.controller=beacon",
             "coordinator.controller: expected a built-in coordinator (sensor-coverage, "
-            "landmark-exploration) or module:Class, got 'beacon'",
+            "landmark-exploration, robot-teams) or module:Class, got 'beacon'",
             "",
         ),
         ("coordinator.controller=nobody:Nobody", "coordinator.controller: cannot import 'nobody': ", "'nobody'"),

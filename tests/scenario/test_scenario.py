@@ -9,6 +9,7 @@ import pytest
 from zwerm.errors import ScenarioError
 from zwerm.run.validation import scenario_mistakes
 from zwerm.scenario.load import built_in, load, locate
+from zwerm.scenario.overrides import _short
 
 GOOD = """
 [arena]
@@ -32,7 +33,7 @@ def mistakes_of(path: str, *overrides: str) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
         load(path, overrides)
     assert str(caught.value) == "\n".join(caught.value.mistakes)
-    places = [f"{path}: ", *(f"--set {each}: " for each in overrides)]
+    places = [f"{path}: ", *(f"--set {_short(each)}: " for each in overrides)]
     assert all(line.startswith(tuple(places)) for line in caught.value.mistakes)
     return [line.removeprefix(place) for line in caught.value.mistakes for place in places if line.startswith(place)]
 

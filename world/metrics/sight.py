@@ -7,7 +7,8 @@ positions is used here: the free area divided by the area of one cell.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import shapely
@@ -21,6 +22,8 @@ _QUARTER_SIDES = 64
 _PIECE_RAD = 0.5
 # Bodies in contact may overlap a wall by a little.
 _INSIDE = 0.98
+# Overlays that fail in floating point are computed on a grid of this size [m].
+_GRID_M = 1e-9
 
 
 def hexagonal_packing_robots(arena: Arena, range_m: float) -> float:
@@ -41,7 +44,8 @@ class SeenArea:
             tuple(each.tolist()): self._from.get(tuple(each.tolist())) or seen_from(each, self.range_m, self.arena)
             for each in position
         }
-        return shapely.intersection(shapely.union_all(list(self._from.values())), self.arena.free)
+        seen = robust(shapely.union_all, list(self._from.values()))
+        return robust(shapely.intersection, seen, self.arena.free)
 
     def fraction(self, position: Floats) -> float:
         """Return the fraction of the arena that is seen from any of position (n, 2)."""
@@ -67,7 +71,15 @@ def seen_from(place: Floats, range_m: float, arena: Arena) -> shapely.Geometry:
     walls = arena.segments[arena.walls_within(place[None, :], range_m).segment]
     shadows = [piece for x0, y0, x1, y1 in walls.tolist() for piece in _shadow(place, (x0, y0), (x1, y1), range_m)]
     near = shapely.intersection(disc, arena.free)
-    return shapely.difference(near, shapely.union_all(shadows)) if shadows else near
+    return robust(shapely.difference, near, robust(shapely.union_all, shadows)) if shadows else near
+
+
+def robust(operation: Callable[..., shapely.Geometry], *geometries: Any) -> shapely.Geometry:
+    """Return an overlay of geometries; where it fails on nearly coincident edges, on a grid of `_GRID_M`."""
+    try:
+        return operation(*geometries)
+    except shapely.errors.GEOSException:
+        return operation(*geometries, grid_size=_GRID_M)
 
 
 def _shadow(

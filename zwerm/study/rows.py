@@ -100,9 +100,9 @@ class Rows:
 
     def add(self, row: Row) -> None:
         """Store a row."""
+        self.held[key_of(row)] = row  # first: an interrupt while the journal is written must not lose the row
         self._journal.write(msgspec.json.encode(row) + b"\n")
         os.fsync(self._journal.fileno())
-        self.held[key_of(row)] = row
 
     def merge(self, axes: Sequence[str], superseded: Iterable[Key] = ()) -> None:
         """Write all rows except `superseded` to the Parquet file, the columns `axes` first, and delete the journal."""

@@ -30,7 +30,7 @@ class PlannerParameters(Struct, frozen=True, forbid_unknown_fields=True):
     survey_ticks_max: Count = 80
     drive_ticks_max: Count = 300
     cycles_max: Count = 2000
-    walls: Literal["paper", "followed"] = "paper"
+    walls: Literal["paper", "followed"] = "followed"
     watch_until_s: Annotated[float, Meta(ge=0.0)] = 0.0
 
     def __post_init__(self) -> None:

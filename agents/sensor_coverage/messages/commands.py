@@ -202,11 +202,14 @@ class Arrived(_Message, frozen=True, tag="arrived"):
 class Walked(_Message, frozen=True, tag="walked"):
     """The end of a drive to a wall or along it, after `driven_m`; `end` is one of OPEN, SHUT, STRETCH, LOST and MET.
 
-    `touched` are bearings [rad] of the wall that stopped a drive to it.
+    (x, y) [m] is the way from the place where the robot stood before it drove to the wall, by odometry. `touched` are
+    bearings [rad] of the wall that stopped a drive to it.
     """
 
     cycle: int
     end: str
+    x_m: float
+    y_m: float
     driven_m: float
     touched: tuple[float, ...]
     waypoints: tuple[Waypoint, ...]

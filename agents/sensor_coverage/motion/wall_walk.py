@@ -21,8 +21,9 @@ PRESS_RAD: Final = math.radians(20.0)
 TURN_RAD: Final = math.radians(40.0)
 # The robot is lost in free space after so much turning without a contact.
 TURNS_RAD_MAX: Final = 3.0 * math.tau
-# A contact within this angle of the heading stops the way to the wall.
-AHEAD_RAD: Final = math.radians(75.0)
+# A contact within this angle of the heading stops the way to the wall. It is less than the angle that a touched wall
+# closes beside its direction (`frontier.wall_proof.TOUCH_RAD`), so a wall ahead always closes the heading.
+AHEAD_RAD: Final = math.radians(40.0)
 # The way to a wall ends after this many ticks with less than this fraction of a full step.
 STUCK_TICKS: Final = 5
 STUCK_FRACTION: Final = 0.2
@@ -52,6 +53,13 @@ class WallWalk:
         self._wall_rad = 0.0
         self._trail: list[Vector] = []
         self._blind_rad = 0.0
+        self._start = motion.position
+
+    @property
+    def way(self) -> Vector:
+        """The way [m] by odometry from the place where the latest drive to a wall began."""
+        x, y = self._motion.position
+        return x - self._start[0], y - self._start[1]
 
     def to_wall(self, bearing_rad: float, hop_m: float, feel_m: float, clear_m: float, hand: int) -> DriveToWalk:
         """Drive along a bearing to a wall, and along the wall until the start is `clear_m` away.
@@ -61,7 +69,7 @@ class WallWalk:
         """
         motion, frame = self._motion, self._motion.frame
         frame.forget()
-        start = motion.position
+        start = self._start = motion.position
         self._trail = [start]
         ux, uy = unit(bearing_rad)
         done, stuck = 0.0, 0
@@ -78,6 +86,9 @@ class WallWalk:
             left = min(hop_m - done, motion.step_m)
             yield motion.velocity(ux * left + uy * aside * 0.5, uy * left - ux * aside * 0.5)
         touched = tuple(each.bearing_rad for each in ahead if each.node is None)
+        beside = [each for each in frame.contacts if _apart(each.bearing_rad, bearing_rad) < math.pi / 2.0]
+        if not ahead and beside and all(each.node is None for each in beside):  # wedged between walls
+            touched = (bearing_rad,)
         if done < feel_m and touched:
             yield from motion.drive_to(start)
             return WalkResult(SHUT, done, touched)

@@ -66,6 +66,27 @@ def test_a_run_is_completed_only_where_all_is_seen(building: tuple[str, ...]) ->
     assert result.metrics["reachable_coverage_fraction"] > 0.99
 
 
+@pytest.mark.parametrize("heading_rad", [0.0, 0.4])
+def test_the_first_robot_aligns_the_lattice_with_a_wall(heading_rad: float) -> None:
+    hall = (
+        "arena.size_m=[4.4,3.6]",
+        f"base.pose=[0.2,1.8,{heading_rad}]",
+        "robots.count=60",
+        "robots.sensors.2.distance_sd_fraction=0.0",
+    )
+    result = run("sensor-coverage", 1, "inline", hall)
+    assert result.outcome == "completed"
+    assert result.metrics["reachable_coverage_fraction"] > 0.99
+    assert result.metrics["robots_over_hexagonal"] < 1.25
+
+
+def test_a_closet_is_completed() -> None:
+    """The first robot has no room for a whole hop in any direction."""
+    result = run("sensor-coverage", 1, "inline", ("arena.size_m=[0.5,0.5]", "base.pose=[0.2,0.2,0.0]"))
+    assert result.outcome == "completed"
+    assert result.metrics["coverage_fraction"] > 0.99
+
+
 def test_the_rules_of_the_paper_miss_a_door() -> None:
     result = run("sensor-coverage-narrow", 101, "inline", (*TWO_ROOMS, PAPER))
     assert result.outcome == "completed"

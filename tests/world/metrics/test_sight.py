@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from shapely.geometry import LineString
 
 from zwerm.run.result import RunResult
@@ -12,7 +13,7 @@ from zwerm.run.runner import run
 from zwerm.scenario.tables import ArenaTable
 from zwerm.view.sensor_coverage import snapshots
 from zwerm.world.arena.arena import Arena
-from zwerm.world.metrics.sight import SeenArea, hexagonal_packing_robots, holes, obstacles, reachable
+from zwerm.world.metrics.sight import SeenArea, hexagonal_packing_robots, holes, obstacles, reachable, robust
 
 
 def arena(**table: object) -> Arena:
@@ -108,6 +109,7 @@ def test_the_complex_of_a_run_can_be_drawn_at_any_cycle(tmp_path: Path) -> None:
 def deployed() -> RunResult:
     pillar = "arena.obstacles=[[[1.5,1.0],[2.3,1.0],[2.3,1.8],[1.5,1.8]]]"
     settings = ["arena.size_m=[3.4,2.8]", "base.pose=[0.2,1.4,0.0]", "robots.count=40", pillar, "metrics.every_s=1.0"]
+    settings.append('coordinator.parameters.walls="paper"')
     result = run("sensor-coverage", runner="inline", overrides=settings)
     assert result.outcome == "completed"
     return result
@@ -166,3 +168,13 @@ def test_a_share_that_is_never_reached_has_no_time() -> None:
     assert math.isnan(found["time_to_99_percent_coverage_s"])
     # The coordinator had no time to say how many; the complex that it told of last does.
     assert found["deployment_cycles"] >= 1.0
+
+
+def test_an_overlay_that_fails_in_floating_point_is_computed_on_a_grid() -> None:
+    def fails(a: shapely.Geometry, b: shapely.Geometry, grid_size: float | None = None) -> shapely.Geometry:
+        if grid_size is None:
+            raise shapely.errors.GEOSException("TopologyException: Ring edge missing")
+        return shapely.difference(a, b, grid_size=grid_size)
+
+    left = robust(fails, shapely.box(0.0, 0.0, 2.0, 1.0), shapely.box(1.0, 0.0, 2.0, 1.0))
+    assert left.equals(shapely.box(0.0, 0.0, 1.0, 1.0))
