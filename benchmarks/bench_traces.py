@@ -30,6 +30,7 @@ DURATION_S: Final = 10.0
 
 # Virtual seconds of scenarios in which little happens within DURATION_S, or whose ticks are short.
 DURATIONS_S: Final = {
+    "agreement-*": 15.0,
     "computation-free-maze": 31.0,
     "gossip-max": 5.0,
     "landmark-*": 15.0,

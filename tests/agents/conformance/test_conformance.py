@@ -25,6 +25,7 @@ from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 
 # Parameters that a controller needs, or that fit the small bodies of the kit.
 PARAMETERS: dict[str, dict[str, Any]] = {
+    "leader-lease": {"swarm": 3},
     "landmark-navigator": {"map_file": '{"format": "landmark-map/1", "observations": [[[0, 1, 2], [0, 60, 120]]]}'},
     "robot-teams": {"footprint_m": 0.4, "spacing_m": 0.5},
 }
