@@ -41,8 +41,8 @@ tools:  ## install what the twin on a real network, MP4 and the test of the sear
 run: setup  ## run a scenario (SCENARIO=name; default sensor-coverage)
 	$(BIN)/zwerm run $(SCENARIO)
 
-test: dev  ## run the tests
-	$(BIN)/python -m pytest
+test: dev  ## run the tests, two files at a time
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: dev  ## check style, types and import boundaries
 	$(BIN)/ruff check .
