@@ -69,6 +69,8 @@ class Depots:
             self.position, self.heading = placed(table.poses, keys, arena, radius_m)
         else:
             self.position, self.heading = place(PlacementTable(), arena, stations, radius_m, draws)
+        if table.heading == "drawn":
+            self.heading = -np.pi + 2.0 * np.pi * draws.uniform("base-heading", np.arange(stations))
         self.stations = stations
         self._waiting = [deque(range(stations + station, count, stations)) for station in range(stations)]
         self._entering: deque[tuple[int, int]] = deque()

@@ -145,7 +145,8 @@ class BaseTable(Table):
 
     It stands at its `pose`, else at a random free place. With several `poses`, or `count` at random places, there are
     as many base stations: robots 0, 1, ... Each has a depot of its own, and the other robots are distributed to the
-    depots in turn.
+    depots in turn. With `heading = "drawn"` the seed draws the heading, and that of `pose` and `poses` has no effect. The
+    robots of a station have its heading when they come out.
     """
 
     controller: str
@@ -153,6 +154,7 @@ class BaseTable(Table):
     pose: Pose | None = None
     poses: Annotated[list[Pose], Field(min_length=1)] | None = None
     count: Count | None = None
+    heading: Literal["given", "drawn"] = "given"
 
     @property
     def stations(self) -> int:
