@@ -233,7 +233,7 @@ class World:
 
     @property
     def completed(self) -> bool:
-        """Whether the task is done."""
+        """True if the task is done."""
         return self.completion.completed(self.bodies.exited, self.status.dead)
 
     # --- inside -----------------------------------------------------------------------------------------------------

@@ -123,7 +123,7 @@ class Explorer(Controller):
         )
 
     def _looks(self) -> bool:
-        """Tell whether the robot adds what it sees to the map."""
+        """Return whether the robot adds what it sees to the map."""
         if self._frozen or self._halted:
             return False
         if self.parameters.strategy == "random-walk" or self.parameters.presence_only:

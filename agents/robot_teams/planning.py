@@ -36,7 +36,7 @@ class Reservation(NamedTuple):
     top_mm: int
 
     def holds(self, task: Task) -> bool:
-        """Tell whether a task lies in it."""
+        """Return whether a task lies in it."""
         end = task.end
         slab = end.slice if task.direction == RIGHT else end.slice - 1
         beside = self.bottom_mm - BESIDE_MM <= end.y_mm <= self.top_mm + BESIDE_MM
@@ -212,6 +212,6 @@ def _place(slice_map: SliceMap, status: Status | None) -> End | None:
 
 
 def _apart(slice_map: SliceMap, places: Mapping[int, End | None]) -> bool:
-    """Tell whether some of the robots stand at ends between which no way is known."""
+    """Return whether some of the robots stand at ends between which no way is known."""
     known = [place for place in places.values() if place is not None]
     return bool(known) and not slice_map.distances(known[0]).keys() >= dict.fromkeys(known).keys()

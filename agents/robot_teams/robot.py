@@ -204,7 +204,7 @@ class TeamRobot(Controller):
                 self.work.at = self.work.sweeping = None
 
     def _swept_by_others(self, k: int) -> bool:
-        """Tell whether another robot is sweeping slice k now, by its own word."""
+        """Return whether another robot is sweeping slice k now, by its own word."""
         roster, tick = self.membership.roster, self._newest_senses().tick
         silence = self.parameters.silence_s / self.setup.dt_s
         return any(

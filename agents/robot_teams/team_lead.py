@@ -89,7 +89,7 @@ class TeamLead:
         self.plans = tuple(dict.fromkeys(latest_plans(tuple(known), view).values()))
 
     def decide(self, tick: int) -> bool:
-        """Unite with teams that were met, divide, or give the free members something to do; tell whether all must hear."""
+        """Unite with teams that were met, divide, or give the free members something to do; return whether all must hear."""
         membership, dt_s = self._membership, self._dt_s
         view, statuses = membership.view, membership.roster.statuses
         free = free_members(view, self.plans, statuses)

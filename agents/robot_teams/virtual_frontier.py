@@ -39,7 +39,7 @@ class Frontiers:
         self.frontier = None
 
     def is_reserved(self, end: End) -> bool:
-        """Tell whether an end lies beyond the frontier, and so is left for later."""
+        """Return whether an end lies beyond the frontier, and so is left for later."""
         return self.frontier is not None and end.y_mm == self.frontier.y_mm and self._map.is_virtual(end)
 
     def limited(self, plan: Plan) -> Plan:

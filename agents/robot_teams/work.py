@@ -44,13 +44,13 @@ class Mates(Protocol):
         """Return which slice of the corridor is this robot's, given for how many it found room; negative for none."""
 
     def claimed(self, k: int) -> bool:
-        """Tell whether a teammate takes slice k in this corridor."""
+        """Return whether a teammate takes slice k in this corridor."""
 
     def sweeping(self, k: int) -> bool:
-        """Tell whether another robot is sweeping slice k now."""
+        """Return whether another robot is sweeping slice k now."""
 
     def awaits_predecessor(self) -> bool:
-        """Tell whether the predecessor has still to sweep its slice."""
+        """Return whether the predecessor has still to sweep its slice."""
 
 
 class Work:
@@ -131,7 +131,7 @@ class Work:
         self.at = self.map.end(end)
 
     def trace(self, direction: int) -> Generator[Manoeuvre | None, None, bool]:
-        """Follow the boundary from the end where the robot is to the next; tell whether that is on another slice."""
+        """Follow the boundary from the end where the robot is to the next; return whether that is on another slice."""
         start = self.at
         if start is None:
             raise Lost
@@ -189,7 +189,7 @@ class Work:
         self.at = goal
 
     def _is_new(self, start: End, direction: int, stop: End, beside_wreck: bool) -> bool:
-        """Tell whether no such way is known, or, beside a wreck, none that leads to `stop`."""
+        """Return whether no such way is known, or, beside a wreck, none that leads to `stop`."""
         known = self.map.end(start)
         if known is None:
             return True
@@ -240,7 +240,7 @@ class Work:
         yield from self._hunt(mine.slice, plan.direction, mates.sweeping, plan.frontier_mm)
 
     def _take_slot(self, plan: Plan, mates: "Mates") -> Generator[Manoeuvre | None, None, bool]:
-        """Trace forward, one slice a robot; tell whether there is a slice for this one.
+        """Trace forward, one slice a robot; return whether there is a slice for this one.
 
         The robot that finds no more room tells for how many there is; then those in front take the slices that there are.
         """

@@ -217,7 +217,7 @@ class LandmarkCoordinator:
     # --- assignment: algorithm 1 --------------------------------------------------------------------------------------
 
     def _assign(self) -> bool:
-        """Send every free robot to the frontier that is best for it; tell whether all is over.
+        """Send every free robot to the frontier that is best for it; return whether all is over.
 
         Lines 4 to 7 of algorithm 1. Of all pairs of a free robot and a frontier the best comes first.
         """

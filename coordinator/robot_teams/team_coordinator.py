@@ -103,7 +103,7 @@ class TeamCoordinator:
         return Command(outbox=outbox, done=done, telemetry=telemetry)
 
     def _is_done(self) -> bool:
-        """Tell whether all is covered that any of the robots that are heard can reach."""
+        """Return whether all is covered that any of the robots that are heard can reach."""
         statuses, members = self.membership.roster.statuses, self.membership.view.members
         places = [statuses[node].at for node in members]
         return bool(members) and all(

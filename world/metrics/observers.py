@@ -50,7 +50,7 @@ class Observers:
         telemetry.listeners += [each.report for each in self._metrics if hasattr(each, "report")]
 
     def is_due(self, tick: int) -> bool:
-        """Tell whether a sample is due at a tick and has not been taken."""
+        """Return whether a sample is due at a tick and has not been taken."""
         return bool(self._periodic) and tick % self._stride == 0 and tick != self._last_tick
 
     def sample(self, truth: Truth) -> None:
@@ -109,7 +109,7 @@ def make_observers(scenario: Scenario, arena: Arena, field: Field | None) -> Obs
 
 
 def is_measured(name: str, names: Sequence[str]) -> bool:
-    """Tell whether one of `names`, where `*` stands for any characters, is that of a metric."""
+    """Return whether one of `names`, where `*` stands for any characters, is that of a metric."""
     return any(fnmatchcase(name, each) for each in names)
 
 

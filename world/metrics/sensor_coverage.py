@@ -157,7 +157,7 @@ class Removals(Metric):
 
 
 def robots_leave(scenario: Scenario) -> bool:
-    """Tell whether the robots of a scenario leave the complex by agreement among neighbours."""
+    """Return whether the robots of a scenario leave the complex by agreement among neighbours."""
     services = {} if scenario.variant is None else dict(scenario.variant.services)
     return services.get("redundancy") == "link" or services == {"path": "gradient", "redundancy": "coordinator"}
 

@@ -116,7 +116,7 @@ class CommandIntake:
         return reasons.total()
 
     def is_pending(self, node: int) -> bool:
-        """Tell whether a node's answer to the observation of this tick has not been accepted."""
+        """Return whether a node's answer to the observation of this tick has not been accepted."""
         return node in self._pending
 
     def newest_tick(self, node: int) -> int:

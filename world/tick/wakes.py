@@ -116,5 +116,5 @@ class Wakes:
 
     @property
     def sleeping(self) -> bool:
-        """Whether any node sleeps."""
+        """True if any node sleeps."""
         return bool(self._asleep)

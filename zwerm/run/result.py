@@ -65,7 +65,7 @@ class RunResult:
 
     @property
     def ok(self) -> bool:
-        """Tell whether the run ended as runs should: completed, or at its time limit."""
+        """Return whether the run ended as runs should: completed, or at its time limit."""
         return self.outcome in ("completed", "time-limit")
 
     @property

@@ -100,7 +100,7 @@ def _keys(where: tuple[int | str, ...]) -> Path:
 
 
 def _touches(line: str, path: Path) -> bool:
-    """Tell whether a line is about a place that is, is inside of, or is around `path`."""
+    """Return whether a line is about a place that is, is inside of, or is around `path`."""
     place = tuple(line.partition(": ")[0].split("."))
     shared = min(len(place), len(path))
     return place[:shared] == path[:shared]

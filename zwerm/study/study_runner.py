@@ -116,7 +116,7 @@ def _distinct(trials: Sequence[Trial]) -> list[Trial]:
 
 
 def _trusted(trial: Trial, row: Row) -> bool:
-    """Tell whether the code that gave a row is known, and is the code of now."""
+    """Return whether the code that gave a row is known, and is the code of now."""
     return not trial.point.modules.unknown and still_same(row.get("modules", ""))
 
 

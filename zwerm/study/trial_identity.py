@@ -159,7 +159,7 @@ class LoadedModules:
 
 
 def still_same(recorded: str) -> bool:
-    """Tell whether the modules that a row recorded, as `LoadedModules.others` returned them, have the same files now."""
+    """Return whether the modules that a row recorded, as `LoadedModules.others` returned them, have the same files now."""
     if not recorded:
         return True
     for name, digest in json.loads(recorded).items():
@@ -170,7 +170,7 @@ def still_same(recorded: str) -> bool:
 
 
 def _is_as_imported(file: SourceFile) -> bool:
-    """Tell whether a module is not imported yet, or was imported from a file that was as it is now."""
+    """Return whether a module is not imported yet, or was imported from a file that was as it is now."""
     if _file_of(file.module) != file.path:
         _imported.pop(file.path, None)
         return True

@@ -104,7 +104,7 @@ class CellsLayer(Layer):
 
     @classmethod
     def applies(cls, view: RunView) -> bool:
-        """Tell whether any robot reported a slice."""
+        """Return whether any robot reported a slice."""
         return any(decode_snapshot(each.snapshot) is not None for each in view.snapshots)
 
     @property

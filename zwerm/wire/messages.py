@@ -330,7 +330,7 @@ def traced_bytes(command: Command, payload: bytes) -> bytes:
 
 
 def is_finite_drive(drive: BodyVelocity | WheelSpeeds) -> bool:
-    """Tell whether every number of `drive` is finite."""
+    """Return whether every number of `drive` is finite."""
     if isinstance(drive, BodyVelocity):
         return isfinite(drive.forward_m_s + drive.left_m_s + drive.turn_rad_s)
     return isfinite(drive.left_m_s + drive.right_m_s)

@@ -31,7 +31,7 @@ def to_rad(steps: int) -> float:
 
 
 def is_left(bearing_a: int, bearing_b: int) -> bool:
-    """Tell whether the observer stands left of the line from landmark a to landmark b.
+    """Return whether the observer stands left of the line from landmark a to landmark b.
 
     It does iff the relative bearing (theta_b - theta_a) mod 2 pi is in (0, pi).
     """
@@ -39,7 +39,7 @@ def is_left(bearing_a: int, bearing_b: int) -> bool:
 
 
 def is_inside(bearings: Sequence[int]) -> bool:
-    """Tell whether the observer stands inside the convex hull of the landmarks it sees.
+    """Return whether the observer stands inside the convex hull of the landmarks it sees.
 
     It does iff there are three or more and no two adjacent bearings are pi or more apart (section IV-A, Fig. 4).
     """

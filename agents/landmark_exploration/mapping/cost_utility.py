@@ -93,11 +93,11 @@ class Offer:
         return self._most
 
     def is_empty(self) -> bool:
-        """Tell whether no frontier is free."""
+        """Return whether no frontier is free."""
         return not any(self.is_free(key) for key in self._frontiers.open)
 
     def is_free(self, key: int) -> bool:
-        """Tell whether a frontier is open and may be chosen."""
+        """Return whether a frontier is open and may be chosen."""
         return key in self._frontiers.open and key not in self._taken and key not in self._avoided
 
     def utility(self, key: int) -> float:

@@ -28,7 +28,7 @@ class LandmarkMap:
         self._parts: dict[int, list[tuple[int, int]]] = {}  # by origin, of an observation that is not complete
 
     def observe(self, snapshot: BearingSnapshot, rank: tuple[int, int] = (0, 0)) -> bool:
-        """Take in an observation; tell whether it was news: a simplex more, or a status that rose."""
+        """Take in an observation; return whether it was news: a simplex more, or a status that rose."""
         risen = not self._presence_only and self.frontiers.note(snapshot)
         news = self.complex.update(snapshot, rank) or risen
         self.version += news
@@ -40,7 +40,7 @@ class LandmarkMap:
             self._read(stretch.origin, number, stretch.entries[number - stretch.first])
 
     def raise_all(self, keys: Sequence[int], status: int) -> bool:
-        """Raise frontiers to a status; tell whether that was news."""
+        """Raise frontiers to a status; return whether that was news."""
         news = [self.frontiers.raise_to(key, status) for key in keys]
         self.version += any(news)
         return any(news)

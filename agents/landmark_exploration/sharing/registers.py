@@ -38,7 +38,7 @@ class Registers:
         self._agreed: tuple[int, int] | None = None  # a digest, and the tick since which all agree on it
 
     def merge(self, register: Register, tick: int) -> bool:
-        """Take in a register heard at `tick`; tell whether it was newer than what is known of its robot."""
+        """Take in a register heard at `tick`; return whether it was newer than what is known of its robot."""
         known = self.newest.get(register.node)
         if known is not None and _age(register) <= _age(known):
             return False
@@ -69,7 +69,7 @@ class Registers:
         return tuple(self.newest[node] for node in chosen)
 
     def concluded(self, digest: int, tick: int) -> bool:
-        """Tell whether all robots have nothing left to explore, with the logs of this digest. To be asked once a tick."""
+        """Return whether all robots have nothing left to explore, with the logs of this digest. To be asked once a tick."""
         living = [node for node in self.newest if not self.is_silent(node, tick)]
         unheard = self._robots_expected - len(self.newest)
         agreed = living and all(self.newest[node].frozen == digest + 1 for node in living)

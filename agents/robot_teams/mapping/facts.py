@@ -132,7 +132,7 @@ class FactSet:
         return fact in self._facts
 
     def add(self, fact: Fact) -> bool:
-        """Add one fact; tell whether it is new."""
+        """Add one fact; return whether it is new."""
         if fact in self._facts:
             return False
         self._facts[fact] = None
@@ -173,7 +173,7 @@ class FactSet:
         return sorted([fact for fact in self._facts if isinstance(fact, Arc) and self._holds(fact.wrecks)])
 
     def _holds(self, wrecks: tuple[Wreck, ...]) -> bool:
-        """Tell whether no robot that is named in `wrecks` was alive later."""
+        """Return whether no robot that is named in `wrecks` was alive later."""
         if not wrecks:
             return True
         alive = self.alive_ticks

@@ -53,7 +53,7 @@ class Certificate(NamedTuple):
 
     @property
     def complete(self) -> bool:
-        """Whether at least one end is known and nothing is open."""
+        """True if at least one end is known and nothing is open."""
         return self.ends > 0 and not self.ends_without_mate and not self.open_ports
 
 
@@ -73,7 +73,7 @@ class SliceMap:
         self._certificate = Certificate(0, (), ())
 
     def add(self, fact: Fact) -> bool:
-        """Add one fact; tell whether it is new."""
+        """Add one fact; return whether it is new."""
         return self.facts.add(fact)
 
     def merge(self, facts: Iterable[Fact]) -> int:
@@ -101,14 +101,14 @@ class SliceMap:
         return self._arcs.get((end, direction))
 
     def is_swept(self, k: int, y_mm: int) -> bool:
-        """Tell whether a swept segment of slice k reaches within the tolerance of the height y."""
+        """Return whether a swept segment of slice k reaches within the tolerance of the height y."""
         self._derive()
         low, high = y_mm - 4 * TOLERANCE_MM, y_mm + 4 * TOLERANCE_MM
         return any(segment.bottom_mm <= high and segment.top_mm >= low for segment in self._by_slice.get(k, ()))
 
     @property
     def arcs_known(self) -> bool:
-        """Whether any arc was traced."""
+        """True if any arc was traced."""
         self._derive()
         return bool(self._arcs)
 
@@ -125,7 +125,7 @@ class SliceMap:
         return self._voids
 
     def complete_from(self, at: End | None) -> bool:
-        """Tell whether all is covered that a robot at the known end `at` can reach; None: it is somewhere else."""
+        """Return whether all is covered that a robot at the known end `at` can reach; None: it is somewhere else."""
         certificate = self.certificate
         return certificate.complete or (certificate.ends > 0 and at is not None and self._is_closed(at))
 
@@ -140,7 +140,7 @@ class SliceMap:
         )
 
     def is_virtual(self, end: End) -> bool:
-        """Tell whether a known end is one at a virtual frontier."""
+        """Return whether a known end is one at a virtual frontier."""
         self._derive()
         return end in self._across
 
@@ -248,7 +248,7 @@ class SliceMap:
                 self._across[upper] = Step(ACROSS, lower, 0)
 
     def _is_passed(self, end: End) -> bool:
-        """Tell whether a robot swept past an end."""
+        """Return whether a robot swept past an end."""
         low, high = end.y_mm - TOLERANCE_MM, end.y_mm + TOLERANCE_MM
         return any(segment.bottom_mm < low and high < segment.top_mm for segment in self._by_slice.get(end.slice, ()))
 

@@ -79,7 +79,7 @@ class Retreat:
 
     @property
     def blocked(self) -> bool:
-        """Whether somebody is in the way forward again."""
+        """True if somebody is in the way forward again."""
         return self._forward and (self._still > self._patience or self._ticks > self._leg_ticks)
 
 

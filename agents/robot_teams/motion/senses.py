@@ -36,7 +36,7 @@ class Beside(NamedTuple):
 
     @property
     def stands(self) -> bool:
-        """Whether it did not move in the last tick."""
+        """True if it did not move in the last tick."""
         return abs(self.dx_m) + abs(self.dy_m) < STANDS_M
 
 

@@ -17,7 +17,7 @@ class CoordinatedMembership(Membership):
         return False
 
     def knows(self, sender: int) -> bool:
-        """Tell whether facts and plans of a sender are taken over: those of the coordinator are."""
+        """Return whether facts and plans of a sender are taken over: those of the coordinator are."""
         return True
 
     def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
@@ -43,7 +43,7 @@ class CoordinatorMembership(Membership):
         self.view = View(1, node, ())
 
     def knows(self, sender: int) -> bool:
-        """Tell whether facts of a sender are taken over: those of all robots are."""
+        """Return whether facts of a sender are taken over: those of all robots are."""
         return True
 
     def receive(self, beacon: Beacon, tick: int, near: bool) -> None:

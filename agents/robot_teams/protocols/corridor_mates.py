@@ -27,11 +27,11 @@ class CorridorMates:
         return order.index(self._node) - max(0, len(order) - min(rooms, default=len(order)))
 
     def claimed(self, k: int) -> bool:
-        """Tell whether a teammate takes slice k in this corridor."""
+        """Return whether a teammate takes slice k in this corridor."""
         return any(status.claim == k for status in self._statuses())
 
     def awaits_predecessor(self) -> bool:
-        """Tell whether the predecessor has still to sweep its slice."""
+        """Return whether the predecessor has still to sweep its slice."""
         order, plan = self._plan.order, self._plan
         index = order.index(self._node) - 1
         if index < 0 or order[index] not in self._membership.view.members:

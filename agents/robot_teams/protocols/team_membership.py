@@ -22,7 +22,7 @@ PARTED_S: Final = 20.0
 
 
 def later(view: View, than: View) -> bool:
-    """Tell whether a view replaces another: by epoch, then the smaller lead, then more members."""
+    """Return whether a view replaces another: by epoch, then the smaller lead, then more members."""
     return (view.epoch, -view.lead, len(view.members), view.members) > (
         *(than.epoch, -than.lead, len(than.members)),
         than.members,
@@ -69,7 +69,7 @@ class Membership:
 
     @property
     def leads(self) -> bool:
-        """Whether this robot decides for the team."""
+        """True if this robot decides for the team."""
         return self.view.lead == self.node
 
     def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
@@ -92,7 +92,7 @@ class Membership:
             self._met[theirs.lead] = theirs, self._met[theirs.lead][1]
 
     def knows(self, sender: int) -> bool:
-        """Tell whether facts and plans of a sender are taken over: those of teammates are."""
+        """Return whether facts and plans of a sender are taken over: those of teammates are."""
         return sender in self.view.members
 
     def meet_first(self, tick: int) -> None:
@@ -144,7 +144,7 @@ class Membership:
         self._adopt(own, tick)
 
     def merge(self, tick: int) -> bool:
-        """Unite with the teams that were met and whose leads have larger ids; tell whether there are any."""
+        """Unite with the teams that were met and whose leads have larger ids; return whether there are any."""
         others = [view for view in self.met() if view.lead > self.node]
         if not others:
             return False
@@ -154,7 +154,7 @@ class Membership:
         return True
 
     def merges_soon(self, tick: int, patience_ticks: int) -> bool:
-        """Tell whether a team was met a short time ago: the lead with the smaller id unites the two when all are free."""
+        """Return whether a team was met a short time ago: the lead with the smaller id unites the two when all are free."""
         return any(tick - since < patience_ticks for _, since in self._met.values())
 
     def _note_statuses(self, beacon: Beacon, tick: int) -> None:
@@ -172,7 +172,7 @@ class Membership:
             self._met[view.lead] = view, known[1]
 
     def _is_gone(self, node: int, tick: int) -> bool:
-        """Tell whether a member is silent, or holds on to another view longer than it takes to hear of this one."""
+        """Return whether a member is silent, or holds on to another view longer than it takes to hear of this one."""
         if self.roster.silent_ticks(node, tick) > self._silence_ticks:
             return True
         status, own = self.roster.statuses.get(node), self.view

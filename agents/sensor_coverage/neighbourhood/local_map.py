@@ -323,12 +323,12 @@ class LocalMap(NeighbourTable):
 
     @property
     def to_gap(self) -> bool:
-        """Whether the route leads to a gap."""
+        """True if the route leads to a gap."""
         return self.route is not None and self.route.cost >= GAP_COST
 
     @property
     def has_route(self) -> bool:
-        """Whether there is a route to a frontier, and no nearer robot is in doubt."""
+        """True if there is a route to a frontier, and no nearer robot is in doubt."""
         return self.route is not None and not DOUBT_COST <= self.route.cost < GAP_COST
 
     def next_hop(self) -> int | None:

@@ -101,7 +101,7 @@ class AdviceClient(Component):
 
     @property
     def _current(self) -> bool:
-        """Whether the report that was sent last still holds."""
+        """True if the report that was sent last still holds."""
         newest, sent = self._newest, self._sent
         return newest is not None and sent is not None and newest == msgspec.structs.replace(sent, number=newest.number)
 

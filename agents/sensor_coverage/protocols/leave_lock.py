@@ -77,12 +77,12 @@ class LeaveLock:
 
     @property
     def wants(self) -> bool:
-        """Whether the robot has requested locks, and neither left nor given up."""
+        """True if the robot has requested locks, and neither left nor given up."""
         return self._request is not None
 
     @property
     def stands(self) -> bool:
-        """Whether the robot is in the complex and stands still."""
+        """True if the robot is in the complex and stands still."""
         return self._stands
 
     @property

@@ -94,12 +94,12 @@ class LeaveNegotiation(Component):
 
     @property
     def locked(self) -> bool:
-        """Whether the robot must stand still."""
+        """True if the robot must stand still."""
         return self._lock is not None and self._lock.locked(self._now_s)
 
     @property
     def stays(self) -> bool:
-        """Whether the robot cannot leave, by lists that are all new."""
+        """True if the robot cannot leave, by lists that are all new."""
         lock = self._lock
         return lock is not None and self._list_requests > 0 and not self._unanswered and not lock.redundant()
 

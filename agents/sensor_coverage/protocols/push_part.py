@@ -50,7 +50,7 @@ class Surroundings(Protocol):
 
     @property
     def clear(self) -> bool:
-        """Whether the robot stands still, has averaged bearings, and no slot around it changes hands."""
+        """True if the robot stands still, has averaged bearings, and no slot around it changes hands."""
 
     @property
     def local_map(self) -> NeighbourTable:

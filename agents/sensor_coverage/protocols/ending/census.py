@@ -69,12 +69,12 @@ class Census:
 
     @property
     def concluded(self) -> bool:
-        """Whether the base has concluded that all was quiet, and was not disturbed since."""
+        """True if the base has concluded that all was quiet, and was not disturbed since."""
         return self._concluded
 
     @property
     def waits(self) -> bool:
-        """Whether the robot has joined a wave and lacks an answer."""
+        """True if the robot has joined a wave and lacks an answer."""
         return self._number > 0 and self._counted is None
 
     @property

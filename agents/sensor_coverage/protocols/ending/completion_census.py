@@ -35,7 +35,7 @@ class CompletionProtocol(Component):
 
     @property
     def concluded(self) -> bool:
-        """Whether the base has concluded that all was quiet."""
+        """True if the base has concluded that all was quiet."""
         return self._census.concluded
 
     @property
