@@ -1,8 +1,9 @@
 """The lead's decisions: which corridors its free robots form next, and when the team divides. Pure functions.
 
 Latimer et al. 2002, sections 3.3 and 3.4. A corridor begins at the open end or port nearest to a free robot. Robots for which
-the map shows no room in it take the next open cell, if there is one near. Where a robot found a new segment on its own slice,
-a reverse critical point lies between it and its predecessor. Then the team divides: it and those behind it take the new cell.
+the map shows no room in it take the next open cell, if there is one near. If a robot found a new segment on its own
+slice, a reverse critical point lies between it and its predecessor. Then the team divides: this robot and those behind
+it take the new cell.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -15,12 +16,12 @@ from zwerm.agents.robot_teams.protocols.team_messages import READY, Plan, Status
 FAR: Final = 10**9
 # The side of the anchor of a plan that only joins the maps of robots that began apart.
 LINK: Final = 0
-# How far beyond the ends of its anchor's segment a corridor reserves its cell [mm].
+# Distance beyond the ends of its anchor's segment up to which a corridor reserves its cell [mm].
 BESIDE_MM: Final = 500
 
 
 class Task(NamedTuple):
-    """Where a corridor begins: at an end that is not swept (`own_slice`), or at the open port of one that is."""
+    """The start of a corridor: an end that is not swept (`own_slice`), or the open port of one that is."""
 
     end: End
     direction: int
@@ -62,7 +63,7 @@ def reservation(slice_map: SliceMap, plan: Plan) -> Reservation:
     anchor, reach = plan.anchor, len(plan.order) * plan.direction
     if anchor.side == LINK:
         return Reservation(0, -1, 0, 0)
-    # Slabs are named by the slice on their left. One more to either side: hunts go back, and the next corridor goes on.
+    # A slab has the number of the slice on its left. One more to either side: hunts go back, and the next corridor goes on.
     first = anchor.slice if plan.direction == RIGHT else anchor.slice - 1
     low, high = sorted((first - plan.direction, first + reach))
     known = slice_map.end(anchor)
@@ -77,7 +78,7 @@ def reservation(slice_map: SliceMap, plan: Plan) -> Reservation:
 
 
 def room(slice_map: SliceMap, task: Task, count: int) -> int:
-    """Return for how many of `count` robots a corridor has room, as far as the map tells: at least one."""
+    """Return the number of robots, of `count`, for which a corridor has room by the map: at least one."""
     k, found = task.end.slice, 1 if task.own_slice else 0
     if slice_map.is_virtual(task.end) or (task.own_slice and slice_map.arc(task.end, task.direction) is not None):
         return 1
@@ -129,7 +130,7 @@ def finder(order: Sequence[int], statuses: Mapping[int, Status]) -> int | None:
 def division(view: View, order: Sequence[int], index: int) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
     """Return the two groups when robot `index` of a formation found a new cell: it and those behind it, and all others.
 
-    Where the lead of the formation found it, the formation splits in half. None where a group would be empty.
+    If the lead of the formation found it, the formation splits in half. None where a group would be empty.
     """
     cut = index + 1 if index + 1 < len(order) else len(order) // 2
     new = tuple(order[:cut])
@@ -149,8 +150,9 @@ def assign(
 ) -> list[Plan]:
     """Return new plans for the free members. With `one_corridor` the whole team forms one corridor at a time.
 
-    While others are busy, no robot travels farther than `join_mm`: its turn comes nearer. The busy plans among `reserving`
-    keep others out of their cells. `skip` has the tasks that brought nothing new lately, each with a robot that tried.
+    While others are busy, no robot travels farther than `join_mm`: a nearer task comes later. The busy plans among
+    `reserving` keep others out of their cells. `skip` has the tasks that recently gave nothing new, each with a robot
+    that tried.
     """
     free = free_members(view, plans, statuses)
     if not free or (one_corridor and len(free) < len(view.members)):
@@ -166,7 +168,8 @@ def assign(
     members = [statuses[node] for node in view.members if node in statuses]
     swept = {status.sweeping for status in members if status.phase != READY}
     tasks = open_tasks(slice_map)
-    # From where nothing open can be reached, what blocks the way is explored: a wreck, or a wrong measurement.
+    # If no open end or port can be reached, the robot explores the cause that blocks the way: a wreck, or a wrong
+    # measurement.
     for node in [node for node in distances if tasks and not any(task.end in distances[node] for task in tasks)]:
         tasks += _tasks(slice_map, slice_map.openings(distances[node]))
     tasks = list(dict.fromkeys(tasks))
@@ -191,7 +194,7 @@ def assign(
         if best is None:
             break
         task = best[3]
-        # The nearest goes first, and so farthest: single file. The last in the order is the lead.
+        # The robots go in single file: the nearest goes first, and so goes farthest. The last in the order is the lead.
         near = sorted(waiting, key=lambda each: (distances[each].get(task.end, FAR), each))
         reach = max(join_mm, best[0])
         near = [each for each in near if distances[each].get(task.end, FAR) <= reach and (task, each) not in skip]

@@ -34,20 +34,20 @@ from zwerm.errors import ControllerError, ProtocolError
 from zwerm.wire.checksum import seal, unseal
 from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 
-# In the first second every robot that is heard is met: the robots start together, as one team.
+# In the first second a robot meets every robot that it receives: the robots start together, as one team.
 MUSTER_S: Final = 1.0
-# A robot this near to an end, or to one that stands there, stands at it [m].
+# A robot nearer than this to an end, or to a robot at that end, counts as standing at it [m].
 PARKED_M: Final = 0.75
 # A wreck hides what is nearer to it than this, beyond two bodies' radii [m].
 HIDDEN_M: Final = GAP_M - 0.005
 # The channel to the coordinator.
 UPLINK: Final = "uplink"
-# The lead decides every so many ticks.
+# Ticks between two decisions of the lead.
 DECIDE_TICKS: Final = 4
 
 
 class TeamTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """The footprint's radius, the slices, the beacons, and when robots are met or given up for lost."""
+    """The footprint's radius, the slices, the beacons, and when robots are met or counted as lost."""
 
     footprint_m: Annotated[float, Meta(gt=0.0)] = 0.5
     spacing_m: Annotated[float, Meta(gt=0.0)] = 0.95
@@ -122,7 +122,7 @@ class TeamRobot(Controller):
         self._left_off = False
 
     def step(self, observation: Observation) -> Command:
-        """Hear, decide, move, and say."""
+        """Receive, decide, move, and send."""
         tick = observation.tick
         senses = self._senses = self._sensing.read(observation, self._wrecks.wrecks)
         if observation.inbox:
@@ -151,14 +151,14 @@ class TeamRobot(Controller):
     # --- moving -------------------------------------------------------------------------------------------------------
 
     def _stand(self, senses: Senses) -> tuple[float, float]:
-        """Leave off work, and make way for others."""
+        """Stop work, and make way for others."""
         self._left_off = True
         return self.pilot.stand(senses)
 
     def _move(self, senses: Senses) -> tuple[float, float]:
         pilot = self.pilot
         if self._left_off:
-            # There is more to do after all: work goes on from wherever the robot is now.
+            # New work was found: it begins at the robot's present place.
             self._left_off = False
             pilot.give_up()
         velocity = pilot.step(senses)
@@ -204,7 +204,7 @@ class TeamRobot(Controller):
                 self.work.at = self.work.sweeping = None
 
     def _swept_by_others(self, k: int) -> bool:
-        """Return whether another robot is sweeping slice k now, by its own word."""
+        """Return whether another robot reports that it is sweeping slice k now."""
         roster, tick = self.membership.roster, self._newest_senses().tick
         silence = self.parameters.silence_s / self.setup.dt_s
         return any(
@@ -214,7 +214,7 @@ class TeamRobot(Controller):
         )
 
     def _parked(self, senses: Senses) -> list[End]:
-        """Return the ends at which robots in contact stand, by their own word."""
+        """Return the ends at which robots in contact report that they stand."""
         found = []
         grid = self._grid
         for other in senses.robots:
@@ -227,7 +227,7 @@ class TeamRobot(Controller):
         return found
 
     def _watch(self, senses: Senses) -> None:
-        """Look for wrecks, tell what they hide, and whether robots that were taken for dead live."""
+        """Look for wrecks. Record the ends that they hide, and the robots that were taken for dead and are alive."""
         tick, roster, voids = senses.tick, self.membership.roster, self.map.voids
         if self._channels:
             for node in self._wrecks.watch(senses, voids):
@@ -260,7 +260,7 @@ class TeamRobot(Controller):
         assert self._senses is not None
         return self._senses
 
-    # --- hearing and saying -------------------------------------------------------------------------------------------
+    # --- receiving and sending ----------------------------------------------------------------------------------------
 
     def _hear(self, observation: Observation, senses: Senses) -> None:
         tick = observation.tick
@@ -329,7 +329,7 @@ class TeamRobot(Controller):
         return tuple([Transmission(channel, frame) for channel in self._channels])
 
     def _telemetry(self) -> dict[str, float | bool]:
-        """Return the certificate and what the team came to, whenever the map has grown."""
+        """Return the certificate and the team's results, whenever the map has grown."""
         facts = self.map.facts
         if (len(facts), self._done) == self._told:
             return {}

@@ -2,8 +2,8 @@
 
 Latimer et al. 2002, section 3.3, Fig. 5. At a forward convex critical point the cell ahead is divided along a line from the
 point, perpendicular to the slices. The team's sweeps end at the line as at a wall. The line ends at the first slice on which
-an obstacle crosses it. It belongs to one view of one team: a merge or a division drops it, and so does a team that has
-nothing else to do. What it left is open in the map, as the ends below or above the line that lack a mate.
+an obstacle crosses it. It belongs to one view of one team. A merge or a division drops it, and a team without other
+work drops it too. The space left for later is open in the map: the ends beyond the line lack a mate.
 """
 
 from typing import Final, NamedTuple
@@ -35,7 +35,7 @@ class Frontiers:
         self._seen: dict[Arc, None] = {}
 
     def drop(self) -> None:
-        """Have no frontier."""
+        """Drop the frontier."""
         self.frontier = None
 
     def is_reserved(self, end: End) -> bool:
@@ -53,7 +53,7 @@ class Frontiers:
         return msgspec.structs.replace(plan, frontier_mm=line.y_mm)
 
     def judge(self, plan: Plan) -> None:
-        """Take in that a plan has ended: an obstacle may have crossed the frontier, or a critical point may begin one."""
+        """Update the frontier at the end of a plan: an obstacle may have crossed it, or a critical point may begin one."""
         facts = self._map.facts
         line = self.frontier
         if line is not None and plan.frontier_mm == line.y_mm:

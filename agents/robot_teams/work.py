@@ -1,7 +1,7 @@
 """One robot's work: travel along known ways, find a slice of a corridor, sweep it, and hunt for critical points.
 
 The work is written as generators: each yields a manoeuvre, or None to wait a tick, and is resumed when the manoeuvre is done.
-They add what they find to the map, and keep `at`, the end where the robot stands.
+They add their findings to the map, and keep `at`, the end where the robot stands.
 """
 
 from collections.abc import Callable, Generator
@@ -15,9 +15,9 @@ from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, SWEEPS, TRAV
 
 Story = Generator[Manoeuvre | None, None, None]
 
-# A journey or a hunt that takes more steps than this has lost its way.
+# Largest number of steps of a journey or a hunt. Beyond it, the robot has lost its position in the map.
 STEPS_MAX: Final = 400
-# So often a step of a journey may lead elsewhere than the map says.
+# Largest number of steps of a journey that may lead elsewhere than the map says.
 ASTRAY_MAX: Final = 3
 # An end of the same slice that is nearer than this may be approached where no way leads to it [mm].
 STRAIGHT_MM: Final = 1_500
@@ -38,10 +38,11 @@ class Lost(Exception):
 
 
 class Mates(Protocol):
-    """What a robot knows of its teammates in a corridor."""
+    """A robot's knowledge of its teammates in a corridor."""
 
     def slot(self, room: int | None) -> int:
-        """Return which slice of the corridor is this robot's, given for how many it found room; negative for none."""
+        """Return the slice of the corridor that this robot takes, given the number of robots it found room for;
+        negative for none."""
 
     def claimed(self, k: int) -> bool:
         """Return whether a teammate takes slice k in this corridor."""
@@ -50,11 +51,11 @@ class Mates(Protocol):
         """Return whether another robot is sweeping slice k now."""
 
     def awaits_predecessor(self) -> bool:
-        """Return whether the predecessor has still to sweep its slice."""
+        """Return whether the predecessor has not swept its slice yet."""
 
 
 class Work:
-    """What one robot does and where it stands. `sense` gives its newest senses."""
+    """The activity and the place of one robot. `sense` returns its newest senses."""
 
     def __init__(
         self, slice_map: SliceMap, grid: Grid, step_m: float, sense: Callable[[], Senses], parked: Parked
@@ -74,7 +75,7 @@ class Work:
         self._sense = sense
         self._parked = parked
 
-    # --- finding itself -----------------------------------------------------------------------------------------------
+    # --- finding a first end ------------------------------------------------------------------------------------------
 
     def localise(self, side: int, swept_by_others: Callable[[int], bool]) -> Story:
         """Find an end from anywhere: go to a slice and along it to its end on `side`; sweep it if it is new."""
@@ -98,7 +99,7 @@ class Work:
         yield from self._hunt(up.slice, RIGHT, swept_by_others)
 
     def link(self, direction: int, swept_by_others: Callable[[int], bool]) -> Story:
-        """Walk back to the predecessor's slice: what joins the maps of robots that began apart."""
+        """Walk back to the predecessor's slice. This joins the maps of robots that began apart."""
         self.found = self.spare = False
         self.phase = HUNTS
         at = self.at
@@ -144,7 +145,7 @@ class Work:
         arc, end = trace.arc, trace.end
         if end is None:
             raise Lost
-        # Where a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known.
+        # If a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known.
         if arc is not None and self._is_new(start, direction, end, bool(arc.wrecks)):
             self._note(arc)
         self.at = self.map.end(end)
@@ -155,8 +156,8 @@ class Work:
     def travel(self, stop: End) -> Story:
         """Go to a known end by the shortest known way, without the steps that led elsewhere before.
 
-        Where a wall is almost parallel to a slice, robots measure its end far apart, and no way may lead to one of them. An end
-        near by on the same slice is then approached straight.
+        If a wall is almost parallel to a slice, robots measure its end far apart, and there may be no way to one of
+        these ends. The robot then goes straight to an end near by on the same slice.
         """
         astray: dict[tuple[End, int], None] = {}
         for _ in range(STEPS_MAX):
@@ -242,7 +243,7 @@ class Work:
     def _take_slot(self, plan: Plan, mates: "Mates") -> Generator[Manoeuvre | None, None, bool]:
         """Trace forward, one slice a robot; return whether there is a slice for this one.
 
-        The robot that finds no more room tells for how many there is; then those in front take the slices that there are.
+        The robot that finds no more room reports the number of robots with room. Then the robots in front take these slices.
         """
         at = self.at
         if at is None:
@@ -271,7 +272,7 @@ class Work:
     def _hunt(
         self, k: int, direction: int, swept_by_others: Callable[[int], bool], frontier_mm: int | None = None
     ) -> Story:
-        """Walk round the slab behind slice k, sweeping what is new, until the end reached is swept.
+        """Walk round the slab behind slice k, and sweep new segments, until the reached end is swept.
 
         Fig. 4 (i) and (ii) of the paper are both this loop.
         """

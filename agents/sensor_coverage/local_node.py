@@ -1,4 +1,4 @@
-"""What a decentralised robot and its base station have in common: the situation, the census, and the loop over components."""
+"""The common part of a decentralised robot and its base station: the situation, the census, and the loop over components."""
 
 from typing import Final
 

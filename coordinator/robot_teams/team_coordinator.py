@@ -1,7 +1,7 @@
-"""The coordinator of coverage by robot teams: it plans the cells of all robots from what they tell it.
+"""The coordinator of coverage by robot teams: it plans the cells of all robots from their messages.
 
-It is the lead of one team of all robots that it hears, with the same decisions as the lead of any team. It has no body. Robots
-hear of one another through its beacons only. It never divides the team: free robots take the nearest open cells.
+It leads one team of all robots in reach, with the same decisions as the lead of any team. It has no body. Robots learn
+of one another only from its beacons. It never divides the team: free robots take the nearest open cells.
 """
 
 from typing import Annotated, Final, Protocol
@@ -24,7 +24,8 @@ DECIDE_TICKS: Final = 4
 
 
 class CoordinatorTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """How often it sends, when it drops a silent robot, and how far robots go to join a corridor while others work."""
+    """Its sending period, the silence after which it drops a robot, and the distance that robots go to join a corridor
+    while others work."""
 
     beacon_s: Annotated[float, Meta(gt=0.0)] = 0.25
     silence_s: Annotated[float, Meta(gt=0.0)] = 6.0
@@ -33,7 +34,7 @@ class CoordinatorTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Setup(Protocol):
-    """What the coordinator needs of its setup."""
+    """The part of its setup that the coordinator needs."""
 
     @property
     def node(self) -> int:
@@ -45,7 +46,7 @@ class Setup(Protocol):
 
     @property
     def parameters(self) -> dict[str, object]:
-        """What the scenario set."""
+        """The parameters from the scenario."""
 
 
 class TeamCoordinator:
@@ -75,7 +76,7 @@ class TeamCoordinator:
         self._told = -1, False
 
     def step(self, observation: Observation) -> Command:
-        """Hear, decide, and say."""
+        """Receive, decide, and send."""
         tick = observation.tick
         for packet in observation.inbox:
             try:
@@ -103,7 +104,7 @@ class TeamCoordinator:
         return Command(outbox=outbox, done=done, telemetry=telemetry)
 
     def _is_done(self) -> bool:
-        """Return whether all is covered that any of the robots that are heard can reach."""
+        """Return whether all space that any robot in reach can drive to is covered."""
         statuses, members = self.membership.roster.statuses, self.membership.view.members
         places = [statuses[node].at for node in members]
         return bool(members) and all(

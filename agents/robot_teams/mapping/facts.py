@@ -2,11 +2,11 @@
 
 Slice `k` is the line x = origin + k * spacing. The configuration space of the body's centre meets it in segments. The upper end
 of a segment is a TOP end, the lower one a BOTTOM end. An arc is the part of the boundary between two consecutive crossings of
-slices. Two sets of facts merge by union, which is commutative, associative and idempotent, so that lost, late and copied
+slices. Two sets of facts merge by union, which is commutative, associative and idempotent, so lost, late and copied
 messages can do no harm. Lengths are whole millimetres: equal facts are equal bytes on every robot.
 
-A dead robot is an obstacle. What a robot observed of such an obstacle names the `Wreck`. A sign of life of that robot is a fact
-too, and all facts that name one of its earlier wrecks are void from then on: no suspicion lasts longer than its proof.
+A dead robot is an obstacle. A fact that a robot observed at such an obstacle names the `Wreck`. A sign of life of that
+robot is a fact too. It makes all facts void that name one of the robot's earlier wrecks.
 """
 
 from typing import Final, NamedTuple
@@ -82,7 +82,7 @@ class Arc(NamedTuple):
 
 
 class Void(NamedTuple):
-    """A wreck at `x_mm` hides the ends of slice `slice` between two heights: nobody can reach them any more."""
+    """A wreck at `x_mm` hides the ends of slice `slice` between two heights: no robot can reach them any more."""
 
     slice: int
     x_mm: int
@@ -92,7 +92,7 @@ class Void(NamedTuple):
 
     @property
     def wrecks(self) -> tuple[Wreck, ...]:
-        """The wreck, as other facts name theirs."""
+        """The wreck, as a tuple, as in the other kinds of facts."""
         return (self.wreck,)
 
 
@@ -109,7 +109,7 @@ class Cut(NamedTuple):
 
 
 class Return(NamedTuple):
-    """Robot `node` lived at `tick`: it was no wreck before."""
+    """Robot `node` was alive at `tick`, so it was no wreck before."""
 
     node: int
     tick: int
@@ -145,7 +145,7 @@ class FactSet:
 
     @property
     def alive_ticks(self) -> dict[int, int]:
-        """The newest proof of life of every robot that was ever taken for dead wrongly."""
+        """The newest proof of life of every robot that was wrongly taken for dead."""
         found: dict[int, int] = {}
         for fact in self._facts:
             if isinstance(fact, Return):
@@ -159,7 +159,7 @@ class FactSet:
 
     @property
     def voids(self) -> list[Void]:
-        """What wrecks hide, sorted."""
+        """The facts about ends that wrecks hide, sorted."""
         return sorted([fact for fact in self._facts if isinstance(fact, Void) and self._holds(fact.wrecks)])
 
     @property

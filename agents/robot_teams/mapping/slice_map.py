@@ -1,24 +1,24 @@
 """The map of ends, ports and mates, derived from a set of facts, and the certificate of complete coverage.
 
-Every end of a segment needs a mate, the other end, once the segment is swept; and has two ports, the arcs of the boundary that
-leave it to either side. Coverage is complete if and only if no end lacks its mate and no port is open: then every slab between
-two slices is bounded by swept segments and traced arcs only. That presumes that the spacing is at most twice the footprint's
-radius, and at most the sum of the footprint's radius and the body's diameter, so that an obstacle between two slices that
-no arc reaches hides nothing.
+Every end of a segment has a mate, the other end, once the segment is swept. It also has two ports, the arcs of the
+boundary that leave it to either side. Coverage is complete if and only if no end lacks its mate and no port is open.
+Then every slab between two slices is bounded by swept segments and traced arcs only. The spacing must be at most twice
+the footprint's radius. It must also be at most the sum of the footprint's radius and the body's diameter. Then an
+obstacle between two slices that no arc reaches hides nothing.
 
-A wreck may hide ends. They count for nothing while it lies there: its own footprint covers what is there, and arcs lead around
-it. A wreck also blocks ways that were free. Ways therefore prefer segments and arcs that were observed beside the wreck. Where
-no way leads from an end to what is open, all that can be reached from that end is covered if and only if every end that
-ways from it reach has a mate and two arcs, none of them blocked.
+A wreck may hide ends. They are ignored while the wreck is there: its own footprint covers that place, and arcs lead
+around it. A wreck also blocks ways that were free. Ways therefore prefer segments and arcs that were observed beside
+the wreck. An end may have no way to any open end or port. Then all that a robot can reach from it is covered if and
+only if every end within reach has a mate and two arcs, none of them blocked.
 
-A slice may graze an obstacle: one robot stops there, and another sweeps past. An end that lies inside a swept segment
-is no end of anything that is left to cover, and counts for nothing either.
+A slice may graze an obstacle: one robot stops there, and another sweeps past. An end inside a swept segment ends no
+space that is left to cover, and is ignored too.
 
 A virtual frontier cuts a slice into two parts. The two ends there need mates, and have no ports: nothing of the boundary is
-there. A way leads across, from the one to the other. A later sweep past the frontier makes them count for nothing.
+there. A way leads across, from the one to the other. After a later sweep past the frontier they are ignored.
 
 Ends that two robots measured a little differently are one: those of one slice and side are joined where neighbours are at most
-`TOLERANCE_MM` apart. The joined ends are a function of the set of facts alone, so that merging maps needs no order.
+`TOLERANCE_MM` apart. The joined ends are a function of the set of facts alone, so maps may be merged in any order.
 """
 
 import heapq
@@ -45,7 +45,7 @@ class Step(NamedTuple):
 
 
 class Certificate(NamedTuple):
-    """Why coverage is complete, or what is missing."""
+    """The reason why coverage is complete, or the ends and ports that are missing."""
 
     ends: int
     ends_without_mate: tuple[End, ...]
@@ -58,7 +58,7 @@ class Certificate(NamedTuple):
 
 
 class SliceMap:
-    """What a robot knows of the free space: its facts, and the graph of ends that follows from them."""
+    """A robot's map of the free space: its facts, and the graph of ends that follows from them."""
 
     def __init__(self) -> None:
         self.facts = FactSet()
@@ -114,13 +114,13 @@ class SliceMap:
 
     @property
     def certificate(self) -> Certificate:
-        """What is open, sorted."""
+        """The open ends and ports, sorted."""
         self._derive()
         return self._certificate
 
     @property
     def voids(self) -> list[Void]:
-        """What wrecks hide."""
+        """The ends that wrecks hide."""
         self._derive()
         return self._voids
 
@@ -193,7 +193,7 @@ class SliceMap:
         return found
 
     def _derive(self) -> None:
-        """Work out ends, mates and arcs anew if facts were added."""
+        """Compute ends, mates and arcs again if facts were added."""
         if len(self.facts) == self._known:
             return
         self._known = len(self.facts)
@@ -208,7 +208,7 @@ class SliceMap:
         ends = sorted(end for level in self._levels.values() for _, _, end in level)
         mated: set[End] = set()
         joined: set[Port] = set()
-        # What was observed beside a wreck comes first: it is the way that is free now.
+        # An observation beside a wreck comes first: it is the way that is free now.
         for segment in sorted(segments, key=_wrecks_first):
             self._by_slice.setdefault(segment.slice, []).append(segment)
             mated.update([known for known in map(self._known_end, segment.ends) if known is not None])

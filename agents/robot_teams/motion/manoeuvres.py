@@ -1,8 +1,8 @@
 """The three manoeuvres: approach an end, sweep a slice, trace the boundary to the next slice.
 
-Each is stepped once a tick with what the robot senses; it returns the unit vector to move along, or None when it is done.
-Robots that stand in the way are handed in as `blocks`, unit vectors towards them: a manoeuvre goes around them as if they
-were walls. What it finds it offers as facts; the pilot decides what to do next.
+Each is stepped once a tick with the robot's senses. It returns the unit vector to move along, or None when it is done.
+The argument `blocks` has unit vectors towards robots in the way: a manoeuvre goes around them as if they were walls. A
+manoeuvre offers its findings as facts; the pilot decides what to do next.
 """
 
 import math
@@ -15,19 +15,19 @@ from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGH
 
 # A contact blocks a sweep if this much of its normal lies along the motion.
 BLOCKS: Final = 0.02
-# How far a sweep may leave its slice before the contact counts as the end of the segment [m].
+# Distance that a sweep may leave its slice before the contact counts as the end of the segment [m].
 OFF_SLICE_M: Final = 0.006
-# How far beyond a slice the centre must be for it to have crossed it [m].
+# Distance of the centre beyond a slice at which it has crossed the slice [m].
 CROSSED_M: Final = 0.002
-# A sweep that takes longer than this to get around other robots gives up [ticks].
+# Time after which a sweep that goes around other robots gives up [ticks].
 AROUND_TICKS_MAX: Final = 100
-# How far it may leave its slice for that [m].
+# Distance that it may leave its slice for that [m].
 AROUND_M: Final = 1.2
-# How far on the wrong side of its slice a trace may begin [m].
+# Distance on the wrong side of its slice at which a trace may begin [m].
 SLACK_M: Final = 0.75
 
 
-# Tells at which ends the robots in contact stand.
+# Returns the ends at which the robots in contact stand.
 Parked = Callable[[Senses], Sequence[End]]
 
 
@@ -95,7 +95,7 @@ class Approach:
 
     @property
     def ticks(self) -> int:
-        """For how long it has lasted."""
+        """The time that it has lasted [ticks]."""
         return self._ticks
 
 
@@ -188,7 +188,7 @@ class Trace:
             self._arrive(senses, self.start.slice + d, 1)
             return None
         if self._inside and depth < -CROSSED_M:
-            # The wall beside the other end lies on the other side; else the robot was only pushed back.
+            # The wall beside the other end is on the other side. Otherwise the robot was only pushed back.
             if any(ny * self.start.side < INTO for _, ny in senses.walls):
                 self._arrive(senses, self.start.slice, -1)
                 return None
@@ -251,7 +251,7 @@ class Seek:
             ahead = [each for each in (*senses.walls, *blocks) if each[0] * way > BLOCKS]
             if not ahead:
                 return way, 0.0
-            # Slide along what is in the way, on the side that leads on.
+            # Slide along the obstacle, on the side that leads on.
             self._follower = WallFollower(LEFT_HAND if ahead[0][1] * way > 0.0 else RIGHT_HAND, (way, 0.0))
         return self._follower.direction(senses.walls, blocks)
 

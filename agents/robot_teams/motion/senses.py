@@ -1,4 +1,4 @@
-"""What a robot senses at one tick, in the frame of the arena: its position, the walls it touches, the robots beside it."""
+"""A robot's senses at one tick, in the frame of the arena: its position, the walls it touches, the robots beside it."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,8 @@ from zwerm.agents.robot_teams.mapping.facts import Wreck
 from zwerm.agents.robot_teams.motion.wall_following import Vector
 from zwerm.wire.messages import Observation
 
-# The gap that robots keep between their bodies [m]: more than a touch switch reaches, so that what is touched is a wall.
+# The gap that robots keep between their bodies [m]. It is larger than the reach of a touch switch, so a touched body is
+# a wall.
 GAP_M: Final = 0.04
 
 # A robot that moves less than this in a tick stands [m].

@@ -1,7 +1,7 @@
-"""One team of all robots, which the coordinator leads: what it is told by robots, and what they take from it.
+"""One team of all robots, which the coordinator leads: the robots' messages to it, and its messages to them.
 
-The coordinator makes a view of all robots that it hears. A robot takes every later view that includes it, and founds none. It
-waits while it hears nothing.
+The coordinator makes a view of all robots that it hears. A robot takes every later view that includes it, and founds
+none. It waits while it receives nothing.
 """
 
 from zwerm.agents.robot_teams.protocols.team_membership import Membership, later
@@ -32,7 +32,7 @@ class CoordinatedMembership(Membership):
         """Wait for the coordinator's view."""
 
     def poll(self, tick: int) -> None:
-        """Drop nobody: the coordinator does."""
+        """Drop no member: the coordinator does."""
 
 
 class CoordinatorMembership(Membership):

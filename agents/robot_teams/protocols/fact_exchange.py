@@ -6,11 +6,11 @@ from zwerm.agents.robot_teams.mapping.facts import Arc, Cut, Fact, Return, Segme
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.protocols.team_messages import Beacon
 
-# For how long a new fact is in every beacon, how long sets may differ before all facts are sent, and how often those are [s].
+# Times [s]: a new fact is in every beacon; sets may differ before all facts are sent; between two such sendings.
 NEW_S: Final = 1.5
 DIFFERENT_S: Final = 1.0
 ALL_EVERY_S: Final = 1.0
-# At most so many facts in one message: an arc takes about 40 bytes.
+# Largest number of facts in one message: an arc takes about 40 bytes.
 FACTS_MAX: Final = 800
 
 
@@ -26,7 +26,7 @@ class FactExchange:
         self._new_ticks = round(NEW_S / dt_s)
         self._different_ticks = round(DIFFERENT_S / dt_s)
         self._all_every_ticks = round(ALL_EVERY_S / dt_s)
-        self._told: list[tuple[int, int]] = []  # when the set first had so many facts
+        self._told: list[tuple[int, int]] = []  # the tick at which the set first had this number of facts
         self._differs_since: dict[int, int] = {}
         self._all_tick = -self._all_every_ticks
         self._page = 0
@@ -40,7 +40,7 @@ class FactExchange:
             self._differs_since.setdefault(beacon.sender, tick)
 
     def forget(self, node: int) -> None:
-        """Owe a robot nothing any more."""
+        """End the exchange with a robot."""
         self._differs_since.pop(node, None)
 
     def outgoing(self, tick: int) -> Parcel:

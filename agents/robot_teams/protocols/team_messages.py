@@ -1,7 +1,7 @@
-"""The one message of a team: a beacon that every robot broadcasts, with all that teammates must know.
+"""The only message of a team: a beacon that every robot broadcasts, with all that teammates must know.
 
-Beacons carry states, not changes: any beacon may be lost, late or copied, and the next one makes up for it. Statuses are passed
-on, so that a team may be larger than the radio's range.
+Beacons carry states, not changes: any beacon may be lost, late or copied, and the next one makes up for it. Robots
+forward statuses, so a team may be larger than the radio's range.
 """
 
 from typing import Final
@@ -19,7 +19,8 @@ HUNTS: Final = 3
 
 
 class View(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """Who is in a team: its `members`, ascending, and the one that decides for it. A later `epoch` replaces earlier ones."""
+    """The robots of a team: its `members`, ascending, and the one that decides for it. A later `epoch` replaces earlier
+    ones."""
 
     epoch: int
     lead: int
@@ -27,7 +28,8 @@ class View(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
 
 
 class Plan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """One corridor: move over from the end `anchor` in x-direction `direction`, one slice a robot; `order` is lag to lead.
+    """One corridor: move over from the end `anchor` in x-direction `direction`, one slice a robot; `order` is from the
+    lag (first) to the lead (last).
 
     The lag's slice is the anchor's own if its segment is not swept (`own_slice`), else the next. Sweeps end at the height
     `frontier_mm` of the team's virtual frontier, if there is one.
@@ -43,10 +45,11 @@ class Plan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
 
 
 class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What one robot does: `beat` grows with every status. `at` is the end where it last was.
+    """The activity of one robot: `beat` grows with every status. `at` is the end where it last was.
 
-    Of the corridor: it `found` a new segment on its slice, is `spare`, takes slice `claim`, found `room` for so many robots.
-    It is `sweeping` a slice now. `team` is the epoch and the lead of its view; `epoch` and `number` are of its plan.
+    In the corridor it `found` a new segment on its slice, is `spare`, takes slice `claim`, found room for `room`
+    robots. It is `sweeping` a slice now. `team` is the epoch and the lead of its view; `epoch` and `number` are of its
+    plan.
     """
 
     node: int
@@ -66,7 +69,8 @@ class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
 
 
 class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What a robot broadcasts. `views` are its own team's, then those its lead has made of it, and teams that were met.
+    """The broadcast of a robot. `views` are its own team's, then those that its lead has made of it, then those of
+    teams that were met.
 
     `digest` and `count` describe its facts, `segments`, `arcs`, `voids`, `returns` and `cuts` are some of them.
     """
@@ -86,7 +90,7 @@ class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
 
 
 class FoundSnapshot(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What one robot found, for metrics and pictures: no node receives it.
+    """The findings of one robot, for metrics and pictures: no node receives them.
 
     `slices` are x, bottom and top of swept segments [m], `critical_points` are x and y [m]; `team` is the lead's id.
     """

@@ -78,7 +78,7 @@ class Situation:
             self.on_arrived(result)
         return velocity
 
-    # --- what the robot knows of itself -----------------------------------------------------------------------------
+    # --- the robot's own state --------------------------------------------------------------------------------------
 
     @property
     def active(self) -> bool:

@@ -40,9 +40,9 @@ ANNOUNCE_TICKS: Final = (4, 8, 14, 22, 32, 48, 70)
 class LeaveNegotiation(Component):
     """One robot's part. `observe` comes first in every tick in which the robot is awake.
 
-    Set `wanted` before `poll`: the robot is redundant as far as it knows, and shall leave. `versions` are neighbours'
-    list versions for which a coordinator has found that. After `poll`, `left` tells whether the robot left in this
-    tick. `tries` counts failed attempts since `begin`.
+    Set `wanted` before `poll`: the robot is redundant as far as it knows, and is to leave. `versions` are neighbours'
+    list versions for which a coordinator has found that. After `poll`, `left` is true if the robot left in this tick.
+    `tries` counts failed attempts since `begin`.
     """
 
     channel: ClassVar[str] = CHANNEL

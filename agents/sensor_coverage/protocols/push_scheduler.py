@@ -121,7 +121,7 @@ class PushScheduler(Component):
             self._end(False)
 
     def poll(self, tick: int) -> None:
-        """Give up a push whose first message was lost, and start the next push if it is time."""
+        """Give up a push if its first message was lost, and start the next push if it is time."""
         mailbox = self._situation.mailbox
         for to, body in mailbox.lost:
             self._map.forget(to)
