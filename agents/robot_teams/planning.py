@@ -10,8 +10,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, TOP, End
-from zwerm.agents.robot_teams.mapping.slice_map import Certificate, SliceMap
-from zwerm.agents.robot_teams.protocols.team_messages import READY, Plan, Status, View
+from zwerm.agents.robot_teams.mapping.slice_map import CoverageCertificate, SliceMap
+from zwerm.agents.robot_teams.protocols.team_messages import READY, CorridorPlan, Status, View
 
 FAR: Final = 10**9
 # The side of the anchor of a plan that only joins the maps of robots that began apart.
@@ -49,7 +49,7 @@ def open_tasks(slice_map: SliceMap) -> list[Task]:
     return _tasks(slice_map, slice_map.certificate)
 
 
-def _tasks(slice_map: SliceMap, certificate: Certificate) -> list[Task]:
+def _tasks(slice_map: SliceMap, certificate: CoverageCertificate) -> list[Task]:
     unswept = dict.fromkeys(certificate.ends_without_mate)
     tasks = []
     for end in unswept:
@@ -58,7 +58,7 @@ def _tasks(slice_map: SliceMap, certificate: Certificate) -> list[Task]:
     return tasks + [Task(end, side, False) for end, side in certificate.open_ports if end not in unswept]
 
 
-def reservation(slice_map: SliceMap, plan: Plan) -> Reservation:
+def reservation(slice_map: SliceMap, plan: CorridorPlan) -> Reservation:
     """Return where the robots of a plan work."""
     anchor, reach = plan.anchor, len(plan.order) * plan.direction
     if anchor.side == LINK:
@@ -90,9 +90,9 @@ def room(slice_map: SliceMap, task: Task, count: int) -> int:
     return max(found, 1)
 
 
-def latest_plans(plans: Sequence[Plan], view: View) -> dict[int, Plan]:
+def latest_plans(plans: Sequence[CorridorPlan], view: View) -> dict[int, CorridorPlan]:
     """Return for each member of the view its latest plan, if it has one."""
-    latest: dict[int, Plan] = {}
+    latest: dict[int, CorridorPlan] = {}
     for plan in plans:
         if plan.epoch == view.epoch:
             for node in plan.order:
@@ -101,7 +101,7 @@ def latest_plans(plans: Sequence[Plan], view: View) -> dict[int, Plan]:
     return latest
 
 
-def free_members(view: View, plans: Sequence[Plan], statuses: Mapping[int, Status]) -> list[int]:
+def free_members(view: View, plans: Sequence[CorridorPlan], statuses: Mapping[int, Status]) -> list[int]:
     """Return the members that have finished their latest plan: the barrier of a corridor is that all of its robots are free."""
     latest = latest_plans(plans, view)
     free = []
@@ -113,7 +113,7 @@ def free_members(view: View, plans: Sequence[Plan], statuses: Mapping[int, Statu
     return free
 
 
-def without_busy(plans: Sequence[Plan], free: Collection[int]) -> list[Plan]:
+def without_busy(plans: Sequence[CorridorPlan], free: Collection[int]) -> list[CorridorPlan]:
     """Return the plans whose robots are all free."""
     return [plan for plan in plans if all(node in free for node in plan.order)]
 
@@ -141,13 +141,13 @@ def division(view: View, order: Sequence[int], index: int) -> tuple[tuple[int, .
 def assign(
     slice_map: SliceMap,
     view: View,
-    plans: Sequence[Plan],
-    reserving: Sequence[Plan],
+    plans: Sequence[CorridorPlan],
+    reserving: Sequence[CorridorPlan],
     statuses: Mapping[int, Status],
     skip: Collection[tuple[Task, int]],
     one_corridor: bool,
     join_mm: int,
-) -> list[Plan]:
+) -> list[CorridorPlan]:
     """Return new plans for the free members. With `one_corridor` the whole team forms one corridor at a time.
 
     While others are busy, no robot travels farther than `join_mm`: a nearer task comes later. The busy plans among
@@ -163,7 +163,7 @@ def assign(
     reserved = [reservation(slice_map, plan) for plan in active if plan in reserving]
     places = {node: _place(slice_map, statuses.get(node)) for node in free}
     if number == 0 and len(free) > 1 and _apart(slice_map, places):
-        return [Plan(view.epoch, 1, End(0, LINK, 0), RIGHT, False, tuple(free))]
+        return [CorridorPlan(view.epoch, 1, End(0, LINK, 0), RIGHT, False, tuple(free))]
     distances = {node: slice_map.distances(at) for node, at in places.items() if at is not None}
     members = [statuses[node] for node in view.members if node in statuses]
     swept = {status.sweeping for status in members if status.phase != READY}
@@ -174,7 +174,7 @@ def assign(
         tasks += _tasks(slice_map, slice_map.openings(distances[node]))
     tasks = list(dict.fromkeys(tasks))
     tasks = [task for task in tasks if not (task.own_slice and task.end.slice in swept)]
-    made: list[Plan] = []
+    made: list[CorridorPlan] = []
     limit = join_mm if active else FAR - 1
     waiting = [node for node in free if node in distances]
     while waiting:
@@ -200,7 +200,7 @@ def assign(
         near = [each for each in near if distances[each].get(task.end, FAR) <= reach and (task, each) not in skip]
         near = near[: room(slice_map, task, len(waiting))]
         number += 1
-        plan = Plan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(reversed(near)))
+        plan = CorridorPlan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(reversed(near)))
         made.append(plan)
         reserved.append(reservation(slice_map, plan))
         waiting = [node for node in waiting if node not in near]

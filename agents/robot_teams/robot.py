@@ -7,22 +7,32 @@ from typing import Annotated, ClassVar, Final
 import msgspec
 from msgspec import Meta, Struct
 
-from zwerm.agents.robot_teams.mapping.facts import BOTTOM, PASSES, TOP, Arc, End, Return, Segment, Void, Wreck
+from zwerm.agents.robot_teams.mapping.facts import (
+    BOTTOM,
+    PASSES,
+    TOP,
+    End,
+    Return,
+    SweptSegment,
+    TracedArc,
+    Void,
+    Wreck,
+)
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
-from zwerm.agents.robot_teams.motion.manoeuvres import Grid, Manoeuvre, mm
+from zwerm.agents.robot_teams.motion.manoeuvres import Manoeuvre, SliceGrid, mm
 from zwerm.agents.robot_teams.motion.pilot import FAILED, IDLE, RUNNING, Pilot
-from zwerm.agents.robot_teams.motion.senses import GAP_M, Senses, Sensing
+from zwerm.agents.robot_teams.motion.senses import GAP_M, SenseReader, Senses
 from zwerm.agents.robot_teams.motion.wrecks import WreckWatch
 from zwerm.agents.robot_teams.planning import LINK, latest_plans
 from zwerm.agents.robot_teams.protocols.central_membership import CoordinatedMembership
 from zwerm.agents.robot_teams.protocols.corridor_mates import CorridorMates
 from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
-from zwerm.agents.robot_teams.protocols.team_membership import Membership
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership
 from zwerm.agents.robot_teams.protocols.team_messages import (
     READY,
-    Beacon,
     FoundSnapshot,
     Status,
+    TeamBeacon,
     decode_beacon,
     encode_beacon,
     encode_snapshot,
@@ -83,8 +93,8 @@ class TeamRobot(Controller):
         self.pilot = Pilot(setup.node, body.max_speed_m_s, setup.dt_s, self.random)
         # All cells are planned by the coordinator, or by the leads of teams.
         self._central = setup.services.get("cells") == "coordinator"
-        membership = CoordinatedMembership if self._central else Membership
-        self.membership: Membership = membership(setup.node, setup.dt_s, table.silence_s)
+        membership = CoordinatedMembership if self._central else TeamMembership
+        self.membership: TeamMembership = membership(setup.node, setup.dt_s, table.silence_s)
         self._channels = tuple([each for each in setup.channels if (each == UPLINK) == self._central])
         self._view = self.membership.view
         self.exchange = FactExchange(self.map, setup.dt_s)
@@ -101,9 +111,9 @@ class TeamRobot(Controller):
         self.refused = 0
         self._radius_m = body.radius_m
         self._wrecks = WreckWatch(setup.dt_s, table.silence_s, self.membership.roster.silent_ticks)
-        self._sensing = Sensing(body.radius_m)
+        self._sensing = SenseReader(body.radius_m)
         self._senses: Senses | None = None
-        self._grid = Grid(table.origin_m, table.spacing_m)
+        self._grid = SliceGrid(table.origin_m, table.spacing_m)
         self.work = Work(
             self.map,
             self._grid,
@@ -267,7 +277,7 @@ class TeamRobot(Controller):
         table: TeamTable = self.parameters
         for packet in observation.inbox:
             try:
-                beacon: Beacon = decode_beacon(unseal(packet.payload))
+                beacon: TeamBeacon = decode_beacon(unseal(packet.payload))
             except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
                 self.refused += 1
                 continue
@@ -315,7 +325,7 @@ class TeamRobot(Controller):
         parcel = self.exchange.outgoing(tick)
         mine = self._status(senses, tick)
         others = [] if self._central else membership.others()
-        beacon = Beacon(
+        beacon = TeamBeacon(
             self.setup.node,
             membership.outgoing(),
             membership.met(),
@@ -341,8 +351,8 @@ class TeamRobot(Controller):
         found, self.work.found_facts = self.work.found_facts, []
         if not found:
             return b""
-        slices = [fact for fact in found if isinstance(fact, Segment)]
-        points = [fact for fact in found if isinstance(fact, Arc) and fact.kind != PASSES]
+        slices = [fact for fact in found if isinstance(fact, SweptSegment)]
+        points = [fact for fact in found if isinstance(fact, TracedArc) and fact.kind != PASSES]
         return encode_snapshot(
             FoundSnapshot(
                 self.membership.view.lead,

@@ -20,9 +20,9 @@ from zwerm.agents.robot_teams.planning import (
     open_tasks,
     without_busy,
 )
-from zwerm.agents.robot_teams.protocols.team_membership import Membership
-from zwerm.agents.robot_teams.protocols.team_messages import Plan
-from zwerm.agents.robot_teams.virtual_frontier import Frontiers
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership
+from zwerm.agents.robot_teams.protocols.team_messages import CorridorPlan
+from zwerm.agents.robot_teams.virtual_frontier import TeamFrontier
 
 # Time that a team waits until the team whose lead has the smaller id unites the two [s].
 MERGE_PATIENCE_S: Final = 30.0
@@ -33,7 +33,7 @@ FAR_AFTER_S: Final = 20.0
 ANY_AFTER_S: Final = 60.0
 
 
-def findings(slice_map: SliceMap, membership: Membership) -> dict[str, float | bool]:
+def findings(slice_map: SliceMap, membership: TeamMembership) -> dict[str, float | bool]:
     """Return the results of a map and a team, as named numbers for observers."""
     certificate, facts = slice_map.certificate, slice_map.facts
     return {
@@ -54,7 +54,7 @@ class TeamLead:
     def __init__(
         self,
         slice_map: SliceMap,
-        membership: Membership,
+        membership: TeamMembership,
         dt_s: float,
         *,
         divide: bool,
@@ -63,15 +63,15 @@ class TeamLead:
         join_m: float,
         virtual_frontier: bool = False,
     ) -> None:
-        self.plans: tuple[Plan, ...] = ()
+        self.plans: tuple[CorridorPlan, ...] = ()
         self._map, self._membership, self._dt_s = slice_map, membership, dt_s
         self._divide, self._merge, self._one_corridor = divide, merge, one_corridor
         self._join_mm = round(1000.0 * join_m)
         self._skip: dict[tuple[Task, int], int] = {}
-        self._judged: dict[int, Plan] = {}
+        self._judged: dict[int, CorridorPlan] = {}
         self._digests: dict[int, int] = {}
         self._made_tick = 0
-        self._frontiers = Frontiers(slice_map) if virtual_frontier else None
+        self._frontiers = TeamFrontier(slice_map) if virtual_frontier else None
 
     def begin(self, tick: int) -> None:
         """Start again in another view: plans hold within one view."""
@@ -82,7 +82,7 @@ class TeamLead:
             self._frontiers.drop()
         self.plans = tuple([plan for plan in self.plans if plan.epoch == self._membership.view.epoch])
 
-    def follow(self, plans: Sequence[Plan]) -> None:
+    def follow(self, plans: Sequence[CorridorPlan]) -> None:
         """Take over the plans of the lead, as a member repeats them."""
         view = self._membership.view
         known = dict.fromkeys((*self.plans, *[plan for plan in plans if plan.epoch == view.epoch]))

@@ -10,9 +10,9 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from zwerm.agents.robot_teams.mapping.facts import CONVEX, Arc, Cut, End
+from zwerm.agents.robot_teams.mapping.facts import CONVEX, End, FrontierCut, TracedArc
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
-from zwerm.agents.robot_teams.protocols.team_messages import Plan
+from zwerm.agents.robot_teams.protocols.team_messages import CorridorPlan
 
 # A corridor whose anchor is nearer than this to the line is not cut [mm].
 NEAR_MM: Final = 300
@@ -26,13 +26,13 @@ class Frontier(NamedTuple):
     direction: int
 
 
-class Frontiers:
+class TeamFrontier:
     """The frontier of one team, as its lead keeps it."""
 
     def __init__(self, slice_map: SliceMap) -> None:
         self.frontier: Frontier | None = None
         self._map = slice_map
-        self._seen: dict[Arc, None] = {}
+        self._seen: dict[TracedArc, None] = {}
 
     def drop(self) -> None:
         """Drop the frontier."""
@@ -42,7 +42,7 @@ class Frontiers:
         """Return whether an end lies beyond the frontier, and so is left for later."""
         return self.frontier is not None and end.y_mm == self.frontier.y_mm and self._map.is_virtual(end)
 
-    def limited(self, plan: Plan) -> Plan:
+    def limited(self, plan: CorridorPlan) -> CorridorPlan:
         """Return a new plan with the frontier at which its sweeps end, if it lies beyond the critical point."""
         line = self.frontier
         if line is None or plan.direction != line.direction or self._map.is_virtual(plan.anchor):
@@ -52,13 +52,13 @@ class Frontiers:
             return plan
         return msgspec.structs.replace(plan, frontier_mm=line.y_mm)
 
-    def judge(self, plan: Plan) -> None:
+    def judge(self, plan: CorridorPlan) -> None:
         """Update the frontier at the end of a plan: an obstacle may have crossed it, or a critical point may begin one."""
         facts = self._map.facts
         line = self.frontier
         if line is not None and plan.frontier_mm == line.y_mm:
             swept = {segment.slice for segment in facts.segments}
-            if any(k in swept and Cut(k, line.y_mm) not in facts for k in _slices(plan)):
+            if any(k in swept and FrontierCut(k, line.y_mm) not in facts for k in _slices(plan)):
                 self.frontier = None
         new = [arc for arc in facts.arcs if arc.kind == CONVEX and arc not in self._seen]
         self._seen.update(dict.fromkeys(new))
@@ -68,6 +68,6 @@ class Frontiers:
             self.frontier = Frontier(arc.y_mm, arc.start.slice + arc.direction, arc.direction)
 
 
-def _slices(plan: Plan) -> list[int]:
+def _slices(plan: CorridorPlan) -> list[int]:
     first = plan.anchor.slice + (0 if plan.own_slice else plan.direction)
     return [first + plan.direction * place for place in range(len(plan.order))]

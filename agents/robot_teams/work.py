@@ -7,11 +7,19 @@ They add their findings to the map, and keep `at`, the end where the robot stand
 from collections.abc import Callable, Generator
 from typing import Final, Protocol
 
-from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, Cut, End, Fact, Segment
+from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, End, Fact, FrontierCut, SweptSegment
 from zwerm.agents.robot_teams.mapping.slice_map import ACROSS, SliceMap
-from zwerm.agents.robot_teams.motion.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
+from zwerm.agents.robot_teams.motion.manoeuvres import (
+    Approach,
+    BoundaryTrace,
+    Manoeuvre,
+    Parked,
+    Seek,
+    SliceGrid,
+    SliceSweep,
+)
 from zwerm.agents.robot_teams.motion.senses import Senses
-from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, SWEEPS, TRAVELS, Plan
+from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, SWEEPS, TRAVELS, CorridorPlan
 
 Story = Generator[Manoeuvre | None, None, None]
 
@@ -58,7 +66,7 @@ class Work:
     """The activity and the place of one robot. `sense` returns its newest senses."""
 
     def __init__(
-        self, slice_map: SliceMap, grid: Grid, step_m: float, sense: Callable[[], Senses], parked: Parked
+        self, slice_map: SliceMap, grid: SliceGrid, step_m: float, sense: Callable[[], Senses], parked: Parked
     ) -> None:
         self.map = slice_map
         self.at: End | None = None
@@ -83,7 +91,7 @@ class Work:
         seek = Seek(self._grid)
         yield seek
         self.sweeping = seek.slice
-        up = Sweep(seek.slice, side, self._grid, self._step_m, self._parked)
+        up = SliceSweep(seek.slice, side, self._grid, self._step_m, self._parked)
         yield up
         if up.end is None:
             raise Lost
@@ -117,7 +125,7 @@ class Work:
         yield from self._approach(start)
         ahead = frontier_mm is not None and (start.y_mm - frontier_mm) * start.side > CUT_MM
         limit_mm = frontier_mm if ahead else None
-        sweep = Sweep(start.slice, -start.side, self._grid, self._step_m, self._parked, limit_mm)
+        sweep = SliceSweep(start.slice, -start.side, self._grid, self._step_m, self._parked, limit_mm)
         self.sweeping = start.slice
         yield sweep
         self.sweeping = None
@@ -126,9 +134,9 @@ class Work:
             raise Lost
         low, high = sorted((start.y_mm, end.y_mm))
         if self._is_new(start, 0, end, bool(sweep.wrecks)):
-            self._note(Segment(start.slice, low, high, tuple(sweep.wrecks)))
+            self._note(SweptSegment(start.slice, low, high, tuple(sweep.wrecks)))
             if sweep.is_cut:
-                self._note(Cut(end.slice, end.y_mm))
+                self._note(FrontierCut(end.slice, end.y_mm))
         self.at = self.map.end(end)
 
     def trace(self, direction: int) -> Generator[Manoeuvre | None, None, bool]:
@@ -140,7 +148,7 @@ class Work:
         depth = (senses.x_m - self._grid.x_m(start.slice)) * direction
         if abs(depth) > 0.6 or abs(senses.y_m - start.y_mm / 1000.0) > 0.6:
             yield from self._approach(start)
-        trace = Trace(start, direction, self._grid, self._parked)
+        trace = BoundaryTrace(start, direction, self._grid, self._parked)
         yield trace
         arc, end = trace.arc, trace.end
         if end is None:
@@ -216,7 +224,7 @@ class Work:
 
     # --- a corridor ---------------------------------------------------------------------------------------------------
 
-    def corridor(self, plan: Plan, mates: "Mates") -> Story:
+    def corridor(self, plan: CorridorPlan, mates: "Mates") -> Story:
         """Take a slice of a corridor, sweep it, and hunt back to the predecessor's slice."""
         self.found = self.spare = False
         self.claim = self.room = None
@@ -240,7 +248,7 @@ class Work:
             yield None
         yield from self._hunt(mine.slice, plan.direction, mates.sweeping, plan.frontier_mm)
 
-    def _take_slot(self, plan: Plan, mates: "Mates") -> Generator[Manoeuvre | None, None, bool]:
+    def _take_slot(self, plan: CorridorPlan, mates: "Mates") -> Generator[Manoeuvre | None, None, bool]:
         """Trace forward, one slice a robot; return whether there is a slice for this one.
 
         The robot that finds no more room reports the number of robots with room. Then the robots in front take these slices.

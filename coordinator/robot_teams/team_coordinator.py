@@ -12,7 +12,7 @@ from msgspec import Meta, Struct
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.protocols.central_membership import CoordinatorMembership
 from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
-from zwerm.agents.robot_teams.protocols.team_messages import Beacon, decode_beacon, encode_beacon
+from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, decode_beacon, encode_beacon
 from zwerm.agents.robot_teams.team_lead import TeamLead, findings
 from zwerm.errors import ProtocolError
 from zwerm.wire.checksum import seal, unseal
@@ -23,7 +23,7 @@ GATHER_S: Final = 1.0
 DECIDE_TICKS: Final = 4
 
 
-class CoordinatorTable(Struct, frozen=True, forbid_unknown_fields=True):
+class TeamCoordinatorTable(Struct, frozen=True, forbid_unknown_fields=True):
     """Its sending period, the silence after which it drops a robot, and the distance that robots go to join a corridor
     while others work."""
 
@@ -33,7 +33,7 @@ class CoordinatorTable(Struct, frozen=True, forbid_unknown_fields=True):
     join_m: Annotated[float, Meta(gt=0.0)] = 6.0
 
 
-class Setup(Protocol):
+class TeamCoordinatorSetup(Protocol):
     """The part of its setup that the coordinator needs."""
 
     @property
@@ -52,10 +52,10 @@ class Setup(Protocol):
 class TeamCoordinator:
     """Leads all robots."""
 
-    Parameters = CoordinatorTable
+    Parameters = TeamCoordinatorTable
 
-    def __init__(self, setup: Setup) -> None:
-        table = msgspec.convert(setup.parameters, CoordinatorTable)
+    def __init__(self, setup: TeamCoordinatorSetup) -> None:
+        table = msgspec.convert(setup.parameters, TeamCoordinatorTable)
         self.map = SliceMap()
         self.membership = CoordinatorMembership(setup.node, setup.dt_s, table.silence_s)
         self.lead = TeamLead(
@@ -80,7 +80,7 @@ class TeamCoordinator:
         tick = observation.tick
         for packet in observation.inbox:
             try:
-                beacon: Beacon = decode_beacon(unseal(packet.payload))
+                beacon: TeamBeacon = decode_beacon(unseal(packet.payload))
             except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
                 self.refused += 1
                 continue
@@ -112,7 +112,7 @@ class TeamCoordinator:
         )
 
     def _say(self, tick: int) -> tuple[Transmission, ...]:
-        beacon = Beacon(
+        beacon = TeamBeacon(
             self._node,
             self.membership.outgoing(),
             (),

@@ -38,7 +38,7 @@ class End(NamedTuple):
     y_mm: int
 
 
-class Segment(NamedTuple):
+class SweptSegment(NamedTuple):
     """A robot swept slice `slice` from `bottom_mm` to `top_mm`, wall to wall, or to one of the `wrecks`."""
 
     slice: int
@@ -52,7 +52,7 @@ class Segment(NamedTuple):
         return End(self.slice, TOP, self.top_mm), End(self.slice, BOTTOM, self.bottom_mm)
 
 
-class Arc(NamedTuple):
+class TracedArc(NamedTuple):
     """A robot followed the boundary from one end into the slab on its side `direction`, until it came to another end.
 
     The arc is `length_mm` long. Its point farthest from the first slice is (`x_mm`, `y_mm`): where the arc returns, that is the
@@ -96,7 +96,7 @@ class Void(NamedTuple):
         return (self.wreck,)
 
 
-class Cut(NamedTuple):
+class FrontierCut(NamedTuple):
     """A virtual frontier at height `y_mm` cuts slice `slice`: the free space goes on above and below."""
 
     slice: int
@@ -115,7 +115,7 @@ class Return(NamedTuple):
     tick: int
 
 
-Fact = Segment | Arc | Void | Cut | Return
+Fact = SweptSegment | TracedArc | Void | FrontierCut | Return
 
 
 class FactSet:
@@ -153,9 +153,9 @@ class FactSet:
         return found
 
     @property
-    def segments(self) -> list[Segment]:
+    def segments(self) -> list[SweptSegment]:
         """The swept segments that hold, sorted: the order of arrival has no influence."""
-        return sorted([fact for fact in self._facts if isinstance(fact, Segment) and self._holds(fact.wrecks)])
+        return sorted([fact for fact in self._facts if isinstance(fact, SweptSegment) and self._holds(fact.wrecks)])
 
     @property
     def voids(self) -> list[Void]:
@@ -163,14 +163,14 @@ class FactSet:
         return sorted([fact for fact in self._facts if isinstance(fact, Void) and self._holds(fact.wrecks)])
 
     @property
-    def cuts(self) -> list[Cut]:
+    def cuts(self) -> list[FrontierCut]:
         """The cuts of slices by virtual frontiers, sorted."""
-        return sorted([fact for fact in self._facts if isinstance(fact, Cut)])
+        return sorted([fact for fact in self._facts if isinstance(fact, FrontierCut)])
 
     @property
-    def arcs(self) -> list[Arc]:
+    def arcs(self) -> list[TracedArc]:
         """The traced arcs that hold, sorted."""
-        return sorted([fact for fact in self._facts if isinstance(fact, Arc) and self._holds(fact.wrecks)])
+        return sorted([fact for fact in self._facts if isinstance(fact, TracedArc) and self._holds(fact.wrecks)])
 
     def _holds(self, wrecks: tuple[Wreck, ...]) -> bool:
         """Return whether no robot that is named in `wrecks` was alive later."""

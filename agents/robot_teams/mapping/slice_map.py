@@ -25,7 +25,7 @@ import heapq
 from collections.abc import Collection, Iterable
 from typing import Final, NamedTuple
 
-from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, Arc, End, Fact, FactSet, Segment, Void
+from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, End, Fact, FactSet, SweptSegment, TracedArc, Void
 
 TOLERANCE_MM: Final = 120
 
@@ -44,7 +44,7 @@ class Step(NamedTuple):
     length_mm: int
 
 
-class Certificate(NamedTuple):
+class CoverageCertificate(NamedTuple):
     """The reason why coverage is complete, or the ends and ports that are missing."""
 
     ends: int
@@ -66,11 +66,11 @@ class SliceMap:
         self._levels: dict[tuple[int, int], list[tuple[int, int, End]]] = {}
         self._mates: dict[End, Step] = {}
         self._arcs: dict[Port, Step] = {}
-        self._by_slice: dict[int, list[Segment]] = {}
+        self._by_slice: dict[int, list[SweptSegment]] = {}
         self._voids: list[Void] = []
         self._across: dict[End, Step] = {}
         self._closed: dict[End, bool] = {}
-        self._certificate = Certificate(0, (), ())
+        self._certificate = CoverageCertificate(0, (), ())
 
     def add(self, fact: Fact) -> bool:
         """Add one fact; return whether it is new."""
@@ -113,7 +113,7 @@ class SliceMap:
         return bool(self._arcs)
 
     @property
-    def certificate(self) -> Certificate:
+    def certificate(self) -> CoverageCertificate:
         """The open ends and ports, sorted."""
         self._derive()
         return self._certificate
@@ -129,11 +129,11 @@ class SliceMap:
         certificate = self.certificate
         return certificate.complete or (certificate.ends > 0 and at is not None and self._is_closed(at))
 
-    def openings(self, reached: Collection[End]) -> Certificate:
+    def openings(self, reached: Collection[End]) -> CoverageCertificate:
         """Return which of the ends in `reached` lack a mate, or arcs, that nothing blocks."""
         self._derive()
         ends = sorted(reached)
-        return Certificate(
+        return CoverageCertificate(
             len(ends),
             tuple([end for end in ends if end not in self._mates]),
             tuple([port for port in self._ports(ends) if port not in self._arcs]),
@@ -220,7 +220,7 @@ class SliceMap:
             self._join(arc)
         self._find_across()
         counting = [end for end in ends if not self._is_passed(end)]
-        self._certificate = Certificate(
+        self._certificate = CoverageCertificate(
             len(ends),
             tuple([end for end in counting if end not in mated]),
             tuple([port for port in self._ports(counting) if port not in joined]),
@@ -252,7 +252,7 @@ class SliceMap:
         low, high = end.y_mm - TOLERANCE_MM, end.y_mm + TOLERANCE_MM
         return any(segment.bottom_mm < low and high < segment.top_mm for segment in self._by_slice.get(end.slice, ()))
 
-    def _mate(self, segment: Segment) -> None:
+    def _mate(self, segment: SweptSegment) -> None:
         top, bottom = map(self._known_end, segment.ends)
         if top is None or bottom is None:
             return
@@ -260,7 +260,7 @@ class SliceMap:
         self._mates.setdefault(top, Step(0, bottom, length))
         self._mates.setdefault(bottom, Step(0, top, length))
 
-    def _join(self, arc: Arc) -> None:
+    def _join(self, arc: TracedArc) -> None:
         (start, there), (stop, back) = ((self._known_end(end), side) for end, side in arc.ports)
         if start is None or stop is None:
             return
@@ -268,12 +268,12 @@ class SliceMap:
         self._arcs.setdefault((stop, back), Step(back, start, arc.length_mm))
 
 
-def _wrecks_first(fact: Segment | Arc) -> tuple[bool, int, Segment | Arc]:
+def _wrecks_first(fact: SweptSegment | TracedArc) -> tuple[bool, int, SweptSegment | TracedArc]:
     """Return the rank of a way: beside a wreck before others, and of two segments the longer one."""
-    return not fact.wrecks, fact.bottom_mm - fact.top_mm if isinstance(fact, Segment) else 0, fact
+    return not fact.wrecks, fact.bottom_mm - fact.top_mm if isinstance(fact, SweptSegment) else 0, fact
 
 
-def _blocks(void: Void, segment: Segment) -> bool:
+def _blocks(void: Void, segment: SweptSegment) -> bool:
     return void.slice == segment.slice and void.low_mm < segment.top_mm and segment.bottom_mm < void.high_mm
 
 

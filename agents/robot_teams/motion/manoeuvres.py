@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
-from zwerm.agents.robot_teams.mapping.facts import Arc, End, Wreck
+from zwerm.agents.robot_teams.mapping.facts import End, TracedArc, Wreck
 from zwerm.agents.robot_teams.motion.senses import Senses
 from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGHT_HAND, Vector, WallFollower
 
@@ -31,7 +31,7 @@ SLACK_M: Final = 0.75
 Parked = Callable[[Senses], Sequence[End]]
 
 
-class Grid(NamedTuple):
+class SliceGrid(NamedTuple):
     """The slices: x = origin_m + k * spacing_m."""
 
     origin_m: float
@@ -78,7 +78,7 @@ class Around:
 class Approach:
     """Go straight to an end near by, sliding along walls, and press against the boundary there."""
 
-    def __init__(self, end: End, grid: Grid, parked: Parked) -> None:
+    def __init__(self, end: End, grid: SliceGrid, parked: Parked) -> None:
         self.end = end
         self._parked = parked
         self._x_m, self._y_m = grid.x_m(end.slice), end.y_mm / 1000.0
@@ -99,11 +99,11 @@ class Approach:
         return self._ticks
 
 
-class Sweep:
+class SliceSweep:
     """Move along a slice to the end of its segment on side `side`, or to the height `limit_mm` of a virtual frontier."""
 
     def __init__(
-        self, k: int, side: int, grid: Grid, step_m: float, parked: Parked, limit_mm: int | None = None
+        self, k: int, side: int, grid: SliceGrid, step_m: float, parked: Parked, limit_mm: int | None = None
     ) -> None:
         self._limit_mm = limit_mm
         self.is_cut = False
@@ -151,10 +151,10 @@ class Sweep:
         return vx, side * math.sqrt(1.0 - vx * vx)
 
 
-class Trace:
+class BoundaryTrace:
     """Follow the boundary from an end into the slab on the side `direction`, until it crosses a slice."""
 
-    def __init__(self, start: End, direction: int, grid: Grid, parked: Parked) -> None:
+    def __init__(self, start: End, direction: int, grid: SliceGrid, parked: Parked) -> None:
         self.start, self.direction = start, direction
         self._parked = parked
         self._grid = grid
@@ -166,7 +166,7 @@ class Trace:
         self._extreme: Vector = (-math.inf, 0.0)
         self._wall_tick = -10
         self.wrecks: dict[Wreck, None] = {}
-        self.arc: Arc | None = None
+        self.arc: TracedArc | None = None
         self.end: End | None = None
 
     def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
@@ -223,7 +223,7 @@ class Trace:
         depth, extreme_y = self._extreme
         extreme_x = self._x_m + self.direction * max(depth, 0.0)
         self.end = end
-        self.arc = Arc(
+        self.arc = TracedArc(
             self.start, self.direction, end, mm(self._length_m), mm(extreme_x), mm(extreme_y), tuple(self.wrecks)
         )
 
@@ -231,7 +231,7 @@ class Trace:
 class Seek:
     """From anywhere, go to the nearest slice: straight, and along the boundary where a wall is in the way."""
 
-    def __init__(self, grid: Grid) -> None:
+    def __init__(self, grid: SliceGrid) -> None:
         self._grid = grid
         self._follower: WallFollower | None = None
         self._last_x_m = math.nan
@@ -256,4 +256,4 @@ class Seek:
         return self._follower.direction(senses.walls, blocks)
 
 
-Manoeuvre = Approach | Sweep | Trace | Seek
+Manoeuvre = Approach | SliceSweep | BoundaryTrace | Seek

@@ -56,7 +56,7 @@ class Senses(NamedTuple):
         return tuple([other.wreck for other in self.robots if other.wreck is not None])
 
 
-class Sensing:
+class SenseReader:
     """Turns observations into senses; remembers where the robots in sight were a tick ago."""
 
     def __init__(self, radius_m: float) -> None:

@@ -4,11 +4,11 @@ The coordinator makes a view of all robots that it hears. A robot takes every la
 none. It waits while it receives nothing.
 """
 
-from zwerm.agents.robot_teams.protocols.team_membership import Membership, later
-from zwerm.agents.robot_teams.protocols.team_messages import Beacon, View
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership, later
+from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, View
 
 
-class CoordinatedMembership(Membership):
+class CoordinatedMembership(TeamMembership):
     """A robot's view of the coordinator's team. All that it hears comes from the coordinator."""
 
     @property
@@ -20,7 +20,7 @@ class CoordinatedMembership(Membership):
         """Return whether facts and plans of a sender are taken over: those of the coordinator are."""
         return True
 
-    def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
+    def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
         """Take in the coordinator's beacon."""
         self._note_statuses(beacon, tick)
         for view in beacon.views:
@@ -35,7 +35,7 @@ class CoordinatedMembership(Membership):
         """Drop no member: the coordinator does."""
 
 
-class CoordinatorMembership(Membership):
+class CoordinatorMembership(TeamMembership):
     """The coordinator's view: all robots that it hears. It is no member itself."""
 
     def __init__(self, node: int, dt_s: float, silence_s: float) -> None:
@@ -46,7 +46,7 @@ class CoordinatorMembership(Membership):
         """Return whether facts of a sender are taken over: those of all robots are."""
         return True
 
-    def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
+    def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
         """Take in a robot's beacon."""
         self._note_statuses(beacon, tick)
         for view in beacon.views:

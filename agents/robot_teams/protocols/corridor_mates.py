@@ -2,14 +2,16 @@
 
 from collections.abc import Callable
 
-from zwerm.agents.robot_teams.protocols.team_membership import Membership
-from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, Plan, Status
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership
+from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, CorridorPlan, Status
 
 
 class CorridorMates:
     """A robot's knowledge of its teammates in one corridor, from their statuses."""
 
-    def __init__(self, plan: Plan, node: int, membership: Membership, sweeping: Callable[[int], bool]) -> None:
+    def __init__(
+        self, plan: CorridorPlan, node: int, membership: TeamMembership, sweeping: Callable[[int], bool]
+    ) -> None:
         self._plan, self._node, self._membership = plan, node, membership
         self.sweeping = sweeping
 

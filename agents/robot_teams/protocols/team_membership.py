@@ -1,7 +1,6 @@
 """Membership of a team: views by epochs, division, merging, and succession of the lead.
 
 Pure protocol: messages in, views out.
-views out.
 
 A robot holds one view. It takes over a later view that includes it. If the lead's later view does not include it, it is
 alone. The lead divides the team by several views, and merges teams by one view that includes those it has met. It drops
@@ -14,7 +13,7 @@ never withdrawn.
 from collections.abc import Sequence
 from typing import Final
 
-from zwerm.agents.robot_teams.protocols.team_messages import Beacon, Status, View
+from zwerm.agents.robot_teams.protocols.team_messages import Status, TeamBeacon, View
 
 # Time that the lead repeats views that it made for others, and time that a meeting is remembered [s].
 REPEAT_S: Final = 10.0
@@ -52,7 +51,7 @@ class Roster:
         return tick - self.news_tick.setdefault(node, tick)
 
 
-class Membership:
+class TeamMembership:
     """One robot's view of its team."""
 
     def __init__(self, node: int, dt_s: float, silence_s: float) -> None:
@@ -76,7 +75,7 @@ class Membership:
         """True if this robot decides for the team."""
         return self.view.lead == self.node
 
-    def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
+    def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
         """Take in a beacon; `near` is true if its sender is close enough to be met."""
         self._note_statuses(beacon, tick)
         theirs = beacon.views[0]
@@ -161,7 +160,7 @@ class Membership:
         """Return whether a team was met a short time ago: the lead with the smaller id unites the two when all are free."""
         return any(tick - since < patience_ticks for _, since in self._met.values())
 
-    def _note_statuses(self, beacon: Beacon, tick: int) -> None:
+    def _note_statuses(self, beacon: TeamBeacon, tick: int) -> None:
         for status in beacon.statuses:
             if status.node != self.node:
                 self.roster.receive(status, tick)

@@ -9,7 +9,7 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
-from zwerm.agents.robot_teams.mapping.facts import Arc, Cut, End, Return, Segment, Void
+from zwerm.agents.robot_teams.mapping.facts import End, FrontierCut, Return, SweptSegment, TracedArc, Void
 
 # The phases of a robot's work on its slice, in order.
 READY: Final = 0  # has finished the plan
@@ -27,7 +27,7 @@ class View(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     members: tuple[int, ...]
 
 
-class Plan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class CorridorPlan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """One corridor: move over from the end `anchor` in x-direction `direction`, one slice a robot; `order` is from the
     lag (first) to the lead (last).
 
@@ -68,7 +68,7 @@ class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     team: tuple[int, int]
 
 
-class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class TeamBeacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """The broadcast of a robot. `views` are its own team's, then those that its lead has made of it, then those of
     teams that were met.
 
@@ -78,15 +78,15 @@ class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     sender: int
     views: tuple[View, ...]
     met: tuple[View, ...]
-    plans: tuple[Plan, ...]
+    plans: tuple[CorridorPlan, ...]
     statuses: tuple[Status, ...]
     digest: int
     count: int
-    segments: tuple[Segment, ...] = ()
-    arcs: tuple[Arc, ...] = ()
+    segments: tuple[SweptSegment, ...] = ()
+    arcs: tuple[TracedArc, ...] = ()
     voids: tuple[Void, ...] = ()
     returns: tuple[Return, ...] = ()
-    cuts: tuple[Cut, ...] = ()
+    cuts: tuple[FrontierCut, ...] = ()
 
 
 class FoundSnapshot(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -114,4 +114,4 @@ def decode_snapshot(payload: bytes) -> FoundSnapshot | None:
 
 
 encode_beacon: Final = msgspec.msgpack.Encoder().encode
-decode_beacon: Final = msgspec.msgpack.Decoder(Beacon).decode
+decode_beacon: Final = msgspec.msgpack.Decoder(TeamBeacon).decode
