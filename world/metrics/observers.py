@@ -14,7 +14,7 @@ from zwerm.world.metrics import Metric, MetricContext, Truth
 from zwerm.world.metrics.own import own_metric
 from zwerm.world.tick.telemetry import TelemetrySink
 
-# Metrics of every run, whatever the scenario asks for, and those of a radio or an uplink.
+# Metrics of every run, independent of the scenario, and those of a radio or an uplink.
 ENGINE_NAMES: Final = (
     *("robots_in_arena", "robots_exited", "faults_missed", "refused_messages"),
     *("late_commands", "deadman_stops", "tick_overruns", "telemetry_dropped"),
@@ -29,7 +29,7 @@ TELEMETRY_NAMES: Final = "telemetry.*"
 class Observers:
     """Metrics of one run. They take samples every `every_s` of virtual time, and at the end.
 
-    Where `every_s` is None, all that sample during a run do so as often as the one that needs it most often.
+    If `every_s` is None, all observers that sample during a run use the shortest period that one of them needs.
     """
 
     def __init__(self, metrics: Sequence[Metric] = (), every_s: float | None = None, dt_s: float = 1.0) -> None:

@@ -1,7 +1,8 @@
 """Every mistake in a scenario at once, of whichever stage: its tables, or what is made of them.
 
-Objects can be made of correct tables only. So wrong tables are left out, and the rest is checked as if it were
-complete. Mistakes at, around or inside a place that was left out are then ignored, because the omission may cause them.
+Objects can be made of correct tables only. So wrong tables are left out, and the other tables are checked as if they
+were complete. Mistakes at, around or inside a place that was left out are then ignored, because the omission may cause
+them.
 """
 
 import copy

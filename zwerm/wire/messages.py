@@ -178,8 +178,8 @@ class Command(
 
     `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation
     at every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of
-    the task is complete, `gave_up`, unless empty, why it never will be. `tick` is set by whatever runs the controller: the
-    tick of the observation answered.
+    the task is complete, `gave_up`, unless empty, why it never will be. The program that runs the controller sets
+    `tick`: the tick of the observation answered.
 
     `telemetry` is named numbers for the observers of the run; no node receives them. `snapshot` is one record in the
     algorithm's own encoding for its metric and picture classes. The trace covers neither.

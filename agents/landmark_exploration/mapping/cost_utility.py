@@ -1,8 +1,8 @@
 """The next frontier for a robot, and the way there: cost-utility over the navigation graph.
 
 Section IV-C of Ramaithitima and Bhattacharya 2018: CU(S, <a, b>) = U(<a, b>) - beta C(S, <a, b>). The cost C is that of
-the cheapest path from the present observation S to an observation that contains a and b. The utility U is the number of
-open frontiers that share a landmark with <a, b>, divided by one more than the number of robots sent to a or b. The
+the cheapest path from the present observation S to an observation that contains a and b. The utility U is n / (m + 1).
+n is the number of open frontiers that share a landmark with <a, b>. m is the number of robots sent to a or b. The
 search ends as soon as no frontier farther away can be better.
 """
 

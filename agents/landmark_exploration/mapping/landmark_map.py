@@ -1,7 +1,7 @@
 """The map of a robot or of the coordinator: the landmark complex and the frontiers, derived from logs.
 
 Robots share observations, and statuses that no observation implies. All else is derived from these, by the same rules
-on every robot. So maps made of the same logs are equal, whatever the order in which the logs' entries came.
+on every robot. So maps made of the same logs are equal for every order of the logs' entries.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkC
 from zwerm.agents.landmark_exploration.sharing import log_entries as entries
 from zwerm.agents.landmark_exploration.sharing.replica import Stretch
 
-# Parts of one observation beyond this are nonsense, and forgotten.
+# Parts of one observation beyond this number are invalid, and are dropped.
 _PARTS_MAX: Final = 4096
 
 

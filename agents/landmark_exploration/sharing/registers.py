@@ -5,12 +5,12 @@ Registers merge by the greatest (incarnation, stamp), in any order. A robot rais
 is void if no newer register of its robot arrived for the time of a lease, by the listener's own clock. So clocks are
 not compared.
 
-**Termination.** A robot that finds nothing left to explore *freezes*: it adds nothing to its log until it receives an
-entry that it does not have. Its register then holds the digest of its logs. If every robot has announced that it is
-frozen with the same digest, no robot can add an entry again. The first to do so would need an entry that none of them
-has, from a robot that is not among them. It does not matter when each of them said it. So a conclusion can be wrong
-only about three kinds of robots: unknown ones, ones that lost their memory since, and ones presumed dead after a long
-silence. All must agree for `settle_ticks`. In this time a robot in reach that lost its memory is found.
+**Termination.** A robot with nothing left to explore *freezes*: it adds nothing to its log until it receives an entry
+that it lacks. Its register then holds the digest of its logs. If every robot has announced that it is frozen with the
+same digest, no robot can add an entry again. The first to do so would need an entry that none of them has, from a robot
+that is not among them. It does not matter when each of them said it. So a conclusion can be wrong only about three
+kinds of robots. They are unknown, or have lost their memory since, or are presumed dead after a long silence. All must
+agree for `settle_ticks`. In this time a robot in reach that lost its memory is found.
 """
 
 from collections.abc import Iterable, Iterator
