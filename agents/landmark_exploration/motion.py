@@ -32,7 +32,8 @@ HOP_TICKS: Final = 60
 NEAR_LINE: Final = 0.25
 # Contact on the near side counts as contact at the line where the sum of the unit vectors is shorter than this.
 AT_LINE: Final = 0.6
-# Contact within so many ticks of the crossing is an obstacle at the line, if it lasts for TOUCH_TICKS: other robots move on.
+# Contact within this number of ticks of the crossing is an obstacle at the line, if it lasts for TOUCH_TICKS: other
+# robots move on.
 CROSSED_TICKS: Final = 4
 TOUCH_TICKS: Final = 6
 # The angle from the outward direction, from tick to tick: the fraction that remains, and the deviation added [rad].
@@ -172,7 +173,8 @@ def wander(view: ExplorerView, random: np.random.Generator, turn_sd_rad: float =
 def roam(view: ExplorerView, random: np.random.Generator, is_new: Callable[[], bool]) -> Drive:
     """Explore without bearings, for ever: go straight on while that shows anything new, and else turn at random.
 
-    `is_new` tells whether what is seen now was new to the map. The direction is kept for `NEWS_TICKS` after the last news.
+    `is_new` is true if the present observation was new to the map. The direction is kept for `NEWS_TICKS` after the
+    last news.
     """
     direction = float(random.uniform(-math.pi, math.pi))
     until = view.tick

@@ -1,7 +1,8 @@
 """The execution of walks along walls: one robot drives to a wall and follows it, past all robots that stand there.
 
-The robots behind it close up first, so that every slot is occupied. The walk goes on until all that it can close is
-closed, or until no standing robot sees the walking robot further on: there it gets a slot, and the swarm goes on from it.
+The robots behind it close up first, so that every slot is occupied. The walk ends when all that it can close is closed,
+or when no standing robot sees the walking robot further on. In the second case it gets a slot there, and the swarm
+continues from that slot.
 """
 
 import math
@@ -38,7 +39,7 @@ FEEL_M: Final = 0.12
 CLEAR_M: Final = 0.3
 # Length [m] of one leg of a walk: the coordinator decides after each leg whether it goes on.
 LEG_M: Final = 3.0
-# A walk ends after so many legs in a row that closed nothing.
+# Number of consecutive legs that closed nothing after which a walk ends.
 IDLE_LEGS_MAX: Final = 2
 # A leg closes something if the open arcs become smaller by this [rad].
 PROGRESS_RAD: Final = 0.1

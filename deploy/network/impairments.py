@@ -130,9 +130,9 @@ def _rule(model: OpenTable, path: str, scenario: Scenario) -> tuple[NetworkRule,
         if rule is None:
             raise ValueError("no rule of the network is known for this model")
         if isinstance(rule, ReceiverDelay) and parameters.senders is not None:
-            raise ValueError("netem delays all that goes to a receiver; say receivers")
+            raise ValueError("netem delays all packets to a receiver: set receivers, not senders")
         if isinstance(rule, SenderRate) and parameters.receivers is not None:
-            raise ValueError("tbf slows down all that a sender sends; say senders")
+            raise ValueError("tbf slows down all packets of a sender: set senders, not receivers")
     except ValidationError as error:
         named = f"{scenario.place}: "
         found = [line.removeprefix(named) for line in mistakes(error, scenario.place, f"{path}.")]
@@ -260,7 +260,7 @@ class Network:
             self._namespaces.run(["tc", "qdisc", "add", "dev", *command], node=node)
 
     def cables(self) -> Iterator[tuple[int | None, list[str]]]:
-        """Yield the arguments of `tc qdisc add dev`, with the node whose namespace they apply to (None: the bridge)."""
+        """Yield the arguments of `tc qdisc add dev`, with the node to whose namespace they apply (None: the bridge)."""
         # The rate counts payload bytes: the size table subtracts the headers, with one entry for each size.
         before = _WIRE_BYTES[self._transport] + _ZENOH_BYTES + HEAD_BYTES
         sizes = ["stab", "overhead", str(-before - 1), "mtu", "2047", "tsize", "2048"]

@@ -1,7 +1,7 @@
 """The schedule of a run: the faults that are active at a tick, and their effects.
 
 Input: the `[[faults]]` tables of the scenario, and those of its random schedule. At each tick the schedule begins and ends
-faults. After a change it gives the states of programs, the judges of packets, and the faults of sensors anew.
+faults. After a change it gives the new states of programs, judges of packets, and faults of sensors.
 """
 
 import json
@@ -119,7 +119,7 @@ class Schedule:
 
     @property
     def touches_programs(self) -> bool:
-        """Whether a fault may kill, start, pause or resume a program."""
+        """True if a fault may kill, start, pause or resume a program."""
         return any(each.fault.touches_programs for each in self.faults)
 
     def turn(self, tick: int, scene: Scene, dead: Sequence[int] = ()) -> bool:

@@ -76,7 +76,8 @@ class Deployment(Metric):
     def _count(self, node: int, cycle: float, restarted: bool) -> None:
         """Count the cycles of a node over all its incarnations.
 
-        A restarted node counts anew: a complex whose cycle is not a later one, or fewer cycles than before, begin a new count.
+        A restarted node starts its count again. A complex of a cycle that is not later, or fewer cycles than before,
+        begin a new count.
         """
         if restarted:
             self._before[node] = self._before.get(node, 0.0) + self._cycle.get(node, 0.0)
@@ -88,7 +89,7 @@ class Conclusion(Metric):
     """`concluded_early`: 1 where the base station has concluded too early, by the truth at that time, else 0.
 
     Too early is a coverage of the space that robots can reach below `ENOUGH`, measured where `metrics.sight_range_m` is given;
-    or a claim of a running robot that it stands at a frontier. A robot that has restarted reports its claim anew.
+    or a claim of a running robot that it stands at a frontier. A robot that has restarted reports its claim again.
     """
 
     names: ClassVar[Sequence[str]] = ("concluded_early",)
@@ -102,7 +103,7 @@ class Conclusion(Metric):
         self._truth: Truth | None = None
 
     def report(self, record: TelemetryRecord) -> None:
-        """Take a robot's claim that it stands at a frontier, or that it does not any more."""
+        """Take a robot's claim that it stands at a frontier, or that it no longer does."""
         if CLAIM in record.numbers:
             self._claims[record.node] = bool(record.numbers[CLAIM])
 
@@ -133,9 +134,9 @@ class Conclusion(Metric):
 class Removals(Metric):
     """Number of robots that have left the complex, and number of these departures that changed its true b0 or b1.
 
-    Each departure is judged by the truth at its own time. The complex is that of all robots in the arena that run then and
-    have not left it, by true visibility within `metrics.sight_range_m`; measured only where that is given and robots leave by
-    agreement.
+    Each departure is judged by the truth at its own time. The complex is that of all running robots in the arena that
+    have not left the complex, by true visibility within `metrics.sight_range_m`. It is measured only if that range is
+    given and robots leave by agreement.
     """
 
     names: ClassVar[Sequence[str]] = ("removals", "unsafe_removals")
@@ -157,7 +158,7 @@ class Removals(Metric):
 
 
 def robots_leave(scenario: Scenario) -> bool:
-    """Tell whether the robots of a scenario leave the complex by agreement among neighbours."""
+    """Return whether the robots of a scenario leave the complex by agreement among neighbours."""
     services = {} if scenario.variant is None else dict(scenario.variant.services)
     return services.get("redundancy") == "link" or services == {"path": "gradient", "redundancy": "coordinator"}
 

@@ -90,7 +90,7 @@ class LineOfSightSensor(Sensor):
             np.subtract(grid, offset_column[first:last], out=grid)
             np.multiply(across, across, out=across)
             if others is robots:
-                across[first :: total + 1] = np.inf  # nobody sees itself
+                across[first :: total + 1] = np.inf  # no robot sees itself
             else:
                 grid[np.arange(last - first), np.searchsorted(others, robots[first:last])] = np.inf
             np.less_equal(across, radius2, out=on_line)
@@ -112,7 +112,7 @@ class LineOfSightSensor(Sensor):
         return sees
 
     def _prepare(self, total: int) -> None:
-        """Make the buffers for so many rows at a time of `total` robots, and tables of each entry's row and column."""
+        """Make the buffers for this number of rows at a time of `total` robots, and tables of each entry's row and column."""
         self._total = total
         self._rows = min(max(1, _PAIRS_AT_ONCE // total), total)
         size = self._rows * total

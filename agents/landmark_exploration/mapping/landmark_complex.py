@@ -10,7 +10,7 @@ from typing import Final
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 
-# n_l of section IV-B: so many landmarks fix a bearing-only target.
+# n_l of section IV-B: the number of landmarks that fix a bearing-only target.
 SHARED_MIN: Final = 2
 
 # Of two snapshots of the same landmarks the one with the smaller rank is kept: (number in its origin's log, origin).
@@ -58,7 +58,7 @@ class LandmarkComplex:
         return {simplex: self._bearings[simplex][1] for simplex in sorted(self._bearings)}
 
     def contains(self, landmarks: Iterable[int]) -> bool:
-        """Tell whether these landmarks are a face of the complex. No landmarks are one."""
+        """Return whether these landmarks are a face of the complex. No landmarks are one."""
         common: set[int] | None = None
         for landmark in landmarks:
             holders = self._holders.get(landmark)
@@ -70,7 +70,7 @@ class LandmarkComplex:
         return True
 
     def update(self, snapshot: BearingSnapshot, rank: Rank = (0, 0)) -> bool:
-        """Take in an observation (algorithm 2); tell whether the complex has a simplex more."""
+        """Take in an observation (algorithm 2); return whether the complex has a simplex more."""
         simplex = snapshot.landmarks
         known = self._bearings.get(simplex)
         if known is not None:

@@ -7,7 +7,7 @@ from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries,
 from zwerm.agents.landmark_exploration.sharing.packing import counts_of, pack_entries
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch
 
-# After so many ticks without an acknowledgement what is not acknowledged is sent again.
+# Ticks without an acknowledgement after which the robot sends the entries again.
 RETRY_TICKS: Final = 5
 # So many entries are sent at a time, at most.
 WINDOW_ENTRIES: Final = 60
@@ -26,7 +26,7 @@ class Upload:
 
     @property
     def complete(self) -> bool:
-        """Whether the coordinator has the whole log."""
+        """True if the coordinator has the whole log."""
         return self._acknowledged == self._replica.vector.get(self._origin, 0)
 
     def acknowledge(self, vector: Vector) -> None:

@@ -1,8 +1,8 @@
 """The barrier of a corridor in all interleavings of small cases: a robot hunts only once its predecessor's slice is swept.
 
-An explorer lets everything happen in every order: a robot goes on with its work, its newest status reaches another robot, or
-one that was sent earlier does, and the predecessor dies. In every state the promise is checked, and then that the time after
-which a silent member is dropped brings every living robot through the barrier.
+The test explores every order of these events. A robot continues its work. Its newest status, or an earlier one, reaches
+another robot. The predecessor dies. In every state the test checks the guarantee. It then lets the time pass after
+which a silent member is dropped. Every living robot must then pass the barrier.
 """
 
 import copy
@@ -11,8 +11,17 @@ import pytest
 
 from zwerm.agents.robot_teams.mapping.facts import RIGHT, TOP, End
 from zwerm.agents.robot_teams.protocols.corridor_mates import CorridorMates
-from zwerm.agents.robot_teams.protocols.team_membership import Membership
-from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, SWEEPS, TRAVELS, Beacon, Plan, Status, View
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership
+from zwerm.agents.robot_teams.protocols.team_messages import (
+    HUNTS,
+    READY,
+    SWEEPS,
+    TRAVELS,
+    CorridorPlan,
+    Status,
+    TeamBeacon,
+    View,
+)
 
 DT_S, SILENCE_S = 1.0, 3.0
 ANCHOR = End(0, TOP, 5_000)
@@ -23,8 +32,8 @@ class Corridor:
 
     def __init__(self, count: int, room: int | None = None) -> None:
         self.view = View(2, 0, tuple(range(count)))
-        self.plan = Plan(2, 1, ANCHOR, RIGHT, False, tuple(range(count)))
-        self.members = [Membership(node, DT_S, SILENCE_S) for node in range(count)]
+        self.plan = CorridorPlan(2, 1, ANCHOR, RIGHT, False, tuple(range(count)))
+        self.members = [TeamMembership(node, DT_S, SILENCE_S) for node in range(count)]
         for member in self.members:
             member.view = self.view
             for node in range(count):
@@ -35,7 +44,7 @@ class Corridor:
         self.claims: list[int | None] = [None] * count
         self.hunting: list[int] = []
         self.swept: set[int] = set()
-        self.old: list[Beacon | None] = [None] * count
+        self.old: list[TeamBeacon | None] = [None] * count
         self.dead: list[int] = []
         self.tick = 1
         self.beats = 0
@@ -43,16 +52,16 @@ class Corridor:
     def mates(self, node: int) -> CorridorMates:
         return CorridorMates(self.plan, node, self.members[node], lambda k: False)
 
-    def beacon(self, node: int) -> Beacon:
+    def beacon(self, node: int) -> TeamBeacon:
         self.beats += 1
         plan, team = self.plan, (self.view.epoch, self.view.lead)
         status = Status(
             *(node, self.beats, 0, 0, plan.epoch, plan.number, self.phase[node], ANCHOR, False, False),
             *(self.claims[node], self.found_room[node], None, team),
         )
-        return Beacon(node, (self.members[node].view,), (), (), (status,), 0, 0)
+        return TeamBeacon(node, (self.members[node].view,), (), (), (status,), 0, 0)
 
-    def deliver(self, beacon: Beacon, receiver: int) -> None:
+    def deliver(self, beacon: TeamBeacon, receiver: int) -> None:
         if beacon.sender != receiver and receiver not in self.dead:
             self.members[receiver].receive(beacon, self.tick, near=False)
 
@@ -156,7 +165,7 @@ def explore(corridor: Corridor, depth: int, dies: int | None = None) -> int:
 
 
 @pytest.mark.parametrize(("count", "depth"), [(2, 7), (3, 4)])
-def test_nobody_hunts_before_its_predecessor_swept_whatever_is_lost_or_late(count: int, depth: int) -> None:
+def test_no_robot_hunts_before_its_predecessor_swept_although_messages_are_lost_or_late(count: int, depth: int) -> None:
     assert explore(Corridor(count), depth) > 200
 
 
@@ -166,7 +175,7 @@ def test_a_corridor_with_too_little_room_ends_for_all(room: int) -> None:
 
 
 @pytest.mark.parametrize("dies", [0, 1])
-def test_a_dead_predecessor_holds_nobody_back_for_ever(dies: int) -> None:
+def test_a_dead_predecessor_delays_no_robot_for_ever(dies: int) -> None:
     assert explore(Corridor(3), 4, dies) > 200
 
 

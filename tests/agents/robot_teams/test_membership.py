@@ -1,7 +1,7 @@
 """Membership in all interleavings of small cases: views, division, merging and succession under loss and delay.
 
-An explorer lets everything happen in every order, up to a depth: any robot's newest beacon reaches any other, or one that was
-sent earlier does; a lead divides or merges its team; a robot dies. In every state what is promised is checked, and then
+The test explores every order of these events, up to a depth. A robot's newest beacon, or an earlier one, reaches
+another robot. A lead divides or merges its team. A robot dies. In every state what is promised is checked, and then
 that a time without loss brings all living robots to agree.
 """
 
@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import pytest
 
-from zwerm.agents.robot_teams.protocols.team_membership import Membership, later
-from zwerm.agents.robot_teams.protocols.team_messages import READY, Beacon, Status, View
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership, later
+from zwerm.agents.robot_teams.protocols.team_messages import READY, Status, TeamBeacon, View
 
 DT_S, SILENCE_S = 1.0, 3.0
 
@@ -20,8 +20,8 @@ class Team:
     """Some robots, the beacons that they sent, and the time."""
 
     def __init__(self, count: int, together: bool = True) -> None:
-        self.robots = [Membership(node, DT_S, SILENCE_S) for node in range(count)]
-        self.old: list[Beacon | None] = [None] * count
+        self.robots = [TeamMembership(node, DT_S, SILENCE_S) for node in range(count)]
+        self.old: list[TeamBeacon | None] = [None] * count
         self.dead: list[int] = []
         self.tick = 0
         if together:
@@ -32,13 +32,13 @@ class Team:
                 robot.meet_first(0)
             self.heal(2)
 
-    def beacon(self, node: int) -> Beacon:
+    def beacon(self, node: int) -> TeamBeacon:
         robot = self.robots[node]
         team = (robot.view.epoch, robot.view.lead)
         status = Status(node, self.tick, 0, 0, robot.view.epoch, 0, READY, None, False, False, None, None, None, team)
-        return Beacon(node, robot.outgoing(), robot.met(), (), (status,), 0, 0)
+        return TeamBeacon(node, robot.outgoing(), robot.met(), (), (status,), 0, 0)
 
-    def deliver(self, beacon: Beacon, receiver: int, near: bool = True) -> None:
+    def deliver(self, beacon: TeamBeacon, receiver: int, near: bool = True) -> None:
         if beacon.sender != receiver and receiver not in self.dead:
             self.robots[receiver].receive(beacon, self.tick, near)
 
@@ -164,16 +164,16 @@ def test_robots_that_hear_each_other_are_one_team() -> None:
 
 
 @pytest.mark.parametrize(("count", "depth"), [(2, 6), (3, 5)])
-def test_a_team_agrees_again_whatever_is_lost_late_or_decided(count: int, depth: int) -> None:
+def test_a_team_agrees_again_after_lost_and_late_messages_and_any_decision(count: int, depth: int) -> None:
     assert explore(Team(count), depth) > 50
 
 
 @pytest.mark.parametrize("dies", [0, 1, 2])
-def test_a_team_agrees_again_whoever_dies_at_any_time(dies: int) -> None:
+def test_a_team_agrees_again_after_any_robot_dies_at_any_time(dies: int) -> None:
     assert explore(Team(3), 4, dies) > 50
 
 
-def test_teams_that_began_apart_agree_whatever_is_lost_or_late() -> None:
+def test_teams_that_began_apart_agree_although_messages_are_lost_or_late() -> None:
     assert explore(Team(3, together=False), 4) > 50
 
 
