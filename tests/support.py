@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -71,10 +72,17 @@ def until(holds: Callable[[], object], what: str, deadline_s: float = 30.0) -> N
 
 
 def script(path: Path) -> ModuleType:
-    """Return a script that is in no package as a module, without running it as a program."""
+    """Return a script that is in no package as a module, without running it as a program.
+
+    It finds the modules beside it, as a program does.
+    """
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(path.parent))
     return module
