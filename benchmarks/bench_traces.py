@@ -1,4 +1,4 @@
-"""Whether runs in processes have the traces of runs inline: every scenario that ships, 20 seeds each.
+"""True if runs in processes have the traces of runs inline: every scenario that ships, 20 seeds each.
 
 Each scenario runs as it ships, and for fewer seeds with faults added: one robot killed and started again, one paused, one
 slow. The virtual time is shortened. Trace, metrics and radio accounts of both runners must be equal. Two controls show that

@@ -1,7 +1,7 @@
 """Certificates of a run over a network: an authority of its own, the world's certificate, and one for each node.
 
 Both ends prove who they are (mutual TLS). The common name of a node's certificate is its user name, and access control
-binds the node's keys to it. The private key of the authority is deleted at once: nobody can add a node later. The tool
+binds the node's keys to it. The private key of the authority is deleted at once: no node can be added later. The tool
 `openssl` makes the certificates, in a private directory.
 """
 
@@ -42,7 +42,7 @@ def certify(credentials: Credentials, names: Sequence[str]) -> tuple[WorldIdenti
 
 
 class _Authority:
-    """A certificate authority whose files are in `directory`."""
+    """A certificate authority with its files in `directory`."""
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory

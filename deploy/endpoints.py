@@ -11,7 +11,7 @@ _ENCRYPTED: Final = ("tls/", "quic/")
 
 
 def is_encrypted(endpoint: str) -> bool:
-    """Tell whether everything that crosses an endpoint is encrypted."""
+    """Return whether everything that crosses an endpoint is encrypted."""
     return endpoint.startswith(_ENCRYPTED)
 
 
@@ -21,7 +21,7 @@ def host_of(endpoint: str) -> str:
 
 
 def is_loopback(endpoint: str) -> bool:
-    """Tell whether an endpoint is reachable from this machine only."""
+    """Return whether an endpoint is reachable from this machine only."""
     if is_local(endpoint):
         return True
     host = host_of(endpoint)

@@ -1,9 +1,9 @@
 """Modules that the fork server of the robots loads first. Importing this module prepares the calling process for
 forking.
 
-Robots share the server's memory as long as nobody writes to it. So all modules that a robot imports are imported here,
-once. They are also exempt from garbage collection, which would write to their pages. For the server only, never for the
-world.
+Robots share the server's memory as long as no process writes to it. So all modules that a robot imports are imported
+here, once. They are also exempt from garbage collection, which would write to their pages. For the server only, never
+for the world.
 """
 
 import gc

@@ -214,7 +214,8 @@ class LocalSwarm(_Swarm):
 
 
 class RemoteSwarm(_Swarm):
-    """A swarm whose processes are started elsewhere, with the credentials in the file `credentials_file`, or those of `keys`.
+    """A swarm with processes that are started elsewhere, with the credentials in the file `credentials_file`, or those
+    of `keys`.
 
     Endpoints of TLS and QUIC get a new authority, and certificates for world and nodes, unless `keys` or `tls` say others.
     """
@@ -236,8 +237,8 @@ class RemoteSwarm(_Swarm):
     ) -> None:
         """`listen` are Zenoh endpoints, such as `tls/0.0.0.0:7447`. All nodes must join within `deadline_s`.
 
-        `names` are further host names and addresses of this machine, for its certificate. A node whose connection is silent for
-        `lease_s` is lost. Exactly one of `credentials_file` and `keys` is needed.
+        `names` are further host names and addresses of this machine, for its certificate. A node is lost if its
+        connection is silent for `lease_s`. Exactly one of `credentials_file` and `keys` is needed.
         """
         super().__init__(run, members, progress, deadline_s, paced)
         self._endpoints = list(listen)

@@ -44,7 +44,7 @@ class Measurement:
 
     @property
     def is_study(self) -> bool:
-        """Whether the CSV file has one row a metric, rather than the table as it is shown."""
+        """True if the CSV file has one row a metric, rather than the table as it is shown."""
         return bool(self.rows) and "metric" in self.rows[0]
 
 
@@ -227,7 +227,7 @@ def _by_point(found: Measurement) -> tuple[list[str], list[list[str]]]:
 
 
 def is_mean(kind: Mapping[str, Any]) -> bool:
-    """Whether the mean of a metric is shown, and not the least or most of all trials."""
+    """True if the mean of a metric is shown, and not the least or most of all trials."""
     return kind.get("show") not in ("least", "most")
 
 

@@ -88,7 +88,7 @@ def measure(name: str, plan: Mapping[str, Any], seeds: str | None, jobs: int | N
 
 
 def is_benchmark(plan: Mapping[str, Any]) -> bool:
-    """Whether a plan runs a script in benchmarks/."""
+    """True if a plan runs a script in benchmarks/."""
     return "command" in plan and plan["command"][0].startswith("benchmarks/")
 
 
@@ -162,7 +162,7 @@ def trials_in(parquet: Path) -> list[dict[str, Any]]:
 
 
 def is_at(trial: Mapping[str, Any], point: Mapping[str, Any]) -> bool:
-    """Tell whether a trial is one of a point's."""
+    """Return whether a trial is one of a point's."""
     settings = point["settings"].items()
     return (trial["variant"] or "") == (point["variant"] or "") and all(
         str(trial.get(axis)) == str(setting) for axis, setting in settings

@@ -159,7 +159,7 @@ class Explorer:
         return self.graph if state.moving else self.later
 
     def _only_forbids(self, state: State, sender: int, receiver: int, message: LockProtocolMessage) -> bool:
-        """Tell whether all that a message would do is to make its receiver refuse others, which might as well be lost."""
+        """Return whether all that a message would do is to make its receiver refuse others, which might as well be lost."""
         lock = self._objects[state.robots[receiver]]._lock
         return isinstance(message, LockRelease) and (
             lock is None or lock.holder != sender or lock.number > message.number
@@ -226,7 +226,7 @@ class Explorer:
         return state._replace(robots=robots, sent=left)
 
     def _still_matters(self, state: State, sender: int, receiver: int, message: LockProtocolMessage) -> bool:
-        """Tell whether a message can allow anything to those who have asked or will."""
+        """Return whether a message can allow anything to those who have asked or will."""
         match message:
             case NeighbourList():
                 return receiver in state.asks

@@ -120,7 +120,7 @@ def named_algorithms(path: Path, text: str) -> list[str]:
 
 
 def is_generic(path: Path) -> bool:
-    """Tell whether a file belongs to no algorithm: every file but those that bear a row's name, and the catalogue."""
+    """Return whether a file belongs to no algorithm: every file but those that bear a row's name, and the catalogue."""
     own = {row.name for row in ALGORITHMS}
     return path != Path("zwerm/catalogue.py") and not own & {part.removesuffix(".py") for part in path.parts}
 

@@ -5,11 +5,11 @@ One tick is, in this order:
 1. `begin`: faults of tick t_k take effect.
 2. `observe`: sense at t_k, for the nodes that are awake; the driver sends the observations.
 3. `precompute`: work ahead while the nodes compute.
-4. `accept`: take each answer; `awaited` are the nodes that still owe one.
-5. `advance`: apply the commands in id order, give their packets to the radio, and move the bodies to t_k+1.
+4. `accept`: take each answer; `awaited` are the nodes whose command is still missing. 5. `advance`: apply the commands
+in id order, give their packets to the radio, and move the bodies to t_k+1.
 
 A driver decides when to advance. In lock-step that is when all nodes have answered, in real time by the clock. `ending`
-tells the driver when the run is over.
+informs the driver when the run is over.
 
 The world is deterministic: its state after a tick is a function of the scenario, the seed and the accepted answers.
 """
@@ -237,7 +237,7 @@ class World:
 
     @property
     def completed(self) -> bool:
-        """Whether the task is done."""
+        """True if the task is done."""
         return self.completion.completed(self.bodies.exited, self.status.dead)
 
     # --- inside -----------------------------------------------------------------------------------------------------

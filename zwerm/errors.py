@@ -2,7 +2,7 @@
 
 
 class ZwermError(Exception):
-    """Base of every error that is the user's to mend."""
+    """Base of every error that the user can correct."""
 
 
 class ScenarioError(ZwermError):

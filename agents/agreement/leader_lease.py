@@ -108,7 +108,7 @@ class LeaderLease(Controller):
         return True
 
     def _yields_to(self, candidate: int, now_s: float) -> bool:
-        """Tell whether this robot is a candidate without a lease, and gives way to another one: the smaller id goes first.
+        """Return whether this robot is a candidate without a lease, and gives way to another one: the smaller id goes first.
 
         Without a rule all robots could be candidates that support themselves, for ever.
         """
@@ -124,7 +124,7 @@ class LeaderLease(Controller):
             self._leads_until_s = max(self._leads_until_s, self._stamp_s + table.lease_s - table.margin_s)
 
     def _is_time(self, now_s: float) -> bool:
-        """Tell whether to ask now: a leader renews, others wait until their promise has ended and then a random time."""
+        """Return whether to ask now: a leader renews, others wait until their promise has ended and then a random time."""
         table: Any = self.parameters
         if now_s < self._leads_until_s:
             return bool(now_s >= self._stamp_s + table.renew_s)

@@ -48,7 +48,7 @@ LOOK_TICKS: Final = 5
 CUT_OFF_TICKS: Final = 200
 # Ticks for which a robot leaves a frontier alone that it did not get to.
 AVOID_TICKS: Final = 300
-# Ticks between what a robot tells those who watch the run.
+# Ticks between two snapshots that a robot reports to observers of the run.
 TELEMETRY_TICKS: Final = 25
 
 ROBOTS: Final = "robots"
@@ -108,7 +108,7 @@ class Explorer(Controller):
         self.done = False
 
     def step(self, observation: Observation) -> Command:
-        """Perceive, listen, act, speak."""
+        """Perceive, receive, act, send."""
         self.view.take(observation)
         for packet in observation.inbox:
             self._hear(packet)
@@ -123,7 +123,7 @@ class Explorer(Controller):
         )
 
     def _looks(self) -> bool:
-        """Tell whether the robot adds what it sees to the map."""
+        """Return whether the robot adds what it sees to the map."""
         if self._frozen or self._halted:
             return False
         if self.parameters.strategy == "random-walk" or self.parameters.presence_only:
@@ -171,7 +171,8 @@ class Explorer(Controller):
             if self._task is None:
                 self._choose()
             if self._task is None or self._task.key is None:
-                # Where robots carry the map to each other, the idle ones do; where a coordinator has it they wait for it.
+                # If robots carry the map to each other, the idle robots do this. If a coordinator has the map, idle
+                # robots wait for it.
                 waits = not (self._carries or self._cut_off)
                 yield None if self._halted or waits else next(idle)
                 continue

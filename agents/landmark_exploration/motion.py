@@ -172,7 +172,8 @@ def wander(view: ExplorerView, random: np.random.Generator, turn_sd_rad: float =
 def roam(view: ExplorerView, random: np.random.Generator, is_new: Callable[[], bool]) -> Drive:
     """Explore without bearings, for ever: go straight on while that shows anything new, and else turn at random.
 
-    `is_new` tells whether what is seen now was new to the map. The direction is kept for `NEWS_TICKS` after the last news.
+    `is_new` is true if the present observation was new to the map. The direction is kept for `NEWS_TICKS` after the
+    last news.
     """
     direction = float(random.uniform(-math.pi, math.pi))
     until = view.tick

@@ -1,26 +1,27 @@
 """The lead's decisions: which corridors its free robots form next, and when the team divides. Pure functions.
 
 Latimer et al. 2002, sections 3.3 and 3.4. A corridor begins at the open end or port nearest to a free robot. Robots for which
-the map shows no room in it take the next open cell, if there is one near. Where a robot found a new segment on its own slice,
-a reverse critical point lies between it and its predecessor. Then the team divides: it and those behind it take the new cell.
+the map shows no room in it take the next open cell, if there is one near. If a robot found a new segment on its own
+slice, a reverse critical point lies between it and its predecessor. Then the team divides: this robot and those behind
+it take the new cell.
 """
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, TOP, End
-from zwerm.agents.robot_teams.mapping.slice_map import Certificate, SliceMap
-from zwerm.agents.robot_teams.protocols.team_messages import READY, Plan, Status, View
+from zwerm.agents.robot_teams.mapping.slice_map import CoverageCertificate, SliceMap
+from zwerm.agents.robot_teams.protocols.team_messages import READY, CorridorPlan, Status, View
 
 FAR: Final = 10**9
 # The side of the anchor of a plan that only joins the maps of robots that began apart.
 LINK: Final = 0
-# How far beyond the ends of its anchor's segment a corridor reserves its cell [mm].
+# Distance beyond the ends of its anchor's segment up to which a corridor reserves its cell [mm].
 BESIDE_MM: Final = 500
 
 
 class Task(NamedTuple):
-    """Where a corridor begins: at an end that is not swept (`own_slice`), or at the open port of one that is."""
+    """The start of a corridor: an end that is not swept (`own_slice`), or the open port of one that is."""
 
     end: End
     direction: int
@@ -36,7 +37,7 @@ class Reservation(NamedTuple):
     top_mm: int
 
     def holds(self, task: Task) -> bool:
-        """Tell whether a task lies in it."""
+        """Return whether a task lies in it."""
         end = task.end
         slab = end.slice if task.direction == RIGHT else end.slice - 1
         beside = self.bottom_mm - BESIDE_MM <= end.y_mm <= self.top_mm + BESIDE_MM
@@ -48,7 +49,7 @@ def open_tasks(slice_map: SliceMap) -> list[Task]:
     return _tasks(slice_map, slice_map.certificate)
 
 
-def _tasks(slice_map: SliceMap, certificate: Certificate) -> list[Task]:
+def _tasks(slice_map: SliceMap, certificate: CoverageCertificate) -> list[Task]:
     unswept = dict.fromkeys(certificate.ends_without_mate)
     tasks = []
     for end in unswept:
@@ -57,12 +58,12 @@ def _tasks(slice_map: SliceMap, certificate: Certificate) -> list[Task]:
     return tasks + [Task(end, side, False) for end, side in certificate.open_ports if end not in unswept]
 
 
-def reservation(slice_map: SliceMap, plan: Plan) -> Reservation:
+def reservation(slice_map: SliceMap, plan: CorridorPlan) -> Reservation:
     """Return where the robots of a plan work."""
     anchor, reach = plan.anchor, len(plan.order) * plan.direction
     if anchor.side == LINK:
         return Reservation(0, -1, 0, 0)
-    # Slabs are named by the slice on their left. One more to either side: hunts go back, and the next corridor goes on.
+    # A slab has the number of the slice on its left. One more to either side: hunts go back, and the next corridor goes on.
     first = anchor.slice if plan.direction == RIGHT else anchor.slice - 1
     low, high = sorted((first - plan.direction, first + reach))
     known = slice_map.end(anchor)
@@ -77,7 +78,7 @@ def reservation(slice_map: SliceMap, plan: Plan) -> Reservation:
 
 
 def room(slice_map: SliceMap, task: Task, count: int) -> int:
-    """Return for how many of `count` robots a corridor has room, as far as the map tells: at least one."""
+    """Return the number of robots, of `count`, for which a corridor has room by the map: at least one."""
     k, found = task.end.slice, 1 if task.own_slice else 0
     if slice_map.is_virtual(task.end) or (task.own_slice and slice_map.arc(task.end, task.direction) is not None):
         return 1
@@ -89,9 +90,9 @@ def room(slice_map: SliceMap, task: Task, count: int) -> int:
     return max(found, 1)
 
 
-def latest_plans(plans: Sequence[Plan], view: View) -> dict[int, Plan]:
+def latest_plans(plans: Sequence[CorridorPlan], view: View) -> dict[int, CorridorPlan]:
     """Return for each member of the view its latest plan, if it has one."""
-    latest: dict[int, Plan] = {}
+    latest: dict[int, CorridorPlan] = {}
     for plan in plans:
         if plan.epoch == view.epoch:
             for node in plan.order:
@@ -100,7 +101,7 @@ def latest_plans(plans: Sequence[Plan], view: View) -> dict[int, Plan]:
     return latest
 
 
-def free_members(view: View, plans: Sequence[Plan], statuses: Mapping[int, Status]) -> list[int]:
+def free_members(view: View, plans: Sequence[CorridorPlan], statuses: Mapping[int, Status]) -> list[int]:
     """Return the members that have finished their latest plan: the barrier of a corridor is that all of its robots are free."""
     latest = latest_plans(plans, view)
     free = []
@@ -112,7 +113,7 @@ def free_members(view: View, plans: Sequence[Plan], statuses: Mapping[int, Statu
     return free
 
 
-def without_busy(plans: Sequence[Plan], free: Collection[int]) -> list[Plan]:
+def without_busy(plans: Sequence[CorridorPlan], free: Collection[int]) -> list[CorridorPlan]:
     """Return the plans whose robots are all free."""
     return [plan for plan in plans if all(node in free for node in plan.order)]
 
@@ -129,7 +130,7 @@ def finder(order: Sequence[int], statuses: Mapping[int, Status]) -> int | None:
 def division(view: View, order: Sequence[int], index: int) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
     """Return the two groups when robot `index` of a formation found a new cell: it and those behind it, and all others.
 
-    Where the lead of the formation found it, the formation splits in half. None where a group would be empty.
+    If the lead of the formation found it, the formation splits in half. None where a group would be empty.
     """
     cut = index + 1 if index + 1 < len(order) else len(order) // 2
     new = tuple(order[:cut])
@@ -140,17 +141,18 @@ def division(view: View, order: Sequence[int], index: int) -> tuple[tuple[int, .
 def assign(
     slice_map: SliceMap,
     view: View,
-    plans: Sequence[Plan],
-    reserving: Sequence[Plan],
+    plans: Sequence[CorridorPlan],
+    reserving: Sequence[CorridorPlan],
     statuses: Mapping[int, Status],
     skip: Collection[tuple[Task, int]],
     one_corridor: bool,
     join_mm: int,
-) -> list[Plan]:
+) -> list[CorridorPlan]:
     """Return new plans for the free members. With `one_corridor` the whole team forms one corridor at a time.
 
-    While others are busy, no robot travels farther than `join_mm`: its turn comes nearer. The busy plans among `reserving`
-    keep others out of their cells. `skip` has the tasks that brought nothing new lately, each with a robot that tried.
+    While others are busy, no robot travels farther than `join_mm`: a nearer task comes later. The busy plans among
+    `reserving` keep others out of their cells. `skip` has the tasks that recently gave nothing new, each with a robot
+    that tried.
     """
     free = free_members(view, plans, statuses)
     if not free or (one_corridor and len(free) < len(view.members)):
@@ -161,17 +163,18 @@ def assign(
     reserved = [reservation(slice_map, plan) for plan in active if plan in reserving]
     places = {node: _place(slice_map, statuses.get(node)) for node in free}
     if number == 0 and len(free) > 1 and _apart(slice_map, places):
-        return [Plan(view.epoch, 1, End(0, LINK, 0), RIGHT, False, tuple(free))]
+        return [CorridorPlan(view.epoch, 1, End(0, LINK, 0), RIGHT, False, tuple(free))]
     distances = {node: slice_map.distances(at) for node, at in places.items() if at is not None}
     members = [statuses[node] for node in view.members if node in statuses]
     swept = {status.sweeping for status in members if status.phase != READY}
     tasks = open_tasks(slice_map)
-    # From where nothing open can be reached, what blocks the way is explored: a wreck, or a wrong measurement.
+    # If no open end or port can be reached, the robot explores the cause that blocks the way: a wreck, or a wrong
+    # measurement.
     for node in [node for node in distances if tasks and not any(task.end in distances[node] for task in tasks)]:
         tasks += _tasks(slice_map, slice_map.openings(distances[node]))
     tasks = list(dict.fromkeys(tasks))
     tasks = [task for task in tasks if not (task.own_slice and task.end.slice in swept)]
-    made: list[Plan] = []
+    made: list[CorridorPlan] = []
     limit = join_mm if active else FAR - 1
     waiting = [node for node in free if node in distances]
     while waiting:
@@ -191,13 +194,13 @@ def assign(
         if best is None:
             break
         task = best[3]
-        # The nearest goes first, and so farthest: single file. The last in the order is the lead.
+        # The robots go in single file: the nearest goes first, and so goes farthest. The last in the order is the lead.
         near = sorted(waiting, key=lambda each: (distances[each].get(task.end, FAR), each))
         reach = max(join_mm, best[0])
         near = [each for each in near if distances[each].get(task.end, FAR) <= reach and (task, each) not in skip]
         near = near[: room(slice_map, task, len(waiting))]
         number += 1
-        plan = Plan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(reversed(near)))
+        plan = CorridorPlan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(reversed(near)))
         made.append(plan)
         reserved.append(reservation(slice_map, plan))
         waiting = [node for node in waiting if node not in near]
@@ -212,6 +215,6 @@ def _place(slice_map: SliceMap, status: Status | None) -> End | None:
 
 
 def _apart(slice_map: SliceMap, places: Mapping[int, End | None]) -> bool:
-    """Tell whether some of the robots stand at ends between which no way is known."""
+    """Return whether some of the robots stand at ends between which no way is known."""
     known = [place for place in places.values() if place is not None]
     return bool(known) and not slice_map.distances(known[0]).keys() >= dict.fromkeys(known).keys()

@@ -7,22 +7,32 @@ from typing import Annotated, ClassVar, Final
 import msgspec
 from msgspec import Meta, Struct
 
-from zwerm.agents.robot_teams.mapping.facts import BOTTOM, PASSES, TOP, Arc, End, Return, Segment, Void, Wreck
+from zwerm.agents.robot_teams.mapping.facts import (
+    BOTTOM,
+    PASSES,
+    TOP,
+    End,
+    Return,
+    SweptSegment,
+    TracedArc,
+    Void,
+    Wreck,
+)
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
-from zwerm.agents.robot_teams.motion.manoeuvres import Grid, Manoeuvre, mm
+from zwerm.agents.robot_teams.motion.manoeuvres import Manoeuvre, SliceGrid, mm
 from zwerm.agents.robot_teams.motion.pilot import FAILED, IDLE, RUNNING, Pilot
-from zwerm.agents.robot_teams.motion.senses import GAP_M, Senses, Sensing
+from zwerm.agents.robot_teams.motion.senses import GAP_M, SenseReader, Senses
 from zwerm.agents.robot_teams.motion.wrecks import WreckWatch
 from zwerm.agents.robot_teams.planning import LINK, latest_plans
 from zwerm.agents.robot_teams.protocols.central_membership import CoordinatedMembership
 from zwerm.agents.robot_teams.protocols.corridor_mates import CorridorMates
 from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
-from zwerm.agents.robot_teams.protocols.team_membership import Membership
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership
 from zwerm.agents.robot_teams.protocols.team_messages import (
     READY,
-    Beacon,
     FoundSnapshot,
     Status,
+    TeamBeacon,
     decode_beacon,
     encode_beacon,
     encode_snapshot,
@@ -34,20 +44,20 @@ from zwerm.errors import ControllerError, ProtocolError
 from zwerm.wire.checksum import seal, unseal
 from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 
-# In the first second every robot that is heard is met: the robots start together, as one team.
+# In the first second a robot meets every robot that it receives: the robots start together, as one team.
 MUSTER_S: Final = 1.0
-# A robot this near to an end, or to one that stands there, stands at it [m].
+# A robot nearer than this to an end, or to a robot at that end, counts as standing at it [m].
 PARKED_M: Final = 0.75
 # A wreck hides what is nearer to it than this, beyond two bodies' radii [m].
 HIDDEN_M: Final = GAP_M - 0.005
 # The channel to the coordinator.
 UPLINK: Final = "uplink"
-# The lead decides every so many ticks.
+# Ticks between two decisions of the lead.
 DECIDE_TICKS: Final = 4
 
 
 class TeamTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """The footprint's radius, the slices, the beacons, and when robots are met or given up for lost."""
+    """The footprint's radius, the slices, the beacons, and when robots are met or counted as lost."""
 
     footprint_m: Annotated[float, Meta(gt=0.0)] = 0.5
     spacing_m: Annotated[float, Meta(gt=0.0)] = 0.95
@@ -83,8 +93,8 @@ class TeamRobot(Controller):
         self.pilot = Pilot(setup.node, body.max_speed_m_s, setup.dt_s, self.random)
         # All cells are planned by the coordinator, or by the leads of teams.
         self._central = setup.services.get("cells") == "coordinator"
-        membership = CoordinatedMembership if self._central else Membership
-        self.membership: Membership = membership(setup.node, setup.dt_s, table.silence_s)
+        membership = CoordinatedMembership if self._central else TeamMembership
+        self.membership: TeamMembership = membership(setup.node, setup.dt_s, table.silence_s)
         self._channels = tuple([each for each in setup.channels if (each == UPLINK) == self._central])
         self._view = self.membership.view
         self.exchange = FactExchange(self.map, setup.dt_s)
@@ -101,9 +111,9 @@ class TeamRobot(Controller):
         self.refused = 0
         self._radius_m = body.radius_m
         self._wrecks = WreckWatch(setup.dt_s, table.silence_s, self.membership.roster.silent_ticks)
-        self._sensing = Sensing(body.radius_m)
+        self._sensing = SenseReader(body.radius_m)
         self._senses: Senses | None = None
-        self._grid = Grid(table.origin_m, table.spacing_m)
+        self._grid = SliceGrid(table.origin_m, table.spacing_m)
         self.work = Work(
             self.map,
             self._grid,
@@ -122,7 +132,7 @@ class TeamRobot(Controller):
         self._left_off = False
 
     def step(self, observation: Observation) -> Command:
-        """Hear, decide, move, and say."""
+        """Receive, decide, move, and send."""
         tick = observation.tick
         senses = self._senses = self._sensing.read(observation, self._wrecks.wrecks)
         if observation.inbox:
@@ -151,14 +161,14 @@ class TeamRobot(Controller):
     # --- moving -------------------------------------------------------------------------------------------------------
 
     def _stand(self, senses: Senses) -> tuple[float, float]:
-        """Leave off work, and make way for others."""
+        """Stop work, and make way for others."""
         self._left_off = True
         return self.pilot.stand(senses)
 
     def _move(self, senses: Senses) -> tuple[float, float]:
         pilot = self.pilot
         if self._left_off:
-            # There is more to do after all: work goes on from wherever the robot is now.
+            # New work was found: it begins at the robot's present place.
             self._left_off = False
             pilot.give_up()
         velocity = pilot.step(senses)
@@ -204,7 +214,7 @@ class TeamRobot(Controller):
                 self.work.at = self.work.sweeping = None
 
     def _swept_by_others(self, k: int) -> bool:
-        """Tell whether another robot is sweeping slice k now, by its own word."""
+        """Return whether another robot reports that it is sweeping slice k now."""
         roster, tick = self.membership.roster, self._newest_senses().tick
         silence = self.parameters.silence_s / self.setup.dt_s
         return any(
@@ -214,7 +224,7 @@ class TeamRobot(Controller):
         )
 
     def _parked(self, senses: Senses) -> list[End]:
-        """Return the ends at which robots in contact stand, by their own word."""
+        """Return the ends at which robots in contact report that they stand."""
         found = []
         grid = self._grid
         for other in senses.robots:
@@ -227,7 +237,7 @@ class TeamRobot(Controller):
         return found
 
     def _watch(self, senses: Senses) -> None:
-        """Look for wrecks, tell what they hide, and whether robots that were taken for dead live."""
+        """Look for wrecks. Record the ends that they hide, and the robots that were taken for dead and are alive."""
         tick, roster, voids = senses.tick, self.membership.roster, self.map.voids
         if self._channels:
             for node in self._wrecks.watch(senses, voids):
@@ -260,14 +270,14 @@ class TeamRobot(Controller):
         assert self._senses is not None
         return self._senses
 
-    # --- hearing and saying -------------------------------------------------------------------------------------------
+    # --- receiving and sending ----------------------------------------------------------------------------------------
 
     def _hear(self, observation: Observation, senses: Senses) -> None:
         tick = observation.tick
         table: TeamTable = self.parameters
         for packet in observation.inbox:
             try:
-                beacon: Beacon = decode_beacon(unseal(packet.payload))
+                beacon: TeamBeacon = decode_beacon(unseal(packet.payload))
             except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
                 self.refused += 1
                 continue
@@ -315,7 +325,7 @@ class TeamRobot(Controller):
         parcel = self.exchange.outgoing(tick)
         mine = self._status(senses, tick)
         others = [] if self._central else membership.others()
-        beacon = Beacon(
+        beacon = TeamBeacon(
             self.setup.node,
             membership.outgoing(),
             membership.met(),
@@ -329,7 +339,7 @@ class TeamRobot(Controller):
         return tuple([Transmission(channel, frame) for channel in self._channels])
 
     def _telemetry(self) -> dict[str, float | bool]:
-        """Return the certificate and what the team came to, whenever the map has grown."""
+        """Return the certificate and the team's results, whenever the map has grown."""
         facts = self.map.facts
         if (len(facts), self._done) == self._told:
             return {}
@@ -341,8 +351,8 @@ class TeamRobot(Controller):
         found, self.work.found_facts = self.work.found_facts, []
         if not found:
             return b""
-        slices = [fact for fact in found if isinstance(fact, Segment)]
-        points = [fact for fact in found if isinstance(fact, Arc) and fact.kind != PASSES]
+        slices = [fact for fact in found if isinstance(fact, SweptSegment)]
+        points = [fact for fact in found if isinstance(fact, TracedArc) and fact.kind != PASSES]
         return encode_snapshot(
             FoundSnapshot(
                 self.membership.view.lead,

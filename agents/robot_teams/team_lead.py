@@ -20,21 +20,21 @@ from zwerm.agents.robot_teams.planning import (
     open_tasks,
     without_busy,
 )
-from zwerm.agents.robot_teams.protocols.team_membership import Membership
-from zwerm.agents.robot_teams.protocols.team_messages import Plan
-from zwerm.agents.robot_teams.virtual_frontier import Frontiers
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership
+from zwerm.agents.robot_teams.protocols.team_messages import CorridorPlan
+from zwerm.agents.robot_teams.virtual_frontier import TeamFrontier
 
-# How long a team waits for one with a smaller lead to unite them [s].
+# Time that a team waits until the team whose lead has the smaller id unites the two [s].
 MERGE_PATIENCE_S: Final = 30.0
-# For how long a robot passes over a task at which it found nothing new [s].
+# Time in which a robot does not take a task again at which it found nothing new [s].
 SKIP_S: Final = 30.0
-# After so long without a new corridor free robots take tasks however far, and then in cells where others work [s].
+# Times without a new corridor after which free robots take tasks at any distance, and then in cells where others work [s].
 FAR_AFTER_S: Final = 20.0
 ANY_AFTER_S: Final = 60.0
 
 
-def findings(slice_map: SliceMap, membership: Membership) -> dict[str, float | bool]:
-    """Return what a map and a team came to, as named numbers for observers."""
+def findings(slice_map: SliceMap, membership: TeamMembership) -> dict[str, float | bool]:
+    """Return the results of a map and a team, as named numbers for observers."""
     certificate, facts = slice_map.certificate, slice_map.facts
     return {
         "ends": certificate.ends,
@@ -54,7 +54,7 @@ class TeamLead:
     def __init__(
         self,
         slice_map: SliceMap,
-        membership: Membership,
+        membership: TeamMembership,
         dt_s: float,
         *,
         divide: bool,
@@ -63,18 +63,18 @@ class TeamLead:
         join_m: float,
         virtual_frontier: bool = False,
     ) -> None:
-        self.plans: tuple[Plan, ...] = ()
+        self.plans: tuple[CorridorPlan, ...] = ()
         self._map, self._membership, self._dt_s = slice_map, membership, dt_s
         self._divide, self._merge, self._one_corridor = divide, merge, one_corridor
         self._join_mm = round(1000.0 * join_m)
         self._skip: dict[tuple[Task, int], int] = {}
-        self._judged: dict[int, Plan] = {}
+        self._judged: dict[int, CorridorPlan] = {}
         self._digests: dict[int, int] = {}
         self._made_tick = 0
-        self._frontiers = Frontiers(slice_map) if virtual_frontier else None
+        self._frontiers = TeamFrontier(slice_map) if virtual_frontier else None
 
     def begin(self, tick: int) -> None:
-        """Start anew in another view: plans hold within one view."""
+        """Start again in another view: plans hold within one view."""
         self._judged.clear()
         self._digests.clear()
         self._made_tick = tick
@@ -82,14 +82,15 @@ class TeamLead:
             self._frontiers.drop()
         self.plans = tuple([plan for plan in self.plans if plan.epoch == self._membership.view.epoch])
 
-    def follow(self, plans: Sequence[Plan]) -> None:
-        """Take over the plans of the lead, as a member tells them."""
+    def follow(self, plans: Sequence[CorridorPlan]) -> None:
+        """Take over the plans of the lead, as a member repeats them."""
         view = self._membership.view
         known = dict.fromkeys((*self.plans, *[plan for plan in plans if plan.epoch == view.epoch]))
         self.plans = tuple(dict.fromkeys(latest_plans(tuple(known), view).values()))
 
     def decide(self, tick: int) -> bool:
-        """Unite with teams that were met, divide, or give the free members something to do; tell whether all must hear."""
+        """Unite with teams that were met, divide, or assign tasks to free members; return whether all robots must be
+        informed."""
         membership, dt_s = self._membership, self._dt_s
         view, statuses = membership.view, membership.roster.statuses
         free = free_members(view, self.plans, statuses)
@@ -105,7 +106,7 @@ class TeamLead:
         if self._divides(free, tick):
             return True
         self._skip = {task: since for task, since in self._skip.items() if (tick - since) * dt_s < SKIP_S}
-        # Where nothing could be assigned for some time, far tasks are taken too, and then those in reserved cells.
+        # If no task could be assigned for some time, robots take far tasks too, and then those in reserved cells.
         idle_s = (tick - self._made_tick) * dt_s
         join_mm = self._join_mm if idle_s < FAR_AFTER_S else FAR
         plans = self.plans if idle_s < ANY_AFTER_S else without_busy(self.plans, free)
@@ -128,7 +129,7 @@ class TeamLead:
         return True
 
     def _divides(self, free: Sequence[int], tick: int) -> bool:
-        """Judge every corridor that has just ended: whether it brought anything, and whether the team divides."""
+        """Evaluate every corridor that has just ended: whether it gave new facts, and whether the team divides."""
         membership = self._membership
         view, statuses = membership.view, membership.roster.statuses
         for plan in dict.fromkeys(latest_plans(self.plans, view).values()):
@@ -136,7 +137,7 @@ class TeamLead:
                 continue
             self._judged[plan.number] = plan
             if self._digests.pop(plan.number, None) == self._map.facts.digest:
-                # Another robot may succeed: one that failed may be kept off by one that waits there.
+                # Another robot may succeed: a robot that waits there may have blocked the one that failed.
                 task = Task(plan.anchor, plan.direction, plan.own_slice)
                 self._skip |= {(task, node): tick for node in plan.order}
             if self._frontiers is not None:

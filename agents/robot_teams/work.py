@@ -1,23 +1,31 @@
 """One robot's work: travel along known ways, find a slice of a corridor, sweep it, and hunt for critical points.
 
 The work is written as generators: each yields a manoeuvre, or None to wait a tick, and is resumed when the manoeuvre is done.
-They add what they find to the map, and keep `at`, the end where the robot stands.
+They add their findings to the map, and keep `at`, the end where the robot stands.
 """
 
 from collections.abc import Callable, Generator
 from typing import Final, Protocol
 
-from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, Cut, End, Fact, Segment
+from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, End, Fact, FrontierCut, SweptSegment
 from zwerm.agents.robot_teams.mapping.slice_map import ACROSS, SliceMap
-from zwerm.agents.robot_teams.motion.manoeuvres import Approach, Grid, Manoeuvre, Parked, Seek, Sweep, Trace
+from zwerm.agents.robot_teams.motion.manoeuvres import (
+    Approach,
+    BoundaryTrace,
+    Manoeuvre,
+    Parked,
+    Seek,
+    SliceGrid,
+    SliceSweep,
+)
 from zwerm.agents.robot_teams.motion.senses import Senses
-from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, SWEEPS, TRAVELS, Plan
+from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, SWEEPS, TRAVELS, CorridorPlan
 
 Story = Generator[Manoeuvre | None, None, None]
 
-# A journey or a hunt that takes more steps than this has lost its way.
+# Largest number of steps of a journey or a hunt. Beyond it, the robot has lost its position in the map.
 STEPS_MAX: Final = 400
-# So often a step of a journey may lead elsewhere than the map says.
+# Largest number of steps of a journey that may lead elsewhere than the map says.
 ASTRAY_MAX: Final = 3
 # An end of the same slice that is nearer than this may be approached where no way leads to it [mm].
 STRAIGHT_MM: Final = 1_500
@@ -38,26 +46,27 @@ class Lost(Exception):
 
 
 class Mates(Protocol):
-    """What a robot knows of its teammates in a corridor."""
+    """A robot's knowledge of its teammates in a corridor."""
 
     def slot(self, room: int | None) -> int:
-        """Return which slice of the corridor is this robot's, given for how many it found room; negative for none."""
+        """Return the slice of the corridor that this robot takes, given the number of robots it found room for;
+        negative for none."""
 
     def claimed(self, k: int) -> bool:
-        """Tell whether a teammate takes slice k in this corridor."""
+        """Return whether a teammate takes slice k in this corridor."""
 
     def sweeping(self, k: int) -> bool:
-        """Tell whether another robot is sweeping slice k now."""
+        """Return whether another robot is sweeping slice k now."""
 
     def awaits_predecessor(self) -> bool:
-        """Tell whether the predecessor has still to sweep its slice."""
+        """Return whether the predecessor has not swept its slice yet."""
 
 
 class Work:
-    """What one robot does and where it stands. `sense` gives its newest senses."""
+    """The activity and the place of one robot. `sense` returns its newest senses."""
 
     def __init__(
-        self, slice_map: SliceMap, grid: Grid, step_m: float, sense: Callable[[], Senses], parked: Parked
+        self, slice_map: SliceMap, grid: SliceGrid, step_m: float, sense: Callable[[], Senses], parked: Parked
     ) -> None:
         self.map = slice_map
         self.at: End | None = None
@@ -74,7 +83,7 @@ class Work:
         self._sense = sense
         self._parked = parked
 
-    # --- finding itself -----------------------------------------------------------------------------------------------
+    # --- finding a first end ------------------------------------------------------------------------------------------
 
     def localise(self, side: int, swept_by_others: Callable[[int], bool]) -> Story:
         """Find an end from anywhere: go to a slice and along it to its end on `side`; sweep it if it is new."""
@@ -82,7 +91,7 @@ class Work:
         seek = Seek(self._grid)
         yield seek
         self.sweeping = seek.slice
-        up = Sweep(seek.slice, side, self._grid, self._step_m, self._parked)
+        up = SliceSweep(seek.slice, side, self._grid, self._step_m, self._parked)
         yield up
         if up.end is None:
             raise Lost
@@ -98,7 +107,7 @@ class Work:
         yield from self._hunt(up.slice, RIGHT, swept_by_others)
 
     def link(self, direction: int, swept_by_others: Callable[[int], bool]) -> Story:
-        """Walk back to the predecessor's slice: what joins the maps of robots that began apart."""
+        """Walk back to the predecessor's slice. This joins the maps of robots that began apart."""
         self.found = self.spare = False
         self.phase = HUNTS
         at = self.at
@@ -116,7 +125,7 @@ class Work:
         yield from self._approach(start)
         ahead = frontier_mm is not None and (start.y_mm - frontier_mm) * start.side > CUT_MM
         limit_mm = frontier_mm if ahead else None
-        sweep = Sweep(start.slice, -start.side, self._grid, self._step_m, self._parked, limit_mm)
+        sweep = SliceSweep(start.slice, -start.side, self._grid, self._step_m, self._parked, limit_mm)
         self.sweeping = start.slice
         yield sweep
         self.sweeping = None
@@ -125,13 +134,13 @@ class Work:
             raise Lost
         low, high = sorted((start.y_mm, end.y_mm))
         if self._is_new(start, 0, end, bool(sweep.wrecks)):
-            self._note(Segment(start.slice, low, high, tuple(sweep.wrecks)))
+            self._note(SweptSegment(start.slice, low, high, tuple(sweep.wrecks)))
             if sweep.is_cut:
-                self._note(Cut(end.slice, end.y_mm))
+                self._note(FrontierCut(end.slice, end.y_mm))
         self.at = self.map.end(end)
 
     def trace(self, direction: int) -> Generator[Manoeuvre | None, None, bool]:
-        """Follow the boundary from the end where the robot is to the next; tell whether that is on another slice."""
+        """Follow the boundary from the end where the robot is to the next; return whether that is on another slice."""
         start = self.at
         if start is None:
             raise Lost
@@ -139,12 +148,12 @@ class Work:
         depth = (senses.x_m - self._grid.x_m(start.slice)) * direction
         if abs(depth) > 0.6 or abs(senses.y_m - start.y_mm / 1000.0) > 0.6:
             yield from self._approach(start)
-        trace = Trace(start, direction, self._grid, self._parked)
+        trace = BoundaryTrace(start, direction, self._grid, self._parked)
         yield trace
         arc, end = trace.arc, trace.end
         if end is None:
             raise Lost
-        # Where a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known.
+        # If a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known.
         if arc is not None and self._is_new(start, direction, end, bool(arc.wrecks)):
             self._note(arc)
         self.at = self.map.end(end)
@@ -155,8 +164,8 @@ class Work:
     def travel(self, stop: End) -> Story:
         """Go to a known end by the shortest known way, without the steps that led elsewhere before.
 
-        Where a wall is almost parallel to a slice, robots measure its end far apart, and no way may lead to one of them. An end
-        near by on the same slice is then approached straight.
+        If a wall is almost parallel to a slice, robots measure its end far apart, and there may be no way to one of
+        these ends. The robot then goes straight to an end near by on the same slice.
         """
         astray: dict[tuple[End, int], None] = {}
         for _ in range(STEPS_MAX):
@@ -189,7 +198,7 @@ class Work:
         self.at = goal
 
     def _is_new(self, start: End, direction: int, stop: End, beside_wreck: bool) -> bool:
-        """Tell whether no such way is known, or, beside a wreck, none that leads to `stop`."""
+        """Return whether no such way is known, or, beside a wreck, none that leads to `stop`."""
         known = self.map.end(start)
         if known is None:
             return True
@@ -215,7 +224,7 @@ class Work:
 
     # --- a corridor ---------------------------------------------------------------------------------------------------
 
-    def corridor(self, plan: Plan, mates: "Mates") -> Story:
+    def corridor(self, plan: CorridorPlan, mates: "Mates") -> Story:
         """Take a slice of a corridor, sweep it, and hunt back to the predecessor's slice."""
         self.found = self.spare = False
         self.claim = self.room = None
@@ -239,10 +248,10 @@ class Work:
             yield None
         yield from self._hunt(mine.slice, plan.direction, mates.sweeping, plan.frontier_mm)
 
-    def _take_slot(self, plan: Plan, mates: "Mates") -> Generator[Manoeuvre | None, None, bool]:
-        """Trace forward, one slice a robot; tell whether there is a slice for this one.
+    def _take_slot(self, plan: CorridorPlan, mates: "Mates") -> Generator[Manoeuvre | None, None, bool]:
+        """Trace forward, one slice a robot; return whether there is a slice for this one.
 
-        The robot that finds no more room tells for how many there is; then those in front take the slices that there are.
+        The robot that finds no more room reports the number of robots with room. Then the robots in front take these slices.
         """
         at = self.at
         if at is None:
@@ -271,7 +280,7 @@ class Work:
     def _hunt(
         self, k: int, direction: int, swept_by_others: Callable[[int], bool], frontier_mm: int | None = None
     ) -> Story:
-        """Walk round the slab behind slice k, sweeping what is new, until the end reached is swept.
+        """Walk round the slab behind slice k, and sweep new segments, until the reached end is swept.
 
         Fig. 4 (i) and (ii) of the paper are both this loop.
         """

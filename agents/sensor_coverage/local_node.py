@@ -1,4 +1,4 @@
-"""What a decentralised robot and its base station have in common: the situation, the census, and the loop over components."""
+"""The common part of a decentralised robot and its base station: the situation, the census, and the loop over components."""
 
 from typing import Final
 
@@ -73,12 +73,12 @@ class LocalNode(Controller):
 
     @property
     def _takes_census(self) -> bool:
-        """Whether the node asks in the census again where answers are missing."""
+        """True if the node asks in the census again where answers are missing."""
         return True
 
     @property
     def _occupied(self) -> bool:
-        """Whether the node is busy, as the census counts it: a message in flight keeps its sender busy."""
+        """True if the node is busy, as the census counts it: a message in flight keeps its sender busy."""
         situation = self.situation
         here = situation.in_push or situation.active or situation.local_map.moving
         return here or situation.homeless or not situation.calm or not situation.mailbox.empty

@@ -2,8 +2,8 @@
 
 Lengths are whole multiples of 2^-LENGTH_BITS m (a quarter of a millimetre), a field whole steps of its own unit times
 `field_scale`. The same cell is clipped and the same moments are summed as in `zwerm.maths.polygons`. Products are
-shifted right as soon as that costs no accuracy. So all numbers fit into 64 bits for regions up to 4 m wide. Plain
-integers go in and come out, so that whatever behaves like an integer can be put through it and be counted.
+shifted right as soon as that costs no accuracy. So all numbers fit into 64 bits for regions up to 4 m wide. Arguments
+and results are plain integers, so a type that behaves like an integer can count the operations.
 """
 
 from collections.abc import Iterable, Sequence

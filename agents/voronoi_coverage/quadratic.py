@@ -1,7 +1,7 @@
 """The quadratic estimate: own value and gradient, and the curvature that fits the Voronoi neighbours' values best.
 
 The paper's conclusion proposes it: "each robot might estimate the sensory function from a quadratic fit of its own and each
-of its Voronoi neighbors' measured values". Mass and centroid stay closed forms, with moments up to the third order. Where
+of its Voronoi neighbors' measured values". Mass and centroid stay closed forms, with moments up to the third order. If
 the fit is underdetermined, or may be negative on the cell, the linear estimate is used instead.
 """
 

@@ -108,7 +108,7 @@ class RadioCoverage(Controller):
         )
 
     def _listen(self, observation: Observation) -> None:
-        """Remember the newest that each robot said; packets may overtake one another."""
+        """Store the newest message of each robot; packets may overtake one another."""
         for packet in observation.inbox:
             said = unpack(packet.payload) if packet.channel == CHANNEL else None
             if said is not None and said[0] != self.setup.node:

@@ -19,7 +19,7 @@ from zwerm.wire.messages import BodyVelocity, Command, Observation, Wake
 PositiveNumber = Annotated[float, Meta(gt=0.0)]
 NonNegativeNumber = Annotated[float, Meta(ge=0.0)]
 
-# Neighbours whose directions differ by less stand in line: the nearer one hides the other's bisector [rad].
+# Neighbours with a smaller difference of directions are in line: the nearer one hides the other's bisector [rad].
 _IN_LINE_RAD: Final = 1e-9
 
 

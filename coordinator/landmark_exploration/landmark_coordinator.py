@@ -1,7 +1,7 @@
 """The coordinator of landmark-based exploration: the map of all robots, and who explores which frontier.
 
 Algorithm 1 of Ramaithitima and Bhattacharya 2018. It knows what robots wrote into their logs, and the landmarks that a free
-robot sees. Where robots choose by themselves it is a hub only, over which they gossip.
+robot sees. If robots choose by themselves, it is only a hub that forwards their gossip.
 
 It ends when no frontier is open, every robot has been halted, and it has all entries that robots wrote. A halted robot
 adds nothing to its log. A robot that is silent for `dead_ticks` is presumed dead: its frontier is free again.
@@ -217,7 +217,7 @@ class LandmarkCoordinator:
     # --- assignment: algorithm 1 --------------------------------------------------------------------------------------
 
     def _assign(self) -> bool:
-        """Send every free robot to the frontier that is best for it; tell whether all is over.
+        """Send every free robot to the frontier that is best for it; return whether all is over.
 
         Lines 4 to 7 of algorithm 1. Of all pairs of a free robot and a frontier the best comes first.
         """
@@ -229,7 +229,7 @@ class LandmarkCoordinator:
             if robot.task is None or robot.task.key is None:
                 continue
             if robot.task.key not in frontiers.open and robot.landmarks and frontiers.open:
-                robot.free = True  # somebody else cleared it: the robot need not go there
+                robot.free = True  # another robot cleared it: the robot need not go there
                 continue
             taken.append(robot.task.key)
         offer = Offer(frontiers, taken)
@@ -284,7 +284,7 @@ class LandmarkCoordinator:
         return min_pos(mine, [self._costs_of(other) for other in living if other != node])
 
     def _costs_of(self, node: int) -> Costs:
-        """Return what each frontier costs a robot, from where it was heard last, by a search that may be a little old."""
+        """Return the cost of each frontier for a robot at its last reported place, by a search that may be a little old."""
         at, costs = self._costs.get(node, (-RANK_TICKS, None))
         if costs is None or self._tick - at >= RANK_TICKS:
             costs = frontier_costs(self.map.complex, self._robots[node].landmarks, self.map.frontiers)
@@ -299,7 +299,8 @@ class LandmarkCoordinator:
             self._give(node, None, cut_off=not offer.is_empty())
 
     def _finish(self, living: Sequence[int]) -> bool:
-        """Halt all robots, and tell whether all is explored: nothing is open, or will be by what a robot has written."""
+        """Halt all robots, and return whether all is explored: nothing is open, and no entry of a robot's log will open
+        anything."""
         if any(robot.incarnation < 0 and self._tick < self._rules.dead_ticks for robot in self._robots.values()):
             return False
         robots = {node: self._robots[node] for node in living if self._robots[node].incarnation >= 0}

@@ -1,7 +1,7 @@
-"""The coordinator of coverage by robot teams: it plans the cells of all robots from what they tell it.
+"""The coordinator of coverage by robot teams: it plans the cells of all robots from their messages.
 
-It is the lead of one team of all robots that it hears, with the same decisions as the lead of any team. It has no body. Robots
-hear of one another through its beacons only. It never divides the team: free robots take the nearest open cells.
+It leads one team of all robots in reach, with the same decisions as the lead of any team. It has no body. Robots learn
+of one another only from its beacons. It never divides the team: free robots take the nearest open cells.
 """
 
 from typing import Annotated, Final, Protocol
@@ -12,7 +12,7 @@ from msgspec import Meta, Struct
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.protocols.central_membership import CoordinatorMembership
 from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
-from zwerm.agents.robot_teams.protocols.team_messages import Beacon, decode_beacon, encode_beacon
+from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, decode_beacon, encode_beacon
 from zwerm.agents.robot_teams.team_lead import TeamLead, findings
 from zwerm.errors import ProtocolError
 from zwerm.wire.checksum import seal, unseal
@@ -23,8 +23,9 @@ GATHER_S: Final = 1.0
 DECIDE_TICKS: Final = 4
 
 
-class CoordinatorTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """How often it sends, when it drops a silent robot, and how far robots go to join a corridor while others work."""
+class TeamCoordinatorTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """Its sending period, the silence after which it drops a robot, and the distance that robots go to join a corridor
+    while others work."""
 
     beacon_s: Annotated[float, Meta(gt=0.0)] = 0.25
     silence_s: Annotated[float, Meta(gt=0.0)] = 6.0
@@ -32,8 +33,8 @@ class CoordinatorTable(Struct, frozen=True, forbid_unknown_fields=True):
     join_m: Annotated[float, Meta(gt=0.0)] = 6.0
 
 
-class Setup(Protocol):
-    """What the coordinator needs of its setup."""
+class TeamCoordinatorSetup(Protocol):
+    """The part of its setup that the coordinator needs."""
 
     @property
     def node(self) -> int:
@@ -45,16 +46,16 @@ class Setup(Protocol):
 
     @property
     def parameters(self) -> dict[str, object]:
-        """What the scenario set."""
+        """The parameters from the scenario."""
 
 
 class TeamCoordinator:
     """Leads all robots."""
 
-    Parameters = CoordinatorTable
+    Parameters = TeamCoordinatorTable
 
-    def __init__(self, setup: Setup) -> None:
-        table = msgspec.convert(setup.parameters, CoordinatorTable)
+    def __init__(self, setup: TeamCoordinatorSetup) -> None:
+        table = msgspec.convert(setup.parameters, TeamCoordinatorTable)
         self.map = SliceMap()
         self.membership = CoordinatorMembership(setup.node, setup.dt_s, table.silence_s)
         self.lead = TeamLead(
@@ -75,11 +76,11 @@ class TeamCoordinator:
         self._told = -1, False
 
     def step(self, observation: Observation) -> Command:
-        """Hear, decide, and say."""
+        """Receive, decide, and send."""
         tick = observation.tick
         for packet in observation.inbox:
             try:
-                beacon: Beacon = decode_beacon(unseal(packet.payload))
+                beacon: TeamBeacon = decode_beacon(unseal(packet.payload))
             except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
                 self.refused += 1
                 continue
@@ -103,7 +104,7 @@ class TeamCoordinator:
         return Command(outbox=outbox, done=done, telemetry=telemetry)
 
     def _is_done(self) -> bool:
-        """Tell whether all is covered that any of the robots that are heard can reach."""
+        """Return whether all space that any robot in reach can drive to is covered."""
         statuses, members = self.membership.roster.statuses, self.membership.view.members
         places = [statuses[node].at for node in members]
         return bool(members) and all(
@@ -111,7 +112,7 @@ class TeamCoordinator:
         )
 
     def _say(self, tick: int) -> tuple[Transmission, ...]:
-        beacon = Beacon(
+        beacon = TeamBeacon(
             self._node,
             self.membership.outgoing(),
             (),

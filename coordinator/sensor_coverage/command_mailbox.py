@@ -42,8 +42,8 @@ STUCK_FACTOR: Final = 3
 URGENT_TRIES: Final = 6
 # An answer is overdue after its time limit divided by this.
 OVERDUE_DIVISOR: Final = 4
-# Recovery burst of a coordinator that starts again, until its first request after the roll call is heard: copies of the
-# roll call, and copies of each request in every tick if messages are lost.
+# Recovery burst of a coordinator that starts again, until a robot receives its first request after the roll call. The
+# numbers are copies of the roll call, and copies of each request in every tick if messages are lost.
 ROLL_CALL_COPIES: Final = 8
 # Bytes of a command that are kept free for everything but packets and snapshot, and bytes of a packet beside its payload.
 COMMAND_BYTES_FREE: Final = 2_048
@@ -154,7 +154,7 @@ class CommandMailbox:
     # --- sending ----------------------------------------------------------------------------------------------------
 
     def roll_call(self, command: RollCall, copies: int = 1) -> None:
-        """Send so many copies of a roll call to all robots that hear it."""
+        """Send this number of copies of a roll call to all robots in reach."""
         self._roll_call = self._call(Request(self._incarnation, 0, 0, UNKNOWN, command), copies), self.tick
         self._in_recovery = copies > 1
         self._second_roll_call_tick = self.tick + REPEAT_TICKS if self._in_recovery else None
@@ -220,7 +220,7 @@ class CommandMailbox:
     def outgoing(self, bytes_taken: int = 0) -> tuple[Transmission, ...]:
         """Return the packets to send now: new requests, and repeated ones.
 
-        What does not fit into one command, of which something else takes `bytes_taken`, is sent at the next ticks.
+        Messages that do not fit into one command are sent at the next ticks; `bytes_taken` of the command are in use already.
         """
         if self._second_roll_call_tick is not None and self.tick >= self._second_roll_call_tick:
             self._call_again()

@@ -235,7 +235,7 @@ class SensorCoverageCoordinator:
     def _ask(self, robots: Sequence[int], moved: Moved) -> Routine[dict[int, Report]]:
         """Return the reports of robots; a robot that does not answer in time is not asked again.
 
-        A robot whose view is unknown is asked as if it had moved, because "nothing has changed" would be no information.
+        If a robot's view is unknown, it is asked as if it had moved, because "nothing has changed" would be no information.
         """
         cycle, known = self.cycle, self.slots.view
         for robot in robots:

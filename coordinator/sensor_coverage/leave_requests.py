@@ -1,9 +1,9 @@
 """Robots that leave the complex by agreement among neighbours: the coordinator's requests, and the robots that have left.
 
 The coordinator asks robots that the frontier does not need: they are not on the fence, and their slot would not be
-expanded to again. The robots decide, by the link criterion and with a lock from every neighbour. Where a robot stands
-that has left or is silent, none of its neighbours can leave. Each scan reports which robots have left, so a coordinator
-without memory knows.
+expanded to again. The robots decide, by the link criterion and with a lock from every neighbour. No neighbour of a
+robot that has left or is silent can leave. Each scan reports which robots have left, so a coordinator without memory
+knows.
 """
 
 from collections.abc import Collection, Iterator, Mapping

@@ -29,7 +29,7 @@ class RetryPolicy:
         self._sent = self._missed = 0.0
 
     def update(self, attempts: int, heard: int) -> None:
-        """Record that a request was sent `attempts` times and heard `heard` times."""
+        """Record that a request was sent `attempts` times and received `heard` times."""
         self.lossy = self.lossy or heard < attempts
         self._sent = FADING * self._sent + attempts
         self._missed = FADING * self._missed + attempts - heard

@@ -1,7 +1,8 @@
 """The execution of walks along walls: one robot drives to a wall and follows it, past all robots that stand there.
 
-The robots behind it close up first, so that every slot is occupied. The walk goes on until all that it can close is
-closed, or until no standing robot sees the walking robot further on: there it gets a slot, and the swarm goes on from it.
+The robots behind it close up first, so that every slot is occupied. The walk ends when all that it can close is closed,
+or when no standing robot sees the walking robot further on. In the second case it gets a slot there, and the swarm
+continues from that slot.
 """
 
 import math

@@ -260,7 +260,7 @@ class Network:
             self._namespaces.run(["tc", "qdisc", "add", "dev", *command], node=node)
 
     def cables(self) -> Iterator[tuple[int | None, list[str]]]:
-        """Yield the arguments of `tc qdisc add dev`, with the node whose namespace they apply to (None: the bridge)."""
+        """Yield the arguments of `tc qdisc add dev`, with the node to whose namespace they apply (None: the bridge)."""
         # The rate counts payload bytes: the size table subtracts the headers, with one entry for each size.
         before = _WIRE_BYTES[self._transport] + _ZENOH_BYTES + HEAD_BYTES
         sizes = ["stab", "overhead", str(-before - 1), "mtu", "2047", "tsize", "2048"]

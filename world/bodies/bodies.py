@@ -1,7 +1,7 @@
 """The bodies of one run: where they stand, what drives them, and which of them enter or leave the arena.
 
-`scene` is the truth at the current tick. Where drives act a tick or more after their command, the next scene does not depend
-on the commands of this tick; `advance_early` then moves the bodies while the nodes still work.
+`scene` is the truth at the current tick. If drives act a tick or more after their command, the next scene does not
+depend on the commands of this tick; `advance_early` then moves the bodies while the nodes still work.
 """
 
 from collections.abc import Mapping
@@ -69,7 +69,7 @@ class Bodies:
             self.drives.stop(node)
 
     def release(self, node: int) -> None:
-        """Let the next robot out of a base station's depot; other nodes release nobody."""
+        """Let the next robot out of a base station's depot; other nodes release no robot."""
         if self.depots is not None and node < self.depots.stations:
             self.depots.release(node)
 

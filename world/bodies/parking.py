@@ -1,8 +1,8 @@
 """Parking: which bodies the physics engine need not step, because they stand still and nothing that moves is near them.
 
 A body in the engine costs time at every step, whether it moves or not. A parked body is out of the engine. It comes back
-before it is driven, and before a body that moves, or that such a body may push, comes within reach. Small swarms park nobody,
-and neither do swarms of which many move: there the engine costs less than the search.
+before it is driven, and before a body that moves, or that such a body may push, comes within reach. Small swarms, and
+swarms of which many robots move, park no robot: there the engine costs less than the search.
 """
 
 from typing import Final

@@ -56,7 +56,7 @@ class Driver(ABC):
             self._programs.kill(node)
 
     def _lose(self, node: int, wait_s: float) -> None:
-        """Tell the world that a node is lost, and how its program ended, as far as that is known within `wait_s`."""
+        """Inform the world that a node is lost, and how its program ended if that is known within `wait_s`."""
         known = self._programs is not None and self._programs.end_of(node, wait_s)
         self._world.crash(node, known or "the connection to it was lost")
 

@@ -18,14 +18,14 @@ from zwerm.world.world import World
 # The last 1 / 8 of the answers is awaited only after the rest has been decoded.
 _LAST: Final = 8
 
-# After a crash that ends the run: how long the driver takes in other answers, so that the first of several crashes in id
-# order is named, whichever arrives first.
+# After a crash that ends the run, the driver takes in other answers for this time. So it names the first of several
+# crashes in id order, and not the first to arrive.
 CRASH_GRACE_S: Final = 1.0
 
-# How long a node without an answer has to leave when it is told to: one that leaves was not busy, so a message was lost.
+# Time in which a node without an answer must leave on request. A node that leaves was not busy, so a message was lost.
 PROBE_S: Final = 1.0
 
-# How long the driver waits for the exit code of a lost node's process. The connection ends before the process does.
+# Time that the driver waits for the exit code of a lost node's process. The connection ends before the process does.
 EXIT_CODE_S: Final = 2.0
 
 
@@ -46,7 +46,7 @@ class LockStep(Driver):
 
     @property
     def lost(self) -> int:
-        """How many messages the middleware lost. A node that is busy, hangs or is stopped has lost none."""
+        """The number of messages that the middleware lost. A node that is busy, hangs or is stopped has lost none."""
         return self._lost
 
     def _carry_out(self, actions: Sequence[ProcessAction]) -> None:

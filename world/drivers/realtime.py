@@ -60,7 +60,7 @@ class RealTime(Driver):
 
     @property
     def lost(self) -> int:
-        """How many observations were never answered although the node answered a later one."""
+        """The number of observations that were never answered although the node answered a later one."""
         return self._lost
 
     def run(self) -> str:
@@ -72,7 +72,7 @@ class RealTime(Driver):
             self._actions.close()
 
     def _carry_out(self, actions: Sequence[ProcessAction]) -> None:
-        """Request the actions of this tick; a dead node owes no answers."""
+        """Request the actions of this tick; no answers are expected of a dead node."""
         for action in actions:
             kind, node = action
             if kind == "kill":

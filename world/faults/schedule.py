@@ -119,7 +119,7 @@ class Schedule:
 
     @property
     def touches_programs(self) -> bool:
-        """Whether a fault may kill, start, pause or resume a program."""
+        """True if a fault may kill, start, pause or resume a program."""
         return any(each.fault.touches_programs for each in self.faults)
 
     def turn(self, tick: int, scene: Scene, dead: Sequence[int] = ()) -> bool:

@@ -14,7 +14,7 @@ class Condition:
         self._metrics = scenario.metrics
 
     def met(self, scene: Scene) -> bool:
-        """Tell whether it holds now."""
+        """Return whether it holds now."""
         table, metrics = self._table, self._metrics
         if table.robot_deployed is not None:
             return bool(scene.present[table.robot_deployed])

@@ -16,7 +16,7 @@ class Bitmap(Field):
     """A picture: black is `low`, white `high`, bilinear between centres of pixels, constant beyond the outer ones.
 
     It covers the arena's bounds, or `size_m` from its lower left corner `origin_m`. The first row of pixels is the top.
-    Where four pixels meet the gradient jumps; there it is that of the upper right patch.
+    The gradient jumps at a point where four pixels meet; there it is that of the upper right patch.
     """
 
     class Parameters(Table):

@@ -250,7 +250,7 @@ def _wrong_edges(mesh: _Mesh, position: Floats) -> Ints | None:
     # Every triangle is on one side of an inner edge: a b c on the left, or b a d on the right.
     if ab.max() >= 0.0 or (ab + bc + ca).min() <= 0.0:
         return None
-    # Whether the corner d lies within the circle through a, b and c.
+    # True if the corner d lies within the circle through a, b and c.
     x, y = around.real[:_D], around.imag[:_D]
     a, b, c = (x * x + y * y) * turns
     return np.flatnonzero(a + b + c > 0.0)

@@ -71,7 +71,7 @@ class WallVerdicts:
 class NearPairs:
     """The pairs of robots within a range, for any range and one scene, which is searched once if the ranges are known.
 
-    `known_m` is the longest range that was asked about in an earlier scene: it is searched first, whatever is asked first.
+    `known_m` is the longest range of a query in an earlier scene: it is searched before the first query.
     """
 
     def __init__(self, known_m: float = 0.0) -> None:

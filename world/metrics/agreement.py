@@ -31,7 +31,8 @@ class Spread(Metric):
 
 
 class Leaders(Metric):
-    """How long no robot led, and how long more than one did: the second breaks the promise of a lease."""
+    """The time in which no robot led, and the time in which more than one did. The second violates the guarantee of a
+    lease."""
 
     names: ClassVar[Sequence[str]] = ("leaders_max", "leaderless_s", "two_leaders_s")
     every_s: ClassVar[float | None] = 0.1

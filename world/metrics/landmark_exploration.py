@@ -202,7 +202,7 @@ class Navigation(Metric):
         self._truth = truth
 
     def metrics(self) -> dict[str, float]:
-        """Return the metrics, or nothing where nobody navigates."""
+        """Return the metrics, or none if no robot navigates."""
         range_m = landmark_range_m(self._context.scenario)
         if not self._ends or range_m is None or self._truth is None:
             return {}

@@ -14,7 +14,7 @@ from zwerm.world.metrics import Metric, MetricContext, Truth
 from zwerm.world.metrics.own import own_metric
 from zwerm.world.tick.telemetry import TelemetrySink
 
-# Metrics of every run, whatever the scenario asks for, and those of a radio or an uplink.
+# Metrics of every run, independent of the scenario, and those of a radio or an uplink.
 ENGINE_NAMES: Final = (
     *("robots_in_arena", "robots_exited", "faults_missed", "refused_messages"),
     *("late_commands", "deadman_stops", "tick_overruns", "telemetry_dropped"),
@@ -29,7 +29,7 @@ TELEMETRY_NAMES: Final = "telemetry.*"
 class Observers:
     """Metrics of one run. They take samples every `every_s` of virtual time, and at the end.
 
-    Where `every_s` is None, all that sample during a run do so as often as the one that needs it most often.
+    If `every_s` is None, all observers that sample during a run use the shortest period that one of them needs.
     """
 
     def __init__(self, metrics: Sequence[Metric] = (), every_s: float | None = None, dt_s: float = 1.0) -> None:
@@ -50,7 +50,7 @@ class Observers:
         telemetry.listeners += [each.report for each in self._metrics if hasattr(each, "report")]
 
     def is_due(self, tick: int) -> bool:
-        """Tell whether a sample is due at a tick and has not been taken."""
+        """Return whether a sample is due at a tick and has not been taken."""
         return bool(self._periodic) and tick % self._stride == 0 and tick != self._last_tick
 
     def sample(self, truth: Truth) -> None:
@@ -109,7 +109,7 @@ def make_observers(scenario: Scenario, arena: Arena, field: Field | None) -> Obs
 
 
 def is_measured(name: str, names: Sequence[str]) -> bool:
-    """Tell whether one of `names`, where `*` stands for any characters, is that of a metric."""
+    """Return whether one of `names`, where `*` stands for any characters, is that of a metric."""
     return any(fnmatchcase(name, each) for each in names)
 
 

@@ -45,8 +45,8 @@ class FunctionMetric(Metric):
 def own_metric(name: str, context: MetricContext) -> Metric:
     """Return the metric that `module:name` names.
 
-    Raises ValueError, in one line, for a name that is neither a metric class nor a function of one argument, and for
-    bad names of metrics. Raises ScenarioError if the class refuses the scenario.
+    Raises ValueError, in one line, for a name that is neither a metric class nor a function of one argument. It raises
+    it for bad names of metrics, too. Raises ScenarioError if the class refuses the scenario.
     """
     found = object_named(name, "metric")
     if isinstance(found, type):

@@ -1,8 +1,8 @@
 """Coverage by a team of robots, by exact polygons: the fraction of the area that footprints can sweep and have swept.
 
-The centre of a robot can be where its body fits, in the part of that space in which it started: the free space eroded
-by the body's radius. Their footprints can sweep the free space within the footprint's radius of it. A circle is a
-polygon of 4 * 32 sides inside it; the same in both areas.
+The centre of a robot can be where its body fits: in the free space eroded by the body's radius. Only the part of that
+space in which it started counts. Their footprints can sweep the free space within the footprint's radius of it. A
+circle is a polygon of 4 * 32 sides inside it; the same in both areas.
 """
 
 import math

@@ -133,9 +133,9 @@ class Conclusion(Metric):
 class Removals(Metric):
     """Number of robots that have left the complex, and number of these departures that changed its true b0 or b1.
 
-    Each departure is judged by the truth at its own time. The complex is that of all robots in the arena that run then and
-    have not left it, by true visibility within `metrics.sight_range_m`; measured only where that is given and robots leave by
-    agreement.
+    Each departure is judged by the truth at its own time. The complex is that of all running robots in the arena that
+    have not left the complex, by true visibility within `metrics.sight_range_m`. It is measured only if that range is
+    given and robots leave by agreement.
     """
 
     names: ClassVar[Sequence[str]] = ("removals", "unsafe_removals")
@@ -157,7 +157,7 @@ class Removals(Metric):
 
 
 def robots_leave(scenario: Scenario) -> bool:
-    """Tell whether the robots of a scenario leave the complex by agreement among neighbours."""
+    """Return whether the robots of a scenario leave the complex by agreement among neighbours."""
     services = {} if scenario.variant is None else dict(scenario.variant.services)
     return services.get("redundancy") == "link" or services == {"path": "gradient", "redundancy": "coordinator"}
 

@@ -152,7 +152,7 @@ class PacketJudge(Protocol):
 
     @property
     def out_of_reach(self) -> bool:
-        """Whether receivers of dropped packets are out of reach. Otherwise the packets are losses."""
+        """True if receivers of dropped packets are out of reach. Otherwise the packets are losses."""
 
     def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
         """Return the effects on `packets`."""

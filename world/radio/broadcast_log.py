@@ -1,4 +1,4 @@
-"""Broadcast log: enough to tell, on request, which links had broadcasts that were never shown to the models.
+"""Broadcast log: it finds, on request, the links with broadcasts that were never shown to the models.
 
 The channel shows its models the receivers in reach only. The log counts the broadcasts of each sender for as long as the same
 nodes are available. So the cost of a tick does not grow with all pairs of nodes; that of `by_link` does.

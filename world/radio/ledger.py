@@ -1,8 +1,8 @@
 """Ledger: counts of sent, delivered and dropped packets, by link of a channel and by cause.
 
 At every tick and for every link: sent = delivered + dropped, by cause + in flight. Dropped packets are out of reach (their
-receivers were), or losses. Broadcast packets that no model saw are counted by cause, and get a link on request only
-(`by_link`): they are part of the totals, and not of the columns `sent`, `dropped` and `out_of_reach`.
+receivers were), or losses. Broadcast packets that no model saw are counted by cause. They get a link only on request
+(`by_link`). They are part of the totals, and not of the columns `sent`, `dropped` and `out_of_reach`.
 
 A copy that the medium made counts as sent, and as a copy; a damaged packet that arrives counts as delivered, and as damaged.
 The age of information of a link is the time since its newest delivered packet was sent, from its first delivery on.

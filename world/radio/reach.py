@@ -116,7 +116,7 @@ class _NearPairs:
         self._first = np.cumsum(self._counts) - self._counts
 
     def valid_for(self, position: Floats, bound_m: float) -> bool:
-        """Tell whether every pair within `bound_m` at these positions is among the kept ones."""
+        """Return whether every pair within `bound_m` at these positions is among the kept ones."""
         if bound_m != self._bound_m:
             return False
         moved = position[self._ids] - self._position[self._ids]

@@ -74,7 +74,7 @@ class Sensor(ABC):
         return None
 
     def item_id(self, item: Any) -> int:
-        """Return the number that tells an item from the others of a reading: by default its first field."""
+        """Return the number that identifies an item of a reading: by default its first field."""
         return int(msgspec.structs.astuple(item)[0])
 
     def phantom(self, robot: int, known: Collection[int], uniform: Callable[[str], float]) -> Any:

@@ -1,4 +1,4 @@
-"""Bearings to landmarks: points with an id that anybody can tell apart, and nobody knows the place of.
+"""Bearings to landmarks: points with an id. Every robot can distinguish them, and no robot knows their places.
 
 As in Ramaithitima and Bhattacharya 2018, a robot sees every landmark within `range_m` if no wall blocks the line. A
 landmark on a wall is seen from the side it faces. The noise is Gaussian and independent for each tick, robot and
@@ -24,7 +24,8 @@ _SHORT = 1e-9
 
 
 class LandmarksTable(Table):
-    """Which landmarks are seen, and how well. With `presence_only` every bearing reads 0: only ids are sensed."""
+    """The landmarks that are seen, and the quality of the bearings. With `presence_only` every bearing reads 0: only
+    ids are sensed."""
 
     range_m: Positive | None = None
     through_walls: bool = False

@@ -90,7 +90,7 @@ class LineOfSightSensor(Sensor):
             np.subtract(grid, offset_column[first:last], out=grid)
             np.multiply(across, across, out=across)
             if others is robots:
-                across[first :: total + 1] = np.inf  # nobody sees itself
+                across[first :: total + 1] = np.inf  # no robot sees itself
             else:
                 grid[np.arange(last - first), np.searchsorted(others, robots[first:last])] = np.inf
             np.less_equal(across, radius2, out=on_line)

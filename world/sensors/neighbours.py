@@ -1,4 +1,4 @@
-"""Where the robots in sight are: their positions in the body frame, as range-and-bearing hardware gives them.
+"""The positions of the robots in sight, in the body frame, as range-and-bearing hardware gives them.
 
 Visibility is that of `bearings`. The noise is Gaussian, alike and independent in x and y, for each tick, observer and
 robot seen. Headings of others are not sensed.

@@ -1,10 +1,10 @@
 """Displacement of the robot since its previous observation, in the body frame of that observation.
 
 The displacement is the straight line between the two poses, not the path between them. The turn is in (-pi, pi]. A
-robot's first reading, and the first after it was out of the arena, is no motion at all. The noise is Gaussian, on the
-length of the displacement and on the turn, independent for each robot and tick. Its variance is (fraction x motion)^2,
-as of a badly calibrated wheel, plus motion x (sd per root)^2, as of many small slips. So a robot that stands still has
-no noise.
+robot's first reading, and the first after it was out of the arena, is zero motion. The noise is Gaussian, on the length
+of the displacement and on the turn, independent for each robot and tick. Its variance is (fraction x motion)^2, as of a
+badly calibrated wheel, plus motion x (sd per root)^2, as of many small slips. So a robot that stands still has no
+noise.
 """
 
 import math

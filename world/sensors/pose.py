@@ -1,4 +1,4 @@
-"""Where the robot is and how it is turned, in the frame of the arena: what a positioning system would tell it.
+"""The position and heading of the robot in the frame of the arena, as from a positioning system.
 
 The noise is Gaussian and independent for each tick and robot: `sd_m` in x and in y, `sd_rad` in the heading. A robot
 that has this sensor is not lost; algorithms without metric information must do without it.

@@ -45,7 +45,7 @@ def find(kind: str) -> type[Sensor]:
 
 
 def make_sensor(table: OpenTable, surroundings: Surroundings, path: str, place: str) -> Sensor:
-    """Return the sensor that `table` describes; `path` is where the table stands in the scenario `place`.
+    """Return the sensor that `table` describes; `path` is the path of the table in the scenario `place`.
 
     Raises ScenarioError with every mistake, each `place: path.key: rule, got value`.
     """

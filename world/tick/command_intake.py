@@ -1,8 +1,8 @@
 """Command intake: collects the answers to one tick's observations and refuses what no node may send.
 
 Each observed node is accepted once a tick, and only with a command that this world can carry out. Every other message is
-refused for a reason, counted, and changes nothing. Where the driver allows late answers (real time), an answer to an earlier
-tick is accepted too, in order.
+refused for a reason, counted, and changes nothing. If the driver allows late answers (real time), an answer to an
+earlier tick is accepted too, in order.
 """
 
 from collections import Counter
@@ -21,7 +21,7 @@ class Addressing(Protocol):
     """The part of the radio that knows which transmissions are possible."""
 
     def refuses(self, sender: int, message: Transmission) -> str:
-        """Return why a transmission cannot be sent at all, or an empty string."""
+        """Return the reason why a transmission can never be sent, or an empty string."""
 
 
 class Exchange(NamedTuple):
@@ -116,7 +116,7 @@ class CommandIntake:
         return reasons.total()
 
     def is_pending(self, node: int) -> bool:
-        """Tell whether a node's answer to the observation of this tick has not been accepted."""
+        """Return whether a node's answer to the observation of this tick has not been accepted."""
         return node in self._pending
 
     def newest_tick(self, node: int) -> int:

@@ -80,7 +80,7 @@ class Completion:
         return Ending(FAILED, f"node {node} crashed at tick {tick}: {crashed[node]}")
 
     def completed(self, exited: Collection[int], dead: Collection[int]) -> bool:
-        """Tell whether the task is done; `exited` are the robots that left, `dead` the nodes that never return."""
+        """Return whether the task is done; `exited` are the robots that left, `dead` the nodes that never return."""
         if self._deciding:
             return bool(self._done[self._deciding[0]])
         if not (self.any_done or exited):

@@ -18,5 +18,5 @@ class PrecomputedReadings(NamedTuple):
     readings: Readings
 
     def valid_for(self, scene: Scene, robots: Ints) -> bool:
-        """Tell whether these are the readings of exactly these robots in exactly this scene."""
+        """Return whether these are the readings of exactly these robots in exactly this scene."""
         return self.scene is scene and np.array_equal(self.robots, robots)

@@ -56,7 +56,7 @@ class Sensing:
     ) -> Iterator[bytes]:
         """Yield the encoded observation of each node: `robots` robots, and after them nodes without sensors up to `nodes`.
 
-        `inboxes` holds the packets of each node; None means that nobody receives any. `times_s` are the readings of
+        `inboxes` holds the packets of each node; None means that no node receives any. `times_s` are the readings of
         their clocks; None means that all are exact.
         """
         columns: list[Any] = [readings.get(field, repeat(None)) for field in self._columns]

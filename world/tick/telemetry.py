@@ -26,7 +26,7 @@ DROPPED: Final = "telemetry_dropped"
 
 
 class TelemetryRecord(NamedTuple):
-    """What one command of a node reported, and the truth at that tick. The arrays must not be changed.
+    """The report of one command of a node, and the true state at that tick. The arrays must not be changed.
 
     `down` are the nodes whose programs did not run then, ascending.
     """
@@ -85,7 +85,7 @@ class TelemetrySink:
         self._tick, self._node, self._name, self._value = array("q"), array("i"), array("h"), array("d")
 
     def accept(self, scene: Scene, node: int, command: Command, down: Bools | None = None) -> None:
-        """Take the telemetry and the snapshot of a command; `down` (nodes,) tells whose programs do not run."""
+        """Take the telemetry and the snapshot of a command; `down` (nodes,) is true for nodes without a running program."""
         if not command.telemetry and not command.snapshot:
             return
         numbers = {name: float(value) for name, value in command.telemetry.items()}

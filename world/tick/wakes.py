@@ -19,7 +19,7 @@ NEVER: Final = math.inf
 
 
 class WakeEvent(NamedTuple):
-    """The event of one sensor: the field of `Wake` that asks for it, and the part of a reading whose change it is."""
+    """The event of one sensor: the field of `Wake` that requests it, and the part of a reading that changes."""
 
     asked_by: str
     signature: Callable[[Any], Hashable]
@@ -116,5 +116,5 @@ class Wakes:
 
     @property
     def sleeping(self) -> bool:
-        """Whether any node sleeps."""
+        """True if any node sleeps."""
         return bool(self._asleep)

@@ -66,7 +66,7 @@ class RunProgress:
         self._progress.update(task, completed=done, unit=unit)
 
 
-# What a file is, by its suffix.
+# The kind of a file, by its suffix.
 FILE_KINDS: Final = {
     **dict.fromkeys((".png", ".pdf", ".svg"), "picture"),
     **dict.fromkeys((".gif", ".mp4"), "animation"),

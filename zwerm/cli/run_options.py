@@ -77,7 +77,7 @@ class RunOptions:
 
     @property
     def shows_no_progress(self) -> bool:
-        """Tell whether progress is left out."""
+        """Return whether progress is left out."""
         return self.as_json or self.quiet
 
 

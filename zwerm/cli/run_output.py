@@ -72,7 +72,7 @@ class RunOutput:
 
     @property
     def draws_by_default(self) -> bool:
-        """Tell whether a picture is drawn although no option asks for it."""
+        """Return whether a picture is drawn although no option asks for it."""
         return self.picture is None and not self.as_json
 
     def report(self, result: RunResult) -> NoReturn:

@@ -1,7 +1,8 @@
 """Admission: which incarnation of each node may join, has joined, or has ended. Without I/O, clock and threads.
 
-A node joins at most once in each incarnation. An incarnation that has ended, for whatever reason, stays ended: its credential
-is refused from then on, so a program that was cut off and comes back acts for no robot. `expect` admits the next incarnation.
+A node joins at most once in each incarnation. An incarnation that has ended, for any reason, stays ended. Its
+credential is refused from then on. So a program that was cut off and comes back acts for no robot. `expect` admits the
+next incarnation.
 """
 
 from collections.abc import Mapping

@@ -7,7 +7,7 @@ from typing import Final
 
 from zwerm.version import __version__
 
-# What computes and encodes. Their releases may differ in the last bits, or in the wire format.
+# The software that computes and encodes. Their releases may differ in the last bits, or in the wire format.
 _LIBRARIES: Final = ("numpy", "msgspec", "eclipse-zenoh")
 
 

@@ -99,7 +99,7 @@ class ZenohWorldLink:
         return self._take(len(self._arrivals))
 
     def dismiss(self, reason: str) -> None:
-        """Tell every joined node to exit; their end is not reported as a loss."""
+        """Request every joined node to exit; their end is not reported as a loss."""
         self._dismissed = True
         if self._session.is_closed():
             return

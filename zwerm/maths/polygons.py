@@ -108,7 +108,7 @@ def moments(polygon: Polygon, ox: float = 0.0, oy: float = 0.0) -> Moments:
 def linear_centroid(polygon: Polygon, value: float, gx: float, gy: float) -> tuple[float, float, float]:
     """Return mass and centroid (M, x, y) of `polygon` under the density value + gx x + gy y. Schwager 2006, eqs. 14 to 18.
 
-    The density must not be negative on the polygon. Where the mass is 0 the centroid is a corner.
+    The density must not be negative on the polygon. If the mass is 0 the centroid is a corner.
 
     Misprints of the paper, corrected here:
     - eq. 14 has the integral of q^T q, a number; what (q - p) grad(phi)^T q comes to is the integral of q q^T, a matrix,

@@ -38,7 +38,7 @@ class FlagComplex:
         )
 
     def __contains__(self, simplex: Edge) -> bool:
-        """Whether the complex contains the ordered simplex."""
+        """True if the complex contains the ordered simplex."""
         return simplex in self._known
 
     def common(self, i: int, j: int) -> tuple[int, ...]:

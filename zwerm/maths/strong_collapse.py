@@ -24,7 +24,7 @@ def collapsed(simplices: Iterable[Iterable[int]]) -> list[tuple[int, ...]]:
 
 
 def _remove_dominated(rows: dict[int, set[int]], columns: dict[int, set[int]]) -> bool:
-    """Remove every row that another row contains; tell whether there was one. `columns` are the same, transposed."""
+    """Remove every row that another row contains; return whether there was one. `columns` are the same, transposed."""
     removed = False
     queue = sorted(rows)
     for n in queue:

@@ -33,7 +33,7 @@ def hang_guard(deadline_s: float) -> Iterator[None]:
     seen: list[FrameType] = []
 
     def look(number: int, frame: FrameType | None) -> None:
-        if sys.gettrace() is not None:  # somebody debugs the controller
+        if sys.gettrace() is not None:  # a user debugs the controller
             seen.clear()
             return
         while frame is not None and not _is_answer(frame):

@@ -65,7 +65,7 @@ class RunResult:
 
     @property
     def ok(self) -> bool:
-        """Tell whether the run ended as runs should: completed, or at its time limit."""
+        """Return whether the run ended as runs should: completed, or at its time limit."""
         return self.outcome in ("completed", "time-limit")
 
     @property
@@ -148,7 +148,8 @@ class RunResult:
         colour_by: str | None = None,
         links: bool | None = None,
     ) -> Path:
-        """Draw the run as an animation at `path`, .gif or .mp4, and return the path. The rest is as in `picture`."""
+        """Draw the run as an animation at `path`, .gif or .mp4, and return the path. The other arguments are as in
+        `picture`."""
         from zwerm.view.animation import animate_run
 
         style = self._style(size_in, bare, colour_by, links)

@@ -40,7 +40,7 @@ class Failing:
     value: str
 
     def of(self, result: RunResult) -> bool:
-        """Tell whether a run failed. Raises ScenarioError where it has no such metric."""
+        """Return whether a run failed. Raises ScenarioError where it has no such metric."""
         if self.name == "outcome":
             return (result.outcome == self.value) == (self.sign == "==")
         measured = {**result.metrics, "ticks": float(result.ticks), "sim_s": result.sim_s}

@@ -1,7 +1,8 @@
 """Every mistake in a scenario at once, of whichever stage: its tables, or what is made of them.
 
-Objects can be made of correct tables only. So wrong tables are left out, and the rest is checked as if it were
-complete. Mistakes at, around or inside a place that was left out are then ignored, because the omission may cause them.
+Objects can be made of correct tables only. So wrong tables are left out, and the other tables are checked as if they
+were complete. Mistakes at, around or inside a place that was left out are then ignored, because the omission may cause
+them.
 """
 
 import copy
@@ -100,7 +101,7 @@ def _keys(where: tuple[int | str, ...]) -> Path:
 
 
 def _touches(line: str, path: Path) -> bool:
-    """Tell whether a line is about a place that is, is inside of, or is around `path`."""
+    """Return whether a line is about a place that is, is inside of, or is around `path`."""
     place = tuple(line.partition(": ")[0].split("."))
     shared = min(len(place), len(path))
     return place[:shared] == path[:shared]

@@ -80,7 +80,7 @@ def _syntax_error(error: SyntaxError) -> str:
 def _raised_at(error: Exception) -> str:
     """Return the kind and the place of an error that a module raised while it was imported, or the empty text.
 
-    Where the module itself does not exist, no line of it was run.
+    If the module itself does not exist, no line of it was run.
     """
     frames = [each for each in traceback.extract_tb(error.__traceback__) if "importlib" not in each.filename]
     last = frames[-1] if len(frames) > 1 else None

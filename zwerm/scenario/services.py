@@ -28,7 +28,7 @@ def choose(row: Algorithm, given: Mapping[str, str]) -> Variant:
 def lacking(variant: Variant, coordinator: bool, radio: bool, stations: int) -> str:
     """Return what a scenario lacks to run `variant`, as one line that starts with the path, or an empty text.
 
-    `coordinator` and `radio` tell whether the scenario has these tables; `stations` is its number of base stations.
+    `coordinator` and `radio` are true if the scenario has these tables; `stations` is its number of base stations.
     """
     chosen = ", ".join(f"{service}={provider}" for service, provider in variant.services.items())
     if variant.coordinator and not coordinator:

@@ -92,7 +92,8 @@ class BodyTable(Table):
 
 
 class PlacementTable(Table):
-    """Where robots start: `uniform` in the arena, in a `disc`, in a random `cell` of a grid, at `poses`, or at `roots`.
+    """The places at which robots start: `uniform` in the arena, in a `disc`, in a random `cell` of a grid, at `poses`,
+    or at `roots`.
 
     `disc` takes `radius_m` and optionally `center_m` (else a random one that fits); `cell` takes `grid` and `radius_m`
     about the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad]; `roots` are the start
@@ -335,7 +336,7 @@ class Scenario(Table):
 
     @property
     def folder(self) -> Path:
-        """Where the relative paths in it start."""
+        """The folder at which the relative paths in it start."""
         return self._folder
 
     @property

@@ -60,7 +60,7 @@ class OpenTable(BaseModel):
 
 
 def is_file(path: Path) -> bool:
-    """Tell whether `path` is a file. A name that the system does not allow, such as one of 300 characters, is none."""
+    """Return whether `path` is a file. A name that the system does not allow, such as one of 300 characters, is none."""
     try:
         return path.is_file()
     except (OSError, ValueError):

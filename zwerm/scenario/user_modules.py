@@ -60,7 +60,7 @@ def find_user_modules(names: Iterable[str]) -> UserModules:
 
 
 def is_users(name: str, path: str) -> bool:
-    """Tell whether a module of this name and file is neither Zwerm's, nor Python's, nor of an installed distribution."""
+    """Return whether a module of this name and file is neither Zwerm's, nor Python's, nor of an installed distribution."""
     top = name.partition(".")[0]
     return top != "zwerm" and not _is_below(path, (*_standard_folders(), *_package_folders()))
 
@@ -189,7 +189,7 @@ def _main_file() -> str | None:
 
 
 def _is_below(path: str, folders: Sequence[str], but: Sequence[str] = ()) -> bool:
-    """Tell whether a path is in one of the folders and in none of `but`."""
+    """Return whether a path is in one of the folders and in none of `but`."""
     return path.startswith(tuple(folders)) and not (but and path.startswith(tuple(but)))
 
 

@@ -93,7 +93,7 @@ def _work(index: int, trial: Trial, parent: int, timeout_s: float | None) -> tup
         threading.Thread(target=_exit_with_parent, args=(parent,), daemon=True).start()
     if timeout_s is None:
         return index, run_trial(trial)
-    # Ends this process from a thread of its own, whatever the trial does.
+    # Ends this process from a separate thread, independent of the trial's state.
     with Path(os.devnull).open("w") as nowhere:
         faulthandler.dump_traceback_later(timeout_s, exit=True, file=nowhere)
         try:

@@ -1,8 +1,8 @@
 """Run the trials of a study that its file does not have yet, store each row, and summarise all rows.
 
 An interrupted study, or one with new seeds or grid values, continues with the missing trials. Rows of points that are no
-longer in the study stay in the file. Rows of a point whose scenario or code has changed are replaced; rows whose code cannot
-be known are never used again.
+longer in the study stay in the file. Rows of a point are replaced if its scenario or code has changed. Rows with
+unknown code are never used again.
 """
 
 from collections.abc import Sequence
@@ -116,7 +116,7 @@ def _distinct(trials: Sequence[Trial]) -> list[Trial]:
 
 
 def _trusted(trial: Trial, row: Row) -> bool:
-    """Tell whether the code that gave a row is known, and is the code of now."""
+    """Return whether the code that gave a row is known, and is the code of now."""
     return not trial.point.modules.unknown and still_same(row.get("modules", ""))
 
 

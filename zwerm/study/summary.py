@@ -42,7 +42,7 @@ class SummaryLine:
 
     @property
     def is_bound(self) -> bool:
-        """Whether the paper gives a lower bound, `at least`."""
+        """True if the paper gives a lower bound, `at least`."""
         return self.published is not None and self.published.value is None
 
     @property
@@ -52,7 +52,7 @@ class SummaryLine:
 
     @property
     def agrees(self) -> bool | None:
-        """Whether the paper's value agrees with the measured mean; None for too few trials or no value."""
+        """True if the paper's value agrees with the measured mean; None for too few trials or no value."""
         if self.difference is None or self.published is None or math.isnan(self.sample.sd):
             return None
         # The smallest of many means is lower over fewer trials, for any swarm.

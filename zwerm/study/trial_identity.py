@@ -1,12 +1,13 @@
 """The identity of a trial: all that decides its result, but for the seed.
 
-It depends on the scenario, the arena, the files that the scenario names, the user's modules that the trial can load, Zwerm,
-and the versions of Python and of the libraries that Zwerm computes with. Zwerm counts by its version, and by the content of
-its code where it runs from a source tree, whose version says nothing about changes.
+It depends on the scenario, the arena, the files that the scenario names, and the user's modules that the trial can
+load. It also depends on Zwerm, and on the versions of Python and of the libraries that Zwerm computes with. Zwerm
+counts by its version, and by the content of its code where it runs from a source tree, whose version says nothing about
+changes.
 
-Import statements do not name every module. So a row also records the user's modules that its trial loaded by a computed name,
-and is used again only while their files are the same. Code that cannot be known at all is stated in words; its rows are never
-used again.
+Import statements do not name every module. So a row also records the user's modules that its trial loaded by a computed
+name. It is used again only while their files are the same. Code that cannot be known is stated in words; its rows are
+never used again.
 """
 
 import json
@@ -46,8 +47,8 @@ class Identities:
     def modules(self, scenario: Scenario, runner: str) -> UserModules:
         """Return the user's modules of a scenario whose plug-ins are imported.
 
-        A module whose file has changed since this process imported it is unknown. Where robots are processes, so are modules
-        that are imported by a computed name.
+        A module whose file has changed since this process imported it is unknown. If robots are processes, so are
+        modules that are imported by a computed name.
         """
         names = tuple(_module_names(scenario.model_dump(mode="json")))
         if names not in self._found:
@@ -146,8 +147,8 @@ class LoadedModules:
     def others(self) -> str:
         """Return the loaded user modules that were not planned, as JSON: digest by name.
 
-        The text is empty where there is none, or where no planned module imports by a computed name. Where one does, modules
-        that other code of this process has loaded are among them: more than needed is recorded, never less.
+        The text is empty where there is none, or where no planned module imports by a computed name. If one does,
+        modules that other code of this process has loaded are among them: more than needed is recorded, never less.
         """
         planned = {each.module for each in self._planned.files}
         found: dict[str, str] = {}
@@ -159,7 +160,7 @@ class LoadedModules:
 
 
 def still_same(recorded: str) -> bool:
-    """Tell whether the modules that a row recorded, as `LoadedModules.others` returned them, have the same files now."""
+    """Return whether the modules that a row recorded, as `LoadedModules.others` returned them, have the same files now."""
     if not recorded:
         return True
     for name, digest in json.loads(recorded).items():
@@ -170,7 +171,7 @@ def still_same(recorded: str) -> bool:
 
 
 def _is_as_imported(file: SourceFile) -> bool:
-    """Tell whether a module is not imported yet, or was imported from a file that was as it is now."""
+    """Return whether a module is not imported yet, or was imported from a file that was as it is now."""
     if _file_of(file.module) != file.path:
         _imported.pop(file.path, None)
         return True

@@ -33,7 +33,7 @@ class Composition:
 
     @property
     def plain_swarm(self) -> bool:
-        """Whether a layer asks for robots without paths and noses."""
+        """True if a layer asks for robots without paths and noses."""
         return any(kind.plain_swarm for kind in self.layers)
 
     @property

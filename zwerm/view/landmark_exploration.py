@@ -60,7 +60,7 @@ class LandmarkComplexLayer(Layer):
 
     @classmethod
     def applies(cls, view: RunView) -> bool:
-        """Tell whether the run has landmarks."""
+        """Return whether the run has landmarks."""
         return len(view.landmarks) > 0
 
     @property

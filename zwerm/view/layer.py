@@ -61,7 +61,7 @@ class Layer(ABC):
 
     @classmethod
     def applies(cls, view: RunView) -> bool:
-        """Tell whether this run has anything to draw in this layer."""
+        """Return whether this run has anything to draw in this layer."""
         return True
 
     @classmethod

@@ -1,4 +1,4 @@
-"""What a user chooses of pictures and animations: their size, their words, and what is drawn besides robots."""
+"""The user's choices for pictures and animations: their size, their words, and the items drawn besides robots."""
 
 from dataclasses import dataclass
 

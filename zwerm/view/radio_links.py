@@ -31,7 +31,7 @@ class RadioLinks(Layer):
 
     @classmethod
     def applies(cls, view: RunView) -> bool:
-        """Tell whether links are asked for, and there are some."""
+        """Return whether links are asked for, and there are some."""
         return len(view.links) > 0
 
     @property

@@ -1,8 +1,8 @@
 """The picture layer of robot teams: swept slices, coloured by team, critical points, and the adjacency graph of cells.
 
-Robots report every fact in a snapshot when they find it. Cells follow from the slices that were swept. Where each of two
-segments on neighbouring slices overlaps the other one only, both are in one cell; else an edge joins their cells. Importing
-this module needs matplotlib.
+Robots report every fact in a snapshot when they find it. Cells follow from the slices that were swept. If each of two
+segments on neighbouring slices overlaps only the other one, both are in one cell. Otherwise an edge joins their cells.
+Importing this module needs matplotlib.
 """
 
 from collections.abc import Sequence
@@ -104,7 +104,7 @@ class CellsLayer(Layer):
 
     @classmethod
     def applies(cls, view: RunView) -> bool:
-        """Tell whether any robot reported a slice."""
+        """Return whether any robot reported a slice."""
         return any(decode_snapshot(each.snapshot) is not None for each in view.snapshots)
 
     @property

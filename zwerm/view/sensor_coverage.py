@@ -120,7 +120,7 @@ class ComplexLayer(Layer):
 
     @classmethod
     def applies(cls, view: RunView) -> bool:
-        """Tell whether there is a complex: a reported one, or the true one of a swarm from base stations."""
+        """Return whether there is a complex: a reported one, or the true one of a swarm from base stations."""
         return bool(cls.stages(view)) or (view.bases > 0 and view.sight_range_m is not None)
 
     @classmethod

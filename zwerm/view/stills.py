@@ -1,8 +1,8 @@
 """Still pictures of a run, at its end or at any moment.
 
-A picture shows the arena in metres, the paths and positions of the robots, the covered area, the occupied cells, and
-the layers of the algorithm. Where coverage was measured, a plot below shows how the arena was filled. Importing this
-module needs matplotlib.
+A picture shows the arena in metres, and the paths and positions of the robots. It also shows the covered area, the
+occupied cells, and the layers of the algorithm. If coverage was measured, a plot below shows how the arena was filled.
+Importing this module needs matplotlib.
 """
 
 from collections.abc import Mapping

@@ -60,7 +60,7 @@ class TelemetryColours(Layer):
 
     @classmethod
     def applies(cls, view: RunView) -> bool:
-        """Tell whether a value is asked for."""
+        """Return whether a value is asked for."""
         return bool(view.colour_by)
 
     @property

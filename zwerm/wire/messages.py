@@ -178,8 +178,8 @@ class Command(
 
     `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation
     at every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of
-    the task is complete, `gave_up`, unless empty, why it never will be. `tick` is set by whatever runs the controller: the
-    tick of the observation answered.
+    the task is complete, `gave_up`, unless empty, why it never will be. The program that runs the controller sets
+    `tick`: the tick of the observation answered.
 
     `telemetry` is named numbers for the observers of the run; no node receives them. `snapshot` is one record in the
     algorithm's own encoding for its metric and picture classes. The trace covers neither.
@@ -330,7 +330,7 @@ def traced_bytes(command: Command, payload: bytes) -> bytes:
 
 
 def is_finite_drive(drive: BodyVelocity | WheelSpeeds) -> bool:
-    """Tell whether every number of `drive` is finite."""
+    """Return whether every number of `drive` is finite."""
     if isinstance(drive, BodyVelocity):
         return isfinite(drive.forward_m_s + drive.left_m_s + drive.turn_rad_s)
     return isfinite(drive.left_m_s + drive.right_m_s)

@@ -17,7 +17,7 @@ _SHOWN_CHARS_MAX: Final = 80
 
 
 def is_telemetry_name(name: str) -> bool:
-    """Tell whether telemetry may carry this name."""
+    """Return whether telemetry may carry this name."""
     return len(name) <= NAME_CHARS_MAX and _NAME.fullmatch(name) is not None
 
 

@@ -1,4 +1,4 @@
-"""Bearings in 256 steps of a full turn, and what a set of them tells about where the observer stands.
+"""Bearings in 256 steps of a full turn, and conclusions from a set of them about the place of the observer.
 
 A step is 1.4 degrees, less than the standard deviation of the sensor (pi/72), and fits into a byte of a message. All robots
 derive the same from an observation because all derive it from these steps.
@@ -31,7 +31,7 @@ def to_rad(steps: int) -> float:
 
 
 def is_left(bearing_a: int, bearing_b: int) -> bool:
-    """Tell whether the observer stands left of the line from landmark a to landmark b.
+    """Return whether the observer stands left of the line from landmark a to landmark b.
 
     It does iff the relative bearing (theta_b - theta_a) mod 2 pi is in (0, pi).
     """
@@ -39,7 +39,7 @@ def is_left(bearing_a: int, bearing_b: int) -> bool:
 
 
 def is_inside(bearings: Sequence[int]) -> bool:
-    """Tell whether the observer stands inside the convex hull of the landmarks it sees.
+    """Return whether the observer stands inside the convex hull of the landmarks it sees.
 
     It does iff there are three or more and no two adjacent bearings are pi or more apart (section IV-A, Fig. 4).
     """

@@ -4,7 +4,8 @@ Section IV-A of Ramaithitima and Bhattacharya 2018 re-explores, once exploration
 inconsistent with the obstacle boundaries traced in the 1-skeleton. The paper leaves open when it is inconsistent. Here
 the unresolved frontiers (timed out, or touched) are directed edges of the 1-skeleton. The boundary of an obstacle is a
 closed walk of such edges, with the obstacle on its left. A closed walk has no ends. So a timed-out frontier <a, b> is
-inconsistent if the boundary cannot be continued: no other unresolved frontier ends at a, or none begins at b.
+inconsistent if the boundary cannot be continued. That is so if no other unresolved frontier ends at a, or none begins
+at b.
 """
 
 from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, BOUNDARY, TIMED_OUT, Frontiers, pair_of

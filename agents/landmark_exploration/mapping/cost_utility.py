@@ -1,8 +1,8 @@
 """The next frontier for a robot, and the way there: cost-utility over the navigation graph.
 
 Section IV-C of Ramaithitima and Bhattacharya 2018: CU(S, <a, b>) = U(<a, b>) - beta C(S, <a, b>). The cost C is that of
-the cheapest path from the present observation S to an observation that contains a and b. The utility U is the number of
-open frontiers that share a landmark with <a, b>, divided by one more than the number of robots sent to a or b. The
+the cheapest path from the present observation S to an observation that contains a and b. The utility U is n / (m + 1).
+n is the number of open frontiers that share a landmark with <a, b>. m is the number of robots sent to a or b. The
 search ends as soon as no frontier farther away can be better.
 """
 
@@ -93,11 +93,11 @@ class Offer:
         return self._most
 
     def is_empty(self) -> bool:
-        """Tell whether no frontier is free."""
+        """Return whether no frontier is free."""
         return not any(self.is_free(key) for key in self._frontiers.open)
 
     def is_free(self, key: int) -> bool:
-        """Tell whether a frontier is open and may be chosen."""
+        """Return whether a frontier is open and may be chosen."""
         return key in self._frontiers.open and key not in self._taken and key not in self._avoided
 
     def utility(self, key: int) -> float:

@@ -48,11 +48,11 @@ class Frontiers:
         return self.statuses.get(a << 16 | b, UNKNOWN)
 
     def is_open(self, a: int, b: int) -> bool:
-        """Tell whether <a, b> is to be explored."""
+        """Return whether <a, b> is to be explored."""
         return a << 16 | b in self.open
 
     def raise_to(self, key: int, status: int) -> bool:
-        """Raise a frontier to a status; tell whether that was news."""
+        """Raise a frontier to a status; return whether that was news."""
         known = self.statuses.get(key, UNKNOWN)
         if status <= known:
             return False
@@ -68,7 +68,7 @@ class Frontiers:
         return True
 
     def note(self, snapshot: BearingSnapshot) -> bool:
-        """Take in an observation; tell whether any status rose.
+        """Take in an observation; return whether any status rose.
 
         Seen from inside the hull of the landmarks, every frontier that the observer is in is clear. All others become
         unexplored if they were unknown. A pair in line with the observer is neither left nor right.

@@ -58,7 +58,7 @@ class LandmarkComplex:
         return {simplex: self._bearings[simplex][1] for simplex in sorted(self._bearings)}
 
     def contains(self, landmarks: Iterable[int]) -> bool:
-        """Tell whether these landmarks are a face of the complex. No landmarks are one."""
+        """Return whether these landmarks are a face of the complex. No landmarks are one."""
         common: set[int] | None = None
         for landmark in landmarks:
             holders = self._holders.get(landmark)
@@ -70,7 +70,7 @@ class LandmarkComplex:
         return True
 
     def update(self, snapshot: BearingSnapshot, rank: Rank = (0, 0)) -> bool:
-        """Take in an observation (algorithm 2); tell whether the complex has a simplex more."""
+        """Take in an observation (algorithm 2); return whether the complex has a simplex more."""
         simplex = snapshot.landmarks
         known = self._bearings.get(simplex)
         if known is not None:

@@ -1,7 +1,7 @@
 """The map of a robot or of the coordinator: the landmark complex and the frontiers, derived from logs.
 
 Robots share observations, and statuses that no observation implies. All else is derived from these, by the same rules
-on every robot. So maps made of the same logs are equal, whatever the order in which the logs' entries came.
+on every robot. So maps made of the same logs are equal for every order of the logs' entries.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkC
 from zwerm.agents.landmark_exploration.sharing import log_entries as entries
 from zwerm.agents.landmark_exploration.sharing.replica import Stretch
 
-# Parts of one observation beyond this are nonsense, and forgotten.
+# Parts of one observation beyond this number are invalid, and are dropped.
 _PARTS_MAX: Final = 4096
 
 
@@ -28,7 +28,7 @@ class LandmarkMap:
         self._parts: dict[int, list[tuple[int, int]]] = {}  # by origin, of an observation that is not complete
 
     def observe(self, snapshot: BearingSnapshot, rank: tuple[int, int] = (0, 0)) -> bool:
-        """Take in an observation; tell whether it was news: a simplex more, or a status that rose."""
+        """Take in an observation; return whether it was news: a simplex more, or a status that rose."""
         risen = not self._presence_only and self.frontiers.note(snapshot)
         news = self.complex.update(snapshot, rank) or risen
         self.version += news
@@ -40,7 +40,7 @@ class LandmarkMap:
             self._read(stretch.origin, number, stretch.entries[number - stretch.first])
 
     def raise_all(self, keys: Sequence[int], status: int) -> bool:
-        """Raise frontiers to a status; tell whether that was news."""
+        """Raise frontiers to a status; return whether that was news."""
         news = [self.frontiers.raise_to(key, status) for key in keys]
         self.version += any(news)
         return any(news)

@@ -92,7 +92,7 @@ class TaskReport(_Message, frozen=True, tag="r"):
 class TaskPart(_Message, frozen=True, tag="o"):
     """To a robot: part `part` of `parts` of the order number `order`, in bytes.
 
-    The format of all parts together stands in `orders`. `incarnation` is that of the robot it is meant for.
+    The module `orders` defines the format of all parts together. `incarnation` is that of the robot it is meant for.
     """
 
     coordinator_incarnation: Count

@@ -1,8 +1,9 @@
-"""Gossip: robots in radio range make their logs and registers equal, whatever is lost, late or said twice.
+"""Gossip: robots in radio range make their logs and registers equal, although messages may be lost, late or repeated.
 
-New entries are broadcast once, at once. Beacons carry a digest of the version vector; whose digest differs is sent the vector,
-rarely, and answers with what the sender lacks (anti-entropy; Demers et al. 1987). Every message makes sense alone, and none is
-waited for: loss costs time only. A hub, the coordinator in the middle of a star, also tells on what it hears.
+New entries are broadcast once, at once. Beacons carry a digest of the version vector; a robot with another digest is
+sent the vector, rarely, and answers with the entries that the sender lacks (anti-entropy; Demers et al. 1987). Every
+message makes sense alone, and none is waited for: loss costs time only. A hub, the coordinator in the middle of a star,
+also forwards the messages that it receives.
 """
 
 from collections.abc import Callable

@@ -5,12 +5,12 @@ Registers merge by the greatest (incarnation, stamp), in any order. A robot rais
 is void if no newer register of its robot arrived for the time of a lease, by the listener's own clock. So clocks are
 not compared.
 
-**Termination.** A robot that finds nothing left to explore *freezes*: it adds nothing to its log until it receives an
-entry that it does not have. Its register then holds the digest of its logs. If every robot has announced that it is
-frozen with the same digest, no robot can add an entry again. The first to do so would need an entry that none of them
-has, from a robot that is not among them. It does not matter when each of them said it. So a conclusion can be wrong
-only about three kinds of robots: unknown ones, ones that lost their memory since, and ones presumed dead after a long
-silence. All must agree for `settle_ticks`. In this time a robot in reach that lost its memory is found.
+**Termination.** A robot with nothing left to explore *freezes*: it adds nothing to its log until it receives an entry
+that it lacks. Its register then holds the digest of its logs. If every robot has announced that it is frozen with the
+same digest, no robot can add an entry again. The first to do so would need an entry that none of them has, from a robot
+that is not among them. It does not matter when each of them said it. So a conclusion can be wrong only about three
+kinds of robots. They are unknown, or have lost their memory since, or are presumed dead after a long silence. All must
+agree for `settle_ticks`. In this time a robot in reach that lost its memory is found.
 """
 
 from collections.abc import Iterable, Iterator
@@ -38,7 +38,7 @@ class Registers:
         self._agreed: tuple[int, int] | None = None  # a digest, and the tick since which all agree on it
 
     def merge(self, register: Register, tick: int) -> bool:
-        """Take in a register heard at `tick`; tell whether it was newer than what is known of its robot."""
+        """Take in a register heard at `tick`; return whether it was newer than what is known of its robot."""
         known = self.newest.get(register.node)
         if known is not None and _age(register) <= _age(known):
             return False
@@ -69,7 +69,7 @@ class Registers:
         return tuple(self.newest[node] for node in chosen)
 
     def concluded(self, digest: int, tick: int) -> bool:
-        """Tell whether all robots have nothing left to explore, with the logs of this digest. To be asked once a tick."""
+        """Return whether all robots have nothing left to explore, with the logs of this digest. To be asked once a tick."""
         living = [node for node in self.newest if not self.is_silent(node, tick)]
         unheard = self._robots_expected - len(self.newest)
         agreed = living and all(self.newest[node].frozen == digest + 1 for node in living)

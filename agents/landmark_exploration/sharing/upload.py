@@ -26,7 +26,7 @@ class Upload:
 
     @property
     def complete(self) -> bool:
-        """Whether the coordinator has the whole log."""
+        """True if the coordinator has the whole log."""
         return self._acknowledged == self._replica.vector.get(self._origin, 0)
 
     def acknowledge(self, vector: Vector) -> None:

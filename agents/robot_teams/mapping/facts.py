@@ -2,11 +2,11 @@
 
 Slice `k` is the line x = origin + k * spacing. The configuration space of the body's centre meets it in segments. The upper end
 of a segment is a TOP end, the lower one a BOTTOM end. An arc is the part of the boundary between two consecutive crossings of
-slices. Two sets of facts merge by union, which is commutative, associative and idempotent, so that lost, late and copied
+slices. Two sets of facts merge by union, which is commutative, associative and idempotent, so lost, late and copied
 messages can do no harm. Lengths are whole millimetres: equal facts are equal bytes on every robot.
 
-A dead robot is an obstacle. What a robot observed of such an obstacle names the `Wreck`. A sign of life of that robot is a fact
-too, and all facts that name one of its earlier wrecks are void from then on: no suspicion lasts longer than its proof.
+A dead robot is an obstacle. A fact that a robot observed at such an obstacle names the `Wreck`. A sign of life of that
+robot is a fact too. It makes all facts void that name one of the robot's earlier wrecks.
 """
 
 from typing import Final, NamedTuple
@@ -38,7 +38,7 @@ class End(NamedTuple):
     y_mm: int
 
 
-class Segment(NamedTuple):
+class SweptSegment(NamedTuple):
     """A robot swept slice `slice` from `bottom_mm` to `top_mm`, wall to wall, or to one of the `wrecks`."""
 
     slice: int
@@ -52,7 +52,7 @@ class Segment(NamedTuple):
         return End(self.slice, TOP, self.top_mm), End(self.slice, BOTTOM, self.bottom_mm)
 
 
-class Arc(NamedTuple):
+class TracedArc(NamedTuple):
     """A robot followed the boundary from one end into the slab on its side `direction`, until it came to another end.
 
     The arc is `length_mm` long. Its point farthest from the first slice is (`x_mm`, `y_mm`): where the arc returns, that is the
@@ -82,7 +82,7 @@ class Arc(NamedTuple):
 
 
 class Void(NamedTuple):
-    """A wreck at `x_mm` hides the ends of slice `slice` between two heights: nobody can reach them any more."""
+    """A wreck at `x_mm` hides the ends of slice `slice` between two heights: no robot can reach them any more."""
 
     slice: int
     x_mm: int
@@ -92,11 +92,11 @@ class Void(NamedTuple):
 
     @property
     def wrecks(self) -> tuple[Wreck, ...]:
-        """The wreck, as other facts name theirs."""
+        """The wreck, as a tuple, as in the other kinds of facts."""
         return (self.wreck,)
 
 
-class Cut(NamedTuple):
+class FrontierCut(NamedTuple):
     """A virtual frontier at height `y_mm` cuts slice `slice`: the free space goes on above and below."""
 
     slice: int
@@ -109,13 +109,13 @@ class Cut(NamedTuple):
 
 
 class Return(NamedTuple):
-    """Robot `node` lived at `tick`: it was no wreck before."""
+    """Robot `node` was alive at `tick`, so it was no wreck before."""
 
     node: int
     tick: int
 
 
-Fact = Segment | Arc | Void | Cut | Return
+Fact = SweptSegment | TracedArc | Void | FrontierCut | Return
 
 
 class FactSet:
@@ -132,7 +132,7 @@ class FactSet:
         return fact in self._facts
 
     def add(self, fact: Fact) -> bool:
-        """Add one fact; tell whether it is new."""
+        """Add one fact; return whether it is new."""
         if fact in self._facts:
             return False
         self._facts[fact] = None
@@ -145,7 +145,7 @@ class FactSet:
 
     @property
     def alive_ticks(self) -> dict[int, int]:
-        """The newest proof of life of every robot that was ever taken for dead wrongly."""
+        """The newest proof of life of every robot that was wrongly taken for dead."""
         found: dict[int, int] = {}
         for fact in self._facts:
             if isinstance(fact, Return):
@@ -153,27 +153,27 @@ class FactSet:
         return found
 
     @property
-    def segments(self) -> list[Segment]:
+    def segments(self) -> list[SweptSegment]:
         """The swept segments that hold, sorted: the order of arrival has no influence."""
-        return sorted([fact for fact in self._facts if isinstance(fact, Segment) and self._holds(fact.wrecks)])
+        return sorted([fact for fact in self._facts if isinstance(fact, SweptSegment) and self._holds(fact.wrecks)])
 
     @property
     def voids(self) -> list[Void]:
-        """What wrecks hide, sorted."""
+        """The facts about ends that wrecks hide, sorted."""
         return sorted([fact for fact in self._facts if isinstance(fact, Void) and self._holds(fact.wrecks)])
 
     @property
-    def cuts(self) -> list[Cut]:
+    def cuts(self) -> list[FrontierCut]:
         """The cuts of slices by virtual frontiers, sorted."""
-        return sorted([fact for fact in self._facts if isinstance(fact, Cut)])
+        return sorted([fact for fact in self._facts if isinstance(fact, FrontierCut)])
 
     @property
-    def arcs(self) -> list[Arc]:
+    def arcs(self) -> list[TracedArc]:
         """The traced arcs that hold, sorted."""
-        return sorted([fact for fact in self._facts if isinstance(fact, Arc) and self._holds(fact.wrecks)])
+        return sorted([fact for fact in self._facts if isinstance(fact, TracedArc) and self._holds(fact.wrecks)])
 
     def _holds(self, wrecks: tuple[Wreck, ...]) -> bool:
-        """Tell whether no robot that is named in `wrecks` was alive later."""
+        """Return whether no robot that is named in `wrecks` was alive later."""
         if not wrecks:
             return True
         alive = self.alive_ticks

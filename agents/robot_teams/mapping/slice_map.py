@@ -1,31 +1,31 @@
 """The map of ends, ports and mates, derived from a set of facts, and the certificate of complete coverage.
 
-Every end of a segment needs a mate, the other end, once the segment is swept; and has two ports, the arcs of the boundary that
-leave it to either side. Coverage is complete if and only if no end lacks its mate and no port is open: then every slab between
-two slices is bounded by swept segments and traced arcs only. That presumes that the spacing is at most twice the footprint's
-radius, and at most the sum of the footprint's radius and the body's diameter, so that an obstacle between two slices that
-no arc reaches hides nothing.
+Every end of a segment has a mate, the other end, once the segment is swept. It also has two ports, the arcs of the
+boundary that leave it to either side. Coverage is complete if and only if no end lacks its mate and no port is open.
+Then every slab between two slices is bounded by swept segments and traced arcs only. The spacing must be at most twice
+the footprint's radius. It must also be at most the sum of the footprint's radius and the body's diameter. Then an
+obstacle between two slices that no arc reaches hides nothing.
 
-A wreck may hide ends. They count for nothing while it lies there: its own footprint covers what is there, and arcs lead around
-it. A wreck also blocks ways that were free. Ways therefore prefer segments and arcs that were observed beside the wreck. Where
-no way leads from an end to what is open, all that can be reached from that end is covered if and only if every end that
-ways from it reach has a mate and two arcs, none of them blocked.
+A wreck may hide ends. They are ignored while the wreck is there: its own footprint covers that place, and arcs lead
+around it. A wreck also blocks ways that were free. Ways therefore prefer segments and arcs that were observed beside
+the wreck. An end may have no way to any open end or port. Then all that a robot can reach from it is covered if and
+only if every end within reach has a mate and two arcs, none of them blocked.
 
-A slice may graze an obstacle: one robot stops there, and another sweeps past. An end that lies inside a swept segment
-is no end of anything that is left to cover, and counts for nothing either.
+A slice may graze an obstacle: one robot stops there, and another sweeps past. An end inside a swept segment ends no
+space that is left to cover, and is ignored too.
 
 A virtual frontier cuts a slice into two parts. The two ends there need mates, and have no ports: nothing of the boundary is
-there. A way leads across, from the one to the other. A later sweep past the frontier makes them count for nothing.
+there. A way leads across, from the one to the other. After a later sweep past the frontier they are ignored.
 
 Ends that two robots measured a little differently are one: those of one slice and side are joined where neighbours are at most
-`TOLERANCE_MM` apart. The joined ends are a function of the set of facts alone, so that merging maps needs no order.
+`TOLERANCE_MM` apart. The joined ends are a function of the set of facts alone, so maps may be merged in any order.
 """
 
 import heapq
 from collections.abc import Collection, Iterable
 from typing import Final, NamedTuple
 
-from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, Arc, End, Fact, FactSet, Segment, Void
+from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, End, Fact, FactSet, SweptSegment, TracedArc, Void
 
 TOLERANCE_MM: Final = 120
 
@@ -44,8 +44,8 @@ class Step(NamedTuple):
     length_mm: int
 
 
-class Certificate(NamedTuple):
-    """Why coverage is complete, or what is missing."""
+class CoverageCertificate(NamedTuple):
+    """The reason why coverage is complete, or the ends and ports that are missing."""
 
     ends: int
     ends_without_mate: tuple[End, ...]
@@ -53,12 +53,12 @@ class Certificate(NamedTuple):
 
     @property
     def complete(self) -> bool:
-        """Whether at least one end is known and nothing is open."""
+        """True if at least one end is known and nothing is open."""
         return self.ends > 0 and not self.ends_without_mate and not self.open_ports
 
 
 class SliceMap:
-    """What a robot knows of the free space: its facts, and the graph of ends that follows from them."""
+    """A robot's map of the free space: its facts, and the graph of ends that follows from them."""
 
     def __init__(self) -> None:
         self.facts = FactSet()
@@ -66,14 +66,14 @@ class SliceMap:
         self._levels: dict[tuple[int, int], list[tuple[int, int, End]]] = {}
         self._mates: dict[End, Step] = {}
         self._arcs: dict[Port, Step] = {}
-        self._by_slice: dict[int, list[Segment]] = {}
+        self._by_slice: dict[int, list[SweptSegment]] = {}
         self._voids: list[Void] = []
         self._across: dict[End, Step] = {}
         self._closed: dict[End, bool] = {}
-        self._certificate = Certificate(0, (), ())
+        self._certificate = CoverageCertificate(0, (), ())
 
     def add(self, fact: Fact) -> bool:
-        """Add one fact; tell whether it is new."""
+        """Add one fact; return whether it is new."""
         return self.facts.add(fact)
 
     def merge(self, facts: Iterable[Fact]) -> int:
@@ -101,46 +101,46 @@ class SliceMap:
         return self._arcs.get((end, direction))
 
     def is_swept(self, k: int, y_mm: int) -> bool:
-        """Tell whether a swept segment of slice k reaches within the tolerance of the height y."""
+        """Return whether a swept segment of slice k reaches within the tolerance of the height y."""
         self._derive()
         low, high = y_mm - 4 * TOLERANCE_MM, y_mm + 4 * TOLERANCE_MM
         return any(segment.bottom_mm <= high and segment.top_mm >= low for segment in self._by_slice.get(k, ()))
 
     @property
     def arcs_known(self) -> bool:
-        """Whether any arc was traced."""
+        """True if any arc was traced."""
         self._derive()
         return bool(self._arcs)
 
     @property
-    def certificate(self) -> Certificate:
-        """What is open, sorted."""
+    def certificate(self) -> CoverageCertificate:
+        """The open ends and ports, sorted."""
         self._derive()
         return self._certificate
 
     @property
     def voids(self) -> list[Void]:
-        """What wrecks hide."""
+        """The ends that wrecks hide."""
         self._derive()
         return self._voids
 
     def complete_from(self, at: End | None) -> bool:
-        """Tell whether all is covered that a robot at the known end `at` can reach; None: it is somewhere else."""
+        """Return whether all is covered that a robot at the known end `at` can reach; None: it is somewhere else."""
         certificate = self.certificate
         return certificate.complete or (certificate.ends > 0 and at is not None and self._is_closed(at))
 
-    def openings(self, reached: Collection[End]) -> Certificate:
+    def openings(self, reached: Collection[End]) -> CoverageCertificate:
         """Return which of the ends in `reached` lack a mate, or arcs, that nothing blocks."""
         self._derive()
         ends = sorted(reached)
-        return Certificate(
+        return CoverageCertificate(
             len(ends),
             tuple([end for end in ends if end not in self._mates]),
             tuple([port for port in self._ports(ends) if port not in self._arcs]),
         )
 
     def is_virtual(self, end: End) -> bool:
-        """Tell whether a known end is one at a virtual frontier."""
+        """Return whether a known end is one at a virtual frontier."""
         self._derive()
         return end in self._across
 
@@ -193,7 +193,7 @@ class SliceMap:
         return found
 
     def _derive(self) -> None:
-        """Work out ends, mates and arcs anew if facts were added."""
+        """Compute ends, mates and arcs again if facts were added."""
         if len(self.facts) == self._known:
             return
         self._known = len(self.facts)
@@ -208,7 +208,7 @@ class SliceMap:
         ends = sorted(end for level in self._levels.values() for _, _, end in level)
         mated: set[End] = set()
         joined: set[Port] = set()
-        # What was observed beside a wreck comes first: it is the way that is free now.
+        # An observation beside a wreck comes first: it is the way that is free now.
         for segment in sorted(segments, key=_wrecks_first):
             self._by_slice.setdefault(segment.slice, []).append(segment)
             mated.update([known for known in map(self._known_end, segment.ends) if known is not None])
@@ -220,7 +220,7 @@ class SliceMap:
             self._join(arc)
         self._find_across()
         counting = [end for end in ends if not self._is_passed(end)]
-        self._certificate = Certificate(
+        self._certificate = CoverageCertificate(
             len(ends),
             tuple([end for end in counting if end not in mated]),
             tuple([port for port in self._ports(counting) if port not in joined]),
@@ -248,11 +248,11 @@ class SliceMap:
                 self._across[upper] = Step(ACROSS, lower, 0)
 
     def _is_passed(self, end: End) -> bool:
-        """Tell whether a robot swept past an end."""
+        """Return whether a robot swept past an end."""
         low, high = end.y_mm - TOLERANCE_MM, end.y_mm + TOLERANCE_MM
         return any(segment.bottom_mm < low and high < segment.top_mm for segment in self._by_slice.get(end.slice, ()))
 
-    def _mate(self, segment: Segment) -> None:
+    def _mate(self, segment: SweptSegment) -> None:
         top, bottom = map(self._known_end, segment.ends)
         if top is None or bottom is None:
             return
@@ -260,7 +260,7 @@ class SliceMap:
         self._mates.setdefault(top, Step(0, bottom, length))
         self._mates.setdefault(bottom, Step(0, top, length))
 
-    def _join(self, arc: Arc) -> None:
+    def _join(self, arc: TracedArc) -> None:
         (start, there), (stop, back) = ((self._known_end(end), side) for end, side in arc.ports)
         if start is None or stop is None:
             return
@@ -268,12 +268,12 @@ class SliceMap:
         self._arcs.setdefault((stop, back), Step(back, start, arc.length_mm))
 
 
-def _wrecks_first(fact: Segment | Arc) -> tuple[bool, int, Segment | Arc]:
+def _wrecks_first(fact: SweptSegment | TracedArc) -> tuple[bool, int, SweptSegment | TracedArc]:
     """Return the rank of a way: beside a wreck before others, and of two segments the longer one."""
-    return not fact.wrecks, fact.bottom_mm - fact.top_mm if isinstance(fact, Segment) else 0, fact
+    return not fact.wrecks, fact.bottom_mm - fact.top_mm if isinstance(fact, SweptSegment) else 0, fact
 
 
-def _blocks(void: Void, segment: Segment) -> bool:
+def _blocks(void: Void, segment: SweptSegment) -> bool:
     return void.slice == segment.slice and void.low_mm < segment.top_mm and segment.bottom_mm < void.high_mm
 
 

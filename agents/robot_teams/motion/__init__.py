@@ -1,1 +1,1 @@
-"""How a robot of a team moves: senses, wall following, manoeuvres, and traffic among bodies."""
+"""Motion of a robot of a team: senses, wall following, manoeuvres, and traffic among bodies."""

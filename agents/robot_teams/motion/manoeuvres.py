@@ -1,37 +1,37 @@
 """The three manoeuvres: approach an end, sweep a slice, trace the boundary to the next slice.
 
-Each is stepped once a tick with what the robot senses; it returns the unit vector to move along, or None when it is done.
-Robots that stand in the way are handed in as `blocks`, unit vectors towards them: a manoeuvre goes around them as if they
-were walls. What it finds it offers as facts; the pilot decides what to do next.
+Each is stepped once a tick with the robot's senses. It returns the unit vector to move along, or None when it is done.
+The argument `blocks` has unit vectors towards robots in the way: a manoeuvre goes around them as if they were walls. A
+manoeuvre offers its findings as facts; the pilot decides what to do next.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
-from zwerm.agents.robot_teams.mapping.facts import Arc, End, Wreck
+from zwerm.agents.robot_teams.mapping.facts import End, TracedArc, Wreck
 from zwerm.agents.robot_teams.motion.senses import Senses
 from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGHT_HAND, Vector, WallFollower
 
 # A contact blocks a sweep if this much of its normal lies along the motion.
 BLOCKS: Final = 0.02
-# How far a sweep may leave its slice before the contact counts as the end of the segment [m].
+# Distance that a sweep may leave its slice before the contact counts as the end of the segment [m].
 OFF_SLICE_M: Final = 0.006
-# How far beyond a slice the centre must be for it to have crossed it [m].
+# Distance of the centre beyond a slice at which it has crossed the slice [m].
 CROSSED_M: Final = 0.002
-# A sweep that takes longer than this to get around other robots gives up [ticks].
+# Time after which a sweep that goes around other robots gives up [ticks].
 AROUND_TICKS_MAX: Final = 100
-# How far it may leave its slice for that [m].
+# Distance that it may leave its slice for that [m].
 AROUND_M: Final = 1.2
-# How far on the wrong side of its slice a trace may begin [m].
+# Distance on the wrong side of its slice at which a trace may begin [m].
 SLACK_M: Final = 0.75
 
 
-# Tells at which ends the robots in contact stand.
+# Returns the ends at which the robots in contact stand.
 Parked = Callable[[Senses], Sequence[End]]
 
 
-class Grid(NamedTuple):
+class SliceGrid(NamedTuple):
     """The slices: x = origin_m + k * spacing_m."""
 
     origin_m: float
@@ -78,7 +78,7 @@ class Around:
 class Approach:
     """Go straight to an end near by, sliding along walls, and press against the boundary there."""
 
-    def __init__(self, end: End, grid: Grid, parked: Parked) -> None:
+    def __init__(self, end: End, grid: SliceGrid, parked: Parked) -> None:
         self.end = end
         self._parked = parked
         self._x_m, self._y_m = grid.x_m(end.slice), end.y_mm / 1000.0
@@ -95,15 +95,15 @@ class Approach:
 
     @property
     def ticks(self) -> int:
-        """For how long it has lasted."""
+        """The time that it has lasted [ticks]."""
         return self._ticks
 
 
-class Sweep:
+class SliceSweep:
     """Move along a slice to the end of its segment on side `side`, or to the height `limit_mm` of a virtual frontier."""
 
     def __init__(
-        self, k: int, side: int, grid: Grid, step_m: float, parked: Parked, limit_mm: int | None = None
+        self, k: int, side: int, grid: SliceGrid, step_m: float, parked: Parked, limit_mm: int | None = None
     ) -> None:
         self._limit_mm = limit_mm
         self.is_cut = False
@@ -151,10 +151,10 @@ class Sweep:
         return vx, side * math.sqrt(1.0 - vx * vx)
 
 
-class Trace:
+class BoundaryTrace:
     """Follow the boundary from an end into the slab on the side `direction`, until it crosses a slice."""
 
-    def __init__(self, start: End, direction: int, grid: Grid, parked: Parked) -> None:
+    def __init__(self, start: End, direction: int, grid: SliceGrid, parked: Parked) -> None:
         self.start, self.direction = start, direction
         self._parked = parked
         self._grid = grid
@@ -166,7 +166,7 @@ class Trace:
         self._extreme: Vector = (-math.inf, 0.0)
         self._wall_tick = -10
         self.wrecks: dict[Wreck, None] = {}
-        self.arc: Arc | None = None
+        self.arc: TracedArc | None = None
         self.end: End | None = None
 
     def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
@@ -188,7 +188,7 @@ class Trace:
             self._arrive(senses, self.start.slice + d, 1)
             return None
         if self._inside and depth < -CROSSED_M:
-            # The wall beside the other end lies on the other side; else the robot was only pushed back.
+            # The wall beside the other end is on the other side. Otherwise the robot was only pushed back.
             if any(ny * self.start.side < INTO for _, ny in senses.walls):
                 self._arrive(senses, self.start.slice, -1)
                 return None
@@ -223,7 +223,7 @@ class Trace:
         depth, extreme_y = self._extreme
         extreme_x = self._x_m + self.direction * max(depth, 0.0)
         self.end = end
-        self.arc = Arc(
+        self.arc = TracedArc(
             self.start, self.direction, end, mm(self._length_m), mm(extreme_x), mm(extreme_y), tuple(self.wrecks)
         )
 
@@ -231,7 +231,7 @@ class Trace:
 class Seek:
     """From anywhere, go to the nearest slice: straight, and along the boundary where a wall is in the way."""
 
-    def __init__(self, grid: Grid) -> None:
+    def __init__(self, grid: SliceGrid) -> None:
         self._grid = grid
         self._follower: WallFollower | None = None
         self._last_x_m = math.nan
@@ -251,9 +251,9 @@ class Seek:
             ahead = [each for each in (*senses.walls, *blocks) if each[0] * way > BLOCKS]
             if not ahead:
                 return way, 0.0
-            # Slide along what is in the way, on the side that leads on.
+            # Slide along the obstacle, on the side that leads on.
             self._follower = WallFollower(LEFT_HAND if ahead[0][1] * way > 0.0 else RIGHT_HAND, (way, 0.0))
         return self._follower.direction(senses.walls, blocks)
 
 
-Manoeuvre = Approach | Sweep | Trace | Seek
+Manoeuvre = Approach | SliceSweep | BoundaryTrace | Seek

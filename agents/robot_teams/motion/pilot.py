@@ -1,9 +1,10 @@
-"""The pilot: carries out one manoeuvre at a time among other bodies, and never runs into one.
+"""The pilot: carries out one manoeuvre at a time among other bodies, without collisions.
 
-Traffic rules, all by what the robot senses itself. Two robots that meet head-on: the one with the smaller id waits, the other
-goes around. A robot that stands is gone around after a short wait. A robot that makes no headway goes back along its own
-trail, a random distance that doubles with every attempt, waits, and comes forward again: where two robots meet in a passage for
-one, one of them backs out of it. The speed towards another body is limited to half of the gap a tick.
+The traffic rules depend only on the robot's own senses. If two robots meet head-on, the one with the smaller id waits,
+and the other goes around. A robot goes around a standing robot after a short wait. A robot that makes no progress goes
+back along its own trail, waits, and comes forward again. The distance is random, and doubles with every attempt. So if
+two robots meet in a passage for one, one of them leaves it backwards. The speed towards another body is limited to half
+of the gap a tick.
 """
 
 import math
@@ -18,20 +19,20 @@ from zwerm.agents.robot_teams.motion.wall_following import Vector
 
 # A robot nearer than this [m], beyond the gap that is kept, is in contact.
 CONTACT_M: Final = 0.04
-# How long a robot waits for one that stands, and for one that has the right of way [s].
+# Time that a robot waits for one that stands, and for one that has the right of way [s].
 STANDING_WAIT_S: Final = 0.5
 MOVING_WAIT_S: Final = 3.0
-# No headway: less than this way in this time.
+# No progress: less than this distance in this time.
 HEADWAY_M: Final = 0.2
 HEADWAY_S: Final = 4.0
 # After so many retreats the manoeuvre has failed.
 ATTEMPTS_MAX: Final = 5
 # The longest retreat, on average [m].
 RETREAT_M: Final = 4.0
-# How far apart the points of the trail are, and how many it has.
+# Distance between the points of the trail, and their number.
 TRAIL_STEP_M: Final = 0.08
 TRAIL_POINTS: Final = 600
-# How long somebody may press against an idle robot before it makes way [s].
+# Time that another robot may press against an idle robot before the idle robot moves away [s].
 PRESSED_S: Final = 2.0
 
 RUNNING: Final = "running"
@@ -79,7 +80,7 @@ class Retreat:
 
     @property
     def blocked(self) -> bool:
-        """Whether somebody is in the way forward again."""
+        """True if a robot is in the way forward again."""
         return self._forward and (self._still > self._patience or self._ticks > self._leg_ticks)
 
 
@@ -92,7 +93,7 @@ def _around_robots(senses: Senses, way: Vector) -> Vector:
 
 
 class Pilot:
-    """Steers one robot; `state` tells how the manoeuvre is getting on."""
+    """Steers one robot; `state` is the state of its manoeuvre."""
 
     def __init__(self, node: int, speed_m_s: float, dt_s: float, random: np.random.Generator) -> None:
         self.state = IDLE
@@ -118,11 +119,11 @@ class Pilot:
         self._mark = (math.inf, 0.0)
 
     def rest(self) -> None:
-        """Have no manoeuvre: stand, and make way for others."""
+        """End the manoeuvre: stand, and make way for others."""
         self._manoeuvre, self.state = None, IDLE
 
     def give_up(self) -> None:
-        """Have failed the manoeuvre, if there was one."""
+        """Mark the manoeuvre as failed, if there is one."""
         self._manoeuvre, self._retreat, self.state = None, None, FAILED
 
     def stand(self, senses: Senses) -> Vector:
@@ -232,7 +233,7 @@ class Pilot:
         )
 
     def _limited(self, senses: Senses, way: Vector) -> Vector:
-        """Return the velocity along `way`, less what would close more than half of a gap in one tick."""
+        """Return the velocity along `way`, limited so that it closes at most half of a gap in one tick."""
         vx, vy = way[0] * self._speed_m_s, way[1] * self._speed_m_s
         for other in senses.robots:
             limit = other.gap_m / (2.0 * self._dt_s)
@@ -240,7 +241,7 @@ class Pilot:
             if closing > limit:
                 vx -= (closing - limit) * other.nx
                 vy -= (closing - limit) * other.ny
-        # Walls deflect the motion: what they leave of it must not lead into a body either.
+        # Walls deflect the motion: the deflected motion must not lead into a body either.
         wx, wy = vx, vy
         for nx, ny in senses.walls:
             into = wx * nx + wy * ny

@@ -1,4 +1,4 @@
-"""What a robot senses at one tick, in the frame of the arena: its position, the walls it touches, the robots beside it."""
+"""A robot's senses at one tick, in the frame of the arena: its position, the walls it touches, the robots beside it."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,8 @@ from zwerm.agents.robot_teams.mapping.facts import Wreck
 from zwerm.agents.robot_teams.motion.wall_following import Vector
 from zwerm.wire.messages import Observation
 
-# The gap that robots keep between their bodies [m]: more than a touch switch reaches, so that what is touched is a wall.
+# The gap that robots keep between their bodies [m]. It is larger than the reach of a touch switch, so a touched body is
+# a wall.
 GAP_M: Final = 0.04
 
 # A robot that moves less than this in a tick stands [m].
@@ -36,7 +37,7 @@ class Beside(NamedTuple):
 
     @property
     def stands(self) -> bool:
-        """Whether it did not move in the last tick."""
+        """True if it did not move in the last tick."""
         return abs(self.dx_m) + abs(self.dy_m) < STANDS_M
 
 
@@ -55,7 +56,7 @@ class Senses(NamedTuple):
         return tuple([other.wreck for other in self.robots if other.wreck is not None])
 
 
-class Sensing:
+class SenseReader:
     """Turns observations into senses; remembers where the robots in sight were a tick ago."""
 
     def __init__(self, radius_m: float) -> None:

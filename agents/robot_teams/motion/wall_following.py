@@ -1,8 +1,7 @@
 """Following the boundary by touch: the direction in which a disc goes on with its contacts on one hand.
 
-Among the tangents of all contacts the robot takes the one nearest to the wall that leads into none of the others: at a
-concave corner it turns away, at a convex one it rolls around the vertex. It presses a little against the contact, so that
-it does not lose it.
+The robot takes the tangent nearest to the wall that leads into no other contact. At a concave corner it turns away; at
+a convex corner it rolls around the vertex. It presses a little against the contact, so that it does not lose it.
 """
 
 import math
@@ -18,12 +17,12 @@ RIGHT_HAND: Final = -1
 PRESS: Final = 0.2
 # A direction leads into a contact if this much of it does.
 INTO: Final = 0.05
-# How far a tangent may turn towards the wall [rad]; beyond it counts as a turn away.
+# Largest turn of a tangent towards the wall [rad]; a larger one counts as a turn away.
 TOWARDS_WALL_RAD: Final = math.radians(100.0)
 
 
 class WallFollower:
-    """Follows whatever it touches with the wall on its `hand`, first in the direction `tangent` (a unit vector)."""
+    """Follows the touched boundary with the wall on its `hand`, first in the direction `tangent` (a unit vector)."""
 
     def __init__(self, hand: int, tangent: Vector) -> None:
         self.hand = hand

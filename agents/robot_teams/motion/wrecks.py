@@ -1,8 +1,9 @@
-"""Which robots are wrecks: those that do not move though they are touched, and say nothing.
+"""Detection of wrecks: robots that do not move although they are touched, and are silent.
 
 Silence alone proves nothing: a packet may be lost, or the radio divided. A living robot that is touched makes way, or goes on.
-So a robot is taken for a wreck only after it was touched for `TOUCHED_S` in all, did not move for `STILL_S`, and was silent
-for twice the time after which a member is dropped. Any motion, and any later status, shows that it lives.
+So a robot counts as a wreck only if three conditions hold. It was touched for `TOUCHED_S` in total. It did not move for
+`STILL_S`. It was silent for twice the time after which a member is dropped. Any motion, and any later status, shows
+that it lives.
 """
 
 from collections.abc import Callable, Iterable
@@ -11,17 +12,17 @@ from typing import Final
 from zwerm.agents.robot_teams.mapping.facts import Void, Wreck
 from zwerm.agents.robot_teams.motion.senses import DEAD_M, Senses
 
-# A robot that was touched for so long, and did not move for so long, is dead if it is silent as well [s].
+# A silent robot is dead if it was touched for this time, and did not move for this time [s].
 TOUCHED_S: Final = 3.0
 STILL_S: Final = 8.0
 # More than this is motion [m].
 MOVED_M: Final = 0.03
-# The place of a wreck that a teammate told of may be this far off [m].
+# Largest error of the place of a wreck that a teammate reported [m].
 TOLD_M: Final = 0.1
 
 
 class _Track:
-    """A robot that was last seen to move at `since` and stands at (x, y) since; it was `touched` for so many ticks."""
+    """A robot that last moved at tick `since` and has stood at (x, y) since then; it was touched for `touched` ticks."""
 
     def __init__(self, x_m: float, y_m: float, since: int) -> None:
         self.x_m, self.y_m, self.since = x_m, y_m, since
@@ -29,7 +30,7 @@ class _Track:
 
 
 class WreckWatch:
-    """Watches the robots in sight. `silent_ticks` tells for how long nothing was heard of one."""
+    """Watches the robots in sight. `silent_ticks` returns the number of ticks since the last news of a robot."""
 
     def __init__(self, dt_s: float, silence_s: float, silent_ticks: Callable[[int, int], int]) -> None:
         self.wrecks: dict[int, Wreck] = {}
@@ -41,7 +42,8 @@ class WreckWatch:
         self._silence_ticks = round(2.0 * silence_s / dt_s)
 
     def watch(self, senses: Senses, told: Iterable[Void]) -> list[int]:
-        """Take in one tick's senses and the wrecks that teammates `told` of; return the robots that are new wrecks."""
+        """Take in one tick's senses and the wrecks that teammates reported (`told`); return the robots that are new
+        wrecks."""
         found = []
         self.moved.clear()
         for other in senses.robots:
@@ -68,7 +70,7 @@ class WreckWatch:
         return found
 
     def lives(self, node: int, tick: int) -> None:
-        """Take in that a robot lived at `tick`."""
+        """Record that a robot was alive at `tick`."""
         wreck = self.wrecks.get(node)
         if wreck is not None and tick > wreck.tick:
             del self.wrecks[node]

@@ -1,1 +1,1 @@
-"""What a team says: its messages, membership, sharing of facts, and the barrier of a corridor."""
+"""Protocols of a team: messages, membership, sharing of facts, and the barrier of a corridor."""

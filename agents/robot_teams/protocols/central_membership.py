@@ -1,14 +1,14 @@
-"""One team of all robots, which the coordinator leads: what it is told by robots, and what they take from it.
+"""One team of all robots, which the coordinator leads: the robots' messages to it, and its messages to them.
 
-The coordinator makes a view of all robots that it hears. A robot takes every later view that includes it, and founds none. It
-waits while it hears nothing.
+The coordinator makes a view of all robots that it hears. A robot takes every later view that includes it, and founds
+none. It waits while it receives nothing.
 """
 
-from zwerm.agents.robot_teams.protocols.team_membership import Membership, later
-from zwerm.agents.robot_teams.protocols.team_messages import Beacon, View
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership, later
+from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, View
 
 
-class CoordinatedMembership(Membership):
+class CoordinatedMembership(TeamMembership):
     """A robot's view of the coordinator's team. All that it hears comes from the coordinator."""
 
     @property
@@ -17,10 +17,10 @@ class CoordinatedMembership(Membership):
         return False
 
     def knows(self, sender: int) -> bool:
-        """Tell whether facts and plans of a sender are taken over: those of the coordinator are."""
+        """Return whether facts and plans of a sender are taken over: those of the coordinator are."""
         return True
 
-    def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
+    def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
         """Take in the coordinator's beacon."""
         self._note_statuses(beacon, tick)
         for view in beacon.views:
@@ -32,10 +32,10 @@ class CoordinatedMembership(Membership):
         """Wait for the coordinator's view."""
 
     def poll(self, tick: int) -> None:
-        """Drop nobody: the coordinator does."""
+        """Drop no member: the coordinator does."""
 
 
-class CoordinatorMembership(Membership):
+class CoordinatorMembership(TeamMembership):
     """The coordinator's view: all robots that it hears. It is no member itself."""
 
     def __init__(self, node: int, dt_s: float, silence_s: float) -> None:
@@ -43,10 +43,10 @@ class CoordinatorMembership(Membership):
         self.view = View(1, node, ())
 
     def knows(self, sender: int) -> bool:
-        """Tell whether facts of a sender are taken over: those of all robots are."""
+        """Return whether facts of a sender are taken over: those of all robots are."""
         return True
 
-    def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
+    def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
         """Take in a robot's beacon."""
         self._note_statuses(beacon, tick)
         for view in beacon.views:

@@ -1,15 +1,17 @@
-"""What a robot knows of its teammates in one corridor: by their statuses, whatever was lost."""
+"""A robot's knowledge of its teammates in one corridor, from their statuses. Lost messages only delay it."""
 
 from collections.abc import Callable
 
-from zwerm.agents.robot_teams.protocols.team_membership import Membership
-from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, Plan, Status
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership
+from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, CorridorPlan, Status
 
 
 class CorridorMates:
-    """What a robot knows of its teammates in one corridor, from their statuses."""
+    """A robot's knowledge of its teammates in one corridor, from their statuses."""
 
-    def __init__(self, plan: Plan, node: int, membership: Membership, sweeping: Callable[[int], bool]) -> None:
+    def __init__(
+        self, plan: CorridorPlan, node: int, membership: TeamMembership, sweeping: Callable[[int], bool]
+    ) -> None:
         self._plan, self._node, self._membership = plan, node, membership
         self.sweeping = sweeping
 
@@ -19,7 +21,8 @@ class CorridorMates:
         return [status for status in found if (status.epoch, status.number) == (plan.epoch, plan.number)]
 
     def slot(self, room: int | None) -> int:
-        """Return which slice of the corridor is this robot's, given for how many it found room; negative for none."""
+        """Return the slice of the corridor that this robot takes, given the number of robots it found room for;
+        negative for none."""
         rooms = [status.room for status in self._statuses() if status.room is not None]
         if room is not None:
             rooms.append(room)
@@ -27,11 +30,11 @@ class CorridorMates:
         return order.index(self._node) - max(0, len(order) - min(rooms, default=len(order)))
 
     def claimed(self, k: int) -> bool:
-        """Tell whether a teammate takes slice k in this corridor."""
+        """Return whether a teammate takes slice k in this corridor."""
         return any(status.claim == k for status in self._statuses())
 
     def awaits_predecessor(self) -> bool:
-        """Tell whether the predecessor has still to sweep its slice."""
+        """Return whether the predecessor has not swept its slice yet."""
         order, plan = self._plan.order, self._plan
         index = order.index(self._node) - 1
         if index < 0 or order[index] not in self._membership.view.members:

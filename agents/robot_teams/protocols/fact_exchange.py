@@ -2,20 +2,22 @@
 
 from typing import Final
 
-from zwerm.agents.robot_teams.mapping.facts import Arc, Cut, Fact, Return, Segment, Void
+from zwerm.agents.robot_teams.mapping.facts import Fact, FrontierCut, Return, SweptSegment, TracedArc, Void
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
-from zwerm.agents.robot_teams.protocols.team_messages import Beacon
+from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon
 
-# For how long a new fact is in every beacon, how long sets may differ before all facts are sent, and how often those are [s].
+# Times [s]: a new fact is in every beacon; sets may differ before all facts are sent; between two such sendings.
 NEW_S: Final = 1.5
 DIFFERENT_S: Final = 1.0
 ALL_EVERY_S: Final = 1.0
-# At most so many facts in one message: an arc takes about 40 bytes.
+# Largest number of facts in one message: an arc takes about 40 bytes.
 FACTS_MAX: Final = 800
 
 
 # Facts by kind, as a beacon carries them.
-Parcel = tuple[tuple[Segment, ...], tuple[Arc, ...], tuple[Void, ...], tuple[Return, ...], tuple[Cut, ...]]
+Parcel = tuple[
+    tuple[SweptSegment, ...], tuple[TracedArc, ...], tuple[Void, ...], tuple[Return, ...], tuple[FrontierCut, ...]
+]
 
 
 class FactExchange:
@@ -26,12 +28,12 @@ class FactExchange:
         self._new_ticks = round(NEW_S / dt_s)
         self._different_ticks = round(DIFFERENT_S / dt_s)
         self._all_every_ticks = round(ALL_EVERY_S / dt_s)
-        self._told: list[tuple[int, int]] = []  # when the set first had so many facts
+        self._told: list[tuple[int, int]] = []  # the tick at which the set first had this number of facts
         self._differs_since: dict[int, int] = {}
         self._all_tick = -self._all_every_ticks
         self._page = 0
 
-    def receive(self, beacon: Beacon, tick: int) -> None:
+    def receive(self, beacon: TeamBeacon, tick: int) -> None:
         """Take over the facts of a beacon, and note whether its sender lacks some of ours."""
         self._map.merge((*beacon.segments, *beacon.arcs, *beacon.voids, *beacon.returns, *beacon.cuts))
         if beacon.digest == self._map.facts.digest:
@@ -40,7 +42,7 @@ class FactExchange:
             self._differs_since.setdefault(beacon.sender, tick)
 
     def forget(self, node: int) -> None:
-        """Owe a robot nothing any more."""
+        """End the exchange with a robot."""
         self._differs_since.pop(node, None)
 
     def outgoing(self, tick: int) -> Parcel:
@@ -67,9 +69,9 @@ class FactExchange:
 
 def _sorted_out(facts: list[Fact]) -> Parcel:
     return (
-        tuple([fact for fact in facts if isinstance(fact, Segment)]),
-        tuple([fact for fact in facts if isinstance(fact, Arc)]),
+        tuple([fact for fact in facts if isinstance(fact, SweptSegment)]),
+        tuple([fact for fact in facts if isinstance(fact, TracedArc)]),
         tuple([fact for fact in facts if isinstance(fact, Void)]),
         tuple([fact for fact in facts if isinstance(fact, Return)]),
-        tuple([fact for fact in facts if isinstance(fact, Cut)]),
+        tuple([fact for fact in facts if isinstance(fact, FrontierCut)]),
     )

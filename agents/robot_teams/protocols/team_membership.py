@@ -1,28 +1,31 @@
-"""Who is in the team: views by epochs, division, merging, and succession of the lead. Pure protocol: messages in, views out.
+"""Membership of a team: views by epochs, division, merging, and succession of the lead.
 
-A robot holds one view. It takes over a later view that includes it; where the lead's later view leaves it out, it is alone.
-The lead divides by making several views, merges by making one that includes those it has met, and drops members that are
-silent or have gone over to another view. When the lead is silent, the smallest member that is not takes its place. Any message
-may be lost, late or copied: views only ever get later, and robots without a common view are teams of their own that merge
-when they meet. A wrong suspicion therefore costs time, and nothing else: facts are never withdrawn.
+Pure protocol: messages in, views out.
+
+A robot holds one view. It takes over a later view that includes it. If the lead's later view does not include it, it is
+alone. The lead divides the team by several views, and merges teams by one view that includes those it has met. It drops
+members that are silent or have taken another view. When the lead is silent, the member with the smallest id that is not
+silent takes its place. Any message may be lost, late or copied: a view is only replaced by a later one. Robots without
+a common view are separate teams, which merge when they meet. A wrong suspicion therefore costs only time: facts are
+never withdrawn.
 """
 
 from collections.abc import Sequence
 from typing import Final
 
-from zwerm.agents.robot_teams.protocols.team_messages import Beacon, Status, View
+from zwerm.agents.robot_teams.protocols.team_messages import Status, TeamBeacon, View
 
-# How long the lead repeats views that it made for others, and how long a meeting is remembered [s].
+# Time that the lead repeats views that it made for others, and time that a meeting is remembered [s].
 REPEAT_S: Final = 10.0
 MEETING_S: Final = 60.0
-# How long a member may show a later view of its own before it is dropped [s].
+# Time that a member may show a later view of its own before it is dropped [s].
 LEFT_S: Final = 2.0
-# Robots that have just divided do not meet for so long [s].
+# Time after a division in which its robots do not meet [s].
 PARTED_S: Final = 20.0
 
 
 def later(view: View, than: View) -> bool:
-    """Tell whether a view replaces another: by epoch, then the smaller lead, then more members."""
+    """Return whether a view replaces another: by epoch, then the smaller lead, then more members."""
     return (view.epoch, -view.lead, len(view.members), view.members) > (
         *(than.epoch, -than.lead, len(than.members)),
         than.members,
@@ -44,11 +47,11 @@ class Roster:
             self.news_tick[status.node] = tick
 
     def silent_ticks(self, node: int, tick: int) -> int:
-        """Return for how long nothing new of a robot has come."""
+        """Return the number of ticks since the last news of a robot."""
         return tick - self.news_tick.setdefault(node, tick)
 
 
-class Membership:
+class TeamMembership:
     """One robot's view of its team."""
 
     def __init__(self, node: int, dt_s: float, silence_s: float) -> None:
@@ -69,11 +72,11 @@ class Membership:
 
     @property
     def leads(self) -> bool:
-        """Whether this robot decides for the team."""
+        """True if this robot decides for the team."""
         return self.view.lead == self.node
 
-    def receive(self, beacon: Beacon, tick: int, near: bool) -> None:
-        """Take in a beacon; `near` tells that its sender is close enough to be met."""
+    def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
+        """Take in a beacon; `near` is true if its sender is close enough to be met."""
         self._note_statuses(beacon, tick)
         theirs = beacon.views[0]
         for view in beacon.views:
@@ -92,11 +95,11 @@ class Membership:
             self._met[theirs.lead] = theirs, self._met[theirs.lead][1]
 
     def knows(self, sender: int) -> bool:
-        """Tell whether facts and plans of a sender are taken over: those of teammates are."""
+        """Return whether facts and plans of a sender are taken over: those of teammates are."""
         return sender in self.view.members
 
     def meet_first(self, tick: int) -> None:
-        """Found the first team: the smallest of all robots that hear each other at the start leads them."""
+        """Found the first team: the robot with the smallest id of all that receive each other at the start leads it."""
         heard = sorted(self.roster.statuses.keys() | {self.node})
         if heard[0] == self.node and len(heard) > 1 and self.view.epoch == 1:
             self._adopt(View(2, self.node, tuple(heard)), tick)
@@ -144,7 +147,7 @@ class Membership:
         self._adopt(own, tick)
 
     def merge(self, tick: int) -> bool:
-        """Unite with the teams that were met and whose leads have larger ids; tell whether there are any."""
+        """Unite with the teams that were met and whose leads have larger ids; return whether there are any."""
         others = [view for view in self.met() if view.lead > self.node]
         if not others:
             return False
@@ -154,10 +157,10 @@ class Membership:
         return True
 
     def merges_soon(self, tick: int, patience_ticks: int) -> bool:
-        """Tell whether a team was met a short time ago: the lead with the smaller id unites the two when all are free."""
+        """Return whether a team was met a short time ago: the lead with the smaller id unites the two when all are free."""
         return any(tick - since < patience_ticks for _, since in self._met.values())
 
-    def _note_statuses(self, beacon: Beacon, tick: int) -> None:
+    def _note_statuses(self, beacon: TeamBeacon, tick: int) -> None:
         for status in beacon.statuses:
             if status.node != self.node:
                 self.roster.receive(status, tick)
@@ -172,7 +175,7 @@ class Membership:
             self._met[view.lead] = view, known[1]
 
     def _is_gone(self, node: int, tick: int) -> bool:
-        """Tell whether a member is silent, or holds on to another view longer than it takes to hear of this one."""
+        """Return whether a member is silent, or keeps another view for longer than this one takes to reach it."""
         if self.roster.silent_ticks(node, tick) > self._silence_ticks:
             return True
         status, own = self.roster.statuses.get(node), self.view

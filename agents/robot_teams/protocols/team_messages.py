@@ -1,7 +1,7 @@
-"""The one message of a team: a beacon that every robot broadcasts, with all that teammates must know.
+"""The only message of a team: a beacon that every robot broadcasts, with all that teammates must know.
 
-Beacons carry states, not changes: any beacon may be lost, late or copied, and the next one makes up for it. Statuses are passed
-on, so that a team may be larger than the radio's range.
+Beacons carry states, not changes: any beacon may be lost, late or copied, and the next one makes up for it. Robots
+forward statuses, so a team may be larger than the radio's range.
 """
 
 from typing import Final
@@ -9,7 +9,7 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
-from zwerm.agents.robot_teams.mapping.facts import Arc, Cut, End, Return, Segment, Void
+from zwerm.agents.robot_teams.mapping.facts import End, FrontierCut, Return, SweptSegment, TracedArc, Void
 
 # The phases of a robot's work on its slice, in order.
 READY: Final = 0  # has finished the plan
@@ -19,15 +19,17 @@ HUNTS: Final = 3
 
 
 class View(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """Who is in a team: its `members`, ascending, and the one that decides for it. A later `epoch` replaces earlier ones."""
+    """The robots of a team: its `members`, ascending, and the one that decides for it. A later `epoch` replaces earlier
+    ones."""
 
     epoch: int
     lead: int
     members: tuple[int, ...]
 
 
-class Plan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """One corridor: move over from the end `anchor` in x-direction `direction`, one slice a robot; `order` is lag to lead.
+class CorridorPlan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """One corridor: move over from the end `anchor` in x-direction `direction`, one slice a robot; `order` is from the
+    lag (first) to the lead (last).
 
     The lag's slice is the anchor's own if its segment is not swept (`own_slice`), else the next. Sweeps end at the height
     `frontier_mm` of the team's virtual frontier, if there is one.
@@ -43,10 +45,11 @@ class Plan(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
 
 
 class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What one robot does: `beat` grows with every status. `at` is the end where it last was.
+    """The activity of one robot: `beat` grows with every status. `at` is the end where it last was.
 
-    Of the corridor: it `found` a new segment on its slice, is `spare`, takes slice `claim`, found `room` for so many robots.
-    It is `sweeping` a slice now. `team` is the epoch and the lead of its view; `epoch` and `number` are of its plan.
+    In the corridor it `found` a new segment on its slice, is `spare`, takes slice `claim`, found room for `room`
+    robots. It is `sweeping` a slice now. `team` is the epoch and the lead of its view; `epoch` and `number` are of its
+    plan.
     """
 
     node: int
@@ -65,8 +68,9 @@ class Status(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     team: tuple[int, int]
 
 
-class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What a robot broadcasts. `views` are its own team's, then those its lead has made of it, and teams that were met.
+class TeamBeacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """The broadcast of a robot. `views` are its own team's, then those that its lead has made of it, then those of
+    teams that were met.
 
     `digest` and `count` describe its facts, `segments`, `arcs`, `voids`, `returns` and `cuts` are some of them.
     """
@@ -74,19 +78,19 @@ class Beacon(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     sender: int
     views: tuple[View, ...]
     met: tuple[View, ...]
-    plans: tuple[Plan, ...]
+    plans: tuple[CorridorPlan, ...]
     statuses: tuple[Status, ...]
     digest: int
     count: int
-    segments: tuple[Segment, ...] = ()
-    arcs: tuple[Arc, ...] = ()
+    segments: tuple[SweptSegment, ...] = ()
+    arcs: tuple[TracedArc, ...] = ()
     voids: tuple[Void, ...] = ()
     returns: tuple[Return, ...] = ()
-    cuts: tuple[Cut, ...] = ()
+    cuts: tuple[FrontierCut, ...] = ()
 
 
 class FoundSnapshot(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What one robot found, for metrics and pictures: no node receives it.
+    """The findings of one robot, for metrics and pictures: no node receives them.
 
     `slices` are x, bottom and top of swept segments [m], `critical_points` are x and y [m]; `team` is the lead's id.
     """
@@ -110,4 +114,4 @@ def decode_snapshot(payload: bytes) -> FoundSnapshot | None:
 
 
 encode_beacon: Final = msgspec.msgpack.Encoder().encode
-decode_beacon: Final = msgspec.msgpack.Decoder(Beacon).decode
+decode_beacon: Final = msgspec.msgpack.Decoder(TeamBeacon).decode

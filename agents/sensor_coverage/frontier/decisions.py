@@ -1,7 +1,7 @@
 """Decisions of a deployment, one interface each: frontier, path, redundancy, assignment, termination.
 
 A central algorithm or an agreement among robots implements an interface, and the caller does not know which. All
-interfaces speak of slots, and none of them moves a robot.
+interfaces refer to slots, and none of them moves a robot.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence

@@ -1,6 +1,6 @@
 """Test whether an empty slot would open frontier: an uncovered side of an edge, or a wide gap around a neighbour.
 
-The link criterion (`zwerm.maths.simplicial.may_leave`) tells whether a departure opens a hole. This module tells
+The link criterion (`zwerm.maths.simplicial.may_leave`) decides whether a departure opens a hole. This module decides
 whether the planner would then send another robot to the same slot.
 """
 

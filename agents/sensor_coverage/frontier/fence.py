@@ -139,7 +139,7 @@ def fence(views: Views, complex_: FlagComplex, corner_margin_rad: float, edges: 
 def wedges(
     views: Views, complex_: FlagComplex, vertices: Iterable[int] | None = None
 ) -> Iterable[tuple[int, int, int, float]]:
-    """Yield (i, a, b, gap_rad) for all neighbours a and b of i, b the next to the left of a, that form no triangle iab.
+    """Yield (i, a, b, gap_rad) for all neighbours a and b of i that form no triangle iab. b is the next to the left of a.
 
     A robot with one neighbour has one gap of a full turn, and a equals b. The edges of all wedges contain a closed
     chain around all uncovered space. The edges of the sign rule alone may not.

@@ -22,8 +22,8 @@ class Plan(NamedTuple):
 
     `key` names what is expanded: one side of an edge, or a gap around one slot. The new robot measures its distance to
     the robots at the `anchors`. `path` leads from a source to the mover, once a path is assigned. With `walk` the robot
-    drives to a wall and follows it, with the wall at its `hand` (+1 left, -1 right); with `beside` it stays in sight of the
-    mover's slot; it stops where it sees a slot of `meet`.
+    drives to a wall and follows it, with the wall at its `hand` (+1 left, -1 right). With `beside` it stays in sight of
+    the mover's slot. It stops where it sees a slot of `meet`.
     """
 
     key: tuple[int, ...]

@@ -16,7 +16,7 @@ class WalkPoint(NamedTuple):
 
     @property
     def in_touch(self) -> bool:
-        """Whether the walking robot touched anything."""
+        """True if the walking robot touched anything."""
         return bool(self.walls or self.robots)
 
     def turned(self, by: float) -> "WalkPoint":

@@ -1,6 +1,6 @@
 """Plans to follow walls: a robot drives into an open arc, to a wall, and along it.
 
-The proof of coverage (`zwerm.agents.sensor_coverage.frontier.wall_proof`) tells which arcs around which slots are open.
+The proof of coverage (`zwerm.agents.sensor_coverage.frontier.wall_proof`) finds the slots with open arcs, and these arcs.
 """
 
 import math
@@ -25,7 +25,7 @@ JOINS_MAX: Final = 4
 
 
 class WallPlans:
-    """Where walls are to be followed. `unproven` are the slots that stay open after all attempts."""
+    """Finds the places at which a robot must follow a wall. `unproven` are the slots that stay open after all attempts."""
 
     def __init__(self, parameters: PlannerParameters, slots: Slots) -> None:
         self.unproven: tuple[int, ...] = ()

@@ -1,9 +1,10 @@
 """The local proof of coverage: in which directions from a robot robots in view, or walls that were followed, close the space.
 
-Every triangle of the proof has a standing robot i as a corner, and two other corners that i sees, of which one may be a
-point of a walk along a wall. Its sides are free lines of sight, or a step of the walk. So i sees the whole triangle.
-A robot is closed if such triangles fill the full turn around it. Beyond a side of a triangle the robots at its ends are
-responsible; beyond a step of a walk is a wall. An open arc is frontier until somebody went there.
+Every triangle of the proof has a standing robot i as a corner. Robot i sees the two other corners. One of these may be
+a point of a walk along a wall. Its sides are free lines of sight, or a step of the walk. So i sees the whole triangle.
+A robot is closed if such triangles fill the full turn around it. The robots at the ends of a triangle's side are
+responsible for the space beyond it. Beyond a step of a walk is a wall. An open arc is frontier until a robot went
+there.
 
 An obstacle that lies within one triangle is not found. The triangle's sides are at most r_v long.
 """

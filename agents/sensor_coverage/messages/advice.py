@@ -2,8 +2,8 @@
 
 All of them cross the uplink under a checksum, and may be lost, late or repeated. A robot repeats its report until it is
 noted. Advice names versions of neighbour lists, and a version never occurs twice. So an old message is either still
-true, or the neighbours whose lists it names detect that it is not. No receiver needs to know which incarnation of the
-coordinator sent it.
+true, or the neighbours with the lists that it names detect that it is not. No receiver needs to know which incarnation
+of the coordinator sent it.
 """
 
 from collections.abc import Callable

@@ -10,7 +10,7 @@ from msgspec import Struct
 
 # Slot of a robot that occupies none.
 NOWHERE: Final = -1
-# Number of hops to the base that stands for unknown.
+# This number of hops to the base means unknown.
 FAR: Final = 1000
 
 
@@ -66,7 +66,7 @@ class PathVector(_Message, frozen=True, tag="path"):
     home: int = FAR
 
 
-# Stands for the path vector of a robot that has sent none.
+# The path vector of a robot that has sent none.
 NO_PATH_VECTOR: Final = PathVector(0, NOWHERE, None)
 
 

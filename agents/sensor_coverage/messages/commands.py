@@ -3,9 +3,9 @@
 Directions are bearings in the frame of the robot that receives or sends the message; the coordinator translates. No
 message contains a position. The only distances are those that a robot drives by its own odometry.
 
-The uplink may lose, repeat, delay and corrupt messages. So a command is sent as a `Request` with a number, again and
-again until it is answered, and an answer is a `Response` to that number. Both are under a checksum. A node that starts
-again has a new random incarnation number.
+The uplink may lose, repeat, delay and corrupt messages. So a command is a `Request` with a number, which is sent again
+until it is answered. An answer is a `Response` to that number. Both have a checksum. A node that starts again has a new
+random incarnation number.
 """
 
 from collections.abc import Callable
@@ -17,8 +17,8 @@ from zwerm.wire.checksum import Sealed
 
 UPLINK: Final = "uplink"
 
-# Ends of drives to walls and along them. There is no wall; there is no way on; the drive has its length; no robot is in
-# sight further on; a robot to meet is in sight.
+# Ends of drives to walls and along them. There is no wall; the way on is blocked; the drive has its full length; no
+# robot further on is in sight; a robot to meet is in sight.
 OPEN: Final = "open"
 SHUT: Final = "shut"
 STRETCH: Final = "stretch"

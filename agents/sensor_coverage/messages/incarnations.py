@@ -1,13 +1,13 @@
-"""Incarnations: how messages of a robot that lost its memory are told from those of its former incarnations.
+"""Incarnations: they distinguish messages of a robot that lost its memory from those of its former incarnations.
 
 Every message between neighbours is in an envelope (`peers.Envelope`) with the incarnation of its sender. So every
-counter in a message is the pair (incarnation, count), and pairs are compared: first the incarnations, by `Incarnations`
-when a packet arrives, then the counts, by the protocol that the counter belongs to. A message to one robot also names
-the incarnation that it is meant for.
+counter in a message is the pair (incarnation, count). `Incarnations` compares the incarnations when a packet arrives.
+Then the protocol that the counter belongs to compares the counts. A message to one robot also names the incarnation
+that it is meant for.
 
-A number that third parties repeat has no envelope of its own: the number of a robot's drive, which its neighbours name
-in their views, and the number of a push, which is the name of a slot. It has the incarnation in its upper bits. Numbers
-of a first incarnation are plain counts.
+A number that third parties repeat has no envelope of its own. There are two: the number of a robot's drive, which its
+neighbours name in their views, and the number of a push, which is the name of a slot. Such a number has the incarnation
+in its upper bits. Numbers of a first incarnation are plain counts.
 """
 
 from typing import Annotated, Final
@@ -19,7 +19,7 @@ COUNT_BITS: Final = 24
 ADOPTED: Final = 1 << 56
 # Bits of a robot's id in the name of an adopted slot.
 NODE_BITS: Final = 20
-# Stands for the incarnation of a receiver that the sender does not know, or of all receivers.
+# Means that the sender does not know the receiver's incarnation, or that the message is for all receivers.
 ANY: Final = 0
 
 Incarnation = Annotated[int, Meta(ge=0, lt=2**32)]
@@ -51,7 +51,8 @@ class Incarnations:
         return incarnation >= self._newest.get(sender, ANY) and receiver in (ANY, self.own)
 
     def is_restart(self, sender: int, incarnation: int) -> bool:
-        """Take in the incarnation of a current message; return whether its sender was heard in a former incarnation."""
+        """Take in the incarnation of a current message; return whether this node received a former incarnation of its
+        sender."""
         known = self._newest.get(sender, ANY)
         self._newest[sender] = incarnation
         return known not in (ANY, incarnation)

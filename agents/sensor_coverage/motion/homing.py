@@ -1,9 +1,9 @@
 """Bearing-only visual homing in the plane: the offset to the goal from which landmarks have the desired bearings.
 
-With g the unit vector towards a landmark as it is seen, and g* as it shall be seen, the gradient of Tron and Daniilidis
-2014 is sum(g - g*). Near the goal it is -M x offset / distance, where M = sum(I - g* g*^T). Division by M is the
-paper's "adaptive gain" (Ramaithitima et al. 2015, section II-D). Landmarks in one line leave one direction of M empty:
-bearings do not determine the offset in that direction.
+Let g be the unit vector towards a landmark as it is seen, and g* as it shall be seen. The gradient of Tron and
+Daniilidis 2014 is sum(g - g*). Near the goal it is -M x offset / distance, where M = sum(I - g* g*^T). Division by M is
+the paper's "adaptive gain" (Ramaithitima et al. 2015, section II-D). Landmarks in one line leave one direction of M
+empty: bearings do not determine the offset in that direction.
 """
 
 import math

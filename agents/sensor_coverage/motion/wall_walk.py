@@ -109,8 +109,9 @@ class WallWalk:
     ) -> DriveToWalk:
         """Follow the wall for `length_m`, in sight of a robot of `keep`, or of any robot if `keep` is empty.
 
-        Ends: STRETCH (`length_m` were followed), LOST (no such robot is in sight further on; the robot stands at the
-        last place with `margin_m` to spare), MET (a robot of `meet` and another one are in sight), SHUT (no wall any more).
+        Ends: STRETCH (`length_m` were followed). LOST (no such robot is in sight further on; the robot stands at the
+        last place with a margin of `margin_m`). MET (a robot of `meet` and another one are in sight). SHUT (no wall any
+        more).
         """
         motion, frame = self._motion, self._motion.frame
         frame.forget()

@@ -26,7 +26,7 @@ HEARTBEAT_TICKS: Final = 100
 class Beaconing(Component):
     """One robot's broadcasts. `heartbeat` is the tick of the next broadcast without any change.
 
-    `waiting` tells whether the robot stands at the base, ready to go.
+    `waiting` is true if the robot stands at the base, ready to go.
     """
 
     channel: ClassVar[str] = CHANNEL

@@ -31,7 +31,7 @@ from zwerm.maths.simplicial import Edge, FlagComplex, edge
 # Cost of a route to a robot that does not know yet whether it is at the frontier. Other robots wait and do not push
 # there.
 DOUBT_COST: Final = 1_000.0
-# Added cost of a route to a robot at a gap: gaps are expanded when no edge can be expanded and no robot is in doubt.
+# Added cost of a route to a robot at a gap. Gaps are expanded when no edge can be expanded and no robot is in doubt.
 GAP_COST: Final = 10_000.0
 
 # A body is seen from the other side if the directions to it differ by more than this [rad].
@@ -136,7 +136,7 @@ class LocalMap(NeighbourTable):
     # --- slots change hands -------------------------------------------------------------------------------------------
 
     def vacate(self) -> None:
-        """Occupy no slot, and forget all that is known of the present one."""
+        """Occupy no slot, and delete all that is known of the present one."""
         self.slot = NOWHERE
         self.redundant = False
         self._references.clear()
@@ -232,10 +232,10 @@ class LocalMap(NeighbourTable):
         self.obstructed = self._count_obstructed(scan)
 
     def _count_obstructed(self, scan: ScanResult) -> int:
-        """Return how many sides and gaps are open here, and closed only by a body behind which nobody has looked.
+        """Return the number of sides and gaps here that are open, or closed only by a body behind which no robot has looked.
 
-        Nobody has to look behind a robot that did not claim a frontier when it died, or whose body a neighbour sees
-        from the other side.
+        No robot must look behind a dead robot that did not claim a frontier when it died. The same holds if a neighbour
+        sees the body from the other side.
         """
         if not self._obstructed:
             return 0
@@ -289,7 +289,7 @@ class LocalMap(NeighbourTable):
         self.change()
 
     def reopen(self) -> None:
-        """Try again all that has failed: somebody is missing, and what was in the way then may be gone."""
+        """Try again all that has failed: a robot is missing, and the obstacle of that time may be gone."""
         log = self._planner.attempt_log
         log.closed, log.failed, log.attempts = {}, {}, {}
         log.blocked.clear()
@@ -323,12 +323,12 @@ class LocalMap(NeighbourTable):
 
     @property
     def to_gap(self) -> bool:
-        """Whether the route leads to a gap."""
+        """True if the route leads to a gap."""
         return self.route is not None and self.route.cost >= GAP_COST
 
     @property
     def has_route(self) -> bool:
-        """Whether there is a route to a frontier, and no nearer robot is in doubt."""
+        """True if there is a route to a frontier, and no nearer robot is in doubt."""
         return self.route is not None and not DOUBT_COST <= self.route.cost < GAP_COST
 
     def next_hop(self) -> int | None:

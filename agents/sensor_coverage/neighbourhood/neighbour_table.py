@@ -1,7 +1,7 @@
 """A robot's table of its neighbours: their states, where it sees them, and its own heading.
 
 Robots announce what they see in one frame, that of the base. Each robot knows its heading from reciprocal bearings. A
-robot that comes out of the depot sees what the base sees. Every sighting names the drive since which it holds, so a
+robot that comes out of the depot sees what the base sees. Every sighting names the drive after which it was made, so a
 robot knows whether two views belong together.
 """
 
@@ -114,14 +114,14 @@ class NeighbourTable:
         self.forget(node)
 
     def restarted(self, node: int) -> None:
-        """Forget a robot that has lost its memory, and where it was seen: it says anew where it stands."""
+        """Forget a robot that has lost its memory, and where it was seen: it will report its slot again."""
         self.forget(node)
         self.seen.pop(node, None)
         self._backs.pop(node, None)
         self._heard_in.pop(node, None)
 
     def at(self, slot: int) -> int | None:
-        """Return the robot at a slot, or None if this robot has heard of none."""
+        """Return the robot at a slot, or None if this robot knows none."""
         if slot == self.slot:
             return self.node
         return next((node for node, state in self.states.items() if state.slot == slot), None)
@@ -184,9 +184,9 @@ class NeighbourTable:
                 self.change()
 
     def find_whether_at_base(self, visible: Iterable[int]) -> None:
-        """After a restart, find out whether this robot stands at the base's point: the base knows its guests.
+        """After a restart, find out whether this robot stands at the base's point: the base knows the robots at its point.
 
-        A robot there sees the base. So it waits until it has heard all `visible` robots.
+        A robot there sees the base. So it waits until it has received messages of all `visible` robots.
         """
         if self.at_base is None and self.samples and all(node in self.states for node in visible):
             base = next((state for state in self.states.values() if state.slot == 0), None)

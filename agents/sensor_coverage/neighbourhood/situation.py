@@ -78,11 +78,11 @@ class Situation:
             self.on_arrived(result)
         return velocity
 
-    # --- what the robot knows of itself -----------------------------------------------------------------------------
+    # --- the robot's own state --------------------------------------------------------------------------------------
 
     @property
     def active(self) -> bool:
-        """Whether the robot drives or averages bearings."""
+        """True if the robot drives or averages bearings."""
         return self._activity is not None
 
     @property
@@ -105,47 +105,47 @@ class Situation:
 
     @property
     def busy(self) -> bool:
-        """Whether the robot drives, averages bearings, or must do so."""
+        """True if the robot drives, averages bearings, or must do so."""
         return self._activity is not None or self.unsure
 
     @property
     def clear(self) -> bool:
-        """Whether the robot stands still, has averaged bearings, and no slot around it changes hands."""
+        """True if the robot stands still, has averaged bearings, and no slot around it changes hands."""
         return not self.busy and not self.local_map.changing(self.bearings, self.tick)
 
     @property
     def stands(self) -> bool:
-        """Whether the robot stands at its slot in the complex, and has nothing else to do."""
+        """True if the robot stands at its slot in the complex, and has nothing else to do."""
         return not (self.local_map.redundant or self.local_map.moving or self.driving or self.in_push)
 
     @property
     def idle(self) -> bool:
-        """Whether the robot is in no push, stands still, and knows its heading."""
+        """True if the robot is in no push, stands still, and knows its heading."""
         return not self.in_push and not self.local_map.moving and self.local_map.heading is not None
 
     @property
     def locked(self) -> bool:
-        """Whether the robot must stand still for a neighbour that leaves."""
+        """True if the robot must stand still for a neighbour that leaves."""
         return self.negotiation is not None and self.negotiation.locked
 
     @property
     def free(self) -> bool:
-        """Whether the robot can take part in a push."""
+        """True if the robot can take part in a push."""
         return self.idle and not self.locked
 
     @property
     def waiting(self) -> bool:
-        """Whether the robot stands at the base, ready to go."""
+        """True if the robot stands at the base, ready to go."""
         return self.local_map.slot == NOWHERE and self.idle and self.local_map.at_base is True
 
     @property
     def homeless(self) -> bool:
-        """Whether the robot has no slot, and is not ready at the base either: it has restarted, or has no heading."""
+        """True if the robot has no slot, and is not ready at the base either: it has restarted, or has no heading."""
         return self.local_map.slot == NOWHERE and not self.in_push and not self.waiting
 
     @property
     def displaced(self) -> bool:
-        """Whether another robot has pushed this robot away from its point of rest."""
+        """True if another robot has pushed this robot away from its point of rest."""
         if self.motion.rest is None:
             return False
         away_m = math.hypot(self.motion.frame.x_m - self.motion.rest[0], self.motion.frame.y_m - self.motion.rest[1])
@@ -153,7 +153,7 @@ class Situation:
 
     @property
     def unsure(self) -> bool:
-        """Whether a visible robot is not averaged yet, or an averaged robot is no longer visible."""
+        """True if a visible robot is not averaged yet, or an averaged robot is no longer visible."""
         motion, frame = self.motion, self.motion.frame
         wanted = 1 if motion.bearing_noise_rad is None else motion.samples
         gone = any(node not in frame.seen for node in self.local_map.seen)

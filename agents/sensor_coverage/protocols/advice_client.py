@@ -1,14 +1,15 @@
 """A robot's end of the uplink to a coordinator that finds redundant robots.
 
-The robot reports its part of the complex once it has been the same for a while, and again, less and less often, until
-the report is noted. A coordinator that starts again asks for reports. While no coordinator answers, no robot leaves,
-and nothing else changes.
+The robot reports its part of the complex once this part has been the same for some time. It repeats the report, less
+and less often, until the coordinator acknowledges it. A coordinator that starts again asks for reports. While no
+coordinator answers, no robot leaves, and nothing else changes.
 
-Why it is safe that a robot leaves on advice: the criterion by which b0 and b1 stay the same depends on its neighbours'
-lists and on nothing else. Advice names the version of each list for which the coordinator found that the criterion
-holds. The robot requests the same locks as if it had found that itself (`leave_lock`), with these versions. A neighbour
-whose list has another version, or which the advice does not name, prevents the departure. So lost, late, repeated or
-wrong advice, and a coordinator that dies, forgets, or misses a push, cost time and cannot open a hole.
+It is safe that a robot leaves on advice. The criterion by which b0 and b1 stay the same depends only on the lists of
+the robot's neighbours. Advice names the version of each list for which the coordinator found that the criterion holds.
+The robot requests the same locks as if it had found that itself (`leave_lock`), with these versions. A neighbour
+prevents the departure if its list has another version, or if the advice does not name it. So lost, late, repeated or
+wrong advice costs time and cannot open a hole. The same holds for a coordinator that dies, loses its memory, or misses
+a push.
 """
 
 from collections.abc import Iterable
@@ -101,7 +102,7 @@ class AdviceClient(Component):
 
     @property
     def _current(self) -> bool:
-        """Whether the report that was sent last still holds."""
+        """True if the report that was sent last still holds."""
         newest, sent = self._newest, self._sent
         return newest is not None and sent is not None and newest == msgspec.structs.replace(sent, number=newest.number)
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 
 class Outgoing(NamedTuple):
-    """A message to one node, or to all that hear the channel if `to` is None."""
+    """A message to one node, or to all that receive the channel if `to` is None."""
 
     to: int | None
     message: Any
@@ -29,7 +29,7 @@ class Component(Protocol):
         return
 
     def restarted(self, node: int, tick: int) -> None:
-        """Forget what a former incarnation of another robot said: it has lost its memory. Its first message follows."""
+        """Forget the messages of a former incarnation of another robot: it has lost its memory. Its first message follows."""
         return
 
     def poll(self, tick: int) -> None:

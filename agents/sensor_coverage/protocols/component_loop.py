@@ -9,7 +9,7 @@ from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.transport.loss_estimate import LossEstimate
 from zwerm.wire.messages import Packet, Transmission
 
-# Sender of a packet on a channel that does not tell it.
+# Sender of a packet on a channel that does not name senders.
 ANONYMOUS = -1
 
 
@@ -17,7 +17,7 @@ class Codec(NamedTuple):
     """Functions that read (None: corrupt) and write the messages of one channel.
 
     With `in_envelopes` the messages are those between neighbours, in envelopes and in copies. Packets of such a channel
-    whose sender is not told are ignored.
+    without a named sender are ignored.
     """
 
     read: Callable[[bytes], Any]
@@ -91,7 +91,7 @@ class ComponentLoop:
         return tuple(sent)
 
     def _transmissions(self, channel: str, outgoing: Outgoing) -> list[Transmission]:
-        """Return the packets of one message: in envelopes, as many copies as the radio's losses ask for."""
+        """Return the packets of one message: in envelopes, with the number of copies that the radio's losses require."""
         codec, (to, message) = self._codecs[channel], outgoing
         if not codec.in_envelopes:
             return [Transmission(channel, codec.write(message), to)]

@@ -1,19 +1,19 @@
 """Locks with which neighbours agree that one of them leaves the complex.
 
-A robot may leave iff the flag complex of the graph that its neighbours induce is non-empty, connected and without holes
-(`zwerm.maths.simplicial.may_leave`): then neither b0 nor b1 changes. It knows that graph from its neighbours' lists.
-Lists may be old, and two neighbours must not leave together. So the robot requests a lock from every neighbour, names
-the version of the list it relies on, and leaves only with a grant from each.
+A robot may leave if and only if the flag complex of the graph that its neighbours induce is non-empty, connected and
+without holes. Then neither b0 nor b1 changes (`zwerm.maths.simplicial.may_leave`). It knows that graph from its
+neighbours' lists. Lists may be old, and two neighbours must not leave together. So the robot requests a lock from every
+neighbour, and names the version of the list it relies on. It leaves only with a grant from each.
 
-Why no loss, delay, copy or crash makes that unsafe: a robot that grants a lock has the list that the requester relies
-on. It neither moves nor leaves nor grants a lock to another robot until the requester releases it or `lease_s` has
-passed since the grant. The requester leaves within half of `lease_s` since its first request, which is before any
-grant. So its neighbours still stand as they stood when they granted, and the edges among them are those of the lists,
-as long as clocks do not differ in pace by a factor of 2. The requester itself sees any other robot that stands there. A
-robot that has left, or moves, or lost its memory less than `lease_s` ago, grants nothing: while it is visible, no
-neighbour leaves.
+No loss, delay, copy or crash makes that unsafe. A robot that grants a lock has the list that the requester relies on.
+It neither moves nor leaves nor grants a lock to another robot until the requester releases it or `lease_s` has passed
+since the grant. The requester leaves within half of `lease_s` since its first request, which is before any grant. So
+its neighbours still stand at the same places as when they granted. The edges among them are those of the lists. This
+holds if the rates of the clocks differ by less than a factor of 2. The requester itself sees any other robot that
+stands there. A robot that has left, or moves, or lost its memory less than `lease_s` ago, grants nothing: while it is
+visible, no neighbour leaves.
 
-Safety is guaranteed. Liveness needs that messages arrive now and then.
+Safety is guaranteed. Liveness requires that some messages arrive.
 """
 
 from collections.abc import Iterable
@@ -77,12 +77,12 @@ class LeaveLock:
 
     @property
     def wants(self) -> bool:
-        """Whether the robot has requested locks, and neither left nor given up."""
+        """True if the robot has requested locks, and neither left nor given up."""
         return self._request is not None
 
     @property
     def stands(self) -> bool:
-        """Whether the robot is in the complex and stands still."""
+        """True if the robot is in the complex and stands still."""
         return self._stands
 
     @property
@@ -108,7 +108,7 @@ class LeaveLock:
         return NeighbourList(self._version, self._listed, self._number if self._request is None else self._number - 1)
 
     def redundant(self) -> bool:
-        """Return whether the robot could leave, if all lists that it knows are true."""
+        """Return whether the robot could leave, if all lists that it knows are correct."""
         lists = {node: each.listed for node, each in self._lists.items()}
         if lists.keys() != set(self._listed) or not all(self._me in each for each in lists.values()):
             return False

@@ -40,9 +40,9 @@ ANNOUNCE_TICKS: Final = (4, 8, 14, 22, 32, 48, 70)
 class LeaveNegotiation(Component):
     """One robot's part. `observe` comes first in every tick in which the robot is awake.
 
-    Set `wanted` before `poll`: the robot is redundant as far as it knows, and shall leave. `versions` are neighbours'
-    list versions for which a coordinator has found that. After `poll`, `left` tells whether the robot left in this
-    tick. `tries` counts failed attempts since `begin`.
+    Set `wanted` before `poll`: the robot is redundant as far as it knows, and is to leave. `versions` are neighbours'
+    list versions for which a coordinator has found that. After `poll`, `left` is true if the robot left in this tick.
+    `tries` counts failed attempts since `begin`.
     """
 
     channel: ClassVar[str] = CHANNEL
@@ -94,12 +94,12 @@ class LeaveNegotiation(Component):
 
     @property
     def locked(self) -> bool:
-        """Whether the robot must stand still."""
+        """True if the robot must stand still."""
         return self._lock is not None and self._lock.locked(self._now_s)
 
     @property
     def stays(self) -> bool:
-        """Whether the robot cannot leave, by lists that are all new."""
+        """True if the robot cannot leave, by lists that are all new."""
         lock = self._lock
         return lock is not None and self._list_requests > 0 and not self._unanswered and not lock.redundant()
 

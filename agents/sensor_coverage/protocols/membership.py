@@ -2,8 +2,8 @@
 
 A robot that has left stays where it stood: it is no neighbour of any robot, and still a landmark for all. The base
 calls it to be the rear of a push, which brings it to the next slot ahead and another robot into unknown space. So no
-robot is lost or counted twice: it has its slot until it leaves, none until it is called, and then the slot of the robot
-ahead.
+robot is lost or counted twice. It has its slot until it leaves, and none until it is called. Then it has the slot of
+the robot ahead.
 """
 
 from typing import Any, ClassVar
@@ -36,7 +36,7 @@ class Membership(Component):
         self._advice_client = advice_client
         self._judged: tuple[object, bool] = None, False  # basis of plans, whether the robot is redundant by it
         self._fenced: tuple[object, tuple[int, ...]] = None, ()  # basis of plans, robots at boundary edges by it
-        self._left = situation.incarnation > 1  # a former incarnation may have left, and did not tell that it is back
+        self._left = situation.incarnation > 1  # a former incarnation may have left, and not reported it
 
     def receive(self, sender: int, message: Any, tick: int) -> None:
         """Take in a message about neighbour lists and locks."""

@@ -6,9 +6,9 @@ slots change hands, the announced route holds until the new occupant announces a
 
 A robot that is no longer at the frontier announces that, and all routes that end there end with it. Otherwise robots
 would try all longer routes there, one after the other. The claims of a slot to be at the frontier are numbered, and the
-numbers pass from occupant to occupant with the slot. So claims are ordered without a clock. An occupant that hears of a
-claim of its slot which is newer than its own continues after that number. Neighbours end the claims of a slot whose
-occupant is dead, or has lost its memory.
+numbers pass from occupant to occupant with the slot. So claims are ordered without a clock. An occupant may receive a
+claim of its slot that is newer than its own. Then it continues after that number. Neighbours end the claims of a slot
+if its occupant is dead, or has lost its memory.
 
 Routes become the shortest once every neighbour's latest message has arrived, in any order and any number of copies. A
 robot that repeats its route gets it through at any loss below 1.
@@ -39,7 +39,7 @@ class PathVectorProtocol:
         self.homes: dict[int, int] = {}
         self._numbers: dict[int, int] = {}  # robot: number of its newest message
         self._routes: dict[int, Route | None] = {}  # slot: the route that begins there
-        self._claims: dict[int, int] = {}  # slot: the newest claim that was heard of
+        self._claims: dict[int, int] = {}  # slot: the newest claim that was received
         self._ended: dict[int, int] = {}  # slot: the newest claim that has ended, the latest news last
         self._claimed_at = 0  # tick of this robot's newest claim
 
@@ -70,7 +70,7 @@ class PathVectorProtocol:
         return self._own(slot) is not None
 
     def newest_claim(self, slot: int) -> int:
-        """Return the number of the newest claim of a slot that was heard of."""
+        """Return the number of the newest received claim of a slot."""
         return self._claims.get(slot, 0)
 
     def take_over(self, slot: int, default: Route | None, claims: int = 0) -> None:

@@ -18,12 +18,12 @@ class PushChain:
 
     @property
     def is_rear(self) -> bool:
-        """Whether this robot is the last of the chain."""
+        """True if this robot is the last of the chain."""
         return self.index == 0
 
     @property
     def leads(self) -> bool:
-        """Whether this robot is the first of the chain."""
+        """True if this robot is the first of the chain."""
         return self.index == len(self.links) - 1
 
     @property

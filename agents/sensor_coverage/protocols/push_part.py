@@ -1,7 +1,7 @@
-"""What one robot of a push knows of it, and the conditions under which it goes on: who stands, and how long it waits.
+"""One robot's knowledge of a push, and its conditions to continue: which robots stand, and how long it waits.
 
-A robot of the chain that is out of range, has lost its memory, or is dead does not keep the others: each waiting time has
-a bound.
+A robot of the chain that is out of range, has lost its memory, or is dead does not stop the others: each waiting time
+has a bound.
 """
 
 import math
@@ -17,8 +17,9 @@ from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 
-# Bounds of the ticks to wait: for the token, for another robot's drive, for the leader to leave or to give up, for the
-# leader's neighbours to agree, for a robot out of range, and for this robot's neighbours to agree at the end.
+# Bounds of the ticks to wait. LINK, WAVE: for the token, and for another robot's drive. VACATED, ARMED, HOLD: for the
+# leader to leave or to give up, and for its neighbours to agree. LOST: for a robot out of range. CLOSE: for this
+# robot's neighbours to agree at the end. TELL: for a robot behind that is out of range at the end.
 LINK_TICKS: Final = 1000
 WAVE_TICKS: Final = 600
 VACATED_TICKS: Final = 80
@@ -50,7 +51,7 @@ class Surroundings(Protocol):
 
     @property
     def clear(self) -> bool:
-        """Whether the robot stands still, has averaged bearings, and no slot around it changes hands."""
+        """True if the robot stands still, has averaged bearings, and no slot around it changes hands."""
 
     @property
     def local_map(self) -> NeighbourTable:
@@ -164,7 +165,7 @@ class PushPart:
         return self._situation.clear or self._waited > HOLD_TICKS
 
     def _may_finish(self) -> bool:
-        # Neighbours hear of the end of the leader's drive one tick later.
+        # Neighbours are informed of the end of the leader's drive one tick later.
         return (self._situation.clear and self._waited > self._chain.leads) or self._waited > CLOSE_TICKS
 
     def _out_of_range(self) -> bool:

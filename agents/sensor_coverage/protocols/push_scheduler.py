@@ -77,7 +77,7 @@ class PushScheduler(Component):
 
     @property
     def idle(self) -> bool:
-        """Whether no push is active."""
+        """True if no push is active."""
         return self._active is None
 
     @property
@@ -87,7 +87,7 @@ class PushScheduler(Component):
 
     @property
     def takes_census(self) -> bool:
-        """Whether the base may begin waves of the census."""
+        """True if the base may begin waves of the census."""
         return self._termination.takes_census and not self.outcome
 
     def see(self, visible: list[int]) -> None:
@@ -121,7 +121,7 @@ class PushScheduler(Component):
             self._end(False)
 
     def poll(self, tick: int) -> None:
-        """Give up a push whose first message was lost, and start the next push if it is time."""
+        """Give up a push if its first message was lost, and start the next push if it is time."""
         mailbox = self._situation.mailbox
         for to, body in mailbox.lost:
             self._map.forget(to)

@@ -1,8 +1,8 @@
 """Robots that have left the complex, and how the base calls them: it pushes from there before it releases another robot.
 
     offer   redundant robot to base, hop by hop, each to the neighbour that is nearest to the base
-    call    base to redundant robot: through the slots that the offer came through, whoever occupies them now
-    end     rear of the push to base: the outcome
+    call    base to redundant robot: through the slots of the offer's path, with the robots that occupy them now end
+    rear of the push to base: the outcome
 
 Each hop is a reliable message, and a robot that forwards one keeps nothing. The base has one push at a time, its own or
 one that it called for, and gives the new slot its number. So no slot has two numbers, and no number two slots. An offer

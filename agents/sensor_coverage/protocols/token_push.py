@@ -1,4 +1,4 @@
-"""One push, as one robot of its path takes part in it: a token searches the leader, and robots move up behind it.
+"""One robot's part in one push: a token searches the leader, and the robots behind the leader move up.
 
     token     base to leader, hop by hop: the token locks the path, rear to front
     ready     leader to its follower: the memory of the leader's slot; then the leader drives into unknown space
@@ -13,8 +13,8 @@ Messages are repeated until they are acknowledged. A robot that waits too long c
 which becomes frontier again. If a leader is back and its follower has come all the same, they occupy the old and the
 new slot.
 
-`PHASES` is the state machine: for each phase, the conditions under which it ends, the action at the end of a drive, and
-the time of the next wake-up.
+`PHASES` is the state machine: for each phase, its end conditions, the action at the end of a drive, and the time of the
+next wake-up.
 """
 
 import math
@@ -44,8 +44,8 @@ from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, WAVE_TICKS, PushPart
 
-# A dead robot's body within this angle [rad] of a drive is expected to stop it, and within this angle of a drive that
-# something stopped without a touch it has stopped it.
+# A dead robot's body within BODY_AHEAD_RAD of a drive's direction is expected to stop the drive. If a drive was stopped
+# without a touch, a dead robot's body within BODY_BESIDE_RAD has stopped it.
 BODY_AHEAD_RAD: Final = 0.3
 BODY_BESIDE_RAD: Final = math.pi / 2.0
 
@@ -114,7 +114,7 @@ class TokenPush(PushPart):
         PHASES[self.phase].arrived(self, result)
 
     def poll(self) -> None:
-        """Take the first transition of the present phase whose condition holds."""
+        """Take the first transition of the present phase that has a true condition."""
         for condition, action in PHASES[self.phase].transitions:
             if condition(self):
                 action(self)
@@ -270,7 +270,7 @@ class TokenPush(PushPart):
         self._situation.correct(self._anchors)
 
     def _settled(self) -> None:
-        """Stand at the new slot, and tell the robot ahead; the leader ends the push."""
+        """Stand at the new slot, and inform the robot ahead; the leader ends the push."""
         self._situation.stand()
         ahead = self._chain.ahead
         if ahead is None:
@@ -289,7 +289,7 @@ class TokenPush(PushPart):
         self._enter("closing")
 
     def _finish(self) -> None:
-        """Tell the robot behind how the push ended; join no other push until that is acknowledged."""
+        """Send the outcome of the push to the robot behind; join no other push until that is acknowledged."""
         if self._map.moving:
             self._situation.stand()
         self.over = self.end is None or self._back is None
@@ -346,7 +346,7 @@ PHASES: Final[Mapping[str, Phase]] = {
     "homing": Phase(arrived=lambda push, _: push._settled()),
     "await": Phase(((TokenPush._waited_for_ahead, lambda push: push.close(PushDone(push.id))),),
                    wake=TokenPush._wake_for_ahead),
-    # All: wait until the view agrees with the neighbours, tell the robot behind, and end.
+    # All: wait until the view agrees with the neighbours, inform the robot behind, and end.
     "closing": Phase(((TokenPush._may_finish, TokenPush._finish),), wake=TokenPush._next_tick),
     "telling": Phase(((TokenPush._out_of_range, TokenPush._drop),), wake=TokenPush._next_tick),
 }

@@ -11,8 +11,17 @@ import pytest
 
 from zwerm.agents.robot_teams.mapping.facts import RIGHT, TOP, End
 from zwerm.agents.robot_teams.protocols.corridor_mates import CorridorMates
-from zwerm.agents.robot_teams.protocols.team_membership import Membership
-from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, SWEEPS, TRAVELS, Beacon, Plan, Status, View
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership
+from zwerm.agents.robot_teams.protocols.team_messages import (
+    HUNTS,
+    READY,
+    SWEEPS,
+    TRAVELS,
+    CorridorPlan,
+    Status,
+    TeamBeacon,
+    View,
+)
 
 DT_S, SILENCE_S = 1.0, 3.0
 ANCHOR = End(0, TOP, 5_000)
@@ -23,8 +32,8 @@ class Corridor:
 
     def __init__(self, count: int, room: int | None = None) -> None:
         self.view = View(2, 0, tuple(range(count)))
-        self.plan = Plan(2, 1, ANCHOR, RIGHT, False, tuple(range(count)))
-        self.members = [Membership(node, DT_S, SILENCE_S) for node in range(count)]
+        self.plan = CorridorPlan(2, 1, ANCHOR, RIGHT, False, tuple(range(count)))
+        self.members = [TeamMembership(node, DT_S, SILENCE_S) for node in range(count)]
         for member in self.members:
             member.view = self.view
             for node in range(count):
@@ -35,7 +44,7 @@ class Corridor:
         self.claims: list[int | None] = [None] * count
         self.hunting: list[int] = []
         self.swept: set[int] = set()
-        self.old: list[Beacon | None] = [None] * count
+        self.old: list[TeamBeacon | None] = [None] * count
         self.dead: list[int] = []
         self.tick = 1
         self.beats = 0
@@ -43,16 +52,16 @@ class Corridor:
     def mates(self, node: int) -> CorridorMates:
         return CorridorMates(self.plan, node, self.members[node], lambda k: False)
 
-    def beacon(self, node: int) -> Beacon:
+    def beacon(self, node: int) -> TeamBeacon:
         self.beats += 1
         plan, team = self.plan, (self.view.epoch, self.view.lead)
         status = Status(
             *(node, self.beats, 0, 0, plan.epoch, plan.number, self.phase[node], ANCHOR, False, False),
             *(self.claims[node], self.found_room[node], None, team),
         )
-        return Beacon(node, (self.members[node].view,), (), (), (status,), 0, 0)
+        return TeamBeacon(node, (self.members[node].view,), (), (), (status,), 0, 0)
 
-    def deliver(self, beacon: Beacon, receiver: int) -> None:
+    def deliver(self, beacon: TeamBeacon, receiver: int) -> None:
         if beacon.sender != receiver and receiver not in self.dead:
             self.members[receiver].receive(beacon, self.tick, near=False)
 

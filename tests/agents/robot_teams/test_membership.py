@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import pytest
 
-from zwerm.agents.robot_teams.protocols.team_membership import Membership, later
-from zwerm.agents.robot_teams.protocols.team_messages import READY, Beacon, Status, View
+from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership, later
+from zwerm.agents.robot_teams.protocols.team_messages import READY, Status, TeamBeacon, View
 
 DT_S, SILENCE_S = 1.0, 3.0
 
@@ -20,8 +20,8 @@ class Team:
     """Some robots, the beacons that they sent, and the time."""
 
     def __init__(self, count: int, together: bool = True) -> None:
-        self.robots = [Membership(node, DT_S, SILENCE_S) for node in range(count)]
-        self.old: list[Beacon | None] = [None] * count
+        self.robots = [TeamMembership(node, DT_S, SILENCE_S) for node in range(count)]
+        self.old: list[TeamBeacon | None] = [None] * count
         self.dead: list[int] = []
         self.tick = 0
         if together:
@@ -32,13 +32,13 @@ class Team:
                 robot.meet_first(0)
             self.heal(2)
 
-    def beacon(self, node: int) -> Beacon:
+    def beacon(self, node: int) -> TeamBeacon:
         robot = self.robots[node]
         team = (robot.view.epoch, robot.view.lead)
         status = Status(node, self.tick, 0, 0, robot.view.epoch, 0, READY, None, False, False, None, None, None, team)
-        return Beacon(node, robot.outgoing(), robot.met(), (), (status,), 0, 0)
+        return TeamBeacon(node, robot.outgoing(), robot.met(), (), (status,), 0, 0)
 
-    def deliver(self, beacon: Beacon, receiver: int, near: bool = True) -> None:
+    def deliver(self, beacon: TeamBeacon, receiver: int, near: bool = True) -> None:
         if beacon.sender != receiver and receiver not in self.dead:
             self.robots[receiver].receive(beacon, self.tick, near)
 

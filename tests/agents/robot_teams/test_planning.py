@@ -2,7 +2,7 @@
 
 import msgspec
 
-from zwerm.agents.robot_teams.mapping.facts import RIGHT, TOP, Arc, End, Segment
+from zwerm.agents.robot_teams.mapping.facts import RIGHT, TOP, End, SweptSegment, TracedArc
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.planning import (
     LINK,
@@ -16,7 +16,7 @@ from zwerm.agents.robot_teams.planning import (
     reservation,
     room,
 )
-from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, Plan, Status, View
+from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, READY, CorridorPlan, Status, View
 
 VIEW = View(2, 0, (0, 1, 2, 3))
 CORNER = End(0, TOP, 5_000)
@@ -26,15 +26,15 @@ def status(node: int, number: int, phase: int = READY, at: End | None = CORNER, 
     return Status(node, 1, 0, 0, VIEW.epoch, number, phase, at, found, False, None, None, None, (VIEW.epoch, VIEW.lead))
 
 
-def plan(number: int, order: tuple[int, ...], epoch: int = 2) -> Plan:
-    return Plan(epoch, number, CORNER, RIGHT, False, order)
+def plan(number: int, order: tuple[int, ...], epoch: int = 2) -> CorridorPlan:
+    return CorridorPlan(epoch, number, CORNER, RIGHT, False, order)
 
 
 def swept(*slices: int) -> SliceMap:
     slice_map = SliceMap()
-    slice_map.merge([Segment(k, 0, 5_000) for k in slices])
+    slice_map.merge([SweptSegment(k, 0, 5_000) for k in slices])
     for k in slices[:-1]:
-        slice_map.add(Arc(End(k, TOP, 5_000), RIGHT, End(k + 1, TOP, 5_000), 950, 0, 0))
+        slice_map.add(TracedArc(End(k, TOP, 5_000), RIGHT, End(k + 1, TOP, 5_000), 950, 0, 0))
     return slice_map
 
 
@@ -75,7 +75,7 @@ def test_free_robots_form_one_corridor_where_there_is_room() -> None:
 
 def test_a_reserved_cell_is_left_to_those_who_work_in_it() -> None:
     slice_map = swept(0, 1)
-    busy = Plan(2, 1, End(1, TOP, 5_000), RIGHT, False, (1, 2, 3))
+    busy = CorridorPlan(2, 1, End(1, TOP, 5_000), RIGHT, False, (1, 2, 3))
     statuses = {node: status(node, 1, HUNTS, End(1, TOP, 5_000)) for node in (1, 2, 3)}
     statuses[0] = status(0, 0, at=End(1, TOP, 5_000))
     assert reservation(slice_map, busy).holds(Task(End(1, TOP, 5_000), RIGHT, False))
@@ -90,7 +90,7 @@ def test_robots_that_began_apart_join_their_maps_first() -> None:
     assert LINK not in [each.anchor.side for each in made]
     statuses[1] = status(1, 0, at=End(7, TOP, 5_000))
     apart = SliceMap()
-    apart.merge([Segment(0, 0, 5_000), Segment(7, 0, 5_000)])
+    apart.merge([SweptSegment(0, 0, 5_000), SweptSegment(7, 0, 5_000)])
     made = assign(apart, View(2, 0, (0, 1)), (), (), statuses, (), False, 6_000)
     assert [each.anchor.side for each in made] == [LINK]
 

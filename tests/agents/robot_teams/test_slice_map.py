@@ -14,23 +14,23 @@ from zwerm.agents.robot_teams.mapping.facts import (
     PASSES,
     RIGHT,
     TOP,
-    Arc,
     End,
     Fact,
-    Segment,
+    SweptSegment,
+    TracedArc,
     Void,
     Wreck,
 )
 from zwerm.agents.robot_teams.mapping.slice_map import TOLERANCE_MM, SliceMap
 
 ENDS = st.builds(End, st.integers(-3, 3), st.sampled_from([TOP, BOTTOM]), st.integers(0, 2_000))
-SEGMENTS = st.builds(Segment, st.integers(-3, 3), st.integers(0, 1_000), st.integers(1_001, 2_000))
-ARCS = st.builds(Arc, ENDS, st.sampled_from([LEFT, RIGHT]), ENDS, st.integers(1, 3_000), st.just(0), st.just(0))
+SEGMENTS = st.builds(SweptSegment, st.integers(-3, 3), st.integers(0, 1_000), st.integers(1_001, 2_000))
+ARCS = st.builds(TracedArc, ENDS, st.sampled_from([LEFT, RIGHT]), ENDS, st.integers(1, 3_000), st.just(0), st.just(0))
 FACTS = st.lists(st.one_of(SEGMENTS, ARCS), max_size=12)
 
 
-def arc(start: End, direction: int, stop: End, length_mm: int = 950) -> Arc:
-    return Arc(start, direction, stop, length_mm, 0, 0)
+def arc(start: End, direction: int, stop: End, length_mm: int = 950) -> TracedArc:
+    return TracedArc(start, direction, stop, length_mm, 0, 0)
 
 
 def known(facts: list[Fact]) -> SliceMap:
@@ -46,7 +46,7 @@ def summary(slice_map: SliceMap) -> object:
 
 def room(slices: int) -> list[Fact]:
     """Return the facts of an empty rectangular room that `slices` slices cross."""
-    facts: list[Fact] = [Segment(k, 0, 5_000) for k in range(slices)]
+    facts: list[Fact] = [SweptSegment(k, 0, 5_000) for k in range(slices)]
     for k in range(slices - 1):
         facts += [arc(End(k, side, y), RIGHT, End(k + 1, side, y)) for side, y in ((TOP, 5_000), (BOTTOM, 0))]
     facts.append(arc(End(0, TOP, 5_000), LEFT, End(0, BOTTOM, 0), 5_500))
@@ -83,7 +83,7 @@ def test_the_order_of_facts_has_no_influence(facts: list[Fact], random: object) 
 
 
 def test_different_sets_have_different_digests() -> None:
-    sets: list[list[Fact]] = [[], [Segment(0, 0, 1)], [Segment(0, 0, 2)], [Segment(1, 0, 1)]]
+    sets: list[list[Fact]] = [[], [SweptSegment(0, 0, 1)], [SweptSegment(0, 0, 2)], [SweptSegment(1, 0, 1)]]
     digests = {known(facts).facts.digest for facts in sets}
     assert len(digests) == 4
 
@@ -106,17 +106,17 @@ def test_the_certificate_names_what_is_open() -> None:
     certificate = slice_map.certificate
     assert certificate.ends_without_mate == (end, End(1, TOP, 5_010))
     assert certificate.open_ports == ((end, LEFT), (End(1, TOP, 5_010), RIGHT))
-    slice_map.add(Segment(0, 0, 5_000))
+    slice_map.add(SweptSegment(0, 0, 5_000))
     assert slice_map.certificate.ends_without_mate == (End(1, TOP, 5_010),)
     assert (mate, LEFT) in slice_map.certificate.open_ports
 
 
 def test_two_measurements_of_an_end_are_one_end() -> None:
     near = End(0, TOP, 5_000 + TOLERANCE_MM)
-    slice_map = known([Segment(0, 0, 5_000), arc(near, RIGHT, End(1, TOP, 5_000))])
+    slice_map = known([SweptSegment(0, 0, 5_000), arc(near, RIGHT, End(1, TOP, 5_000))])
     assert slice_map.end(near) == slice_map.end(End(0, TOP, 5_000)) == End(0, TOP, 5_000)
     assert slice_map.certificate.ends == 3
-    far = known([Segment(0, 0, 5_000), arc(End(0, TOP, 5_001 + TOLERANCE_MM), RIGHT, End(1, TOP, 5_000))])
+    far = known([SweptSegment(0, 0, 5_000), arc(End(0, TOP, 5_001 + TOLERANCE_MM), RIGHT, End(1, TOP, 5_000))])
     assert far.certificate.ends == 4
 
 
@@ -155,13 +155,15 @@ def test_the_route_is_the_shortest_whatever_the_order_of_the_facts() -> None:
 
 
 def test_there_is_no_route_to_where_nothing_leads() -> None:
-    slice_map = known([Segment(0, 0, 1_000), Segment(5, 0, 1_000)])
+    slice_map = known([SweptSegment(0, 0, 1_000), SweptSegment(5, 0, 1_000)])
     assert slice_map.route(End(0, TOP, 1_000), End(5, TOP, 1_000)) is None
     assert End(5, TOP, 1_000) not in slice_map.distances(End(0, TOP, 1_000))
 
 
 def test_what_a_dead_robot_hides_is_not_open() -> None:
-    facts: list[Fact] = [fact for fact in room(3) if not isinstance(fact, Arc) or End(1, TOP, 5_000) not in fact[:3]]
+    facts: list[Fact] = [
+        fact for fact in room(3) if not isinstance(fact, TracedArc) or End(1, TOP, 5_000) not in fact[:3]
+    ]
     assert not known(facts).certificate.complete
     hidden = known([*facts, Void(1, 950, 4_600, 5_400, Wreck(3, 100))]).certificate
     assert all(end != End(1, TOP, 5_000) for end, _ in hidden.open_ports)
@@ -169,7 +171,7 @@ def test_what_a_dead_robot_hides_is_not_open() -> None:
 
 
 def test_a_swept_slice_is_known_by_height() -> None:
-    slice_map = known([Segment(2, 1_000, 3_000)])
+    slice_map = known([SweptSegment(2, 1_000, 3_000)])
     assert slice_map.is_swept(2, 2_000)
     assert not slice_map.is_swept(2, 6_000)
     assert not slice_map.is_swept(3, 2_000)

@@ -1,17 +1,27 @@
 """The virtual frontier: sweeps end at it, what it leaves is open, and a later sweep past it makes it count for nothing."""
 
-from zwerm.agents.robot_teams.mapping.facts import BOTTOM, LEFT, RIGHT, TOP, Arc, Cut, End, Fact, Segment
+from zwerm.agents.robot_teams.mapping.facts import (
+    BOTTOM,
+    LEFT,
+    RIGHT,
+    TOP,
+    End,
+    Fact,
+    FrontierCut,
+    SweptSegment,
+    TracedArc,
+)
 from zwerm.agents.robot_teams.mapping.slice_map import ACROSS, SliceMap
 from zwerm.agents.robot_teams.planning import Task, open_tasks, room
-from zwerm.agents.robot_teams.protocols.team_messages import Plan
-from zwerm.agents.robot_teams.virtual_frontier import Frontier, Frontiers
+from zwerm.agents.robot_teams.protocols.team_messages import CorridorPlan
+from zwerm.agents.robot_teams.virtual_frontier import Frontier, TeamFrontier
 
 LINE_MM = 2_000
-LOWER, UPPER = Cut(1, LINE_MM).ends
+LOWER, UPPER = FrontierCut(1, LINE_MM).ends
 
 
-def arc(start: End, direction: int, stop: End) -> Arc:
-    return Arc(start, direction, stop, 950, 0, 0)
+def arc(start: End, direction: int, stop: End) -> TracedArc:
+    return TracedArc(start, direction, stop, 950, 0, 0)
 
 
 def walls() -> list[Fact]:
@@ -28,7 +38,7 @@ def known(*facts: Fact) -> SliceMap:
 
 
 def test_what_a_frontier_leaves_lacks_a_mate_and_has_no_ports() -> None:
-    slice_map = known(*walls(), Segment(0, 0, 5_000), Segment(1, LINE_MM, 5_000), Cut(1, LINE_MM))
+    slice_map = known(*walls(), SweptSegment(0, 0, 5_000), SweptSegment(1, LINE_MM, 5_000), FrontierCut(1, LINE_MM))
     certificate = slice_map.certificate
     assert certificate.ends_without_mate == (End(1, BOTTOM, 0), LOWER)
     assert certificate.open_ports == ()
@@ -37,14 +47,14 @@ def test_what_a_frontier_leaves_lacks_a_mate_and_has_no_ports() -> None:
 
 
 def test_both_parts_swept_are_complete_and_so_is_a_sweep_past_the_frontier() -> None:
-    cut: list[Fact] = [*walls(), Segment(0, 0, 5_000), Segment(1, LINE_MM, 5_000), Cut(1, LINE_MM)]
-    assert known(*cut, Segment(1, 0, LINE_MM)).certificate.complete
-    assert known(*cut, Segment(1, 0, 5_000)).certificate.complete
+    cut: list[Fact] = [*walls(), SweptSegment(0, 0, 5_000), SweptSegment(1, LINE_MM, 5_000), FrontierCut(1, LINE_MM)]
+    assert known(*cut, SweptSegment(1, 0, LINE_MM)).certificate.complete
+    assert known(*cut, SweptSegment(1, 0, 5_000)).certificate.complete
     assert not known(*cut).certificate.complete
 
 
 def test_a_way_leads_across_the_frontier() -> None:
-    slice_map = known(Segment(1, LINE_MM, 5_000), Segment(1, 0, LINE_MM), Cut(1, LINE_MM))
+    slice_map = known(SweptSegment(1, LINE_MM, 5_000), SweptSegment(1, 0, LINE_MM), FrontierCut(1, LINE_MM))
     route = slice_map.route(End(1, TOP, 5_000), End(1, BOTTOM, 0))
     assert route is not None
     assert [step.direction for _, step in route] == [0, ACROSS, 0]
@@ -53,22 +63,24 @@ def test_a_way_leads_across_the_frontier() -> None:
 def test_an_end_of_the_boundary_at_the_frontier_keeps_its_ports() -> None:
     """The floor lies a little below the line: the ends there were measured as one, and the boundary counts."""
     floor = End(1, BOTTOM, LINE_MM - 50)
-    slice_map = known(Segment(1, LINE_MM, 5_000), Cut(1, LINE_MM), arc(floor, RIGHT, End(2, BOTTOM, LINE_MM)))
+    slice_map = known(
+        SweptSegment(1, LINE_MM, 5_000), FrontierCut(1, LINE_MM), arc(floor, RIGHT, End(2, BOTTOM, LINE_MM))
+    )
     assert not slice_map.is_virtual(floor)
     assert (floor, LEFT) in slice_map.certificate.open_ports
 
 
 # --- the lead's frontier ----------------------------------------------------------------------------------------------
 
-TIP = Arc(End(3, BOTTOM, 3_000), RIGHT, End(3, TOP, 1_000), 2_500, 3_200, LINE_MM)
+TIP = TracedArc(End(3, BOTTOM, 3_000), RIGHT, End(3, TOP, 1_000), 2_500, 3_200, LINE_MM)
 
 
-def plan(first: int, count: int = 2, direction: int = RIGHT, y_mm: int = 5_000) -> Plan:
-    return Plan(2, 1, End(first, TOP, y_mm), direction, True, tuple(range(count)))
+def plan(first: int, count: int = 2, direction: int = RIGHT, y_mm: int = 5_000) -> CorridorPlan:
+    return CorridorPlan(2, 1, End(first, TOP, y_mm), direction, True, tuple(range(count)))
 
 
 def test_a_forward_convex_critical_point_begins_a_frontier_for_later_corridors() -> None:
-    frontiers = Frontiers(known(TIP))
+    frontiers = TeamFrontier(known(TIP))
     assert frontiers.limited(plan(4)).frontier_mm is None
     frontiers.judge(plan(2))
     assert frontiers.frontier == Frontier(LINE_MM, 4, RIGHT)
@@ -79,23 +91,30 @@ def test_a_forward_convex_critical_point_begins_a_frontier_for_later_corridors()
 
 
 def test_a_reverse_or_concave_critical_point_begins_none() -> None:
-    concave = Arc(End(3, TOP, 3_000), RIGHT, End(3, BOTTOM, 1_000), 2_500, 3_200, LINE_MM)
+    concave = TracedArc(End(3, TOP, 3_000), RIGHT, End(3, BOTTOM, 1_000), 2_500, 3_200, LINE_MM)
     for facts in ((concave,), (TIP._replace(direction=LEFT),)):
-        frontiers = Frontiers(known(*facts))
+        frontiers = TeamFrontier(known(*facts))
         frontiers.judge(plan(2))
         assert frontiers.frontier is None
 
 
 def test_a_frontier_ends_at_the_first_slice_that_an_obstacle_cuts_off() -> None:
     slice_map = known(TIP)
-    frontiers = Frontiers(slice_map)
+    frontiers = TeamFrontier(slice_map)
     frontiers.judge(plan(2))
     corridor = frontiers.limited(plan(4))
-    slice_map.merge([Segment(4, LINE_MM, 5_000), Cut(4, LINE_MM), Segment(5, LINE_MM, 5_000), Cut(5, LINE_MM)])
+    slice_map.merge(
+        [
+            SweptSegment(4, LINE_MM, 5_000),
+            FrontierCut(4, LINE_MM),
+            SweptSegment(5, LINE_MM, 5_000),
+            FrontierCut(5, LINE_MM),
+        ]
+    )
     frontiers.judge(corridor)
     assert frontiers.frontier is not None
-    assert frontiers.is_reserved(Cut(4, LINE_MM).ends[0])
-    slice_map.merge([Segment(6, 3_500, 5_000)])
+    assert frontiers.is_reserved(FrontierCut(4, LINE_MM).ends[0])
+    slice_map.merge([SweptSegment(6, 3_500, 5_000)])
     frontiers.judge(frontiers.limited(plan(6, count=1)))
     assert frontiers.frontier is None
-    assert not frontiers.is_reserved(Cut(4, LINE_MM).ends[0])
+    assert not frontiers.is_reserved(FrontierCut(4, LINE_MM).ends[0])

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from zwerm.agents.robot_teams.mapping.facts import BOTTOM, LEFT, RIGHT, TOP
-from zwerm.agents.robot_teams.motion.manoeuvres import Grid, hand_of
+from zwerm.agents.robot_teams.motion.manoeuvres import SliceGrid, hand_of
 from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGHT_HAND, WallFollower
 
 UP, DOWN, EAST, WEST = (0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0)
@@ -67,6 +67,6 @@ def test_the_hand_follows_from_side_and_direction(side: int, direction: int, han
 
 
 def test_the_nearest_slice_is_by_its_line() -> None:
-    grid = Grid(0.5, 0.95)
+    grid = SliceGrid(0.5, 0.95)
     assert grid.x_m(2) == pytest.approx(2.4)
     assert [grid.nearest(x) for x in (0.5, 0.97, 0.98, -0.5)] == [0, 0, 1, -1]

@@ -5,11 +5,11 @@ from zwerm.agents.robot_teams.mapping.facts import (
     LEFT,
     RIGHT,
     TOP,
-    Arc,
     End,
     Fact,
     Return,
-    Segment,
+    SweptSegment,
+    TracedArc,
     Void,
     Wreck,
 )
@@ -71,12 +71,12 @@ def known(facts: list[Fact]) -> SliceMap:
     return slice_map
 
 
-def arc(start: End, direction: int, stop: End, *wrecks: Wreck) -> Arc:
-    return Arc(start, direction, stop, 950, 0, 0, wrecks)
+def arc(start: End, direction: int, stop: End, *wrecks: Wreck) -> TracedArc:
+    return TracedArc(start, direction, stop, 950, 0, 0, wrecks)
 
 
 def room(slices: int) -> list[Fact]:
-    facts: list[Fact] = [Segment(k, 0, 5_000) for k in range(slices)]
+    facts: list[Fact] = [SweptSegment(k, 0, 5_000) for k in range(slices)]
     for k in range(slices - 1):
         facts += [arc(End(k, side, y), RIGHT, End(k + 1, side, y)) for side, y in ((TOP, 5_000), (BOTTOM, 0))]
     facts.append(arc(End(0, TOP, 5_000), LEFT, End(0, BOTTOM, 0)))
@@ -85,7 +85,9 @@ def room(slices: int) -> list[Fact]:
 
 
 def test_what_a_wreck_hides_is_open_again_once_the_robot_lived_later() -> None:
-    facts: list[Fact] = [fact for fact in room(3) if not isinstance(fact, Arc) or End(1, TOP, 5_000) not in fact[:3]]
+    facts: list[Fact] = [
+        fact for fact in room(3) if not isinstance(fact, TracedArc) or End(1, TOP, 5_000) not in fact[:3]
+    ]
     hidden: list[Fact] = [
         *facts,
         Void(1, 950, 4_600, 5_400, WRECK),
@@ -100,7 +102,7 @@ def test_what_a_wreck_hides_is_open_again_once_the_robot_lived_later() -> None:
 
 
 def test_a_later_wreck_of_a_robot_that_returned_holds() -> None:
-    facts: list[Fact] = [fact for fact in room(1) if not isinstance(fact, Arc)]
+    facts: list[Fact] = [fact for fact in room(1) if not isinstance(fact, TracedArc)]
     voids: list[Fact] = [Void(0, 0, 4_600, 5_400, WRECK), Void(0, 0, -400, 400, Wreck(3, 300))]
     slice_map = known([*facts, *voids, Return(3, 200)])
     assert slice_map.voids == voids[1:]
@@ -108,7 +110,7 @@ def test_a_later_wreck_of_a_robot_that_returned_holds() -> None:
 
 def test_a_way_through_a_wreck_is_closed_and_the_way_around_it_is_taken() -> None:
     """The wreck lies on slice 1; robots have traced around it from above, and the segment ends there now."""
-    facts = [*room(3), Void(1, 950, 2_500, 3_500, WRECK), Segment(1, 3_540, 5_000, (WRECK,))]
+    facts = [*room(3), Void(1, 950, 2_500, 3_500, WRECK), SweptSegment(1, 3_540, 5_000, (WRECK,))]
     slice_map = known(facts)
     assert slice_map.certificate.complete
     mate = slice_map.mate(End(1, TOP, 5_000))
@@ -121,7 +123,7 @@ def test_a_way_through_a_wreck_is_closed_and_the_way_around_it_is_taken() -> Non
 
 
 def test_what_no_way_leads_to_counts_only_from_where_a_way_is_open() -> None:
-    beyond: list[Fact] = [Segment(9, 0, 5_000)]
+    beyond: list[Fact] = [SweptSegment(9, 0, 5_000)]
     slice_map = known([*room(2), *beyond])
     assert not slice_map.certificate.complete
     assert slice_map.complete_from(End(0, TOP, 5_000))
@@ -131,7 +133,7 @@ def test_what_no_way_leads_to_counts_only_from_where_a_way_is_open() -> None:
 
 
 def test_an_end_that_a_robot_swept_past_counts_for_nothing() -> None:
-    grazed = [*room(2), arc(End(0, TOP, 5_000), RIGHT, End(1, TOP, 2_500)), Segment(1, 0, 2_500)]
+    grazed = [*room(2), arc(End(0, TOP, 5_000), RIGHT, End(1, TOP, 2_500)), SweptSegment(1, 0, 2_500)]
     assert known(grazed).certificate.complete
     beside = [*room(2), arc(End(0, TOP, 5_000), RIGHT, End(1, TOP, 6_500))]
     assert not known(beside).certificate.complete

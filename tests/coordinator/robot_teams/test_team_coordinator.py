@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from zwerm.agents.robot_teams.protocols.central_membership import CoordinatedMembership, CoordinatorMembership
-from zwerm.agents.robot_teams.protocols.team_messages import READY, Beacon, Status, View
+from zwerm.agents.robot_teams.protocols.team_messages import READY, Status, TeamBeacon, View
 from zwerm.run.runner import run
 from zwerm.scenario.load import tables_of, validate
 from zwerm.scenario.tables import Scenario
@@ -57,9 +57,9 @@ def test_the_trace_is_the_same_inline_and_in_processes_and_another_with_another_
 COORDINATOR = 3
 
 
-def beacon(sender: int, tick: int, *views: View) -> Beacon:
+def beacon(sender: int, tick: int, *views: View) -> TeamBeacon:
     status = Status(sender, tick, 0, 0, 1, 0, READY, None, False, False, None, None, None, (1, 0))
-    return Beacon(sender, views, (), (), (status,), 0, 0)
+    return TeamBeacon(sender, views, (), (), (status,), 0, 0)
 
 
 def test_the_coordinator_takes_in_what_it_hears_and_drops_the_silent() -> None:

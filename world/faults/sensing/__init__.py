@@ -25,7 +25,7 @@ class SensingFaultTable(FaultTable):
 
 
 class SensingFault(Fault):
-    """A fault of the sensors of some robots. `hit` (robots,) tells which."""
+    """A fault of the sensors of some robots. `hit` (robots,) is true for these robots."""
 
     Parameters: ClassVar[type[FaultTable]] = SensingFaultTable
     alters_sensors: ClassVar[bool] = True

@@ -4,8 +4,8 @@ The multi-wall model of COST 231 (Digital mobile radio towards future generation
 floors. Losses are for one wall at 2.4 GHz, near the middle of published values (COST 231; ITU-R P.2040; ITU-R P.1238).
 The arena has no materials: `regions` give one to the walls within a rectangle, all others have `material`.
 
-Without `margin_db` the model drops nothing, and a `path_loss` that follows uses the attenuation. With `margin_db`, a packet
-passes if the walls attenuate it by no more than that.
+Without `margin_db` the model drops nothing, and a `path_loss` that follows uses the attenuation. With `margin_db`, a
+packet passes if the walls attenuate it by at most that.
 """
 
 from typing import ClassVar, Final, Literal

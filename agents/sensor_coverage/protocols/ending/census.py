@@ -1,21 +1,21 @@
 """A census by which the base station detects the end of the deployment, over links between neighbours.
 
-A wave starts at the base. Each robot joins it when it first hears of it, and that neighbour is its parent. Once all
-neighbours of a robot have joined and its children have counted, the robot counts too: robots, frontier claims, and the
-latest wave in which any of them was disturbed (propagation of information with feedback, Segall 1983). A robot is
-disturbed when it claims a frontier, is busy, or sees neighbours come or go. A robot that lacks an answer asks again, so
-a lost message costs only time.
+A wave starts at the base. Each robot joins it with the first message of it; the sender of that message is its parent. A
+robot counts once all its neighbours have joined and its children have counted. It counts robots, frontier claims, and
+the latest wave in which any of them was disturbed. This is propagation of information with feedback (Segall 1983). A
+robot is disturbed when it claims a frontier, is busy, or sees neighbours come or go. A robot that lacks an answer asks
+again, so a lost message costs only time.
 
-The base concludes after two waves without claims, which counted the same robots in the same incarnations, and since the
-first of which no robot was disturbed: between the two waves there was a moment at which all robots were quiet. A
-message in flight between two robots must keep one of them busy. So a conclusion is wrong only in two cases: a robot was
-no neighbour of any counted robot, or robots lost their memory in both waves and late messages of their earlier
-incarnations were accepted.
+The base concludes after two waves without claims, under two conditions. Both waves counted the same robots in the same
+incarnations, and no robot was disturbed since the first. Then all robots were quiet at some moment between the two
+waves. A message in flight between two robots must keep one of them busy. So a conclusion is wrong only in two cases. In
+the first, a robot was no neighbour of any counted robot. In the second, robots lost their memory in both waves, and
+late messages of their earlier incarnations were accepted.
 
-A conclusion says nothing of robots that no wave reached. So tallies name the counted robots, and the robots that one of
-them declares dead: it sees the body, and asked in vain for longer than any living robot is silent. Whoever was let out
-and is neither is `missing`. Waves and tallies carry the roster of all robots that were let out, so that a base that lost
-its memory learns it from any of them.
+A conclusion gives no information about robots that no wave reached. So tallies name the counted robots, and the robots
+that one of these declares dead. It sees the body, and its requests had no answer for longer than any living robot is
+silent. A released robot that is neither counted nor dead is `missing`. Waves and tallies carry the roster of all
+released robots. So a base that lost its memory learns the roster from any of them.
 """
 
 from collections.abc import Iterable
@@ -69,12 +69,12 @@ class Census:
 
     @property
     def concluded(self) -> bool:
-        """Whether the base has concluded that all was quiet, and was not disturbed since."""
+        """True if the base has concluded that all was quiet, and was not disturbed since."""
         return self._concluded
 
     @property
     def waits(self) -> bool:
-        """Whether the robot has joined a wave and lacks an answer."""
+        """True if the robot has joined a wave and lacks an answer."""
         return self._number > 0 and self._counted is None
 
     @property
@@ -94,7 +94,7 @@ class Census:
         self._roster |= robot_set(robots)
 
     def restarted(self, node: int) -> None:
-        """Forget what a former incarnation of a neighbour answered; a moment without it was not quiet."""
+        """Forget the answers of a neighbour's former incarnation; a moment without it was not quiet."""
         self._joined.pop(node, None)
         self._tallies.pop(node, None)
         self._disturbed = self._number

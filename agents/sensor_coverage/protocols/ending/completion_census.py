@@ -17,7 +17,7 @@ WAVE_TICKS: Final = 60
 
 
 class CompletionProtocol(Component):
-    """One robot's part in the census. `asks` tells whether the base may begin waves in this tick."""
+    """One robot's part in the census. `asks` is true if the base may begin waves in this tick."""
 
     channel: ClassVar[str] = CHANNEL
     accepts: ClassVar[tuple[type, ...]] = (CensusWave, CensusTally)
@@ -35,7 +35,7 @@ class CompletionProtocol(Component):
 
     @property
     def concluded(self) -> bool:
-        """Whether the base has concluded that all was quiet."""
+        """True if the base has concluded that all was quiet."""
         return self._census.concluded
 
     @property
@@ -62,7 +62,7 @@ class CompletionProtocol(Component):
         self._census.let_out(robots)
 
     def restarted(self, node: int, tick: int) -> None:
-        """Forget what a former incarnation of a neighbour answered."""
+        """Forget the answers of a neighbour's former incarnation."""
         self._census.restarted(node)
 
     def update(

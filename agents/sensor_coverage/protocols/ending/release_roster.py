@@ -8,7 +8,7 @@ from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
 class ReleaseRoster:
     """`known` are the robots that were ever in sight of the base: each robot that comes out of the depot is, at once.
 
-    A base that has restarted knows only those who say so to stand at its point: others may have restarted, too.
+    A base that has restarted knows only the robots that report to stand at its point: others may have restarted, too.
     """
 
     def __init__(self, first_incarnation: bool) -> None:

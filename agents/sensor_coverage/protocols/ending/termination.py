@@ -1,9 +1,9 @@
-"""How the base ends a decentralised deployment: covered, by a census with nobody missing, or failed, with the reason.
+"""The end of a decentralised deployment: covered, by a census in which no robot is missing, or failed, with the reason.
 
-The base takes the census when no path has led to a frontier for some time. A census that concludes counts every robot
-that was let out as present, or as dead with a witness; then all is covered. If somebody is missing, the base has all
-robots try again what had failed, a few times, and then gives up. It also gives up when nothing has come of any attempt
-for a long time. It never reports success because time has passed.
+The base takes the census when no path has led to a frontier for some time. If the census counts every released robot as
+present, or as dead with a witness, all is covered. If a robot is missing, the base lets all robots repeat the failed
+attempts, a few times, and then gives up. It also gives up when no attempt has had success for a long time. It never
+reports success because time has passed.
 """
 
 from collections.abc import Iterable
@@ -15,7 +15,7 @@ COVERED: Final = "covered"
 
 # Ticks without a frontier before the census.
 QUIET_TICKS: Final = 60
-# Ticks that a robot may be missing before a search: one that is down for a while, or whose death has no witness yet.
+# Ticks that a robot may be missing before a search. It may be down for some time, or its death may have no witness yet.
 MISSING_TICKS: Final = 900
 SEARCHES_MAX: Final = 2
 # Ticks without any progress after which the base gives up.

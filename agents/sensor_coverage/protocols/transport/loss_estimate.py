@@ -1,8 +1,8 @@
-"""How many messages of its neighbours a robot misses, and how many copies of its own it sends for that.
+"""The share of its neighbours' messages that a robot misses, and the number of copies of its own that it sends for that.
 
 Each sender numbers its broadcasts, and says how many copies it sends. A receiver counts the copies that arrive, and the
-broadcasts between them that do not. Losses are nearly the same in both directions, so a robot sends as many copies as
-make the loss of all of them rare. A radio without losses carries no copy.
+broadcasts between them that do not. Losses are nearly the same in both directions. So a robot sends enough copies that
+the loss of all of them is rare. A radio without losses carries no copy.
 """
 
 from typing import Final

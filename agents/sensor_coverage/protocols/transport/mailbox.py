@@ -41,7 +41,7 @@ class ReliableMailbox(Component):
 
     @property
     def empty(self) -> bool:
-        """Whether every body was acknowledged or given up."""
+        """True if every body was acknowledged or given up."""
         return not any(queue.bodies for queue in self._queues.values())
 
     def write(self, to: int, body: Body) -> None:

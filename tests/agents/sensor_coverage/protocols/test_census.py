@@ -173,7 +173,7 @@ class Hurried(Census):
 
 
 def handed_around(kind: type[Census], seed: int, loss: float) -> bool:
-    """Let one claim wander through the swarm; tell whether the base concludes that there is none."""
+    """Let one claim wander through the swarm; return whether the base concludes that there is none."""
     swarm = Swarm(lattice(3), seed, loss=loss, delay_ticks=2)
     swarm.robots = {node: kind(node, POLL_S, EVERY_S, node, base=node == 0) for node in swarm.graph}
     holder = 8
@@ -197,7 +197,7 @@ def test_a_census_that_ignores_disturbed_robots_misses_a_moving_claim() -> None:
 
 
 def broken_links(seed: int, faults: dict[str, float], amnesia: float) -> bool:
-    """Let a robot that claims be in reach now by one neighbour and now by another; tell whether the base concludes."""
+    """Let a robot that claims be in reach now by one neighbour and now by another; return whether the base concludes."""
     swarm = Swarm({0: [1, 2], 1: [0, 2, 3], 2: [0, 1, 3], 3: [1, 2]}, seed, **faults)  # type: ignore[arg-type]
     swarm.claims[3] = 1
     for _ in range(400):
