@@ -92,9 +92,9 @@ ROWS = [
     Row(
         "A picture layer",
         "centre.py",
-        ("zwerm/view/centre.py",),
+        ("zwerm/view/layers/centre.py",),
         'name="computation_free",',
-        'layers=("zwerm.view.centre:Centre",),',
+        'layers=("zwerm.view.layers.centre:Centre",),',
         {"--set 'pictures.layers=[\"centre:Centre\"]'": ""},
     ),
     Row(
