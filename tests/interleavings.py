@@ -1,13 +1,13 @@
 """Every interleaving of the redundancy protocol on a small graph, by explicit exploration of its states.
 
-The network is the set of all messages ever sent: any of them can be delivered at any time and as often as one likes, or
-never, which is loss, delay, reordering and duplication at once. Robots ask, give up, leave, look around, lose their memory,
-come and are moved by others whenever they can; time is a few ticks. A robot's state is interned, and what an event does to
-it is computed once.
+The network is the set of all messages ever sent. Any of them can be delivered at any time, any number of times, or
+never. This is loss, delay, reordering and duplication at once. Robots ask, give up, leave, look around, lose their
+memory, come and are moved by others whenever they can. Time is a few ticks. A robot's state is interned, and the effect
+of an event on it is computed once.
 
-What cannot matter is left out: a denial does what giving up does, which robots do anyway; a grant only ever allows more, so it
-arrives at once (a robot need not use it); what a list tells of wishes, messages tell that were sent too; and a message that
-its receiver will ignore for ever is forgotten.
+Events without influence are left out. A denial has the effect of giving up, which robots do anyway. A grant only allows
+more, so it arrives at once; a robot need not use it. The leave requests in a list are also in messages that were sent.
+A message that its receiver will always ignore is deleted.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,7 +32,7 @@ Graph = Mapping[int, tuple[int, ...]]
 
 
 class Budget(NamedTuple):
-    """How often what may happen does, in one life of the swarm."""
+    """The largest number of each kind of event in one run of the swarm."""
 
     asks: tuple[int, ...]  # one each of these robots
     ticks: int = 0

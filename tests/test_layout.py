@@ -1,4 +1,4 @@
-"""How the project is laid out and what its code may not do: each rule a small scan, each exception with its reason."""
+"""The layout of the project and the limits of its code: each rule is a small scan, each exception has its reason."""
 
 import ast
 import importlib.metadata
@@ -92,7 +92,7 @@ def bare_imports(tree: ast.Module) -> Iterator[Finding]:
 
 
 def imports_beyond_the_robot(tree: ast.Module) -> Iterator[Finding]:
-    """What runs on a robot knows neither the world nor the coordinator nor who started it.
+    """Code of a robot imports neither the world nor the coordinator nor the code that starts it.
 
     Nor does it import the package itself, which offers all of that under its own name.
     """
@@ -133,7 +133,7 @@ def global_randomness(tree: ast.Module) -> Iterator[Finding]:
 
 SET_MAKERS = ("set", "frozenset")
 SET_METHODS = ("union", "intersection", "difference", "symmetric_difference", "copy")
-# What may look into a set: its result does not depend on the order.
+# Functions that may iterate over a set: their result does not depend on the order.
 ORDER_BLIND = ("sorted", "len", "min", "max", "any", "all", "set", "frozenset", "bool")
 
 

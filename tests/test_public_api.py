@@ -15,7 +15,7 @@ import zwerm
 
 HEAVY = ("pydantic", "shapely", "pymunk", "zenoh", "scipy", "PIL", "matplotlib", "pandas", "zwerm.world")
 
-# What README and documentation import besides `zwerm`, and why.
+# The modules besides `zwerm` that README and documentation import, with the reason.
 DOCUMENTED: dict[str, str] = {
     "zwerm.scenario.types": "the types of parameters of plug-ins: NonNegative, Rectangle",
     "zwerm.agents.landmark_exploration.mapping.map_file": "reading and writing the map files of landmark exploration",

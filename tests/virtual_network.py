@@ -1,7 +1,8 @@
 """A simulated network: connections, clocks and deaths of robots as events in virtual time, each run a function of its seed.
 
-The drivers, the world, the nodes and the admission of nodes are the real ones. Link, transport and processes are replaced:
-latency, a cable that is cut and heals, a lease that ends, a process that is killed or hangs, a program that returns.
+The drivers, the world, the nodes and the admission of nodes are the real ones. Link, transport and processes are
+replaced. The replacements have latency, a cable that is cut and repaired, and a lease that ends. A process may be
+killed or hang, and a program may return.
 """
 
 import heapq
@@ -67,7 +68,8 @@ class VirtualNetwork:
     # --- failures ---------------------------------------------------------------------------------------------------
 
     def cut(self, nodes: Sequence[int], at_s: float, for_s: float) -> None:
-        """Cut the cable to `nodes` at a time, and mend it after `for_s`. Their programs then try to go on, or to join again."""
+        """Cut the cable to `nodes` at a time, and repair it after `for_s`. Their programs then try to go on, or to join
+        again."""
 
         def begin() -> None:
             for node in nodes:
@@ -161,7 +163,7 @@ class VirtualNetwork:
         heapq.heappush(self._events, (time_s, next(self._number), happen))
 
     def _later(self, direction: str, node: int, happen: Callable[[], None]) -> None:
-        """Let a message take its time: in order, and over a cut cable not before it is mended, if the connection lives then."""
+        """Delay a message: in order, and over a cut cable until the repair, if the connection is alive then."""
         time_s = max(self.now + self._random.uniform(0.0001, 0.02), self._cut.get(node, 0.0))
         time_s = max(time_s, self._last.get((direction, node), 0.0))
         self._last[direction, node] = time_s

@@ -1,4 +1,4 @@
-"""The result of a run is printed, whole and alone, whatever else is printed and whatever file cannot be written."""
+"""The result of a run is printed complete and alone, also when a file cannot be written."""
 
 import json
 from pathlib import Path

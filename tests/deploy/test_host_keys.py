@@ -60,7 +60,7 @@ def test_each_file_holds_the_secrets_of_its_own_host_only(keys: Path) -> None:
 
 
 @pytest.mark.parametrize("protocol", ["tls", "quic"])
-def test_two_hosts_join_with_their_own_files_and_nobody_else_does(
+def test_two_hosts_join_with_their_own_files_and_no_other_host_does(
     keys: Path, protocol: str, nothing_left: None
 ) -> None:
     endpoint = f"{protocol}/localhost:{free_port()}"

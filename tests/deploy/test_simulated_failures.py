@@ -89,7 +89,7 @@ def test_a_single_cut_cable_is_named_within_the_lease_for_any_number_of_robots(m
         assert network.now <= 0.1 + NAMED_WITHIN_S
 
 
-def test_in_real_time_no_lost_robot_moves_again_whatever_returns(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_in_real_time_no_lost_robot_moves_again_after_any_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     moved = 0.0
     for seed in SEEDS[:60]:
         tables = scenario(robots={"count": ROBOTS, "on_crash": "continue"}, time={"duration_s": 30.0, "dt_s": 0.5})

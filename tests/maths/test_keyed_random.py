@@ -39,7 +39,7 @@ def test_a_draw_does_not_depend_on_what_was_drawn_before() -> None:
     assert (used.uniform("sight", np.arange(10), 3) == fresh).all()
 
 
-def test_adding_a_robot_changes_nobody_elses_draws() -> None:
+def test_adding_a_robot_changes_no_other_robots_draws() -> None:
     draws = Draws(5)
     many = draws.normal("sight", np.arange(50), 3)
     assert (draws.normal("sight", np.arange(49), 3) == many[:49]).all()

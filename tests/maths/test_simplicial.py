@@ -134,8 +134,8 @@ def test_of_two_hubs_one_is_redundant() -> None:
     assert set(found.boundary) == {edge(*each) for each in ring(6)}
 
 
-def test_a_fence_that_bounds_nothing_spares_nobody() -> None:
-    """The trap: a fence chain that is not closed would let a tetrahedron's boundary pass for a certificate."""
+def test_an_open_fence_makes_no_robot_redundant() -> None:
+    """With a fence chain that is not closed, a tetrahedron's boundary would wrongly be accepted as a certificate."""
     lists = graph(*ring(6), *((n, hub) for n in range(6) for hub in (6, 7)), (6, 7))
     assert find_redundant(FlagComplex(lists), [edge(*each) for each in ring(6)][:4]).redundant == ()
 

@@ -41,6 +41,6 @@ def test_a_sample_is_a_copy_with_all_its_rows() -> None:
     assert tracks.present.tolist() == [[True, False, False, False]]
 
 
-def test_an_empty_history_says_so() -> None:
+def test_an_empty_history_is_reported_as_empty() -> None:
     with pytest.raises(ValueError, match="empty"):
         History().arrays()

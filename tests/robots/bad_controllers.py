@@ -5,7 +5,7 @@ from zwerm.wire.messages import Command, Observation, WheelSpeeds
 
 
 class OrderOfASet(Controller):
-    """What it does depends on the order in which a set of strings happens to be."""
+    """Its command depends on the order of iteration over a set of strings."""
 
     def step(self, observation: Observation) -> Command:
         order = "".join({"1", "2", "3", "4", "5", "6", "7", "8"})
@@ -13,7 +13,7 @@ class OrderOfASet(Controller):
 
 
 class HashOfAName(Controller):
-    """What it does depends on the hash of a string."""
+    """Its command depends on the hash of a string."""
 
     def step(self, observation: Observation) -> Command:
         return Command(drive=WheelSpeeds(0.01 * (hash("name") % 97), 0.0))

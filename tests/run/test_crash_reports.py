@@ -1,4 +1,4 @@
-"""What a run says of programs that ended: how, which, and what that means for the run."""
+"""The report of a run about programs that ended: the way, the program, and the effect on the run."""
 
 import pytest
 from support import scenario

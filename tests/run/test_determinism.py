@@ -1,4 +1,4 @@
-"""Same scenario and seed, same trace: inline and in processes, whatever the start order, the load or the hash seed."""
+"""Same scenario and seed, same trace: inline and in processes, for every start order, load and hash seed."""
 
 import json
 import os

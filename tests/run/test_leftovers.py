@@ -1,4 +1,5 @@
-"""What is left behind: no process that a controller started, a readable recording after a kill, no long path that fails."""
+"""Nothing is left behind: no process that a controller started, a readable recording after a kill, no long path that
+fails."""
 
 import os
 import signal

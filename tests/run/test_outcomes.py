@@ -1,4 +1,4 @@
-"""How a deployment ends: what completes it, and every reason why it cannot go on, each with its line and exit status."""
+"""The end of a deployment: its completion, and every reason for failure, each with its line and exit status."""
 
 import subprocess
 import sys
@@ -45,7 +45,7 @@ def test_a_deployment_that_cannot_go_on_says_why(settings: tuple[str, ...], reas
 
 
 def test_a_frontier_that_no_path_leads_to_is_cut_off() -> None:
-    """In a corridor the robots in the middle die, and those that take their places, until nobody is sent there again."""
+    """In a corridor the robots in the middle die, and their replacements die, until no robot is sent there again."""
     corridor = ("arena.size_m=[6.0,0.5]", "base.pose=[0.2,0.25,0.0]", "robots.on_crash=continue")
 
     def strike(world: World) -> None:

@@ -1,4 +1,4 @@
-"""What robots, base and coordinator are given is checked before anything runs: the exact line for every kind of mistake."""
+"""Parameters of robots, base and coordinator are checked before a run: the exact line for every kind of mistake."""
 
 import pytest
 
@@ -56,7 +56,7 @@ def test_a_wrong_parameter_is_one_line_with_its_place_the_rule_and_the_value(
     assert line.endswith(end)
 
 
-def test_every_wrong_parameter_of_everyone_is_told_at_once_and_a_missing_sensor_once() -> None:
+def test_every_wrong_parameter_of_every_node_is_reported_at_once_and_a_missing_sensor_once() -> None:
     wrong = ("robots.parameters.samples=0", "base.parameters.creep_m=0", "coordinator.parameters.nix=1")
     with pytest.raises(ScenarioError) as caught:
         prepare(load("sensor-coverage", (*wrong, "robots.sensors.2={kind='compass'}")))

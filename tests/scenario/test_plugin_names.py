@@ -1,4 +1,4 @@
-"""Where the modules that a scenario names are looked for, and what is said where they cannot be used."""
+"""The search for the modules that a scenario names, and the error lines for unusable modules."""
 
 import sys
 from collections.abc import Iterator

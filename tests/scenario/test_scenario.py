@@ -56,7 +56,7 @@ def test_a_scenario_cannot_be_changed_once_it_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(built_in()))
-def test_every_built_in_scenario_is_without_mistake_and_says_what_it_is(name: str) -> None:
+def test_every_built_in_scenario_is_without_mistake_and_has_a_description(name: str) -> None:
     scenario = load(name)
     assert scenario.name == name
     assert scenario.summary

@@ -1,4 +1,4 @@
-"""What a user chooses of pictures: size, words, colours by telemetry, and radio links."""
+"""The user's choices for pictures: size, words, colours by telemetry, and radio links."""
 
 from pathlib import Path
 

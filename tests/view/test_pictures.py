@@ -1,4 +1,4 @@
-"""Pictures: what is true of the run is at its place on the sheet, and whatever hinders them is one line."""
+"""Pictures: the data of the run is at its place on the sheet, and every error is one line."""
 
 import math
 import shutil

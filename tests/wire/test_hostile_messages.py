@@ -33,7 +33,7 @@ from zwerm.world.world import World
 GOOD = Command(tick=0, drive=WheelSpeeds(0.1, 0.1))
 NAN = float("nan")
 
-# What a robot might send in place of its first command, and the reason it is refused for.
+# A message that a robot might send in place of its first command, and the reason of the refusal.
 HOSTILE = {
     b"": "malformed",
     b"\xc1": "malformed",

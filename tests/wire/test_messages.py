@@ -1,4 +1,4 @@
-"""The wire: what goes in comes out, other languages can join, and whatever is wrong is refused for a reason."""
+"""The wire: messages survive encoding, other languages can join, and every wrong message is refused with a reason."""
 
 import math
 import random

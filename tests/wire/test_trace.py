@@ -1,4 +1,4 @@
-"""The trace: equal runs have equal traces, and whatever differs between two runs shows in it."""
+"""The trace: equal runs have equal traces, and every difference between two runs changes the trace."""
 
 from collections.abc import Sequence
 

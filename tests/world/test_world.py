@@ -95,7 +95,7 @@ def test_drives_are_clamped_to_what_the_motors_can_do() -> None:
     assert world.scene.position[0] == pytest.approx([2.06, 2.08])
 
 
-def test_walls_and_bodies_stop_bodies_and_nobody_passes() -> None:
+def test_walls_and_bodies_stop_bodies_and_no_body_passes() -> None:
     world = world_at((0.5, 2.0, math.pi), (1.5, 2.0, math.pi))
     for _ in range(30):
         tick(world, n0=Command(drive=BodyVelocity(1.0)), n1=Command(drive=BodyVelocity(1.0)))
@@ -111,7 +111,7 @@ def test_a_robot_slides_along_a_wall_without_friction() -> None:
     assert world.scene.position[0] == pytest.approx([2.0 + 0.5 / math.sqrt(2), 0.1], abs=0.005)
 
 
-def test_a_world_in_which_nobody_moves_is_not_stepped() -> None:
+def test_a_world_in_which_no_robot_moves_is_not_stepped() -> None:
     world = world_at((1.0, 1.0, 0.0))
     tick(world)
     tick(world)

@@ -77,7 +77,7 @@ def test_landmarks_in_line_with_the_observer_are_on_neither_side() -> None:
     assert set(opposite.statuses.values()) == {UNEXPLORED}
 
 
-def test_clear_stays_clear_whatever_comes_later() -> None:
+def test_a_clear_frontier_keeps_this_status() -> None:
     frontiers = Frontiers()
     assert frontiers.raise_to(key_of(1, 2), CLEAR)
     assert not frontiers.raise_to(key_of(1, 2), BOUNDARY)

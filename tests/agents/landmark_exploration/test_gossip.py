@@ -1,4 +1,4 @@
-"""Logs and registers merge by laws; gossip makes the maps of a connected swarm equal, whatever happens to messages."""
+"""Merging logs and registers obeys its laws; gossip makes the maps of a connected swarm equal, although messages are lost."""
 
 import random
 from dataclasses import dataclass, field
@@ -170,7 +170,9 @@ def scribble(robot: Robot, fate: random.Random) -> None:
 
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from([0.0, 0.3, 0.6]), st.sampled_from([64, 1000]))
-def test_whatever_is_lost_late_or_copied_connected_maps_become_equal(seed: int, loss: float, bytes_max: int) -> None:
+def test_connected_maps_become_equal_although_messages_are_lost_late_or_copied(
+    seed: int, loss: float, bytes_max: int
+) -> None:
     fate = random.Random(seed)
     robots = [Robot(me, bytes_max) for me in range(4)]
     for _ in range(6):

@@ -91,7 +91,7 @@ CRASHES = {
 
 @pytest.mark.parametrize("how", CRASHES)
 @pytest.mark.parametrize("services", [None, GOSSIP])
-def test_a_robot_that_crashes_while_it_holds_a_frontier_holds_nobody_up(
+def test_a_robot_that_crashes_while_it_holds_a_frontier_delays_no_robot(
     how: str, services: dict[str, str] | None
 ) -> None:
     faults = CRASHES[how]
@@ -146,7 +146,7 @@ def test_bad_sets_of_landmarks_do_no_harm(landmarks: list[list[float]]) -> None:
         assert ran(scenario).outcome in ("completed", "time-limit")
 
 
-def test_no_landmarks_at_all_are_one_line() -> None:
+def test_a_landmark_sensor_without_landmarks_is_refused_in_one_line() -> None:
     with pytest.raises(ScenarioError, match="the landmark sensor needs landmarks"):
         run(hall(scatter=None), 1, "inline")
 

@@ -1,4 +1,4 @@
-"""What crosses the radio fits into small packets, and is put together again whatever order the parts come in."""
+"""Messages fit into small packets, and the receiver joins the parts in any order of arrival."""
 
 import itertools
 import random
@@ -54,7 +54,7 @@ def test_a_log_says_what_was_observed_in_packets_of_any_size(some: list[BearingS
 
 
 @given(st.dictionaries(st.integers(0, 2**31), st.integers(1, 2**31), max_size=40), st.sampled_from([64, 1_000]))
-def test_a_vector_in_parts_speaks_of_every_origin_once(vector: dict[int, int], size: int) -> None:
+def test_a_vector_in_parts_names_every_origin_once(vector: dict[int, int], size: int) -> None:
     parts = pack_vector(vector, size, ask=True)
     assert all(len(messages.write(part)) <= size for part in parts)
     assert {origin: count for part in parts for origin, count in counts_of(part).items()} == vector
@@ -118,7 +118,7 @@ def test_a_report_is_small() -> None:
     assert landmarks_in(landmark_bytes((5, 3))) == (3, 5)
 
 
-def test_a_damaged_packet_says_nothing() -> None:
+def test_a_damaged_packet_is_ignored() -> None:
     packet = bytearray(messages.write(Vector(0, 9, (1, 2), True)))
     packet[6] ^= 1
     assert messages.read(bytes(packet)) is None

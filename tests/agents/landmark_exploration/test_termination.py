@@ -1,4 +1,4 @@
-"""Claims run out by the listener's clock, and nobody concludes while a robot in reach may still add to the map."""
+"""Claims expire by the receiver's clock, and no robot concludes while a robot in reach may still add to the map."""
 
 import copy
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ LEASE, DEAD = 150, 1_500
 
 
 @pytest.mark.parametrize("pace", [0.5, 1.0, 2.0])
-def test_a_claim_lasts_while_its_robot_is_heard_whatever_its_clock_says(pace: float) -> None:
+def test_a_claim_lasts_while_its_robot_is_received_for_every_rate_of_its_clock(pace: float) -> None:
     registers = Registers(LEASE, DEAD, 2)
     # The claimant says it again every 8 of its own ticks: every 8 / pace of the listener's.
     for stamp in range(100):
@@ -38,7 +38,7 @@ def test_a_robot_that_begins_anew_has_no_claim() -> None:
     assert list(registers.claims(0, 3)) == []
 
 
-def test_a_robot_that_was_never_heard_of_is_waited_for() -> None:
+def test_the_conclusion_waits_for_a_robot_that_was_never_received() -> None:
     registers = Registers(LEASE, DEAD, robots_expected=3)
     for tick in (0, 1, 2, DEAD - 1):
         for node in (0, 1):
@@ -138,7 +138,7 @@ def signature(state: State) -> str:
 
 
 def explore(count: int, depth: int) -> tuple[int, int]:
-    """Try every interleaving; return how many states there were, and in how many somebody concluded."""
+    """Try every interleaving; return the number of states, and of those in which a robot concluded."""
     begin: State = ([Model(me, count) for me in range(count)], [])
     seen = {signature(begin)}
     level, concluded = [begin], 0

@@ -1,8 +1,8 @@
 """The barrier of a corridor in all interleavings of small cases: a robot hunts only once its predecessor's slice is swept.
 
-An explorer lets everything happen in every order: a robot goes on with its work, its newest status reaches another robot, or
-one that was sent earlier does, and the predecessor dies. In every state the promise is checked, and then that the time after
-which a silent member is dropped brings every living robot through the barrier.
+The test explores every order of these events. A robot continues its work. Its newest status, or an earlier one, reaches
+another robot. The predecessor dies. In every state the test checks the guarantee. It then lets the time pass after
+which a silent member is dropped. Every living robot must then pass the barrier.
 """
 
 import copy
@@ -165,7 +165,7 @@ def explore(corridor: Corridor, depth: int, dies: int | None = None) -> int:
 
 
 @pytest.mark.parametrize(("count", "depth"), [(2, 7), (3, 4)])
-def test_nobody_hunts_before_its_predecessor_swept_whatever_is_lost_or_late(count: int, depth: int) -> None:
+def test_no_robot_hunts_before_its_predecessor_swept_although_messages_are_lost_or_late(count: int, depth: int) -> None:
     assert explore(Corridor(count), depth) > 200
 
 
@@ -175,7 +175,7 @@ def test_a_corridor_with_too_little_room_ends_for_all(room: int) -> None:
 
 
 @pytest.mark.parametrize("dies", [0, 1])
-def test_a_dead_predecessor_holds_nobody_back_for_ever(dies: int) -> None:
+def test_a_dead_predecessor_delays_no_robot_for_ever(dies: int) -> None:
     assert explore(Corridor(3), 4, dies) > 200
 
 

@@ -1,4 +1,4 @@
-"""Facts spread through a team whatever packets are lost, and no fact is ever forgotten."""
+"""Facts spread through a team although packets are lost, and no fact is ever deleted."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,7 @@
 """Membership in all interleavings of small cases: views, division, merging and succession under loss and delay.
 
-An explorer lets everything happen in every order, up to a depth: any robot's newest beacon reaches any other, or one that was
-sent earlier does; a lead divides or merges its team; a robot dies. In every state what is promised is checked, and then
+The test explores every order of these events, up to a depth. A robot's newest beacon, or an earlier one, reaches
+another robot. A lead divides or merges its team. A robot dies. In every state what is promised is checked, and then
 that a time without loss brings all living robots to agree.
 """
 
@@ -164,16 +164,16 @@ def test_robots_that_hear_each_other_are_one_team() -> None:
 
 
 @pytest.mark.parametrize(("count", "depth"), [(2, 6), (3, 5)])
-def test_a_team_agrees_again_whatever_is_lost_late_or_decided(count: int, depth: int) -> None:
+def test_a_team_agrees_again_after_lost_and_late_messages_and_any_decision(count: int, depth: int) -> None:
     assert explore(Team(count), depth) > 50
 
 
 @pytest.mark.parametrize("dies", [0, 1, 2])
-def test_a_team_agrees_again_whoever_dies_at_any_time(dies: int) -> None:
+def test_a_team_agrees_again_after_any_robot_dies_at_any_time(dies: int) -> None:
     assert explore(Team(3), 4, dies) > 50
 
 
-def test_teams_that_began_apart_agree_whatever_is_lost_or_late() -> None:
+def test_teams_that_began_apart_agree_although_messages_are_lost_or_late() -> None:
     assert explore(Team(3, together=False), 4) > 50
 
 

@@ -73,7 +73,7 @@ def test_free_robots_form_one_corridor_where_there_is_room() -> None:
     assert made[0].anchor.slice in (0, 1)
 
 
-def test_a_reserved_cell_is_left_to_those_who_work_in_it() -> None:
+def test_a_reserved_cell_is_left_to_the_robots_that_work_in_it() -> None:
     slice_map = swept(0, 1)
     busy = CorridorPlan(2, 1, End(1, TOP, 5_000), RIGHT, False, (1, 2, 3))
     statuses = {node: status(node, 1, HUNTS, End(1, TOP, 5_000)) for node in (1, 2, 3)}

@@ -28,7 +28,7 @@ HALL: dict[str, Any] = {
 
 
 class Outcome(NamedTuple):
-    """What a run came to; `gap_m` is the smallest distance between two bodies."""
+    """The outcome of a run; `gap_m` is the smallest distance between two bodies."""
 
     outcome: str
     coverage: dict[str, float]
@@ -131,7 +131,7 @@ def test_a_partition_costs_no_coverage() -> None:
     check(cover(team(3, faults=[partition])))
 
 
-def test_parts_that_never_hear_each_other_again_are_each_complete_and_nobody_is_a_wreck() -> None:
+def test_parts_that_lose_contact_are_each_complete_and_no_robot_is_a_wreck() -> None:
     partition = {"kind": "partition", "groups": [[0], [1, 2]], "at_s": 10.0, "for_s": 2000.0}
     check(cover(team(3, faults=[partition])))
 

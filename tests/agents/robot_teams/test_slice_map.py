@@ -141,7 +141,7 @@ def test_an_arc_closes_a_port_at_both_of_its_ends() -> None:
     assert returning.ports == ((End(0, TOP, 900), RIGHT), (End(0, BOTTOM, 0), RIGHT))
 
 
-def test_the_route_is_the_shortest_whatever_the_order_of_the_facts() -> None:
+def test_the_route_is_the_shortest_for_every_order_of_the_facts() -> None:
     facts = room(4)
     start, stop = End(0, BOTTOM, 0), End(3, TOP, 5_000)
     routes = []

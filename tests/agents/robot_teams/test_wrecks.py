@@ -44,12 +44,12 @@ def test_neither_silence_nor_rest_nor_touch_alone_makes_a_wreck() -> None:
     assert not watched(LONG_TICKS, moves_m=0.1).wrecks
 
 
-def test_a_wreck_that_a_teammate_told_of_is_known_at_sight_and_only_there() -> None:
+def test_a_wreck_that_a_teammate_reported_is_known_at_sight_and_only_there() -> None:
     assert watched(1, told=(Void(1, 1_020, 0, 0, WRECK),)).wrecks == {3: WRECK}
     assert not watched(1, told=(Void(1, 2_020, 0, 0, WRECK),)).wrecks
 
 
-def test_a_wreck_that_moves_or_speaks_lives() -> None:
+def test_a_wreck_that_moves_or_sends_counts_as_alive() -> None:
     watch = watched(1, told=(Void(1, 1_000, 0, 0, WRECK),))
     watch.watch(Senses(120, 0.5, 2.0, (), (Beside(3, 1.2, 2.0, 1.0, 0.0, 0.2, 0.0, 0.0),)), ())
     assert watch.moved == [3]

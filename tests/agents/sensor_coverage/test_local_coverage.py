@@ -1,4 +1,4 @@
-"""Sensor coverage without a coordinator, run for real in a small hall: how it ends, who decides, and that nobody is lost."""
+"""Complete runs of sensor coverage without a coordinator in a small hall: the end, the deciding node, and no lost robot."""
 
 import pytest
 

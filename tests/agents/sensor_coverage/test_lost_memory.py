@@ -1,4 +1,4 @@
-"""Robots that die, restart, or have another clock: nobody is forgotten, and `completed` is true."""
+"""Robots that die, restart, or have another clock: every robot is accounted for, and `completed` is true."""
 
 from collections.abc import Callable
 
@@ -198,7 +198,7 @@ def test_robots_that_die_are_replaced_and_do_not_keep_the_run_from_ending() -> N
     assert is_covered(result)
 
 
-def test_a_body_in_a_passage_that_nobody_can_look_behind_is_a_frontier() -> None:
+def test_a_body_in_a_passage_that_no_robot_can_look_behind_is_a_frontier() -> None:
     """The first robot of a single file dies, and no other robot gets past its body."""
     passage = ("arena.size_m=[4.4,0.22]", "base.pose=[0.2,0.11,0.0]", "robots.count=10", "services.path=gradient")
     result = with_faults(passage, '{kind="crash", nodes=[1], at_s=34.0}')
@@ -214,7 +214,7 @@ def test_a_swarm_in_a_corridor_that_a_death_has_parted_is_joined_again() -> None
 
 
 def test_the_base_waits_for_robots_that_it_does_not_hear() -> None:
-    """It hears nobody for four minutes; then the others are there as before."""
+    """It receives nothing for four minutes; then the others are there as before."""
     result = with_faults(SMALL, '{kind="partition", groups=[[0]], at_s=30.0, for_s=240.0}')
     assert is_covered(result)
     assert result.sim_s > 270.0

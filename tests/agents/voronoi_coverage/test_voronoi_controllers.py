@@ -1,4 +1,4 @@
-"""The controllers of Voronoi coverage: one observation in, one command out, whatever is observed."""
+"""The controllers of Voronoi coverage: one observation in, one command out, for every observation."""
 
 import math
 from typing import Any
@@ -80,7 +80,7 @@ def test_a_robot_that_is_turned_moves_the_same_way_in_the_room(others, heading, 
 @given(
     PLACES, st.lists(PLACES, max_size=12), FIELDS, FIELDS, FIELDS, st.sampled_from(["coverage", "integer", "swarmbot"])
 )
-def test_whatever_a_robot_observes_its_command_is_finite_and_leads_into_the_region(here, others, value, gx, gy, kind):
+def test_every_observation_gives_a_finite_command_that_leads_into_the_region(here, others, value, gx, gy, kind):
     found = velocity(controller(f"voronoi-{kind}").step(observe(here, [*others, here], value, (gx, gy))))
     assert all(map(math.isfinite, found))
     if kind == "coverage":
@@ -211,7 +211,7 @@ def test_a_damaged_packet_is_passed_over(byte, flip):
     assert unpack(pack(7, NeighbourReport(1.0, math.nan, 0.25, 3.0))) is None
 
 
-def test_robots_speak_in_turn_and_as_often_as_they_are_told():
+def test_robots_send_in_turn_and_at_the_set_period():
     robots = [controller("voronoi-radio", node=node, every_s=0.3) for node in range(3)]
     spoke = [[bool(robot.step(observe((0.5, 0.5), [], tick=tick)).outbox) for robot in robots] for tick in range(6)]
     assert [sum(tick) for tick in spoke] == [1] * 6

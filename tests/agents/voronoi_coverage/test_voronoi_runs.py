@@ -150,7 +150,7 @@ def test_processes_give_the_same_trace():
 
 
 def test_sensing_voronoi_neighbours_only_changes_no_command():
-    """The cell is the same whoever else is known of, so the robots go the same way to the last bit but rounding."""
+    """Further known robots do not change the cell, so the robots take the same paths except for rounding."""
     few = inline(TABLE1, "time.duration_s=5.0", "robots.count=25")
     all_ = inline(TABLE1, "time.duration_s=5.0", "robots.count=25", "robots.sensors.0.voronoi=false")
     assert few.trace != all_.trace

@@ -210,8 +210,8 @@ def test_neighbours_grant_a_lock_by_advice_only_if_it_names_their_present_lists(
 class Swarm:
     """Robots about a grid, and a ring of others around them; who has left the complex is carried away after a while.
 
-    What crosses the uplink is lost, late by up to `late` ticks, and repeated. With `locks` robots leave as they should, else
-    as soon as they are told to.
+    Packets of the uplink are lost, late by up to `late` ticks, and repeated. With `locks` robots leave as they should,
+    else as soon as they are told to.
     """
 
     def __init__(self, seed: int, late: int, locks: bool) -> None:

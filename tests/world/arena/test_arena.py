@@ -1,4 +1,4 @@
-"""What an arena answers is what shapely, which computes it otherwise, answers."""
+"""The answers of an arena equal those of shapely, which computes them by another method."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -177,7 +177,7 @@ def test_collinear_pieces_of_wall_are_one_segment_and_doubled_points_none() -> N
     ]
 
 
-def test_an_arena_tells_its_area_and_bounds_and_cannot_be_written_to() -> None:
+def test_an_arena_has_an_area_and_bounds_and_cannot_be_written_to() -> None:
     arena = Arena(box(-1, 0, 3, 2).difference(box(0, 0.5, 1, 1.5)))
     assert arena.area_m2 == pytest.approx(7.0)
     assert arena.bounds == (-1.0, 0.0, 3.0, 2.0)

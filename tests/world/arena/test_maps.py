@@ -258,7 +258,7 @@ def test_a_file_that_is_no_yaml_table_is_one_line(folder: Path, text: str, line:
     assert caught.value.mistakes == [f"arena.map: {path}: {line}"]
 
 
-def test_a_ros_map_takes_no_other_size_and_all_mistakes_are_told(folder: Path) -> None:
+def test_a_ros_map_takes_no_other_size_and_all_mistakes_are_reported(folder: Path) -> None:
     path = folder / "room.yaml"
     write_yaml(path, resolution=-1, free_thresh=2)
     with pytest.raises(ScenarioError) as caught:

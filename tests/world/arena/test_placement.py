@@ -81,7 +81,7 @@ def test_a_robot_out_of_everyones_way_is_where_it_would_be_alone() -> None:
     assert placed(SQUARE, 25, seed=1)[0][0].tolist() == alone[0][0].tolist()
     thin, thick = (placed(SQUARE, 25, seed=1, body_m=body_m)[0] for body_m in (1e-6, 0.03))
     unmoved = (thin == thick).all(axis=1)
-    assert 15 < unmoved.sum() < 25  # thick robots make room for one another, and nobody else moves
+    assert 15 < unmoved.sum() < 25  # thick robots make room for one another, and no other robot moves
 
 
 def test_uniform_places_fill_the_arena_evenly() -> None:
@@ -140,7 +140,7 @@ def test_an_entry_rectangle_stands_in_for_the_arenas_bounds() -> None:
     assert (position <= entry[2:]).all()
 
 
-def test_nobody_starts_in_a_pocket_that_it_cannot_leave() -> None:
+def test_no_robot_starts_in_a_pocket_that_it_cannot_leave() -> None:
     # A closet of a third of the room's size, whose door is open by 0.1 m.
     room = union_all([box(0, 0, 3, 2), box(2.9, 0.95, 3.3, 1.05), box(3.2, 0, 4.2, 2)])
     slim, stout = (placed(Arena(room), 60, body_m=body_m)[0] for body_m in (0.03, 0.06))

@@ -44,7 +44,7 @@ def test_robots_that_stand_still_far_from_others_leave_the_engine() -> None:
     assert in_engine(bodies) <= 3
 
 
-def test_a_small_swarm_and_one_of_which_many_move_park_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_small_swarm_and_one_of_which_many_move_park_no_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     bodies = grid()
     everyone = np.full(COUNT, 0.01)
     for _ in range(40):

@@ -1,4 +1,4 @@
-"""In real time nobody is waited for: not for a program that starts, and not for one that hangs."""
+"""In real time the driver waits for no program: neither for one that starts nor for one that hangs."""
 
 import os
 import signal
@@ -58,7 +58,9 @@ def test_the_world_goes_on_while_a_program_starts_and_observes_it_once_it_has() 
     assert observed[0] == 40
 
 
-def test_a_hung_robot_is_sent_no_more_than_it_can_owe_and_is_observed_again_when_it_goes_on(nothing_left: None) -> None:
+def test_a_hung_robot_gets_a_bounded_number_of_observations_and_is_observed_again_when_it_goes_on(
+    nothing_left: None,
+) -> None:
     chosen = scenario(time={"dt_s": 0.01, "duration_s": 2.0})
     with LocalSwarm(new_run_id(), node_specs(chosen, 1), paced=True) as swarm:
         world, observed = assemble(chosen, 1), Counter[int]()

@@ -384,7 +384,7 @@ def test_a_new_optional_key_of_a_kind_of_fault_changes_no_random_number(
     monkeypatch.setattr(Crash, "Parameters", WiderCrash)
     monkeypatch.setattr(SensorNoise, "Parameters", WiderNoise)
     assert drawn_now() == before
-    # What a scenario writes does key the draws: the same value, given, is another fault.
+    # The table as written in the scenario is the key of the draws: the default value, if written, is another fault.
     assert drawn_now(depth_m=WiderNoise.model_fields["depth_m"].default)[1] != before[1]
 
 

@@ -1,4 +1,4 @@
-"""What a swarm sees, against areas known by hand."""
+"""The area that a swarm sees, against areas computed by hand."""
 
 import math
 from pathlib import Path

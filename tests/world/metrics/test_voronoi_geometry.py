@@ -96,7 +96,7 @@ def test_voronoi_neighbours_alone_give_the_same_cell_as_everyone(position):
         assert shapely.Polygon(cell).hausdorff_distance(shapely.Polygon(everyone)) < 1e-9
 
 
-def test_a_triangulation_that_is_kept_or_mended_is_the_one_made_anew(monkeypatch):
+def test_a_kept_or_repaired_triangulation_equals_a_new_one(monkeypatch):
     made = []
     triangulate = tessellation._triangulate
     monkeypatch.setattr(tessellation, "_triangulate", lambda position: made.append(1) or triangulate(position))
@@ -111,10 +111,10 @@ def test_a_triangulation_that_is_kept_or_mended_is_the_one_made_anew(monkeypatch
         mended += found is not before and len(made) == earlier
         np.testing.assert_array_equal(found, Tessellation().pairs(position))
         changes += found is not before
-    assert 20 < mended < changes < 290  # the kept, the mended and the new have been compared
+    assert 20 < mended < changes < 290  # the kept, the repaired and the new have been compared
 
 
-def test_a_rim_that_is_dented_or_crossed_is_mended_too(monkeypatch):
+def test_a_hull_that_is_dented_or_crossed_is_repaired_too(monkeypatch):
     angle = np.arange(9) * (math.tau / 9)
     inner = np.random.default_rng(6).uniform(-0.5, 0.5, (20, 2))
     made, hulls = [], []
@@ -220,7 +220,7 @@ def test_the_closed_form_is_adaptive_quadrature_to_a_billionth_over_ten_thousand
 @example(np.array([[0.5, 0.5], [0.2, 0.2]]), -1.0, 1e-300, 0.0)
 @example(np.array([[0.5, 0.5], [0.5, 0.5 + 2e-12], [0.5 + 2e-12, 0.5]]), 1.0, 2.0, 3.0)
 @example(np.array([[0.001, 0.5]]), 5e-324, 0.0, 5e-324)
-def test_whatever_the_field_the_centroid_lies_in_the_cell(position, value, gx, gy):
+def test_the_centroid_lies_in_the_cell_for_every_field(position, value, gx, gy):
     for robot in range(len(position)):
         cell = relative(cell_of(position, robot, SQUARE), position[robot])
         centroid = estimated_centroid(cell, value, gx, gy)

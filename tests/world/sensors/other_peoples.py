@@ -6,7 +6,7 @@ from zwerm.scenario.types import Positive, Table
 
 
 class Thermometer:
-    """How far from the left wall, in units of its own."""
+    """The distance from the left wall, in a unit of its own."""
 
     field = "temperature"
 

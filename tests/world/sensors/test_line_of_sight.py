@@ -108,7 +108,7 @@ def test_a_reading_becomes_a_random_bit_with_the_given_probability(facing, senso
             assert (one == other).mean() == pytest.approx(agree, abs=4.0 * math.sqrt(agree * (1.0 - agree) / one.size))
 
 
-def test_another_robot_changes_nobodys_noise(make_scene, sensor_for):
+def test_another_robot_does_not_change_the_noise_of_others(make_scene, sensor_for):
     poses = [(0.5, 0.1 + 0.1 * index, 0.0) for index in range(20)]
     few, more = make_scene(poses), make_scene([*poses, (2.9, 2.9, 0.0)])
     readings = [sensor_for(each, "line_of_sight", combined=1.0).read(each, each.present_ids()) for each in (few, more)]

@@ -1,4 +1,4 @@
-"""What a robot may know of itself: pose, compass, odometry; and the outline of the arena as it sees it."""
+"""Sensors of the robot's own motion: pose, compass, odometry; and the outline of the arena as the robot sees it."""
 
 import math
 
@@ -103,7 +103,7 @@ def test_displacements_put_end_to_end_lead_where_the_robot_is(make_scene, sensor
         assert facing == pytest.approx(complex(math.cos(at[2]), math.sin(at[2])), abs=1e-9)
 
 
-def test_odometry_speaks_of_the_robots_own_previous_observation(make_scene, sensor_for):
+def test_odometry_is_relative_to_the_robots_own_previous_observation(make_scene, sensor_for):
     scenes = [
         make_scene([(0.5 + 0.1 * tick, 1.0, 0.0), (0.5, 0.5 + 0.1 * tick, math.pi / 2)], tick=tick) for tick in range(4)
     ]
@@ -134,7 +134,7 @@ def test_a_robot_that_comes_back_into_the_arena_has_not_moved(make_scene, sensor
         ({"turn_sd_fraction": 0.3, "turn_sd_per_root_rad": 0.1}, 0.0, math.hypot(0.3 * 0.16, 0.1 * 0.4)),
     ],
 )
-def test_odometry_errs_along_its_way_and_in_its_turn_as_told(make_scene, sensor_for, parameters, sd_m, sd_rad):
+def test_odometry_errs_in_distance_and_turn_by_the_set_noise(make_scene, sensor_for, parameters, sd_m, sd_rad):
     """A robot that moves 0.25 m and turns 0.16 rad; and one that stands still, without error."""
     count = 400
     start = np.column_stack([np.full(count, 1.0), np.full(count, 1.0), np.full(count, 0.5)])
@@ -152,7 +152,7 @@ def test_odometry_errs_along_its_way_and_in_its_turn_as_told(make_scene, sensor_
     assert not read(sensor, make_scene(start + step, tick=2)).any()
 
 
-def test_another_robot_changes_nobodys_odometry(make_scene, sensor_for):
+def test_another_robot_does_not_change_the_odometry_of_others(make_scene, sensor_for):
     start = np.random.default_rng(1).uniform(0.1, 2.9, (20, 3))
     told = []
     for poses in (start, np.vstack([start, [1.0, 1.0, 0.0]])):

@@ -60,7 +60,7 @@ def test_every_built_in_sensor_fills_its_field_with_what_crosses_the_wire(make, 
             assert repr(getattr(decoded, name)) == repr(getattr(observation, name))
 
 
-def test_every_built_in_sensor_reads_nobody_where_nobody_is_asked(make, scene):
+def test_every_built_in_sensor_reads_no_robot_if_none_is_requested(make, scene):
     nobody = np.empty(0, dtype=np.int64)
     sensors = make(*({"kind": kind} for kind in SENSORS), landmarks=np.array([[1.0, 1.0]]), field=Linear(0, (0, 0)))
     assert [list(sensor.read(scene, nobody)) for sensor in sensors] == [[]] * len(SENSORS)
@@ -138,7 +138,7 @@ def test_a_mistake_in_a_table_is_one_line(make, table, lines):
     assert mistakes(make, table) == [f"x.toml: {line}" for line in lines]
 
 
-def test_mistakes_in_several_tables_are_told_at_once(make):
+def test_mistakes_in_several_tables_are_reported_at_once(make):
     assert mistakes(make, {"kind": "pose", "sd_m": -1}, {"kind": "compass"}, {"kind": "sonor:"}) == [
         "x.toml: robots.sensors.0.sd_m: expected >= 0, got -1",
         f"x.toml: robots.sensors.2.kind: expected a built-in sensor ({', '.join(SENSORS)}) or module:Class, got 'sonor:'",
@@ -169,7 +169,7 @@ def test_other_peoples_sensors_are_gathered_under_their_names(make, scene):
     assert msgspec.msgpack.decode(encode(observation), type=Observation) == observation
 
 
-def test_somebody_elses_sensor_may_stand_in_for_a_built_in_one(make, scene):
+def test_a_users_sensor_may_replace_a_built_in_one(make, scene):
     (sensor,) = make({"kind": "other_peoples:OwnLineOfSight"})
     assert sensor.field == "line_of_sight"
     assert sensor.read(scene, scene.present_ids()) == [True, True]

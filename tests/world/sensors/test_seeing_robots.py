@@ -121,7 +121,7 @@ def test_neighbour_noise_is_gaussian_and_independent_in_both_axes(make_scene, se
 
 
 @pytest.mark.parametrize(("kind", "noise"), [("bearings", "sd_rad"), ("neighbours", "sd_m")])
-def test_another_robot_changes_nobodys_noise(make_scene, sensor_for, crowd, kind, noise):
+def test_another_robot_does_not_change_the_noise_of_others(make_scene, sensor_for, crowd, kind, noise):
     few = make_scene(crowd, tick=3)
     more = make_scene([*crowd.tolist(), (0.2, 0.2, 0.0)], tick=3)
     before, after = (numbers(sensor_for(each, kind, **{noise: 0.1}), each) for each in (few, more))
@@ -129,7 +129,7 @@ def test_another_robot_changes_nobodys_noise(make_scene, sensor_for, crowd, kind
 
 
 @pytest.mark.parametrize(("kind", "noise"), [("bearings", "sd_rad"), ("neighbours", "sd_m")])
-def test_a_robot_reads_the_same_whoever_else_is_read(make_scene, sensor_for, crowd, kind, noise):
+def test_the_readings_of_a_robot_do_not_depend_on_the_other_robots_read(make_scene, sensor_for, crowd, kind, noise):
     scene = make_scene(crowd, tick=3)
     sensor = sensor_for(scene, kind, range_m=1.0, **{noise: 0.1})
     everyone = sensor.read(scene, scene.present_ids())

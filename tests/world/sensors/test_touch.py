@@ -80,7 +80,7 @@ def test_switches_err_with_the_given_probabilities_each_by_itself(make_scene, se
     assert (both[:, 0] & both[:, 1]).mean() == pytest.approx(0.01, abs=4 * math.sqrt(0.01 / len(closed)))
 
 
-def test_another_robot_changes_nobodys_noise(make_scene, sensor_for):
+def test_another_robot_does_not_change_the_noise_of_others(make_scene, sensor_for):
     poses = [(0.1 + 0.2 * index, 0.037, 0.0) for index in range(12)]
     few, more = make_scene(poses), make_scene([*poses, (2.0, 2.0, 0.0)])
     one, other = (

@@ -1,4 +1,4 @@
-"""Who sees whom, against shapely; and that remembering changes nothing but the work."""
+"""Visibility between robots, against shapely; a cache changes the cost and not the result."""
 
 import itertools
 

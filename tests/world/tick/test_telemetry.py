@@ -91,7 +91,7 @@ def test_five_robots_over_3000_ticks_stay_within_the_stated_bound_of_memory(scen
     assert sink.dropped > 0
 
 
-def test_a_listener_gets_every_record_whatever_is_dropped(scene: Scene) -> None:
+def test_a_listener_gets_every_record_that_the_sink_drops(scene: Scene) -> None:
     sink = TelemetrySink(numbers_max=0, bytes_max=0)
     heard: list[telemetry.TelemetryRecord] = []
     sink.listeners.append(heard.append)

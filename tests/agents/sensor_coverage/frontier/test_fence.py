@@ -25,7 +25,7 @@ SIXTY = math.pi / 3.0
 def swarm(
     slots: dict[int, tuple[float, float]], turned: dict[int, float] | None = None, range_m: float = 1.0, blind=()
 ) -> tuple[Views, FlagComplex]:
-    """What robots at these places see of each other, each in a frame of its own."""
+    """The bearings between robots at these places, each in the frame of its own robot."""
     turned = turned or {}
     views: Views = {
         i: {

@@ -1,7 +1,7 @@
 """Figures 5 to 9 of Ramaithitima et al. 2015 as complexes built by hand, by the ids that their captions and text give.
 
-What is tested are the services as the coordinator has them, from bearings in frames that are turned at random. Figures 6(a),
-6(c), 7 and 8(b) are in `test_fence` too, rule by rule; the test drive of 6(d) is a robot's and in `test_sensor_coverage`.
+The tests use the services as the coordinator does, from bearings in randomly turned frames. Figures 6(a), 6(c), 7 and
+8(b) are in `test_fence` too, rule by rule; the test drive of 6(d) is a robot's and in `test_sensor_coverage`.
 """
 
 import math
@@ -91,7 +91,7 @@ class Swarm:
         return sorted((min(occupant[i], occupant[j]), max(occupant[i], occupant[j])) for i, j in edges)
 
     def goal(self, plan: Plan) -> Point:
-        """Where a plan leads, in truth."""
+        """The true target of a plan."""
         robot = self.slots.occupant[plan.mover]
         return at(math.degrees(plan.direction - self.off(robot)), plan.hop_m, self.position[robot])
 

@@ -17,7 +17,7 @@ Positions = dict[int, tuple[float, float]]
 
 
 def seen(slots: Positions) -> tuple[dict[int, dict[int, float]], FlagComplex]:
-    """What robots at these places see of each other within 1 m, in one frame."""
+    """The bearings between robots at these places within 1 m, in one frame."""
     views = {
         i: {
             j: math.atan2(there[1] - here[1], there[0] - here[0])

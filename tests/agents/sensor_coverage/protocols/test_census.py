@@ -139,7 +139,7 @@ def test_a_claim_at_the_base_revokes_the_conclusion_of_the_census() -> None:
     assert not swarm.robots[0].concluded
 
 
-# --- whatever happens to its messages -------------------------------------------------------------------------------
+# --- with messages lost, late and repeated --------------------------------------------------------------------------
 
 
 @settings(max_examples=60, deadline=None)

@@ -36,7 +36,7 @@ def pairs(graph: Graph) -> Iterator[tuple[int, int]]:
 
 
 def explore(graphs: list[Graph], kind: type[LeaveLock] = LeaveLock, **budget: Any) -> tuple[int, int]:
-    """Visit all states, and return how many there were and in how many of them somebody left."""
+    """Visit all states; return their number, and the number of those in which a robot left."""
     states = departures = 0
     for graph in graphs:
         for asks in pairs(graph):
@@ -46,7 +46,7 @@ def explore(graphs: list[Graph], kind: type[LeaveLock] = LeaveLock, **budget: An
     return states, departures
 
 
-# --- whatever is lost, late, copied or forgotten --------------------------------------------------------------------
+# --- with messages lost, late and copied, and memory lost -----------------------------------------------------------
 
 
 def test_of_five_robots_no_two_neighbours_leave_together_and_no_departure_changes_b0_or_b1() -> None:
@@ -85,11 +85,11 @@ def test_no_departure_is_unsafe_when_one_of_four_robots_is_moved() -> None:
     assert departures > 100
 
 
-# --- when somebody else finds who may leave ---------------------------------------------------------------------------
+# --- when another node finds the robots that may leave ----------------------------------------------------------------
 
 
 class Advised(LeaveLock):
-    """Relies on lists upon which it was told at some time that it may leave, whatever it has heard or seen since."""
+    """Relies on lists from earlier advice that it may leave, and ignores all later messages and sightings."""
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)

@@ -1,4 +1,5 @@
-"""Who may leave: the criterion against gudhi, and the locks one by one. All interleavings are in test_interleavings.py."""
+"""Permission to leave: the criterion against gudhi, and the locks one by one. All interleavings are in
+test_interleavings.py."""
 
 import importlib
 import sys
@@ -95,7 +96,7 @@ def test_a_departure_by_the_link_criterion_changes_no_betti_number(graph: Graph)
 @pytest.mark.parametrize(
     ("graph", "redundant"),
     [
-        ({0: []}, []),  # nobody is left
+        ({0: []}, []),  # no robot is left
         (everyone(2), [0, 1]),
         ({0: [1], 1: [0, 2], 2: [1]}, [0, 2]),  # a chain breaks in the middle
         ({0: [1, 3], 1: [0, 2], 2: [1, 3], 3: [0, 2]}, []),  # a hole would open

@@ -81,7 +81,7 @@ def settled(network: Network, rounds: int) -> Network:
     return network
 
 
-# --- whatever happens to its messages -------------------------------------------------------------------------------
+# --- with messages lost, late and repeated --------------------------------------------------------------------------
 
 
 class Lossy(RuleBasedStateMachine):
@@ -175,7 +175,7 @@ class Gullible(PathVectorProtocol):
 
 
 def after_the_cut(kind: type[PathVectorProtocol], loss: float, delay: int, seed: int, rounds: int = 400) -> list[float]:
-    """Cut a settled grid's only root off; return the costs told from then on until nobody tells any."""
+    """Disconnect a settled grid's only root; return the costs sent from then on until no robot sends any."""
     random = np.random.Generator(np.random.Philox(seed))
     network = Network(16, grid(4), kind)
     network.roots[1] = None
@@ -275,7 +275,7 @@ def test_a_route_belongs_to_a_slot_and_outlives_its_occupant() -> None:
     assert robot.route == Route(2.0, (2, 1, 5), 5)
     robot.take_over(1, None)
     assert robot.route == Route(1.0, (1, 5), 5)
-    robot.receive(9, PathVector(1, 1, None))  # whoever stands there now
+    robot.receive(9, PathVector(1, 1, None))  # the robot that stands there now
     robot.choose(2, None, {1: 1.0, 6: 1.0}, 9)
     assert robot.route is None
 
@@ -313,7 +313,7 @@ def test_a_claim_is_renewed_after_a_time_of_the_robots_own_clock() -> None:
 
 def test_claims_of_a_slot_go_on_counting_with_its_next_occupant() -> None:
     follower, other = PathVectorProtocol(), PathVectorProtocol()
-    other.receive(4, PathVector(2, 2, None, ended=((2, 8),)))  # the follower has not heard that
+    other.receive(4, PathVector(2, 2, None, ended=((2, 8),)))  # the follower has not received that
     follower.take_over(2, None, claims=8)
     follower.choose(2, 0.0, {}, 1)
     other.receive(6, PathVector(1, 2, follower.route))
