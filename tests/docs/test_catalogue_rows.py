@@ -172,7 +172,7 @@ def test_a_recipe_works_by_its_short_name_after_one_file_and_one_row(row: Row, t
 
 
 def test_the_layer_of_a_row_is_drawn(tree: Path, tmp_path: Path) -> None:
-    pictures = []
+    pictures: list[bytes] = []
     for root in (ROOT, tree):
         folder = tmp_path / str(len(pictures))
         folder.mkdir()
