@@ -1,7 +1,8 @@
 """Gossip: every robot learns the largest id in the swarm. It broadcasts the largest id that it knows.
 
 The maximum is idempotent, commutative and associative. So lost, copied, late and reordered packets cost time and never
-change the result. A checksum refuses damaged packets. A restarted robot knows only its own id again, and learns anew.
+change the result. A checksum refuses damaged packets. A restarted robot knows only its own id, and learns the largest
+id again.
 """
 
 from struct import Struct as Layout

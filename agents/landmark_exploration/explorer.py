@@ -43,7 +43,7 @@ BUSY_REPORT_TICKS: Final = 50
 RETRY_TICKS: Final = 10
 RETRY_TICKS_MAX: Final = 80
 # A robot looks around where it begins, and then only while it explores: what an idle robot happens to see would open
-# frontiers for ever. It looks again where it is cut off: for so many ticks there was a frontier for it, and no way there.
+# frontiers for ever. It looks again if, for CUT_OFF_TICKS, there was a frontier for it and no way there.
 LOOK_TICKS: Final = 5
 CUT_OFF_TICKS: Final = 200
 # Ticks for which a robot leaves a frontier alone that it did not get to.

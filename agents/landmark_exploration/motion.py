@@ -32,7 +32,8 @@ HOP_TICKS: Final = 60
 NEAR_LINE: Final = 0.25
 # Contact on the near side counts as contact at the line where the sum of the unit vectors is shorter than this.
 AT_LINE: Final = 0.6
-# Contact within so many ticks of the crossing is an obstacle at the line, if it lasts for TOUCH_TICKS: other robots move on.
+# Contact within this number of ticks of the crossing is an obstacle at the line, if it lasts for TOUCH_TICKS: other
+# robots move on.
 CROSSED_TICKS: Final = 4
 TOUCH_TICKS: Final = 6
 # The angle from the outward direction, from tick to tick: the fraction that remains, and the deviation added [rad].

@@ -22,12 +22,11 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
 
     `beta` weighs the cost against the utility. A robot has `cross_ticks` to cross the line of a frontier, and `search_ticks` to
     search behind it (minimal effort: 1). `message_bytes_max` caps every radio message. A claim is void when its robot has
-    been silent for `lease_ticks`; a robot silent for `dead_ticks` is presumed dead. A robot that has found nothing left to
-    explore for `freeze_ticks` adds nothing to the map any more. `robots_expected` is the number of robots that must
-    agree that all is explored. A robot without any message counts as silent from the start. `turn_sd_rad` is the random
-    walk's turn a tick.
-    With `presence_only` no bearing is used: robots know which landmarks they see, and stop when nothing was new for
-    `stagnation_ticks`.
+    been silent for `lease_ticks`; a robot silent for `dead_ticks` is presumed dead. A robot that has found nothing left
+    to explore for `freeze_ticks` stops adding to the map. `robots_expected` is the number of robots that must agree
+    that all is explored. A robot without any message counts as silent from the start. `turn_sd_rad` is the random
+    walk's turn a tick. With `presence_only` no bearing is used: robots know which landmarks they see, and stop when
+    nothing was new for `stagnation_ticks`.
     """
 
     beta: NonNegative = 10.0

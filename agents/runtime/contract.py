@@ -1,4 +1,4 @@
-"""The contract between a controller and whatever runs it: observation in, command out.
+"""The contract between a controller and the program that runs it: observation in, command out.
 
 A controller is a plain object. It does no I/O, reads no clock and imports no global randomness. Its `Setup` holds all
 that it may know of itself. Each `Observation` holds all that it may know of its surroundings. `Controller` is a
@@ -32,8 +32,8 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
 class Setup(Struct, frozen=True, forbid_unknown_fields=True):
     """All that a node knows before its first observation.
 
-    The `bases`, ids of base stations, only a coordinator knows. `services` tells who provides which service. A node that has
-    lost its memory is a later `incarnation`.
+    The `bases`, ids of base stations, only a coordinator knows. `services` names the provider of each service. A node
+    that has lost its memory is a later `incarnation`.
     """
 
     node: int  # id: robots from 0, base stations first, then the coordinator

@@ -109,7 +109,7 @@ class Node:
 
 
 def _formatted(error: BaseException) -> list[str]:
-    """Return the traceback of an error without the frame of this file, which tells nothing of the controller."""
+    """Return the traceback of an error without the frame of this file, which gives no information about the controller."""
     trace = error.__traceback__
     if trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

@@ -62,7 +62,7 @@ def main(
     """
     die_with_parent(_server)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.setsid()  # the session tells which processes a controller has started
+    os.setsid()  # the session identifies the processes that a controller has started
     os.register_at_fork(after_in_child=die_with_parent)
     hide_memory()
     os.nice(NICENESS)
@@ -97,7 +97,7 @@ class _Prefixed(io.TextIOBase):
         self._stream, self._prefix, self._line = stream, prefix, ""
 
     def writable(self) -> bool:
-        """Tell that the stream can be written to."""
+        """Report that the stream can be written to."""
         return True
 
     def write(self, text: str) -> int:
@@ -230,7 +230,8 @@ def _is_goodbye(payload: bytes) -> bool:
 def die_with_parent(parent: int | None = None) -> None:
     """Tell the kernel to kill this process when its parent dies (Linux only).
 
-    Exits at once if `parent` is not the parent any more: it died before the kernel was told, and the kernel says nothing then.
+    Exits at once if `parent` is no longer the parent: it died before this request to the kernel, so the kernel sends no
+    signal.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -248,6 +249,7 @@ _server: int | None = None
 
 
 def serve_robots() -> None:
-    """Note that this process is the server that robots are forked from: a robot ends when it is not their parent any more."""
+    """Note that this process is the server that robots are forked from: a robot ends when its parent is no longer this
+    server."""
     global _server
     _server = os.getpid()

@@ -1,7 +1,7 @@
 """The robot under a coordinator: it stands still and reports until the coordinator commands a drive.
 
 An activity is a generator that yields one velocity a tick: averaging, a drive, or a scan. The robot decides local
-questions itself: its offset from the bearings it shall see, contacts with walls, broken visual links, and arrival.
+questions itself: its offset from the bearings that it must reach, contacts with walls, broken visual links, and arrival.
 """
 
 import math

@@ -41,7 +41,7 @@ from zwerm.wire.messages import Command, Observation, Transmission
 # Ticks after which a robot that has nothing to explore is considered again: at first, and at most.
 RETRY_TICKS: Final = 10
 RETRY_TICKS_MAX: Final = 80
-# The costs by which min-pos ranks the other robots may be so many ticks old.
+# Largest age [ticks] of the costs by which min-pos ranks the other robots.
 RANK_TICKS: Final = 20
 # Ticks between two tries of the same order.
 SAY_AGAIN_TICKS: Final = 4

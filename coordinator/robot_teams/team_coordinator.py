@@ -18,7 +18,7 @@ from zwerm.errors import ProtocolError
 from zwerm.wire.checksum import seal, unseal
 from zwerm.wire.messages import Command, Observation, Transmission
 
-# The coordinator waits so long for robots to say where they are [s], and then decides every so many ticks.
+# Time that the coordinator waits for the robots' first reports [s], and ticks between its decisions after that.
 GATHER_S: Final = 1.0
 DECIDE_TICKS: Final = 4
 

@@ -160,7 +160,7 @@ class CommandMailbox:
         self._second_roll_call_tick = self.tick + REPEAT_TICKS if self._in_recovery else None
 
     def _call(self, request: Request, copies: int) -> Request:
-        """Send so many copies of a request to all robots, and return the last one."""
+        """Send this number of copies of a request to all robots, and return the last one."""
         for _ in range(copies):
             request = _next_attempt(request)
             self._outbox.append(Transmission(UPLINK, write(request)))

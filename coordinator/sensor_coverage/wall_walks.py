@@ -39,7 +39,7 @@ FEEL_M: Final = 0.12
 CLEAR_M: Final = 0.3
 # Length [m] of one leg of a walk: the coordinator decides after each leg whether it goes on.
 LEG_M: Final = 3.0
-# A walk ends after so many legs in a row that closed nothing.
+# Number of consecutive legs that closed nothing after which a walk ends.
 IDLE_LEGS_MAX: Final = 2
 # A leg closes something if the open arcs become smaller by this [rad].
 PROGRESS_RAD: Final = 0.1

@@ -130,9 +130,9 @@ def _rule(model: OpenTable, path: str, scenario: Scenario) -> tuple[NetworkRule,
         if rule is None:
             raise ValueError("no rule of the network is known for this model")
         if isinstance(rule, ReceiverDelay) and parameters.senders is not None:
-            raise ValueError("netem delays all that goes to a receiver; say receivers")
+            raise ValueError("netem delays all packets to a receiver: set receivers, not senders")
         if isinstance(rule, SenderRate) and parameters.receivers is not None:
-            raise ValueError("tbf slows down all that a sender sends; say senders")
+            raise ValueError("tbf slows down all packets of a sender: set senders, not receivers")
     except ValidationError as error:
         named = f"{scenario.place}: "
         found = [line.removeprefix(named) for line in mistakes(error, scenario.place, f"{path}.")]

@@ -233,8 +233,8 @@ def test_namespaces_are_removed_after_an_error(nothing_left: None) -> None:
 @pytest.mark.parametrize(
     ("tables", "line"),
     [
-        ({"radio": {"models": [{"kind": "path_loss"}]}}, "radio.models.0.kind: not in the twin: its chance changes with "
-         "every distance; say range and loss, got 'path_loss'"),
+        ({"radio": {"models": [{"kind": "path_loss"}]}}, "radio.models.0.kind: not in the twin: its loss depends on "
+         "the distance: use the models range and loss, got 'path_loss'"),
         ({"radio": {"models": [{"kind": "wall_attenuation"}]}},
          "radio.models.0.kind: not in the twin: without margin_db nothing is dropped, got 'wall_attenuation'"),
         ({"radio": {"models": [{"kind": "collision", "airtime_s": 0.1}]}},

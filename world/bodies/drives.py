@@ -1,7 +1,7 @@
 """Drives: from the commands of robots to the velocities that their bodies track.
 
 A commanded drive persists until the next one. It acts a fixed number of ticks after the observation it answers (the body's
-actuation latency). Noise, drawn anew for every tick, disturbs it; then it is clamped to the limits of the motors.
+actuation latency). Noise, drawn again for every tick, disturbs it; then it is clamped to the limits of the motors.
 """
 
 from collections.abc import Mapping

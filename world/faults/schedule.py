@@ -1,7 +1,7 @@
 """The schedule of a run: the faults that are active at a tick, and their effects.
 
 Input: the `[[faults]]` tables of the scenario, and those of its random schedule. At each tick the schedule begins and ends
-faults. After a change it gives the states of programs, the judges of packets, and the faults of sensors anew.
+faults. After a change it gives the new states of programs, judges of packets, and faults of sensors.
 """
 
 import json

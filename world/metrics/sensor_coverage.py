@@ -76,7 +76,8 @@ class Deployment(Metric):
     def _count(self, node: int, cycle: float, restarted: bool) -> None:
         """Count the cycles of a node over all its incarnations.
 
-        A restarted node counts anew: a complex whose cycle is not a later one, or fewer cycles than before, begin a new count.
+        A restarted node starts its count again. A complex of a cycle that is not later, or fewer cycles than before,
+        begin a new count.
         """
         if restarted:
             self._before[node] = self._before.get(node, 0.0) + self._cycle.get(node, 0.0)
@@ -88,7 +89,7 @@ class Conclusion(Metric):
     """`concluded_early`: 1 where the base station has concluded too early, by the truth at that time, else 0.
 
     Too early is a coverage of the space that robots can reach below `ENOUGH`, measured where `metrics.sight_range_m` is given;
-    or a claim of a running robot that it stands at a frontier. A robot that has restarted reports its claim anew.
+    or a claim of a running robot that it stands at a frontier. A robot that has restarted reports its claim again.
     """
 
     names: ClassVar[Sequence[str]] = ("concluded_early",)
@@ -102,7 +103,7 @@ class Conclusion(Metric):
         self._truth: Truth | None = None
 
     def report(self, record: TelemetryRecord) -> None:
-        """Take a robot's claim that it stands at a frontier, or that it does not any more."""
+        """Take a robot's claim that it stands at a frontier, or that it no longer does."""
         if CLAIM in record.numbers:
             self._claims[record.node] = bool(record.numbers[CLAIM])
 

@@ -51,7 +51,7 @@ class Ledger:
         self._age_ticks = links.integers()
 
     def transmit(self, sender: Ints, sizes: Ints) -> None:
-        """Count one transmission of each of `sender` (t,), with payloads of so many bytes (t,)."""
+        """Count one transmission of each of `sender` (t,), with the sizes of their payloads [bytes] (t,)."""
         np.add.at(self.node_messages, sender, 1)
         np.add.at(self.node_bytes, sender, sizes)
 

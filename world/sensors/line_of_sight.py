@@ -112,7 +112,7 @@ class LineOfSightSensor(Sensor):
         return sees
 
     def _prepare(self, total: int) -> None:
-        """Make the buffers for so many rows at a time of `total` robots, and tables of each entry's row and column."""
+        """Make the buffers for this number of rows at a time of `total` robots, and tables of each entry's row and column."""
         self._total = total
         self._rows = min(max(1, _PAIRS_AT_ONCE // total), total)
         size = self._rows * total

@@ -10,7 +10,7 @@ from typing import Final
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 
-# n_l of section IV-B: so many landmarks fix a bearing-only target.
+# n_l of section IV-B: the number of landmarks that fix a bearing-only target.
 SHARED_MIN: Final = 2
 
 # Of two snapshots of the same landmarks the one with the smaller rank is kept: (number in its origin's log, origin).

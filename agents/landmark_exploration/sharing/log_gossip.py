@@ -24,7 +24,7 @@ from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch
 # Ticks between a robot's beacons, and between the vectors it sends.
 BEACON_TICKS: Final = 8
 SYNC_TICKS: Final = 4
-# A beacon whose digest differed counts for so many ticks.
+# Ticks for which a beacon with another digest counts.
 DIFFERS_TICKS: Final = 12
 # Entries in answer to one vector, at most.
 ANSWER_ENTRIES_MAX: Final = 150

@@ -18,7 +18,7 @@ from typing import Final
 
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Register
 
-# All robots have to agree for so many ticks: a few beacons, of which some may be lost.
+# Ticks for which all robots must agree: a few beacons, of which some may be lost.
 SETTLE_TICKS: Final = 60
 
 
@@ -47,7 +47,7 @@ class Registers:
         return True
 
     def is_silent(self, node: int, tick: int) -> bool:
-        """Return whether no new register of a robot came for so long that it is presumed dead."""
+        """Return whether a robot is presumed dead, because no new register of it has come for `dead_ticks`."""
         return tick - self._heard.get(node, 0) >= self._dead_ticks
 
     def claims(self, me: int, tick: int) -> Iterator[int]:

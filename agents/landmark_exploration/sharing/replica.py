@@ -73,7 +73,7 @@ class Replica:
         return stretch
 
     def missing(self, vector: Mapping[int, int], origins: Iterable[int], entries_max: int) -> list[Stretch]:
-        """Return what the holder of `vector` lacks of the logs of `origins`, up to so many entries."""
+        """Return the entries of the logs of `origins` that the holder of `vector` lacks, up to a largest number."""
         found: list[Stretch] = []
         for origin in origins:
             first = vector.get(origin, 0)

@@ -7,7 +7,7 @@ from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries,
 from zwerm.agents.landmark_exploration.sharing.packing import counts_of, pack_entries
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch
 
-# After so many ticks without an acknowledgement what is not acknowledged is sent again.
+# Ticks without an acknowledgement after which the robot sends the entries again.
 RETRY_TICKS: Final = 5
 # So many entries are sent at a time, at most.
 WINDOW_ENTRIES: Final = 60

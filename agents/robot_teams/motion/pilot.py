@@ -25,7 +25,7 @@ MOVING_WAIT_S: Final = 3.0
 # No progress: less than this distance in this time.
 HEADWAY_M: Final = 0.2
 HEADWAY_S: Final = 4.0
-# After so many retreats the manoeuvre has failed.
+# Number of retreats after which the manoeuvre has failed.
 ATTEMPTS_MAX: Final = 5
 # The longest retreat, on average [m].
 RETREAT_M: Final = 4.0

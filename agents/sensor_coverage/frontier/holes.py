@@ -1,7 +1,7 @@
 """Holes of a swarm's complex, by bearings: their corners, and whether a robot ever met an obstacle in them.
 
-Homology finds a hole but does not tell a pillar from an accidental gap. Robots can: a robot that touched a wall, or was
-stopped by one, knows its direction. A hole into which no such direction leads does not surround an obstacle.
+Homology finds a hole but does not distinguish a pillar from an accidental gap. Robots can: a robot that touched a wall,
+or was stopped by one, knows its direction. A hole into which no such direction leads does not surround an obstacle.
 """
 
 import math

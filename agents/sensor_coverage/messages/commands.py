@@ -66,7 +66,7 @@ class Waypoint(_Part, frozen=True):
 
 
 class RollCall(_Message, frozen=True, tag="roll-call"):
-    """To all: stop, average bearings anew, and report."""
+    """To all: stop, average bearings again, and report."""
 
     cycle: int
 

@@ -114,7 +114,7 @@ class RedundantOffer(_Message, frozen=True, tag="offer"):
 
 
 class RedundantCall(_Message, frozen=True, tag="call"):
-    """From the base, hop by hop: the robot that has left the first of `slots` shall be the rear of a push."""
+    """From the base, hop by hop: the robot that has left the first of `slots` must be the rear of a push."""
 
     push: int
     slots: tuple[int, ...]

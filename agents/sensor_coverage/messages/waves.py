@@ -10,7 +10,7 @@ Count = Annotated[int, Meta(ge=0, le=2**62)]
 class CensusWave(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag="wave"):
     """The sender has joined this wave by `parent` (None at the base), and waits for the neighbours in `missing`.
 
-    With `again` the neighbours in `missing` that have joined shall send their wave or tally once more. `roster` are all
+    With `again` the neighbours in `missing` that have joined must send their wave or tally again. `roster` are all
     robots that were ever let out. `search` counts the times that the base has all robots try again what had failed.
     """
 

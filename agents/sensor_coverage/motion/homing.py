@@ -1,6 +1,6 @@
 """Bearing-only visual homing in the plane: the offset to the goal from which landmarks have the desired bearings.
 
-Let g be the unit vector towards a landmark as it is seen, and g* as it shall be seen. The gradient of Tron and
+Let g be the unit vector towards a landmark as it is seen, and g* the same vector at the goal. The gradient of Tron and
 Daniilidis 2014 is sum(g - g*). Near the goal it is -M x offset / distance, where M = sum(I - g* g*^T). Division by M is
 the paper's "adaptive gain" (Ramaithitima et al. 2015, section II-D). Landmarks in one line leave one direction of M
 empty: bearings do not determine the offset in that direction.

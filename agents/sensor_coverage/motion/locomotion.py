@@ -27,7 +27,7 @@ RETURN_TICKS_MAX = 20
 class Locomotion:
     """Readings and means of driving of one robot.
 
-    `rest` is the point where the robot shall stand, in its odometry frame, or None if it never drove.
+    `rest` is the point where the robot must stand, in its odometry frame, or None if it never drove.
     `bearing_noise_rad` is the standard deviation of a bearing, which the robot measures itself, or None before that.
     """
 

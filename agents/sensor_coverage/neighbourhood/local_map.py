@@ -68,7 +68,7 @@ class LocalMap(NeighbourTable):
         self._slots = Slots()
         self._planner = make_planner(parameters, self._slots)
         self._plan_basis: object = None
-        self._led: tuple[int, int | None] | None = None  # (new slot, follower) of a push that this robot led in vain
+        self._led: tuple[int, int | None] | None = None  # (new slot, follower) of a push that failed
 
     # --- memory of the slot -------------------------------------------------------------------------------------------
 

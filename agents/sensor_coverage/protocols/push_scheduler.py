@@ -30,7 +30,7 @@ PUSH_TICKS_MAX: Final = 2000
 GAP_TICKS: Final = 24
 # Bound of the ticks to wait for a robot that stands at the base and is not ready.
 READY_TICKS_MAX: Final = 1500
-# Pause after so many pushes, and its ticks: redundant robots negotiate while all robots stand still.
+# Number of pushes before a pause, and ticks of the pause: redundant robots negotiate while all robots stand still.
 PAUSE_EVERY: Final = 10
 PAUSE_TICKS: Final = 80
 

@@ -22,7 +22,7 @@ STILL_TICKS: Final = 2
 class RequestedLeave(Component):
     """The negotiation of a robot under a coordinator.
 
-    `wanted`: the robot shall leave if it can. `driving`: it carries out a drive. `has_left`: it has left the complex.
+    `wanted`: the robot must leave if it can. `driving`: it carries out a drive. `has_left`: it has left the complex.
     `snapshot` is a change of membership that is not reported yet.
     """
 

@@ -97,7 +97,7 @@ class PathLoss(RadioModel):
     @classmethod
     def network_rule(cls, parameters: PathLossTable) -> None:
         """Raise ValueError: the probability of loss depends on the distance."""
-        raise ValueError("its chance changes with every distance; say range and loss")
+        raise ValueError("its loss depends on the distance: use the models range and loss")
 
 
 def reach_m(table: PathLossTable) -> float:

@@ -36,7 +36,7 @@ class LossEstimate:
         self._newest.pop(sender, None)
 
     def receive(self, sender: int, number: int, copies: int, arrived: int) -> None:
-        """Take in that `arrived` of so many copies of a broadcast have arrived in one tick."""
+        """Record that `arrived` of the copies of a broadcast have arrived in one tick."""
         newest = self._newest.get(sender)
         if newest is not None and number <= newest:
             self._count(-min(arrived, copies), 0)  # late: it was counted as lost
