@@ -51,9 +51,9 @@ def words(text: str) -> str:
 
 
 class Reader:
-    """A reader with a folder and a shell, whose `zwerm` and `python` are those of these tests."""
+    """A reader with a folder and a shell: `zwerm` is that of the tree `root`, and `python` that of these tests."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, root: Path = ROOT) -> None:
         self.folder = folder
         self.printed = ""
         self.commands = 0
@@ -67,7 +67,7 @@ class Reader:
         self._where = tools / "where"
         self._environment = os.environ | {
             "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}",
-            "PYTHONPATH": str(ROOT),
+            "PYTHONPATH": str(root),
             "COLUMNS": "200",
         }
 

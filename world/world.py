@@ -210,6 +210,10 @@ class World:
         """Stop a robot's motors until its next command."""
         self.bodies.stop(node)
 
+    def newest_answer(self, node: int) -> int:
+        """Return the tick of the newest answer accepted from a node, where answers may be late; -1 for none."""
+        return self.intake.newest_tick(node)
+
     def refuse_stale(self, node: int) -> None:
         """Count a message that a former incarnation of a node sent."""
         self.intake.note_refusal(node, "stale-incarnation")

@@ -101,7 +101,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             f"{_SENSOR_COVERAGE_METRICS}:Conclusion",
             f"{_SENSOR_COVERAGE_METRICS}:Removals",
         ),
-        layers=("zwerm.view.sensor_coverage:ComplexLayer",),
+        layers=("zwerm.view.layers.sensor_coverage:ComplexLayer",),
         scenarios=("sensor-coverage*",),
     ),
     Algorithm(
@@ -141,7 +141,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             "zwerm.world.metrics.landmark_exploration:Exploration",
             "zwerm.world.metrics.landmark_exploration:Navigation",
         ),
-        layers=("zwerm.view.landmark_exploration:LandmarkComplexLayer",),
+        layers=("zwerm.view.layers.landmark_exploration:LandmarkComplexLayer",),
         scenarios=("landmark-*",),
     ),
     Algorithm(
@@ -171,7 +171,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             Variant({"cells": "coordinator"}, decides=COORDINATOR),
         ),
         metrics=("zwerm.world.metrics.robot_teams:TeamCoverage",),
-        layers=("zwerm.view.robot_teams:CellsLayer",),
+        layers=("zwerm.view.layers.robot_teams:CellsLayer",),
         scenarios=("robot-teams*",),
     ),
     Algorithm(
@@ -282,7 +282,10 @@ METRICS: Final = {
 
 
 # Layers of the pictures of every run, each of which applies only where it is asked for.
-PICTURE_LAYERS: Final = ("zwerm.view.radio_links:RadioLinks", "zwerm.view.telemetry_colours:TelemetryColours")
+PICTURE_LAYERS: Final = (
+    "zwerm.view.layers.radio_links:RadioLinks",
+    "zwerm.view.layers.telemetry_colours:TelemetryColours",
+)
 
 
 def plugins() -> dict[str, Mapping[str, str]]:

@@ -1,4 +1,4 @@
-"""Runs over a network with certificates on both sides: who is let in, and what each host's file holds."""
+"""Runs over a network with certificates on both sides: the admitted hosts, and the content of each host's file."""
 
 import subprocess
 import tempfile

@@ -1,4 +1,4 @@
-"""The documentation: what it generates is complete, and every example in it works."""
+"""The documentation: its generated parts are complete, and every example in it works."""
 
 import os
 import re

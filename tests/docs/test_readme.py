@@ -1,4 +1,4 @@
-"""Everything the README tells a reader to do is done here, as it stands there."""
+"""The tests carry out every instruction of the README without changes."""
 
 import os
 import re

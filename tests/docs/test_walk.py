@@ -1,4 +1,4 @@
-"""The test helper that follows a page: it fails where the page is not true."""
+"""The test helper that follows a page: it fails if a statement of the page is wrong."""
 
 from pathlib import Path
 

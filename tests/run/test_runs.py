@@ -1,4 +1,4 @@
-"""Whole runs in real processes over real Zenoh: how they end, what they say, and that they leave nothing behind."""
+"""Whole runs in real processes over real Zenoh: their end, their output, and no files or processes left behind."""
 
 import json
 import os

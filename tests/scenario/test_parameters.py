@@ -2,6 +2,7 @@
 
 import pytest
 
+from zwerm.catalogue import COORDINATOR, names
 from zwerm.errors import ScenarioError
 from zwerm.run.assembly import prepare
 from zwerm.scenario.load import load
@@ -37,9 +38,8 @@ from zwerm.scenario.load import load
         ),
         (
             "coordinator.controller=beacon",
-            "coordinator.controller: expected a built-in coordinator (sensor-coverage, "
-            "landmark-exploration, robot-teams) or module:Class, got 'beacon'",
-            "",
+            f"coordinator.controller: expected a built-in coordinator ({', '.join(names(COORDINATOR))}) or module:Class, ",
+            "got 'beacon'",
         ),
         ("coordinator.controller=nobody:Nobody", "coordinator.controller: cannot import 'nobody': ", "'nobody'"),
     ],

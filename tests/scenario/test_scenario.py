@@ -1,4 +1,4 @@
-"""Scenarios: what is read, what an override changes, and the exact line for every kind of mistake."""
+"""Scenarios: reading, the effect of an override, and the exact line for every kind of mistake."""
 
 import subprocess
 import sys

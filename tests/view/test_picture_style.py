@@ -9,8 +9,8 @@ from PIL import Image
 from zwerm.errors import PictureError
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
+from zwerm.view.layers.telemetry_colours import TelemetryColours
 from zwerm.view.picture_style import PictureStyle
-from zwerm.view.telemetry_colours import TelemetryColours
 
 # Two pairs, each out of reach of the other: 0 and 1 on the left, 2 and 3 on the right.
 POSES = "[[0.3,1.0,0.0],[0.7,1.0,0.0],[1.3,1.0,0.0],[1.7,1.0,0.0]]"

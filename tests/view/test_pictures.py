@@ -22,9 +22,9 @@ from zwerm.view.animation import animate_run
 from zwerm.view.canvas import Sheet, outline, readable, round_down
 from zwerm.view.composition import Composition
 from zwerm.view.coverage_curve import coverage_curve
+from zwerm.view.layers.sensor_coverage import FRONTIER, OBSTACLE, PUSH, ComplexLayer, Snapshot, snapshots, true_snapshot
+from zwerm.view.layers.sensor_coverage import TRIANGLE as FILL
 from zwerm.view.run_view import RunView
-from zwerm.view.sensor_coverage import FRONTIER, OBSTACLE, PUSH, ComplexLayer, Snapshot, snapshots, true_snapshot
-from zwerm.view.sensor_coverage import TRIANGLE as FILL
 from zwerm.view.stills import draw_run
 from zwerm.view.swarm_artists import Swarm, gone_at_the_end
 from zwerm.world.arena.arena import Arena
@@ -178,7 +178,7 @@ def test_a_scale_bar_is_a_round_number_of_metres(length_m: float, bar_m: float) 
     assert round_down(length_m) == pytest.approx(bar_m)
 
 
-LAYERS = ("zwerm.view.sensor_coverage:ComplexLayer",)
+LAYERS = ("zwerm.view.layers.sensor_coverage:ComplexLayer",)
 
 # --- a deployment ---------------------------------------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from zwerm.view.robot_teams import Slice, cells_of
+from zwerm.view.layers.robot_teams import Slice, cells_of
 
 
 def test_a_room_is_one_cell() -> None:

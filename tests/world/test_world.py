@@ -1,4 +1,4 @@
-"""The world without any link: time, drives, wake rule, radio accounts, depots, and what becomes of robots that crash."""
+"""The world without any link: time, drives, wake rule, radio accounts, depots, and the treatment of robots that crash."""
 
 import math
 

@@ -132,7 +132,7 @@ class RealTime(Driver):
 
     def _note_answer(self, node: int) -> None:
         """Forget the observations that a node has answered, and count those that it skipped: nodes answer in order."""
-        unanswered, newest = self._unanswered.get(node), self._world.intake.newest_tick(node)
+        unanswered, newest = self._unanswered.get(node), self._world.newest_answer(node)
         if not unanswered:
             return
         while unanswered and unanswered[0][0] <= newest:

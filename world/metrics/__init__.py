@@ -62,7 +62,8 @@ class Metric:
 
     `names` are the names of its metrics, units last; `*` in a name stands for any characters. `every_s` is the sampling
     period [s] where the scenario does not give `metrics.every_s`; None samples at the end only. `Parameters` is the pydantic
-    type of its key's value in `[metrics]`. A method `report(record)`, if there is one, gets every TelemetryRecord as it comes.
+    type of its key's value in `[metrics]`; with None the key is a switch, true or false. A method `report(record)`, if there
+    is one, gets every TelemetryRecord as it comes.
     """
 
     names: ClassVar[Sequence[str]] = ()

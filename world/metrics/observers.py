@@ -123,7 +123,11 @@ def algorithms(scenario: Scenario) -> list[Algorithm]:
 def _asked_for(scenario: Scenario) -> Iterator[tuple[str, Any]]:
     """Yield every metric class of the catalogue that a scenario asks for, as `module:Class`, and its parameters."""
     for key, path in METRICS.items():
-        if (parameters := getattr(scenario.metrics, key)) is not None:
+        parameters = getattr(scenario.metrics, key)
+        if class_named(path, "metric", METRICS).Parameters is None:  # the key is a switch
+            if parameters:
+                yield path, None
+        elif parameters is not None:
             yield path, parameters
     for row in algorithms(scenario):
         yield from ((path, None) for path in row.metrics)

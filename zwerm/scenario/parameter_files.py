@@ -12,7 +12,7 @@ from zwerm.errors import ScenarioError
 
 SUFFIX: Final = "_file"
 
-# A larger file is refused: it would not fit into the message that tells a node what it is.
+# A larger file is refused: it would not fit into the message that gives a node its role.
 FILE_BYTES_MAX: Final = 8_000_000
 
 

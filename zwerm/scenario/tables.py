@@ -265,10 +265,12 @@ class MetricsTable(Table):
 
 @cache
 def metrics_table(keys: tuple[str, ...] = tuple(METRICS)) -> type[MetricsTable]:
-    """Return the table `[metrics]` with these keys of the catalogue, each typed by the `Parameters` of its row's class."""
-    fields: dict[str, Any] = {
-        key: (class_named(METRICS[key], "metric", METRICS).Parameters | None, None) for key in keys
-    }
+    """Return the table `[metrics]` with these keys of the catalogue, each typed by the `Parameters` of its row's class.
+
+    The key of a class without parameters is a switch, true or false.
+    """
+    types = {key: class_named(METRICS[key], "metric", METRICS).Parameters for key in keys}
+    fields: dict[str, Any] = {key: ((bool if each is None else each) | None, None) for key, each in types.items()}
     return create_model("MetricsTable", __base__=MetricsTable, __doc__=MetricsTable.__doc__, **fields)
 
 

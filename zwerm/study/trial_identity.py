@@ -120,7 +120,7 @@ class LoadedModules:
     """The user's modules that a trial loads, against those that its point was planned with."""
 
     def __init__(self, planned: UserModules, in_processes: bool = False) -> None:
-        """Remember how the planned files are now. `in_processes` means that robots import them anew in every trial."""
+        """Remember how the planned files are now. `in_processes` means that robots import them again in every trial."""
         self._planned = planned
         self._in_processes = in_processes
         self._changed = self._first_changed()

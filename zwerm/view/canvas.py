@@ -59,7 +59,7 @@ NOTHING: Final = Outline(np.zeros((0, 2)))
 def outline(area: shapely.Geometry) -> Outline:
     """Return the path around the polygons of `area`, holes included; lines and points in it are left out."""
     rings: list[Outline] = []
-    # Normalised, exteriors and holes run opposite ways, which is how a fill tells them apart.
+    # Normalised, exteriors and holes run opposite ways, which is how a fill distinguishes them.
     for part in shapely.get_parts(shapely.normalize(area)):
         if part.geom_type == "Polygon":
             rings += [Outline(np.asarray(ring.coords)[:, :2], closed=True) for ring in (part.exterior, *part.interiors)]

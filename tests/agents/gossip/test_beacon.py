@@ -1,4 +1,4 @@
-"""The beacon: it counts what it hears and what it misses, and drives straight on if it is told a speed."""
+"""The beacon: it counts received and missed packets, and drives straight on if a speed is set."""
 
 import pytest
 from support import scenario

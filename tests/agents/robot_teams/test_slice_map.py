@@ -1,4 +1,4 @@
-"""The map of ends, ports and mates: merging needs no order, and the certificate says what is open."""
+"""The map of ends, ports and mates: maps merge in any order, and the certificate names the open ends and ports."""
 
 from itertools import permutations
 

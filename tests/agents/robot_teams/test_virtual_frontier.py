@@ -1,4 +1,4 @@
-"""The virtual frontier: sweeps end at it, what it leaves is open, and a later sweep past it makes it count for nothing."""
+"""The virtual frontier: sweeps end at it, the space beyond it stays open, and a later sweep past it makes it void."""
 
 from zwerm.agents.robot_teams.mapping.facts import (
     BOTTOM,

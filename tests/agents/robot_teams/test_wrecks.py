@@ -1,4 +1,4 @@
-"""A robot is taken for a wreck by touch, rest and silence together; what names a wreck is void once that robot lives."""
+"""A robot is taken for a wreck by touch, rest and silence together; facts that name it are void once it is alive."""
 
 from zwerm.agents.robot_teams.mapping.facts import (
     BOTTOM,

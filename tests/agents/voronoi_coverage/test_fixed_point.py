@@ -1,4 +1,4 @@
-"""The integer variant: its error against floating point, what it costs, and that it fits the machine it is for."""
+"""The integer variant: its error against floating point, its cost, and its limits on the target machine."""
 
 import operator
 from collections import Counter

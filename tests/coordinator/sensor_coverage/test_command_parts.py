@@ -1,4 +1,4 @@
-"""A coordinator of many robots divides what it sends into commands that the world accepts."""
+"""A coordinator of many robots divides its messages into commands that the world accepts."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A coordinator that finds the path, and robots that find out among themselves who can be spared."""
+"""A coordinator that finds the path, and robots that find the redundant ones among themselves."""
 
 import math
 

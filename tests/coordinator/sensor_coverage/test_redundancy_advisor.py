@@ -1,4 +1,4 @@
-"""A coordinator that does nothing but tell robots who of them can be spared: its part, the robots', and whole deployments."""
+"""A coordinator that only advises robots that they are redundant: its part, the robots' part, and whole deployments."""
 
 import math
 import random

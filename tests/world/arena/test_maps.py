@@ -1,4 +1,4 @@
-"""Maps become arenas: which cells are free by the rules of each format, and what becomes of staircases of pixels."""
+"""Maps become arenas: which cells are free by the rules of each format, and the treatment of staircases of pixels."""
 
 import os
 from pathlib import Path

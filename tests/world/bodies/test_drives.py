@@ -19,7 +19,7 @@ def test_a_built_in_drive_keeps_to_the_limits_of_the_motors(kind: str) -> None:
     forward, left, turn = drive.velocities(random.uniform(-5.0, 5.0, (200, axes)))
     speed = np.hypot(forward, 0.0 if left is None else left)
     assert speed.max() <= 0.1 + 1e-12
-    assert np.abs(turn).max() <= (4.0 if kind == "differential" else 1.0) + 1e-12
+    assert np.abs(turn).max() <= (4.0 if drive.has_wheels else 1.0) + 1e-12
 
 
 def test_a_differential_drive_turns_by_the_difference_of_its_wheels() -> None:
@@ -43,7 +43,7 @@ def test_a_drive_of_a_users_own_moves_the_robots_of_a_run() -> None:
 @pytest.mark.parametrize(
     ("kind", "line"),
     [
-        ("legs", "expected a built-in drive (differential, holonomic) or module:Class, got 'legs'"),
+        ("legs", f"expected a built-in drive ({', '.join(DRIVES)}) or module:Class, got 'legs'"),
         ("own_drives:NoCommand", "own_drives:NoCommand is no drive: expected a subclass of zwerm.Drive"),
     ],
 )

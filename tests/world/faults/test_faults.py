@@ -10,6 +10,7 @@ from rich.console import Console
 from support import scenario
 
 from zwerm.agents.runtime.node import Node
+from zwerm.catalogue import FAULTS
 from zwerm.cli.console import print_result
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import LinkError, ScenarioError
@@ -464,8 +465,7 @@ def test_a_rate_of_random_faults_that_cannot_occur_is_a_mistake() -> None:
 @pytest.mark.parametrize(
     ("fault", "line"),
     [
-        ({"kind": "explode", "at_s": 0}, "faults.0.kind: expected a built-in fault (crash, restart, pause, slow, join, "
-         "partition, jam, blackout, cut, camera_blackout, dead_beacon, stuck_touch, sensor_noise, heal) or module:Class, "
+        ({"kind": "explode", "at_s": 0}, f"faults.0.kind: expected a built-in fault ({', '.join(FAULTS)}) or module:Class, "
          "got 'explode'"),
         ({"kind": "crash", "nodes": [9], "at_s": 0}, "faults.0.nodes.0: no such robot: ids are 0 to 3, got 9"),
         ({"kind": "crash", "nodes": [-1], "at_s": 0}, "faults.0.nodes.0: no such robot: ids are 0 to 3, got -1"),

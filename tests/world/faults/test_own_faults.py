@@ -140,8 +140,7 @@ def test_a_rate_of_a_kind_that_has_no_random_faults_is_refused_in_one_line(rates
     ("rates", "line"),
     [
         ({"explode_per_h": 1.0, "crash_rate": 1.0}, "random_faults: expected seed, mean_s, or KIND_per_h with a built-in "
-         "fault (crash, restart, pause, slow, join, partition, jam, blackout, cut, camera_blackout, dead_beacon, "
-         "stuck_touch, sensor_noise, heal) or module:Class, got explode_per_h, crash_rate"),
+         f"fault ({', '.join(FAULTS)}) or module:Class, got explode_per_h, crash_rate"),
         ({"crash_per_h": -1.0}, "random_faults.crash_per_h: expected >= 0, got -1.0"),
         ({"own_faults:Flood_per_h": "often"}, 'random_faults.own_faults:Flood_per_h: expected a number, got "often"'),
     ],

@@ -4,11 +4,13 @@ import math
 from typing import Any
 
 import numpy as np
+import pytest
 from support import scenario
 
 from zwerm.run.assembly import assemble
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Bearing, Observation, decode_observation
+from zwerm.world.faults.sensing.sensor_noise import SensorNoise, SensorNoiseTable
 from zwerm.world.world import World
 
 SENSORS = [
@@ -135,3 +137,18 @@ def test_a_fault_of_another_sensor_changes_no_random_numbers() -> None:
         return look(assemble(faulty(*faults), 1))[0].bearings
 
     assert bearings(one) == bearings(other, one) != bearings()
+
+
+def test_a_new_optional_key_of_a_fault_changes_no_random_number_and_a_key_that_is_written_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Grown(SensorNoiseTable):
+        """The table of a later version, with one more optional key."""
+
+        drift: float = 0.0
+
+    noise = {"kind": "sensor_noise", "sensor": "bearings", "sd": 0.1, "at_s": 0.0}
+    before = look(assemble(faulty(noise), 1))
+    monkeypatch.setattr(SensorNoise, "Parameters", Grown)
+    assert look(assemble(faulty(noise), 1)) == before
+    assert look(assemble(faulty(noise | {"drift": 0.0}), 1)) != before

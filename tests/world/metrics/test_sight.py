@@ -11,7 +11,7 @@ from shapely.geometry import LineString
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
 from zwerm.scenario.tables import ArenaTable
-from zwerm.view.sensor_coverage import snapshots
+from zwerm.view.layers.sensor_coverage import snapshots
 from zwerm.world.arena.arena import Arena
 from zwerm.world.metrics.sight import SeenArea, hexagonal_packing_robots, holes, obstacles, reachable, robust
 

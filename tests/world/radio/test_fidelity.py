@@ -1,4 +1,5 @@
-"""The benchmark of the radio's fidelity, on few packets: every model is as true as it says, and a wrong one is found out."""
+"""The benchmark of the radio's fidelity, on few packets: every model is as accurate as stated, and a wrong model is
+detected."""
 
 from types import ModuleType
 

@@ -415,8 +415,7 @@ def test_these_tests_try_every_former_name() -> None:
 @pytest.mark.parametrize(
     ("model", "line"),
     [
-        ({"kind": "los"}, "radio.models.0.kind: expected a built-in model (range, line_of_sight, path_loss, "
-         "wall_attenuation, loss, gilbert_elliott, delay, duplication, corruption, rate_limit, collision) or module:Class, "
+        ({"kind": "los"}, f"radio.models.0.kind: expected a built-in model ({', '.join(RADIO_MODELS)}) or module:Class, "
          "got 'los'; did you mean loss?"),
         ({"kind": "own_models:Missing"}, "radio.models.0.kind: module 'own_models' has no class 'Missing'"),
         ({"kind": "own_models:WithoutJudge"}, "radio.models.0.kind: own_models:WithoutJudge is no radio model: it has no "

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from PIL import Image
 from scipy.interpolate import RegularGridInterpolator
 
+from zwerm.catalogue import FIELDS
 from zwerm.errors import ScenarioError
 from zwerm.scenario.types import OpenTable
 from zwerm.world.fields.bitmap import Bitmap
@@ -102,10 +103,7 @@ def test_pictures_of_one_pixel_and_of_sixteen_bits_are_fields_too(tmp_path):
     [
         (
             {"kind": "hills"},
-            [
-                "x.toml: field.kind: expected a built-in field (bitmap, constant, gaussians, lamp, linear) "
-                "or module:Class, got 'hills'"
-            ],
+            [f"x.toml: field.kind: expected a built-in field ({', '.join(FIELDS)}) or module:Class, got 'hills'"],
         ),
         ({"kind": "constant"}, ["x.toml: field.value: required, and missing"]),
         (

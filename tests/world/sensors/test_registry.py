@@ -93,10 +93,7 @@ def test_every_built_in_sensor_reads_no_robot_if_none_is_requested(make, scene):
         ({"kind": "field"}, ["robots.sensors.0.kind: the field sensor needs a field, and the scenario has none"]),
         (
             {"kind": "sonar"},
-            [
-                "robots.sensors.0.kind: expected a built-in sensor (bearings, boundary, compass, field, landmarks, "
-                "line_of_sight, neighbours, odometry, pose, touch) or module:Class, got 'sonar'"
-            ],
+            [f"robots.sensors.0.kind: expected a built-in sensor ({', '.join(SENSORS)}) or module:Class, got 'sonar'"],
         ),
         (
             {"kind": "no_such_module:Sensor"},
@@ -144,8 +141,7 @@ def test_a_mistake_in_a_table_is_one_line(make, table, lines):
 def test_mistakes_in_several_tables_are_reported_at_once(make):
     assert mistakes(make, {"kind": "pose", "sd_m": -1}, {"kind": "compass"}, {"kind": "sonor:"}) == [
         "x.toml: robots.sensors.0.sd_m: expected >= 0, got -1",
-        "x.toml: robots.sensors.2.kind: expected a built-in sensor (bearings, boundary, compass, field, landmarks, "
-        "line_of_sight, neighbours, odometry, pose, touch) or module:Class, got 'sonor:'",
+        f"x.toml: robots.sensors.2.kind: expected a built-in sensor ({', '.join(SENSORS)}) or module:Class, got 'sonor:'",
     ]
 
 

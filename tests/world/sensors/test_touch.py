@@ -1,4 +1,4 @@
-"""Touch switches: which close, and how often they err."""
+"""Touch switches: the closed switches, and the rate of errors."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""One rule says when a run ends, and both drivers follow it."""
+"""One rule decides when a run ends, and both drivers follow it."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""The sink of telemetry: what it keeps, what it drops, and how much memory it may take."""
+"""The sink of telemetry: the records that it keeps, those that it drops, and its largest memory."""
 
 import tracemalloc
 

@@ -1,4 +1,4 @@
-"""The proof of coverage by arcs: what closes a direction, and what does not."""
+"""The proof of coverage by arcs: conditions that close a direction, and conditions that do not."""
 
 import math
 

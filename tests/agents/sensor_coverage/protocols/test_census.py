@@ -1,4 +1,4 @@
-"""The census that tells when it is over, on networks that lose, delay, copy and reorder what robots say."""
+"""The census that detects the end of a deployment, on networks that lose, delay, copy and reorder messages."""
 
 import msgspec
 import numpy as np

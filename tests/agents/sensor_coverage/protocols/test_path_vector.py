@@ -1,4 +1,4 @@
-"""The way to the frontier, on networks that lose, delay, copy and reorder what robots say of it."""
+"""The way to the frontier, on networks that lose, delay, copy and reorder messages."""
 
 from collections.abc import Iterable
 from itertools import combinations

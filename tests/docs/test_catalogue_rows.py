@@ -1,0 +1,201 @@
+"""Each recipe as a part of Zwerm: its file in the room of its kind, and one row of the catalogue. No other file is edited."""
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from support import ROOT
+from walk import Reader, blocks, part
+
+import zwerm
+
+RECIPES = (ROOT / "docs" / "recipes.md").read_text(encoding="utf-8")
+FOLDERS = ("agents", "coordinator", "deploy", "docs", "scenarios", "studies", "world", "zwerm")
+
+
+class Row(NamedTuple):
+    """A recipe with the file of its plug-in, the files in rooms that it becomes, its row, and what its page says then.
+
+    `table` is the beginning of a table of the catalogue, and `row` the text that is inserted behind it.
+    """
+
+    heading: str
+    file: str
+    rooms: tuple[str, ...]
+    table: str
+    row: str
+    instead: dict[str, str]
+
+
+ALGORITHM_ROW = next(
+    re.sub(
+        r"^ +(metrics|layers)=.*\n", "", block.text.strip()[1:-1], flags=re.MULTILINE
+    )  # those have recipes of their own
+    for block in blocks(part(RECIPES, "A row of the catalogue"))
+    if "Algorithm(" in block.text
+)
+ROWS = [
+    Row(
+        "A sensor",
+        "beacon.py",
+        ("world/sensors/beacon.py",),
+        "SENSORS: Final = {",
+        '"beacon": "zwerm.world.sensors.beacon:Beacon",',
+        {"beacon:Beacon": "beacon"},
+    ),
+    Row(
+        "A radio model",
+        "rain.py",
+        ("world/radio/models/rain.py",),
+        "RADIO_MODELS: Final = {",
+        '"rain": "zwerm.world.radio.models.rain:Rain",',
+        {"rain:Rain": "rain"},
+    ),
+    Row(
+        "A fault",
+        "storm.py",
+        ("world/faults/air/storm.py",),
+        "FAULTS: Final = {",
+        '"storm": "zwerm.world.faults.air.storm:Storm",',
+        {"storm:Storm": "storm"},
+    ),
+    Row(
+        "A field",
+        "waves.py",
+        ("world/fields/waves.py",),
+        "FIELDS: Final = {",
+        '"waves": "zwerm.world.fields.waves:Waves",',
+        {"waves:Waves": "waves"},
+    ),
+    Row(
+        "A drive",
+        "tracks.py",
+        ("world/bodies/tracks.py",),
+        "DRIVES: Final = {",
+        '"tracks": "zwerm.world.bodies.tracks:Tracks",',
+        {"tracks:Tracks": "tracks"},
+    ),
+    Row(
+        "A metric",
+        "travel.py",
+        ("world/metrics/travel.py",),
+        "METRICS: Final = {",
+        '"travel": "zwerm.world.metrics.travel:Travel",',
+        {"'metrics.own=[\"travel:Travel\"]'": "metrics.travel=true"},
+    ),
+    Row(
+        "A picture layer",
+        "centre.py",
+        ("zwerm/view/layers/centre.py",),
+        'name="computation_free",',
+        'layers=("zwerm.view.layers.centre:Centre",),',
+        {"--set 'pictures.layers=[\"centre:Centre\"]'": ""},
+    ),
+    Row(
+        "An algorithm with a coordinator",
+        "headcount.py",
+        ("agents/headcount/__init__.py", "coordinator/headcount/__init__.py"),
+        "ALGORITHMS: Final[Sequence[Algorithm]] = (",
+        ALGORITHM_ROW,
+        {"headcount:Member": "headcount", "headcount:Counter": "headcount"},
+    ),
+    Row(
+        "A command",
+        "hurry.py",
+        ("zwerm/cli/commands/hurry_command.py",),
+        "COMMANDS: Final = {",
+        '"fastest": "zwerm.cli.commands.hurry_command:fastest",',
+        {"hurry:fastest": "fastest"},
+    ),
+]
+
+
+def for_a_room(text: str) -> str:
+    """Return a file that imports public names with each name imported from the module that defines it."""
+    lines = text.splitlines()
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.ImportFrom) and node.module == "zwerm":
+            found = [(getattr(zwerm, alias.name).__module__, alias.name) for alias in node.names]
+            lines[node.lineno - 1 : node.end_lineno] = [
+                "; ".join(f"from {module} import {name}" for module, name in found)
+            ]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the project with the file and the row of every recipe."""
+    root = tmp_path_factory.mktemp("tree")
+    for name in FOLDERS:
+        shutil.copytree(ROOT / name, root / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "README.md", root)
+    catalogue = root / "zwerm" / "catalogue.py"
+    text = catalogue.read_text(encoding="utf-8")
+    for row in ROWS:
+        [source] = [block.text for block in blocks(part(RECIPES, row.heading)) if block.title == row.file]
+        for name in row.rooms:
+            file = root / name
+            assert not file.exists()
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(for_a_room(source), encoding="utf-8")
+        assert text.count(row.table) == 1
+        text = text.replace(row.table, f"{row.table}\n{row.row}")
+    catalogue.write_text(text, encoding="utf-8")
+    [scenario] = [block.text for block in blocks(RECIPES) if block.title == "headcount.toml"]
+    scenario = scenario.replace("headcount:Member", "headcount").replace("headcount:Counter", "headcount")
+    (root / "scenarios" / "headcount.toml").write_text(scenario, encoding="utf-8")
+    return root
+
+
+def test_every_recipe_has_a_row() -> None:
+    headings = re.findall(r"^## (.*)$", RECIPES, re.MULTILINE)
+    assert [row.heading for row in ROWS] == [heading for heading in headings if heading != "A row of the catalogue"]
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.heading)
+def test_a_recipe_works_by_its_short_name_after_one_file_and_one_row(row: Row, tree: Path, tmp_path: Path) -> None:
+    page = part(RECIPES, row.heading)
+    for name, short in row.instead.items():
+        assert name in page
+        page = page.replace(name, short)
+    page = page.replace(f'title="{row.file}"', "")  # the file is in its room
+    reader = Reader(tmp_path, tree)
+    reader.follow(page)
+    assert reader.commands >= 1
+    assert not (tmp_path / row.file).exists()
+
+
+def test_the_layer_of_a_row_is_drawn(tree: Path, tmp_path: Path) -> None:
+    pictures: list[bytes] = []
+    for root in (ROOT, tree):
+        folder = tmp_path / str(len(pictures))
+        folder.mkdir()
+        command = "zwerm run computation-free --inline --set time.duration_s=1 --picture centre.png"
+        Reader(folder, root).follow(f"```console\n$ {command}\n```\n")
+        pictures.append((folder / "centre.png").read_bytes())
+    assert pictures[0] != pictures[1]
+
+
+def test_the_catalogue_and_the_reference_pages_name_what_was_added(tree: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(tree)}
+    for command in (["docs/pages.py"], ["-P", "-m", "zwerm", "list"]):
+        ran = subprocess.run(
+            [sys.executable, *command],
+            cwd=tree,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+        )
+        assert ran.returncode == 0, ran.stderr
+    assert "headcount" in ran.stdout
+    reference = "".join(page.read_text(encoding="utf-8") for page in (tree / "docs" / "reference").glob("*.md"))
+    for name in ("beacon", "rain", "storm", "waves", "tracks", "travel", "fastest", "headcount"):
+        assert re.search(rf"[`#] ?.*\b{name}\b", reference), name

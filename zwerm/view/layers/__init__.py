@@ -1,0 +1,1 @@
+"""Picture layers, one file each: those of the algorithms, and those that a scenario asks for."""
