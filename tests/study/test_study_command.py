@@ -97,4 +97,4 @@ def test_study_prints_a_table_and_exits_with_the_status_of_its_trials(
     process = start(tmp_path, "raises.toml", "--set", "robots.count=0")
     output, errors = process.communicate(timeout=DEADLINE_S)
     assert (process.returncode, output) == (2, "")
-    assert errors == "zwerm: raises.toml: tiny-scenario.toml: robots.count: expected >= 1, got 0\n"
+    assert errors == "zwerm: raises.toml: --set robots.count=0: robots.count: expected >= 1, got 0\n"

@@ -48,7 +48,9 @@ from zwerm.run.runner import run
 from zwerm.scenario.load import tables_of, validate
 from zwerm.wire.messages import Bearing, BodyVelocity, Displacement, Observation, Packet
 
-HALL = ("arena.size_m=[2.4,1.8]", "base.pose=[0.2,0.9,0.0]", "robots.count=30", "services.redundancy=link")
+# The times of these tests are those of a deployment by the paper's rules.
+PAPER = 'coordinator.parameters.walls="paper"'
+HALL = ("arena.size_m=[2.4,1.8]", "base.pose=[0.2,0.9,0.0]", "robots.count=30", "services.redundancy=link", PAPER)
 CLOSE = tuple(f"{each}.parameters.margin_m=0.62" for each in ("robots", "base", "coordinator"))
 OFTEN = "coordinator.parameters.redundancy_every=3"
 LOSS = ("radio.loss=0.3", "uplink.loss=0.3")
@@ -282,7 +284,7 @@ def test_a_restarted_coordinator_learns_from_the_robots_which_have_left() -> Non
 
 
 def test_robots_leave_safely_while_the_swarms_of_two_stations_have_not_met() -> None:
-    hall = ["arena.size_m=[3.4,2.4]", "robots.count=60", "base.poses=[[0.2,1.3,0.0],[3.2,1.3,3.0]]"]
+    hall = ["arena.size_m=[3.4,2.4]", "robots.count=60", "base.poses=[[0.2,1.3,0.0],[3.2,1.3,3.0]]", PAPER]
     close = [f"{each}.parameters.margin_m=0.5" for each in ("robots", "base", "coordinator")]
     often = ["coordinator.parameters.redundancy_every=4", "services.redundancy=link", "time.duration_s=70.0"]
     result = run("sensor-coverage-multi-source", runner="inline", overrides=[*hall, *close, *often, *LOSS])

@@ -22,6 +22,8 @@ from zwerm.wire.messages import Wake
 
 HALL = ("arena.size_m=[4.2,2.6]", "robots.count=40", "base.poses=[[0.2,1.3,0.0],[4.0,1.3,3.0]]")
 NOISE = "robots.sensors.0.sd_rad=0.0436332"
+# Walls are followed one at a time, whatever the number of pushes.
+PAPER = ['coordinator.parameters.walls="paper"']
 
 Point = tuple[float, float]
 
@@ -237,7 +239,7 @@ def test_concurrent_routines_end_with_the_last_and_wake_for_the_first() -> None:
 def test_two_stations_fill_a_hall_with_pushes_at_once_and_their_swarms_become_one() -> None:
     result, single = (
         run("sensor-coverage-multi-source", runner="inline", overrides=[*HALL, NOISE, *more])
-        for more in ([], ["coordinator.parameters.pushes_max=1"])
+        for more in (PAPER, [*PAPER, "coordinator.parameters.pushes_max=1"])
     )
     for each in (result, single):
         assert each.outcome == "completed"

@@ -73,7 +73,7 @@ class Swarm:
         self.slot = self.slots.slot_of()
         bases = () if base is None else (self.slot[base],)
         self.scan = ScanResult(views, FlagComplex(views), bases)
-        self.planner = Planner(PlannerParameters(), self.slots)
+        self.planner = Planner(PlannerParameters(walls="paper"), self.slots)
 
     def update(self) -> "Swarm":
         self.planner.update(self.scan)
