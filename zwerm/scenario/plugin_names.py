@@ -96,7 +96,7 @@ def _where(module: ModuleType) -> str:
     hidden = [each for each in _places(module.__name__) if each != place]
     if hidden:
         return f"; it is {place}, which hides {' and '.join(hidden)}"
-    return f"; it is {place}" if module.__file__ is None else ""
+    return f"; it is {place}" if place and getattr(module, "__file__", None) is None else ""
 
 
 def _nearer(module: ModuleType) -> str:
@@ -108,9 +108,11 @@ def _nearer(module: ModuleType) -> str:
 
 
 def _place_of(module: ModuleType) -> str:
-    if module.__file__ is not None:
-        return module.__file__
-    return f"the folder {next(iter(getattr(module, '__path__', ())), '')}"
+    file: str | None = getattr(module, "__file__", None)  # the program itself has no such attribute in a session
+    if file is not None:
+        return file
+    folder = next(iter(getattr(module, "__path__", ())), "")
+    return f"the folder {folder}" if folder else ""
 
 
 def _places(name: str) -> Iterator[str]:
