@@ -96,7 +96,8 @@ def fault_tables(scenario: Scenario, duration_s: float) -> list[str]:
 def difference(inline: RunResult, processes: RunResult) -> str:
     """Return the first thing in which two runs differ, or nothing."""
     for name in ("trace", "outcome", "ticks", "robot_ticks", "metrics", "radio", "crashed", "restarted", "hindered"):
-        if getattr(inline, name) != getattr(processes, name):
+        # As text, since a metric that has no value is not equal to itself.
+        if repr(getattr(inline, name)) != repr(getattr(processes, name)):
             return name
     return f"middleware lost {processes.middleware_lost}" if processes.middleware_lost else ""
 
