@@ -151,12 +151,12 @@ class World:
         raised has crashed. So has one whose answer is refused: it gives no other.
         """
         if node in self.status.crashed:  # a program that the run has given up acts for no body
-            self.intake.note_refusal(node, "crashed")
+            self.intake.refusals.count(node, "crashed")
             raise ProtocolError("crashed", f"node {node} crashed at tick {self.status.crash_ticks[node]}")
         try:
             answer = self.intake.accept(node, payload, late_allowed)
         except ProtocolError as error:
-            if self.intake.refused_by[node].total() == FLOOD:
+            if self.intake.refusals.of_node(node) == FLOOD:
                 self.bodies.advance_early()
                 self.crash(node, f"flood: {FLOOD} of its messages were refused, the last one as {error}")
                 self.on_flood(node)
@@ -216,7 +216,7 @@ class World:
 
     def refuse_stale(self, node: int) -> None:
         """Count a message that a former incarnation of a node sent."""
-        self.intake.note_refusal(node, "stale-incarnation")
+        self.intake.refusals.count(node, "stale-incarnation")
 
     # --- the truth --------------------------------------------------------------------------------------------------
 

@@ -41,7 +41,7 @@ class LeaseTable(Struct, frozen=True, forbid_unknown_fields=True):
     absolute: bool = False
 
 
-class _Message(NamedTuple):
+class _LeaseMessage(NamedTuple):
     """A request or a promise: `candidate` is whom it concerns, `stamp_s` the time of the request by the candidate's clock."""
 
     kind: int
@@ -74,28 +74,28 @@ class LeaderLease(Controller):
             if message is None:
                 continue
             if message.kind == _REQUEST and self._promise(message, now_s):
-                answers.append(_Message(_PROMISE, self.setup.node, message.candidate, message.stamp_s))
+                answers.append(_LeaseMessage(_PROMISE, self.setup.node, message.candidate, message.stamp_s))
             elif message.kind == _PROMISE:
                 self._count(message)
         if self._is_time(now_s):
             self._stamp_s = now_s
             self._supporters = {}
-            request = _Message(_REQUEST, self.setup.node, self.setup.node, now_s)
+            request = _LeaseMessage(_REQUEST, self.setup.node, self.setup.node, now_s)
             if self._promise(request, now_s):
                 answers.append(request)
-                self._count(_Message(_PROMISE, self.setup.node, self.setup.node, now_s))
+                self._count(_LeaseMessage(_PROMISE, self.setup.node, self.setup.node, now_s))
         sent = [Transmission(channel, seal(_LAYOUT.pack(*each))) for channel in self.setup.channels for each in answers]
         return Command(outbox=tuple(sent), telemetry={"leader": now_s < self._leads_until_s})
 
-    def _decoded(self, payload: bytes) -> _Message | None:
+    def _decoded(self, payload: bytes) -> _LeaseMessage | None:
         """Return a message, or None for what is none."""
         try:
-            return _Message(*_LAYOUT.unpack(unseal(payload)))
+            return _LeaseMessage(*_LAYOUT.unpack(unseal(payload)))
         except (ProtocolError, LayoutError):
             self.refused += 1
             return None
 
-    def _promise(self, request: _Message, now_s: float) -> bool:
+    def _promise(self, request: _LeaseMessage, now_s: float) -> bool:
         """Promise support to a candidate, unless another promise is in force; return whether it was promised."""
         if now_s < self._promised_until_s and self._promised_to != request.candidate:
             if not self._yields_to(request.candidate, now_s):
@@ -114,7 +114,7 @@ class LeaderLease(Controller):
         """
         return self._promised_to == self.setup.node and now_s >= self._leads_until_s and candidate < self.setup.node
 
-    def _count(self, promise: _Message) -> None:
+    def _count(self, promise: _LeaseMessage) -> None:
         """Lead from the promise that makes a majority."""
         if promise.candidate != self.setup.node or promise.stamp_s != self._stamp_s:
             return

@@ -1,7 +1,7 @@
 """A sum of Gaussian bumps."""
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field as Key
@@ -12,29 +12,32 @@ from zwerm.world.fields import Field
 from zwerm.world.scene import Floats
 
 
+class GaussiansTable(Table):
+    """The bumps: lists of equal length, or one sd for all."""
+
+    amplitudes: Annotated[list[Finite], Key(min_length=1)]
+    centers_m: list[Point]
+    sd_m: list[Positive]
+    offset: Finite = 0.0
+
+    @field_validator("sd_m", mode="before")
+    @classmethod
+    def _one_for_all(cls, sd_m: object, table: ValidationInfo) -> object:
+        return sd_m if isinstance(sd_m, list) else [sd_m] * len(table.data.get("amplitudes", [0]))
+
+    @field_validator("centers_m", "sd_m")
+    @classmethod
+    def _as_many(cls, each: list[object], table: ValidationInfo) -> list[object]:
+        amplitudes = table.data.get("amplitudes", each)
+        if len(each) != len(amplitudes):
+            raise ValueError(f"expected {len(amplitudes)} items, one for each of amplitudes")
+        return each
+
+
 class Gaussians(Field):
     """`offset` plus a bump for each of `amplitudes`, at `centers_m`, `sd_m` wide; it has that height at its centre."""
 
-    class Parameters(Table):
-        """The bumps: lists of equal length, or one sd for all."""
-
-        amplitudes: Annotated[list[Finite], Key(min_length=1)]
-        centers_m: list[Point]
-        sd_m: list[Positive]
-        offset: Finite = 0.0
-
-        @field_validator("sd_m", mode="before")
-        @classmethod
-        def _one_for_all(cls, sd_m: object, table: ValidationInfo) -> object:
-            return sd_m if isinstance(sd_m, list) else [sd_m] * len(table.data.get("amplitudes", [0]))
-
-        @field_validator("centers_m", "sd_m")
-        @classmethod
-        def _as_many(cls, each: list[object], table: ValidationInfo) -> list[object]:
-            amplitudes = table.data.get("amplitudes", each)
-            if len(each) != len(amplitudes):
-                raise ValueError(f"expected {len(amplitudes)} items, one for each of amplitudes")
-            return each
+    Parameters: ClassVar[type[Table]] = GaussiansTable
 
     def __init__(
         self, amplitudes: Sequence[float], centers_m: Sequence[Point], sd_m: Sequence[float], offset: float = 0.0

@@ -1,10 +1,20 @@
 """A lamp above the floor."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from zwerm.scenario.types import Finite, Point, Positive, Table
 from zwerm.world.fields import Field
 from zwerm.world.scene import Floats
+
+
+class LampTable(Table):
+    """The lamp."""
+
+    peak: Finite
+    center_m: Point
+    height_m: Positive
 
 
 class Lamp(Field):
@@ -13,12 +23,7 @@ class Lamp(Field):
     `peak` right below, and from there as one over the square of the distance.
     """
 
-    class Parameters(Table):
-        """The lamp."""
-
-        peak: Finite
-        center_m: Point
-        height_m: Positive
+    Parameters: ClassVar[type[Table]] = LampTable
 
     def __init__(self, peak: float, center_m: Point, height_m: float) -> None:
         self._peak, self._center, self._height2 = peak, np.array(center_m), height_m**2

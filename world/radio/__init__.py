@@ -8,7 +8,7 @@ names them.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Literal, NamedTuple, Protocol
 
@@ -165,6 +165,8 @@ class RadioModel(ABC):
     """
 
     Parameters: ClassVar[type[RadioModelTable]] = RadioModelTable
+    # Parameters of an example. The tests try the model with them, and the reference page shows them.
+    example: ClassVar[Mapping[str, Any]] = {}
 
     # The name under which the ledger counts the packets that the model drops.
     cause: ClassVar[str] = "lost"

@@ -9,7 +9,7 @@ state of its last reading.
 import dataclasses
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, ClassVar, TypeVar
 
@@ -48,6 +48,8 @@ class Sensor(ABC):
 
     field: ClassVar[str]
     Parameters: ClassVar[type[Table]] = Table
+    # Parameters of an example. The tests try the sensor with them, and the reference page shows them.
+    example: ClassVar[Mapping[str, Any]] = {}
 
     # The field of `Wake` that asks for an observation when the `signature` of the reading changes, or "".
     wake_event: ClassVar[str] = ""
