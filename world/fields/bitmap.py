@@ -1,4 +1,4 @@
-"""A picture whose shades are values."""
+"""A field from a picture: each shade is a value."""
 
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -13,7 +13,7 @@ from zwerm.world.scene import Floats
 
 
 class BitmapTable(Table):
-    """The picture, where it lies and what its shades mean. `file` is relative to the scenario."""
+    """The picture, its position, and the values of black and white. `file` is relative to the scenario."""
 
     file: str
     low: Finite = 0.0

@@ -35,7 +35,8 @@ class GaussiansTable(Table):
 
 
 class Gaussians(Field):
-    """`offset` plus a bump for each of `amplitudes`, at `centers_m`, `sd_m` wide; it has that height at its centre."""
+    """`offset` plus a bump for each of `amplitudes`, with its centre in `centers_m` and the standard deviation `sd_m`;
+    the amplitude is its height at the centre."""
 
     Parameters: ClassVar[type[Table]] = GaussiansTable
 
@@ -65,6 +66,6 @@ class Gaussians(Field):
         return self._offset + height.sum(axis=0), gradient
 
     def _bumps(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return (g, k) each bump's height at each point, and how far right of its centre and above it that is."""
+        """Return (g, k) the height of each bump at each point, and the point's x and y relative to the bump's centre."""
         x, y = points.T[:, None, :] - self._centers.T[:, :, None]
         return self._amplitudes * np.exp(-0.5 * (x * x + y * y) * self._precision), x, y

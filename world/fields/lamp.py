@@ -18,9 +18,9 @@ class LampTable(Table):
 
 
 class Lamp(Field):
-    """A lamp `height_m` above `center_m`, as a sensor that faces it from the floor sees it.
+    """The light of a lamp `height_m` above `center_m`, on a sensor on the floor that faces the lamp.
 
-    `peak` right below, and from there as one over the square of the distance.
+    The value is `peak` directly below the lamp, and falls with the square of the distance from the lamp.
     """
 
     Parameters: ClassVar[type[Table]] = LampTable

@@ -1,4 +1,4 @@
-"""Command intake: collects the answers to one tick's observations and refuses what no node may send.
+"""Command intake: collects the answers to one tick's observations and refuses forbidden messages.
 
 Each observed node is accepted once a tick, and only with a command that this world can carry out. Every other message is
 refused for a reason, counted, and changes nothing. If the driver allows late answers (real time), an answer to an

@@ -1,13 +1,13 @@
 """All messages on the wire: one `Observation` to a node, one `Command` back, and the messages that open and close a
 connection.
 
-Messages are MessagePack maps with field names, so that a node can be written in any language. Small parts that occur in
-numbers (a bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as
+Messages are MessagePack maps with field names, so that a node can be written in any language. Small parts that occur
+often (a bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as
 `type`, for example "command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and
 trailing bytes are refused, each with a reason that is counted.
 
-New fields go last, with defaults; a field at its default is left out of a message (except in drives). Angles are radians in
-(-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
+New fields go last, with defaults; a field at its default is left out of a message (except in drives). Angles are
+radians in (-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
 """
 
 import re
@@ -177,9 +177,9 @@ class Command(
     """A node's answer to one observation.
 
     `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation
-    at every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of
-    the task is complete, `gave_up`, unless empty, why it never will be. The program that runs the controller sets
-    `tick`: the tick of the observation answered.
+    at every tick. `release`: a base station lets one robot out of its depot. `done`: the node's part of the task is
+    complete. `gave_up`, if not empty, is the reason why that part cannot be completed. The program that runs the
+    controller sets `tick`: the tick of the observation answered.
 
     `telemetry` is named numbers for the observers of the run; no node receives them. `snapshot` is one record in the
     algorithm's own encoding for its metric and picture classes. The trace covers neither.
@@ -233,7 +233,7 @@ class Welcome(_WireMessage, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
 
 
 class Goodbye(_WireMessage, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
-    """The world ends a node's run and gives the reason; the node closes and exits. Or a node announces that it leaves."""
+    """The world ends a node's run and gives the reason; the node closes and exits. Or a node leaves."""
 
     reason: str
 
@@ -280,8 +280,8 @@ def refusal(error: Exception) -> ProtocolError:
 def open_answer(payload: bytes) -> Command | Failure:
     """Return the command or failure in `payload`.
 
-    Raises ProtocolError with the reasons of `refusal`, or `oversized`; or `not-finite` for a number in the drive or the wake;
-    or `telemetry` for a name or number that breaks the rules of `zwerm.wire.telemetry_rules`.
+    Raises ProtocolError with the reasons of `refusal`, or `oversized`; or `not-finite` for a number in the drive or the
+    wake; or `telemetry` for a name or number that breaks the rules of `zwerm.wire.telemetry_rules`.
     """
     if len(payload) > MESSAGE_BYTES_MAX:
         raise ProtocolError("oversized", f"{len(payload)} bytes, at most {MESSAGE_BYTES_MAX}")

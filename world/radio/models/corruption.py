@@ -65,5 +65,5 @@ class Corruption(RadioModel):
 
     @classmethod
     def network_rule(cls, parameters: CorruptionTable) -> None:
-        """Raise ValueError: no damaged packet passes a kernel."""
+        """Raise ValueError: a kernel drops damaged packets."""
         raise ValueError("the kernel drops packets with a wrong checksum")

@@ -1,4 +1,4 @@
-"""Duplication: some packets arrive more than once, as behind a link layer whose acknowledgements get lost.
+"""Duplication: some packets arrive more than once, as on a link layer that loses acknowledgements.
 
 The models that follow judge a copy with random numbers of its own. It counts as sent, and as a copy.
 """
