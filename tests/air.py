@@ -15,6 +15,21 @@ from zwerm.world.scene import Scene
 
 DT_S = 0.1
 
+# An example of every radio model of the catalogue.
+MODELS: dict[str, dict[str, Any]] = {
+    "range": {"range_m": 1.2},
+    "line_of_sight": {},
+    "path_loss": {"tx_power_dbm": -50.0},
+    "wall_attenuation": {"material": "glass", "margin_db": 1.0},
+    "loss": {"fraction": 0.3},
+    "gilbert_elliott": {"loss_fraction": 0.4, "burst_packets": 3.0},
+    "delay": {"delay_s": 0.05, "jitter_s": 0.2, "distribution": "exponential"},
+    "duplication": {"fraction": 0.5, "copies": 2},
+    "corruption": {"bit_error_rate": 0.02},
+    "rate_limit": {"rate_bytes_s": 60.0, "queue_bytes": 20.0},
+    "collision": {"airtime_s": 0.02},
+}
+
 
 class Radio:
     """Nodes at fixed `positions` that send given packets. `received` maps a node to its list of (tick, packet)."""

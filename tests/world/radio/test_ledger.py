@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from air import DT_S, Radio, ring
+from air import DT_S, MODELS, Radio, ring
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rich.console import Console
@@ -19,19 +19,6 @@ from zwerm.run.runner import run
 from zwerm.wire.messages import Transmission
 from zwerm.world.radio.links import Links
 
-MODELS: dict[str, dict[str, Any]] = {
-    "range": {"range_m": 1.2},
-    "line_of_sight": {},
-    "path_loss": {"tx_power_dbm": -50.0},
-    "wall_attenuation": {"material": "glass", "margin_db": 1.0},
-    "loss": {"fraction": 0.3},
-    "gilbert_elliott": {"loss_fraction": 0.4, "burst_packets": 3.0},
-    "delay": {"delay_s": 0.05, "jitter_s": 0.2, "distribution": "exponential"},
-    "duplication": {"fraction": 0.5, "copies": 2},
-    "corruption": {"bit_error_rate": 0.02},
-    "rate_limit": {"rate_bytes_s": 60.0, "queue_bytes": 20.0},
-    "collision": {"airtime_s": 0.02},
-}
 WALL = [[50.0, 50.0], [50.0, 60.0]]
 
 
