@@ -223,7 +223,7 @@ def _example(array: str, kind: str, found: type[Any]) -> list[str]:
     """Return the example of a plug-in as an item of the array of tables `array` of a scenario, where it has one."""
     example = getattr(found, "example", {})
     table = tomli_w.dumps({"kind": kind, **example}).strip()
-    return [f"```toml\n[[{array}]]\n{table}\n```"] if example else []
+    return [f'```toml title="Part of a scenario"\n[[{array}]]\n{table}\n```'] if example else []
 
 
 def field_list() -> str:
