@@ -211,6 +211,20 @@ def test_no_two_files_that_may_be_open_at_once_share_a_name() -> None:
     assert SHARED_NAMES.keys() <= twice
 
 
+def test_every_room_has_its_tests_in_the_folder_of_its_name() -> None:
+    folders: set[str] = set()
+    for path in MODULES.values():
+        folder = path.parent.parts
+        if folder[0] == "zwerm":
+            folder = folder[1:]
+        if folder and folder[0] not in ("world", "agents", "coordinator"):
+            folders.add("/".join(folder[:2]) if folder[0] == "deploy" else folder[0])
+        elif len(folder) > 1:
+            folders.add("/".join(folder[:2]))
+    assert len(folders) > 25
+    assert [each for each in sorted(folders) if not list((ROOT / "tests" / each).glob("**/test_*.py"))] == []
+
+
 def test_every_class_of_the_catalogue_exists() -> None:
     paths = [*controller_classes(), *(path for rows in plugins().values() for path in rows.values())]
     paths += [path for row in ALGORITHMS for path in (*row.metrics, *row.layers)]
