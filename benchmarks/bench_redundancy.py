@@ -255,8 +255,8 @@ def main() -> None:
         for loss in chosen.losses:
             each = Troubled(chosen.robots, seed=chosen.seed, loss=loss, kind=kind)
             each.run(chosen.decisions if kind is LeaveLock else chosen.decisions // 10)
-            told = f"{loss:>6} {each.decisions:>10,} {each.departures:>10,} {each.violations:>17}"
-            print(f"{told} {each.radio.sent / each.decisions:>20.1f}  {kind.__name__}", flush=True)
+            departures_text = f"{loss:>6} {each.decisions:>10,} {each.departures:>10,} {each.violations:>17}"
+            print(f"{departures_text} {each.radio.sent / each.decisions:>20.1f}  {kind.__name__}", flush=True)
             rows.append(
                 {
                     "robots leave": "with locks" if kind is LeaveLock else "without locks (control)",
