@@ -6,7 +6,7 @@ earlier tick is accepted too, in order.
 """
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Final, NamedTuple, Protocol
 
 from zwerm.errors import ProtocolError
@@ -55,6 +55,7 @@ class CommandIntake:
         self.exchange = Exchange(-1, (), (), (), ())
         self.refused: Counter[str] = Counter()
         self.refused_by: dict[int, Counter[str]] = {}  # refusals by node and reason
+        self.on_refusal: Callable[[int, str], object] = lambda node, reason: None  # called with node and reason
         self.late_count = 0
         self.observed_count = 0
         self._drive = drive
@@ -113,6 +114,7 @@ class CommandIntake:
         self.refused[reason] += 1
         reasons = self.refused_by.setdefault(node, Counter())
         reasons[reason] += 1
+        self.on_refusal(node, reason)
         return reasons.total()
 
     def is_pending(self, node: int) -> bool:

@@ -37,6 +37,7 @@ class ZenohWorldLink:
     def __init__(self, run: str, members: Mapping[int, ExpectedNode], settings: Mapping[str, Any]) -> None:
         """Open the router's session, without waiting for nodes. Raises LinkError if it cannot listen."""
         self.refused: Counter[str] = Counter()
+        self.on_refusal: Callable[[int, str], object] = lambda node, reason: None  # called with node (or -1) and reason
         self.refused_by: dict[int, Counter[str]] = {}  # refusals by node and reason
         self._evicted: set[int] = set()
         self._run = run
@@ -183,6 +184,7 @@ class ZenohWorldLink:
     def _note_refusal(self, node: int, reason: str) -> None:
         self.refused[reason] += 1
         self.refused_by.setdefault(node, Counter())[reason] += 1
+        self.on_refusal(node, reason)
 
     def _on_liveliness(self, sample: zenoh.Sample) -> None:
         """Handle a liveliness token; it vanishes after the node's last message. Runs in a thread of its own."""

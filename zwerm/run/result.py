@@ -1,6 +1,6 @@
 """The result of a run: its outcome, its numbers, and enough of its history to draw it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,7 +56,7 @@ class RunResult:
     missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
     series: dict[str, Floats] = field(default_factory=dict)  # (k,) samples by name, time_s among them
     refused: dict[str, int] = field(default_factory=dict)  # refused messages, by reason
-    refused_by: dict[int, dict[str, int]] = field(default_factory=dict)  # of them, by node and reason
+    refused_by: dict[int, dict[str, int]] = field(default_factory=dict)  # of them, by node and reason; -1: not known
     problems: list[str] = field(default_factory=list)  # what could not be written during the run
     tracebacks: dict[int, str] = field(default_factory=dict)  # of controllers that raised, by node
     crash_reasons: dict[int, str] = field(default_factory=dict)  # "tick 5: ..." of programs that ended, by node
@@ -67,6 +67,15 @@ class RunResult:
     def ok(self) -> bool:
         """Return whether the run ended as runs should: completed, or at its time limit."""
         return self.outcome in ("completed", "time-limit")
+
+    def add_refusals(self, counts: Mapping[int, Mapping[str, int]]) -> None:
+        """Add refusals by node and reason to those counted already."""
+        for node, reasons in counts.items():
+            for reason, count in reasons.items():
+                self.refused[reason] = self.refused.get(reason, 0) + count
+                of_node = self.refused_by.setdefault(node, {})
+                of_node[reason] = of_node.get(reason, 0) + count
+        self.refused_by = dict(sorted(self.refused_by.items()))
 
     @property
     def positions(self) -> Positions:
@@ -111,7 +120,7 @@ class RunResult:
             "faults": self.faults,
             "refused": {
                 "reasons": self.refused,
-                "nodes": {str(node): reasons for node, reasons in self.refused_by.items()},
+                "nodes": {"unknown" if node < 0 else str(node): each for node, each in self.refused_by.items()},
             },
         }
 
