@@ -105,7 +105,7 @@ def run(
             paced=realtime is not None,
             late_joiners=world.schedule.late_joiners,
             restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
-            on_refusal=security and security.note,
+            on_refusal=None if security is None else security.note,
         ) as swarm,
     ):
         return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)
@@ -186,7 +186,7 @@ def serve(
             progress=watcher.joined,
             deadline_s=deadline_s,
             paced=realtime is not None,
-            on_refusal=security and security.note,
+            on_refusal=None if security is None else security.note,
         ) as swarm,
     ):
         return drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, security)
