@@ -17,6 +17,7 @@ import msgspec
 
 from zwerm.deploy.router_messages import RouterEvent, RouterMessages, capture
 from zwerm.errors import ScenarioError
+from zwerm.wire.refusals import Refusals
 
 LINES_MAX: Final = 1_000
 UNKNOWN_NODE: Final = -1
@@ -26,12 +27,11 @@ _MODE: Final = 0o600
 class SecurityLog:
     """Writes a new file at `path`, for its owner only; with `router` also what this process's Zenoh router refuses.
 
-    `router_refused` counts the router's refusals by node and reason. Raises ScenarioError if the file cannot be written. `note`
-    may be called in any thread.
+    Raises ScenarioError if the file cannot be written. `note` may be called in any thread.
     """
 
     def __init__(self, path: Path, router: bool) -> None:
-        self.router_refused: dict[int, Counter[str]] = {}
+        self._router_refusals = Refusals()
         self.error = ""  # why the log is incomplete
         self._path = path
         self._counts: dict[int, Counter[str]] = {}
@@ -63,15 +63,16 @@ class SecurityLog:
                 known = None if node == UNKNOWN_NODE else node
                 self._write({"node": known, "reason": reason, "detail": detail})
 
-    def settle(self) -> None:
-        """Return when all that the router has refused so far is counted."""
+    def router_refusals(self) -> Refusals:
+        """Return the counts of all that the router has refused so far."""
         if self._router is not None:
             self._router.settle()
+        return self._router_refusals
 
     def close(self) -> None:
         """Write the counts, and close the file; idempotent."""
-        self.settle()
         if self._router is not None:
+            self._router.settle()
             self._router.on_event = None
             self._router = None
         with self._lock:
@@ -81,7 +82,7 @@ class SecurityLog:
                     self._file.close()
 
     def _on_router(self, event: RouterEvent) -> None:
-        self.router_refused.setdefault(event.node, Counter())[event.reason] += 1
+        self._router_refusals.count(event.node, event.reason)
         self.note(event.node, event.reason, event.detail)
 
     def _write(self, line: dict[str, Any]) -> None:

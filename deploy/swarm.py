@@ -113,7 +113,7 @@ class _Swarm(ABC):
         finally:
             passwords.unlink()
         if self._on_refusal is not None:
-            self.link.on_refusal = self._on_refusal
+            self.link.refusals.listener = self._on_refusal
         self._stack.callback(self.link.close)
 
     def _member(self, credential: Credential) -> ExpectedNode:

@@ -1,6 +1,6 @@
 """The result of a run: its outcome, its numbers, and enough of its history to draw it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -65,17 +65,8 @@ class RunResult:
 
     @property
     def ok(self) -> bool:
-        """Return whether the run ended as runs should: completed, or at its time limit."""
+        """Return whether the run ended without failure: completed, or at its time limit."""
         return self.outcome in ("completed", "time-limit")
-
-    def add_refusals(self, counts: Mapping[int, Mapping[str, int]]) -> None:
-        """Add refusals by node and reason to those counted already."""
-        for node, reasons in counts.items():
-            for reason, count in reasons.items():
-                self.refused[reason] = self.refused.get(reason, 0) + count
-                of_node = self.refused_by.setdefault(node, {})
-                of_node[reason] = of_node.get(reason, 0) + count
-        self.refused_by = dict(sorted(self.refused_by.items()))
 
     @property
     def positions(self) -> Positions:
@@ -88,10 +79,9 @@ class RunResult:
     def to_frame(self, kind: FrameKind = "positions") -> "DataFrame":
         """Return a pandas frame of the run.
 
-        `positions`: time_s, node, x_m, y_m, heading_rad, present, a row for each sample and robot. `metrics`: time_s and a
-        column for each metric that was sampled during the run. `telemetry`: tick, time_s, node, name, value, a row for each
-        number.
-        Raises MissingExtraError without pandas, and ValueError for another kind.
+        `positions`: time_s, node, x_m, y_m, heading_rad, present, a row for each sample and robot. `metrics`: time_s
+        and a column for each metric that was sampled during the run. `telemetry`: tick, time_s, node, name, value, a
+        row for each number. Raises MissingExtraError without pandas, and ValueError for another kind.
         """
         return frame_of(kind, self.positions, self.series, self.telemetry)
 
@@ -137,10 +127,10 @@ class RunResult:
     ) -> Path:
         """Draw the run at its end, at a deployment cycle or at a time [s] at `path`, and return the path.
 
-        The suffix chooses the format: .png, .pdf or .svg. `size_in` is the greatest width and height [inches] of the arena. A
-        `bare` picture has no title, numbers, legend and curve. `colour_by` names the telemetry that colours robots, and `links`
-        connects robots whose packets have arrived; by default the scenario's `[pictures]` decides on both.
-        Raises PictureError where the file cannot be written, or the moment is not of the run.
+        The suffix chooses the format: .png, .pdf or .svg. `size_in` is the greatest width and height [inches] of the
+        arena. A `bare` picture has no title, numbers, legend and curve. `colour_by` names the telemetry that colours
+        robots, and `links` connects robots whose packets have arrived; by default the scenario's `[pictures]` decides
+        on both. Raises PictureError where the file cannot be written, or the moment is not of the run.
         """
         from zwerm.view.stills import draw_run
 

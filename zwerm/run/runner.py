@@ -26,6 +26,7 @@ from zwerm.run.result import RunResult
 from zwerm.scenario.load import load
 from zwerm.scenario.nearest import did_you_mean
 from zwerm.scenario.tables import Scenario
+from zwerm.wire.refusals import Refusals
 from zwerm.world.drivers.driver import TickObserver
 from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.drivers.realtime import RealTime
@@ -230,7 +231,7 @@ def drive(
             observers.append(ExchangeObserver(world, recording))
         observers.append(sampling)
         if security is not None:
-            world.intake.on_refusal = security.note
+            world.intake.refusals.listener = security.note
         driver = (
             LockStep(world, link, observers, programs)
             if realtime is None
@@ -246,13 +247,14 @@ def drive(
             outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
         wall_s = time.monotonic() - start
         sampling.finish()
-        result = _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, link)
+        refusals = world.intake.refusals | link.refusals
+        if security is not None:
+            refusals |= security.router_refusals()
+        result = _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, refusals)
         if recording is not None:
             recording.close()
             result.problems += [recording.error] if recording.error else []
         if security is not None:
-            security.settle()
-            result.add_refusals(security.router_refused)
             result.problems += [security.error] if security.error else []
         return result
 
@@ -334,11 +336,11 @@ def _result(
     wall_s: float,
     driver: LockStep | RealTime,
     sampling: Sampling,
-    link: WorldLink,
+    refusals: Refusals,
 ) -> RunResult:
     scenario, status, intake = world.scenario, world.status, world.intake
     metrics = measure(world, sampling.observers)
-    metrics["refused_messages"] = float(intake.refused.total())
+    metrics["refused_messages"] = float(intake.refusals.by_reason.total())
     if isinstance(driver, RealTime):
         metrics["late_commands"] = float(intake.late_count)
         metrics["deadman_stops"] = float(driver.deadman_stops)
@@ -347,7 +349,7 @@ def _result(
     if scenario.metrics.cells is not None:
         position = world.scene.position[world.scene.present]
         counts = cell_counts(position, world.scene.arena.bounds, scenario.metrics.cells)
-    result = RunResult(
+    return RunResult(
         scenario=scenario,
         seed=seed,
         runner=runner,
@@ -370,12 +372,11 @@ def _result(
         arena=world.scene.arena,
         history=sampling.history,
         cell_counts=counts,
+        refused=dict(refusals.by_reason),
+        refused_by=refusals.by_node,
         series={name: np.array(values) for name, values in sampling.observers.series().items()},
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,
         crash_reasons={node: f"tick {status.crash_ticks[node]}: {why}" for node, why in status.crashed.items()},
         tracebacks={node: failure.traceback for node, failure in status.failures.items()},
     )
-    result.add_refusals(intake.refused_by)
-    result.add_refusals(getattr(link, "refused_by", {}))
-    return result
