@@ -1,8 +1,8 @@
 """Safety of departures that robots negotiate with their neighbours, and comparison with relative H2.
 
-Part 1: random swarms in a square, over a radio that loses, delays, reorders and duplicates packets. Robots crash, restart
-without memory, are moved and return. A checker compares the Betti numbers of the complex before and after each departure. The
-negative control are robots that leave without locks.
+Part 1: random swarms in a square, over a radio that loses, delays, reorders and duplicates packets. Robots crash,
+restart without memory, are moved and return. A checker compares the Betti numbers of the complex before and after each
+departure. The negative control has robots that leave without locks.
 
 Part 2: the number of robots freed in the same swarms by relative H2 with global knowledge, and by negotiation of neighbours.
 """

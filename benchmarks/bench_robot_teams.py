@@ -1,4 +1,4 @@
-"""Coverage by robot teams over drawn arenas, starts and faults: is it complete, how long does it take, how much is repeated?
+"""Coverage by robot teams over drawn arenas, starts and faults: completeness, duration and repeated coverage.
 
 Every run is drawn from its seed: the arena and the line in which robots start, or the start alone in one of three halls, and
 the fault. Runs are kept in a file and not made again, so that a long measurement may be stopped and continued.
@@ -52,7 +52,7 @@ HALLS: Final[dict[str, tuple[float, float, tuple[str, ...]]]] = {
     "one obstacle": (20.0, 12.0, ("five",)),
     "three obstacles": (28.0, 16.0, ("five", "low", "high")),
 }
-# What is different from the scenario `robot-teams`.
+# Settings that differ from the scenario `robot-teams`.
 SETTINGS: Final = (
     *("none", "loss", "bursts", "range", "death", "partition", "pause", "coordinator", "coordinator loss"),
     *("virtual frontier", "never divides", "never merges", "one corridor"),
