@@ -127,7 +127,7 @@ class TeamRobot(Controller):
         self._epoch = 0
         self._every = max(1, round(table.beacon_s / setup.dt_s))
         self._urgent = False
-        self._told = -1, False
+        self._told = -1, False, 0, 0
         self._done = False
         self._left_off = False
 
@@ -339,11 +339,12 @@ class TeamRobot(Controller):
         return tuple([Transmission(channel, frame) for channel in self._channels])
 
     def _telemetry(self) -> dict[str, float | bool]:
-        """Return the certificate and the team's results, whenever the map has grown."""
-        facts = self.map.facts
-        if (len(facts), self._done) == self._told:
+        """Return the certificate and the team's results, whenever one of them may have changed."""
+        membership = self.membership
+        news = len(self.map.facts), self._done, membership.divisions, membership.merges
+        if news == self._told:
             return {}
-        self._told = len(facts), self._done
+        self._told = news
         return {"certificate_satisfied": self._done, **findings(self.map, self.membership)}
 
     def _snapshot(self) -> bytes:

@@ -70,6 +70,7 @@ class SliceMap:
         self._voids: list[Void] = []
         self._across: dict[End, Step] = {}
         self._closed: dict[End, bool] = {}
+        self._distances: dict[End, dict[End, int]] = {}
         self._certificate = CoverageCertificate(0, (), ())
 
     def add(self, fact: Fact) -> bool:
@@ -152,7 +153,12 @@ class SliceMap:
 
     def distances(self, start: End) -> dict[End, int]:
         """Return the length [mm] of the shortest known way from a known end to every end that can be reached."""
-        return {end: length for end, (length, _) in self._shortest(start).items()}
+        self._derive()
+        found = self._distances.get(start)
+        if found is None:
+            found = {end: length for end, (length, _) in self._shortest(start).items()}
+            self._distances[start] = found
+        return found
 
     def route(self, start: End, stop: End, avoid: Collection[Port] = ()) -> list[tuple[End, Step]] | None:
         """Return the shortest known way as (end, step) pairs; empty where start is stop, None where there is none.
@@ -198,6 +204,7 @@ class SliceMap:
             return
         self._known = len(self.facts)
         self._closed.clear()
+        self._distances.clear()
         segments, arcs, voids = self.facts.segments, self.facts.arcs, self.facts.voids
         self._voids = voids
         measured = [end for arc in arcs for end in (arc.start, arc.stop)]
