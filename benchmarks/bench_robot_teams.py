@@ -220,6 +220,7 @@ def summary(rows: Sequence[dict[str, str]], known: Sequence[dict[str, str]]) -> 
             "time [s]": f"{np.mean([float(run['completion_time_s']) for run in runs]):.0f}",
             "time / one robot's": f"{np.median(alone):.2f}" if alone else "",
             "time / undisturbed": f"{np.median(calm):.2f}" if calm and setting else "",
+            "time / undisturbed, most": f"{max(calm):.2f}" if calm and setting else "",
             "time / lower bound": f"{np.mean([times[key(r)] / b for r, b in zip(runs, bound, strict=True)]):.2f}",
             "repeat coverage": f"{np.mean([float(run['repeat_coverage_fraction']) for run in runs]):.2f}",
             "messages per robot": f"{np.mean([int(run['messages']) for run in runs]) / robots:.0f}",
@@ -287,7 +288,8 @@ def main() -> None:
         for row in known.values()
         if row["arena"] in options.arenas and row["setting"] in options.setting and int(row["robots"]) in options.robots
     ]
-    found = list(summary(shown, list(known.values())))
+    lines = list(summary(shown, list(known.values())))
+    found = [{name: line[name] for name in line if any(each[name] for each in lines)} for line in lines]
     for line in found if options.summary else []:
         print(line)
     write_csv(options.csv, found)
