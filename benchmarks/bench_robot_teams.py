@@ -140,6 +140,10 @@ class FirstEvents:
                 self.first_s.setdefault(name, record.time_s)
                 counts[record.node] = number
 
+    def first(self, name: str) -> str:
+        """Return the time [s] of the first one, or nothing."""
+        return f"{self.first_s[name]:.2f}" if name in self.first_s else ""
+
     def total(self, name: str) -> int:
         """Return the sum over all robots."""
         return int(sum(self.counts[name].values()))
@@ -185,8 +189,8 @@ def measure(arena: str, setting: str, robots: int, seed: int, event_s: float | N
         "processor_s": f"{processor_s:.1f}",
         "divisions": events.total("divisions"),
         "merges": events.total("merges"),
-        "division_s": events.first_s.get("divisions", ""),
-        "merge_s": events.first_s.get("merges", ""),
+        "division_s": events.first("divisions"),
+        "merge_s": events.first("merges"),
     }
     return {key: str(values[key]) for key in COLUMNS}
 

@@ -79,7 +79,7 @@ class Robot:
 
     def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
         self.membership.receive(beacon, tick, near)
-        if near or self.membership.knows(beacon.sender):
+        if near or self.membership.accepts(beacon.sender):
             self.exchange.receive(beacon, tick)
 
     def decide(self, tick: int) -> None:
