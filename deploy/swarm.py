@@ -41,6 +41,9 @@ from zwerm.wire.messages import encode
 
 Members = Mapping[int, tuple[str, Setup]]
 
+# Called with the node (or -1) and the reason of each refusal by the link.
+RefusalListener = Callable[[int, str], object]
+
 # From a node's id and incarnation to its controller and Setup.
 RestartSpec = Callable[[int, int], tuple[str, Setup]]
 
@@ -64,8 +67,17 @@ class _Swarm(ABC):
     link: ZenohWorldLink
     credentials: Credentials
 
-    def __init__(self, run: str, members: Members, progress: Progress | None, deadline_s: float, paced: bool) -> None:
+    def __init__(
+        self,
+        run: str,
+        members: Members,
+        progress: Progress | None,
+        deadline_s: float,
+        paced: bool,
+        on_refusal: RefusalListener | None,
+    ) -> None:
         self._run = run
+        self._on_refusal = on_refusal
         self._paced = paced
         self._members = members
         self._progress = progress or (lambda joined, total: None)
@@ -100,6 +112,8 @@ class _Swarm(ABC):
             self.link = ZenohWorldLink(self._run, members, settings)
         finally:
             passwords.unlink()
+        if self._on_refusal is not None:
+            self.link.refusals.listener = self._on_refusal
         self._stack.callback(self.link.close)
 
     def _member(self, credential: Credential) -> ExpectedNode:
@@ -132,13 +146,14 @@ class LocalSwarm(_Swarm):
         late_joiners: Collection[int] = (),
         restart: RestartSpec | None = None,
         stations: Mapping[int, Station] | None = None,
+        on_refusal: RefusalListener | None = None,
     ) -> None:
         """`order` is the order of starting, `deadline_s` the time each process has to join, `paced` means real time.
 
         The nodes `late_joiners` start only when `start` is called. `restart` returns the controller and Setup of a node's
         next incarnation; without it they stay the same. Nodes in `stations` send packets over a real network.
         """
-        super().__init__(run, members, progress, deadline_s, paced)
+        super().__init__(run, members, progress, deadline_s, paced, on_refusal)
         self._order = [node for node in (members if order is None else order) if node not in late_joiners]
         self._restart = restart
         self._stations = stations
@@ -234,13 +249,14 @@ class RemoteSwarm(_Swarm):
         progress: Progress | None = None,
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
+        on_refusal: RefusalListener | None = None,
     ) -> None:
         """`listen` are Zenoh endpoints, such as `tls/0.0.0.0:7447`. All nodes must join within `deadline_s`.
 
         `names` are further host names and addresses of this machine, for its certificate. A node is lost if its
         connection is silent for `lease_s`. Exactly one of `credentials_file` and `keys` is needed.
         """
-        super().__init__(run, members, progress, deadline_s, paced)
+        super().__init__(run, members, progress, deadline_s, paced, on_refusal)
         self._endpoints = list(listen)
         self._credentials_file = credentials_file
         self._keys = keys
