@@ -72,10 +72,8 @@ class Robot:
         parts = self.exchange.outgoing(tick)
         facts, membership = self.map.facts, self.membership
         statuses = (self.status(tick), *membership.others())
-        return TeamBeacon(
-            *(self.node, membership.outgoing(), membership.met(), self.lead.plans, statuses),
-            *(facts.digest, len(facts), *parts),
-        )
+        views, met, plans = membership.outgoing(), membership.met(), self.lead.plans
+        return TeamBeacon(self.node, views, met, plans, statuses, facts.digest, len(facts), *parts)
 
     def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
         self.membership.receive(beacon, tick, near)
