@@ -31,7 +31,7 @@ CATALOGUE_TESTS = (
     "world/radio/test_reach.py",
     "world/sensors/test_registry.py",
 )
-OF_CATALOGUE = "catalogue or built_in or every or pair or generic or module or share or deep or same_packets or stimuli"
+OF_CATALOGUE = "not every_room and (catalogue or built_in or every or pair or generic or module or share or deep or same_packets or stimuli)"
 # A metric that decodes the messages of the algorithm of the recipes.
 OWN_METRIC = '''"""Headcount: the size of a report."""
 
