@@ -1,4 +1,4 @@
-"""A recorded run can be read back by other people's tools, message by message, and changes nothing."""
+"""Other tools can read a recording message by message, and recording changes no run."""
 
 import json
 from pathlib import Path
