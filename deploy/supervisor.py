@@ -28,7 +28,7 @@ from zwerm.errors import LinkError
 from zwerm.link.peer_radio import Station
 from zwerm.link.session import Credential, Credentials
 
-# Largest number of robots that start at the same time; more slow each other down.
+# Largest number of robots that start at the same time; with more, all start later.
 JOINING_MAX: Final = 16
 JOIN_DEADLINE_S: Final = 60.0
 

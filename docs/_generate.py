@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
+import tomli_w
 import typer
 from _objects import object_fields, public_names
 from pydantic import BaseModel
@@ -189,20 +190,21 @@ def sensor_list() -> str:
         parts.append(f"{heading(f'`{kind}`', 'sensor-' + kind.replace('_', '-'))}\n\n{paragraphs(text)}")
         parts.append(f"Fills `{found.field}` of the observation.")
         parts.append(rows(found.Parameters.model_json_schema()))
+        parts += _example("robots.sensors", kind, found)
     return "\n\n".join(parts)
 
 
 def radio_models() -> str:
     """Return every radio model: what it is, its cause, and its parameters."""
-    return _kinds({kind: radio.find(kind) for kind in RADIO_MODELS}, RadioModelTable)
+    return _kinds({kind: radio.find(kind) for kind in RADIO_MODELS}, RadioModelTable, "radio.models")
 
 
 def fault_list() -> str:
     """Return every kind of fault and its parameters."""
-    return _kinds({kind: faults.find(kind) for kind in FAULTS}, FaultTable)
+    return _kinds({kind: faults.find(kind) for kind in FAULTS}, FaultTable, "faults")
 
 
-def _kinds(kinds: Mapping[str, type[Any]], base: type[BaseModel]) -> str:
+def _kinds(kinds: Mapping[str, type[Any]], base: type[BaseModel], array: str) -> str:
     parts = []
     for kind, found in kinds.items():
         schema = found.Parameters.model_json_schema()
@@ -213,7 +215,15 @@ def _kinds(kinds: Mapping[str, type[Any]], base: type[BaseModel]) -> str:
             parts.append(f"Drops for `{cause}`.")
         if own:
             parts.append(rows(schema | {"properties": own}))
+        parts += _example(array, kind, found)
     return "\n\n".join(parts)
+
+
+def _example(array: str, kind: str, found: type[Any]) -> list[str]:
+    """Return the example of a plug-in as an item of the array of tables `array` of a scenario, where it has one."""
+    example = getattr(found, "example", {})
+    table = tomli_w.dumps({"kind": kind, **example}).strip()
+    return [f"```toml\n[[{array}]]\n{table}\n```"] if example else []
 
 
 def field_list() -> str:

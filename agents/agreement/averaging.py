@@ -1,4 +1,4 @@
-"""Average consensus: every robot moves its value towards the mean of the values that it hears.
+"""Average consensus: every robot moves its value towards the mean of the values that it receives.
 
 With symmetric links and enough steps all values become equal (Olfati-Saber, Fax, Murray 2007). Each part of a partitioned swarm
 agrees on a value of its own; after the partition they agree again. Lost packets move the common value.
@@ -18,7 +18,7 @@ _LAYOUT: Final = Layout(">d")
 
 
 class AveragingTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """The size of a step towards the mean of the values heard, and the ticks between two broadcasts."""
+    """The size of a step towards the mean of the values received, and the ticks between two broadcasts."""
 
     gain: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.3
     every_ticks: Annotated[int, Meta(ge=1)] = 1
@@ -35,7 +35,7 @@ class Averaging(Controller):
         self.refused = 0
 
     def step(self, observation: Observation) -> Command:
-        """Move towards the mean of the values heard, and broadcast the own value."""
+        """Move towards the mean of the values received, and broadcast the own value."""
         heard = []
         for packet in observation.inbox:
             try:

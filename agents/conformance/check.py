@@ -3,7 +3,7 @@
 The kit makes and steps the controller as a runner does. The observations are ordinary and unusual: empty readings, many
 readings, malformed packets, a very late tick. The controller must answer each observation with a command that the world
 accepts. Its answers must not depend on other controllers in the process, and it must not do what `purity` detects. All
-violations are reported at once. A controller without violations is not proven correct: the kit uses a few hundred
+violations are reported at once. The kit is no proof: it uses a few hundred
 observations.
 """
 

@@ -1,9 +1,9 @@
-"""Detect what a controller must not do: read a clock, draw from a global random stream, use files, network or processes.
+"""Detect forbidden actions of a controller: read a clock, draw from a global random stream, use files, network or processes.
 
 A `PurityMonitor` records the violations of the code that runs inside it, in its own thread, and does not stop the code. It
 detects calls of functions written in C, the interpreter's audit events (PEP 578), changes of the global random streams, and
 printed text. The way a function was imported makes no difference. Imports are allowed. It does not see system calls that C
-code makes without an audit event: it finds mistakes, and is no sandbox.
+code makes without an audit event: it detects mistakes, and is no sandbox.
 """
 
 import contextlib

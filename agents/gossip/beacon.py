@@ -1,6 +1,6 @@
-"""The beacon: every robot broadcasts a numbered packet at even intervals, and counts what it hears of others.
+"""The beacon: every robot broadcasts a numbered packet at even intervals, and counts the packets that it receives from others.
 
-For statistics of links. A receiver that hears number 7 after number 4 knows that two are missing, or late.
+The counts are statistics of links: number 7 after number 4 means that two packets are lost or late.
 """
 
 from struct import Struct as Layout
@@ -39,7 +39,7 @@ class Beacon(Controller):
         self._drive = _straight_on(setup, self.parameters)
 
     def step(self, observation: Observation) -> Command:
-        """Count what was heard, and send the next beacon if it is time."""
+        """Count received packets, and send the next beacon if it is due."""
         heard, missed, following = self.heard, self.missed, self._next
         for packet in observation.inbox:
             try:
@@ -64,7 +64,7 @@ class Beacon(Controller):
 
 
 def _straight_on(setup: Setup, table: Any) -> BodyVelocity | WheelSpeeds | None:
-    """Return the drive, or None where the node stands."""
+    """Return the drive, or None if the node does not move."""
     speed: float = table.speed_m_s
     if setup.body is None or not speed:
         return None

@@ -4,7 +4,6 @@ import math
 from collections.abc import Generator
 from typing import Annotated, ClassVar, Final
 
-import msgspec
 from msgspec import Meta, Struct
 
 from zwerm.agents.robot_teams.mapping.facts import (
@@ -33,15 +32,14 @@ from zwerm.agents.robot_teams.protocols.team_messages import (
     FoundSnapshot,
     Status,
     TeamBeacon,
-    decode_beacon,
-    encode_beacon,
     encode_snapshot,
+    read_beacon,
+    write_beacon,
 )
 from zwerm.agents.robot_teams.team_lead import TeamLead, findings
 from zwerm.agents.robot_teams.work import Lost, NoWay, Work
 from zwerm.agents.runtime.contract import Controller, Setup
-from zwerm.errors import ControllerError, ProtocolError
-from zwerm.wire.checksum import seal, unseal
+from zwerm.errors import ControllerError
 from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 
 # In the first second a robot meets every robot that it receives: the robots start together, as one team.
@@ -276,9 +274,8 @@ class TeamRobot(Controller):
         tick = observation.tick
         table: TeamTable = self.parameters
         for packet in observation.inbox:
-            try:
-                beacon: TeamBeacon = decode_beacon(unseal(packet.payload))
-            except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
+            beacon = read_beacon(packet.payload)
+            if beacon is None:
                 self.refused += 1
                 continue
             near = False
@@ -335,7 +332,7 @@ class TeamRobot(Controller):
             len(self.map.facts),
             *parcel,
         )
-        frame = seal(encode_beacon(beacon))
+        frame = write_beacon(beacon)
         return tuple([Transmission(channel, frame) for channel in self._channels])
 
     def _telemetry(self) -> dict[str, float | bool]:

@@ -1,10 +1,10 @@
-"""Voronoi coverage with neighbours learned by radio instead of sensed, so that lost and late packets matter.
+"""Voronoi coverage with neighbours known from packets instead of a sensor, so lost and late packets have an effect.
 
-Every robot knows its own pose, and broadcasts it with the field's value there. It assumes that the other robots are at
-the places of their latest packets. It forgets a robot from which no packet came for `memory_s`. It listens for one
-period before it first moves. A robot that knows no other robot stays at its place, as the SwarmBots did: its cell would
-be the whole region. A packet carries a checksum; one that is not ours, or is damaged, is passed over. With `estimate =
-"quadratic"` the values heard bend the estimate of the field.
+Every robot senses its own pose, and broadcasts it with the field's value there. It assumes that the other robots are at
+the places of their latest packets. It removes a robot from which no packet came for `memory_s`. It listens for one
+period before it first moves. A robot without another robot stays at its place, as the SwarmBots did: its cell would
+be the whole region. A packet carries a checksum; foreign and damaged packets are ignored. With `estimate =
+"quadratic"` the received values add a quadratic term to the estimate of the field.
 """
 
 import math
@@ -36,13 +36,13 @@ class NeighbourReport(NamedTuple):
 
 
 def pack(node: int, heard: NeighbourReport) -> bytes:
-    """Return the packet that says it."""
+    """Return the packet with this message."""
     body = _LAYOUT.pack(node, *heard)
     return body + _SUM.pack(zlib.crc32(body))
 
 
 def unpack(payload: bytes) -> tuple[int, NeighbourReport] | None:
-    """Return who said what, or None for a packet that is not ours, or is damaged."""
+    """Return the sender and its message, or None for a foreign or damaged packet."""
     if len(payload) != _LAYOUT.size + _SUM.size:
         return None
     body = payload[: _LAYOUT.size]
@@ -53,8 +53,8 @@ def unpack(payload: bytes) -> tuple[int, NeighbourReport] | None:
 
 
 class RadioCoverageTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """The gain k, the period of broadcasts [s], the time for which packets are remembered [s], and how the field is
-    estimated.
+    """The gain k, the period of broadcasts [s], the time for which packets are kept [s], and the estimate of the
+    field.
 
     It is done while its own error is below `tolerance_m`.
     """
@@ -98,7 +98,7 @@ class RadioCoverage(Controller):
             centroid = estimated_centroid(cell, *field)
         x, y = centroid or nearest_point(observation.boundary)
         moves = bool(samples) and observation.tick > self._every_ticks
-        # Robots take turns, so that not all broadcast at once.
+        # Robots broadcast at different ticks, so that not all broadcast at once.
         speaks = (observation.tick + self.setup.node) % self._every_ticks == 0
         say = NeighbourReport(observation.time_s, pose.x_m, pose.y_m, here.value)
         return Command(

@@ -12,10 +12,8 @@ from msgspec import Meta, Struct
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.protocols.central_membership import CoordinatorMembership
 from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
-from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, decode_beacon, encode_beacon
+from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, read_beacon, write_beacon
 from zwerm.agents.robot_teams.team_lead import TeamLead, findings
-from zwerm.errors import ProtocolError
-from zwerm.wire.checksum import seal, unseal
 from zwerm.wire.messages import Command, Observation, Transmission
 
 # Time that the coordinator waits for the robots' first reports [s], and ticks between its decisions after that.
@@ -79,9 +77,8 @@ class TeamCoordinator:
         """Receive, decide, and send."""
         tick = observation.tick
         for packet in observation.inbox:
-            try:
-                beacon: TeamBeacon = decode_beacon(unseal(packet.payload))
-            except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
+            beacon = read_beacon(packet.payload)
+            if beacon is None:
                 self.refused += 1
                 continue
             self.membership.receive(beacon, tick, near=False)
@@ -122,4 +119,4 @@ class TeamCoordinator:
             len(self.map.facts),
             *self._exchange.outgoing(tick),
         )
-        return (Transmission("uplink", seal(encode_beacon(beacon))),)
+        return (Transmission("uplink", write_beacon(beacon)),)

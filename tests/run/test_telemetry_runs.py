@@ -82,7 +82,7 @@ def test_forged_telemetry_on_the_wire_crashes_its_node_is_counted_and_does_not_s
     world.observe()
     forged = encode(Command()).replace(b"\x81\xa4type", b"\x82\xa9telemetry\x81\xa7complex\x80\xa4type")
     world.accept(1, forged)
-    assert world.intake.refused == {"telemetry": 1}
+    assert world.intake.refusals.by_reason == {"telemetry": 1}
     assert list(world.status.crashed) == [1]
     assert world.status.crashed[1].startswith("its command was refused: telemetry: ")
     assert world.awaited() == [0, 2, 3]

@@ -71,7 +71,7 @@ def test_a_hostile_message_is_refused_for_its_reason(payload: bytes, reason: str
     else:
         world.accept(0, payload)
         assert world.status.crashed[0].startswith(f"its command was refused: {reason}: ")
-    assert world.intake.refused == {reason: 1}
+    assert world.intake.refusals.by_reason == {reason: 1}
     assert world.awaited() == [1, 2, 3]
 
 
@@ -82,7 +82,7 @@ def test_a_second_answer_and_one_from_a_node_that_does_not_exist_are_refused() -
     for node, reason in ((0, "duplicate"), (4, "unasked"), (-1, "unasked")):
         with pytest.raises(ProtocolError, match=f"^{reason}:"):
             world.accept(node, encode(GOOD))
-    assert world.intake.refused == {"duplicate": 1, "unasked": 2}
+    assert world.intake.refusals.by_reason == {"duplicate": 1, "unasked": 2}
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ mutations = st.one_of(
 @example(encode(GOOD))
 def test_no_bytes_at_all_do_more_than_be_refused_or_be_a_valid_command(waiting_world: World, payload: bytes) -> None:
     world = waiting_world
-    before = world.intake.refused.total()
+    before = world.intake.refusals.by_reason.total()
     try:
         world.intake.accept(1, payload)
     except ProtocolError:
@@ -114,7 +114,7 @@ def test_no_bytes_at_all_do_more_than_be_refused_or_be_a_valid_command(waiting_w
     else:
         refused = 0
         world.intake.begin_tick(0, range(4), [b""] * 4)  # so that the next example is not refused as a duplicate
-    assert world.intake.refused.total() == before + refused
+    assert world.intake.refusals.by_reason.total() == before + refused
     assert 1 in world.awaited()
 
 

@@ -65,12 +65,12 @@ class ScheduledFault:
         return self.ends is None or tick < self.ends
 
     def pending(self, tick: int) -> bool:
-        """Return whether it has not begun before or at `tick`."""
+        """Return whether it begins after `tick`."""
         return self.begins is None or tick < self.begins
 
     @property
     def in_words(self) -> str:
-        """Its kind, and its begin, if that is known."""
+        """Its kind, and the time of its beginning, if that is known."""
         if self.begins is None:
             return f"{self.kind} on a condition"
         return f"{self.kind} at {self.begins * self._dt_s:g} s"

@@ -1,4 +1,5 @@
-"""The options that `zwerm run` and `zwerm world` share, as one object that a command takes as its parameter `options`."""
+"""The options that `zwerm run` and `zwerm world` share, as one object that a command takes as its parameter
+`options`."""
 
 import inspect
 from collections.abc import Callable
@@ -23,7 +24,7 @@ from zwerm.cli.options import (
     Sets,
 )
 
-if TYPE_CHECKING:  # --help needs none of them
+if TYPE_CHECKING:  # not above: --help needs none of them
     from zwerm.cli.run_output import RunOutput
     from zwerm.scenario.tables import Scenario
 

@@ -3,7 +3,6 @@
 import gc
 import secrets
 import time
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -310,12 +309,6 @@ class ExchangeObserver:
         self._scene = world.scene
 
 
-def _refusals(*counts: Mapping[int, Counter[str]]) -> dict[int, dict[str, int]]:
-    """Return the sum of refusals by node and reason, ascending."""
-    nodes = sorted({node for each in counts for node in each})
-    return {node: dict(sum((each.get(node, Counter()) for each in counts), Counter())) for node in nodes}
-
-
 @contextmanager
 def _collecting_seldom() -> Iterator[None]:
     """Let Python search for garbage cycles 100 times less often: messages form no cycles, and most objects are messages."""
@@ -340,11 +333,12 @@ def _result(
 ) -> RunResult:
     scenario, status, intake = world.scenario, world.status, world.intake
     metrics = measure(world, sampling.observers)
-    metrics["refused_messages"] = float(intake.refused.total())
+    metrics["refused_messages"] = float(intake.refusals.by_reason.total())
     if isinstance(driver, RealTime):
         metrics["late_commands"] = float(intake.late_count)
         metrics["deadman_stops"] = float(driver.deadman_stops)
         metrics["tick_overruns"] = float(driver.overruns)
+    refusals = intake.refusals | link.refusals
     counts = None
     if scenario.metrics.cells is not None:
         position = world.scene.position[world.scene.present]
@@ -372,8 +366,8 @@ def _result(
         arena=world.scene.arena,
         history=sampling.history,
         cell_counts=counts,
-        refused=dict(intake.refused + Counter(getattr(link, "refused", {}))),
-        refused_by=_refusals(intake.refused_by, getattr(link, "refused_by", {})),
+        refused=dict(refusals.by_reason),
+        refused_by=refusals.by_node,
         series={name: np.array(values) for name, values in sampling.observers.series().items()},
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,

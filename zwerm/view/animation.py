@@ -124,7 +124,7 @@ def _write_mp4(path: Path, frames: Iterator[NDArray[np.uint8]], fps: int) -> Non
     first = next(frames)
     height, width = first.shape[:2]
     raw = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{width}x{height}", "-r", str(fps), "-i", "-"]
-    # Players want even sizes and this pixel format.
+    # Players need even sizes and this pixel format.
     out = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p", str(path)]
     command = ["ffmpeg", "-loglevel", "error", "-y", *raw, *out]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:

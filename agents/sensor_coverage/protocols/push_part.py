@@ -34,7 +34,7 @@ VACANCY_PERIOD_TICKS: Final = 20
 BACK_RAD: Final = 0.3
 
 
-class Surroundings(Protocol):
+class PushSituation(Protocol):
     """The part of a robot's situation that its part in a push depends on."""
 
     @property
@@ -67,7 +67,7 @@ class PushPart:
 
     def __init__(
         self,
-        situation: Surroundings,
+        situation: PushSituation,
         announce_vacated: Callable[[int], None],
         push: int,
         fresh: int,
@@ -79,7 +79,7 @@ class PushPart:
         self.phase = "link"
         self.over = False
         self.end: Body | None = None
-        self._situation: Surroundings = situation
+        self._situation: PushSituation = situation
         self._map: NeighbourTable = situation.local_map
         self._announce_vacated = announce_vacated
         self._since = situation.tick

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
+from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
@@ -173,7 +173,7 @@ def plan(mover: int, *key: int) -> Plan:
 def assigned(
     complex_: FlagComplex, sources: dict[int, float], *tiers: list[Plan], pushes_max: int = 9
 ) -> list[tuple[int, ...]]:
-    def routes(part: FlagComplex, starts: dict[int, float]) -> Reach:
+    def routes(part: FlagComplex, starts: dict[int, float]) -> CheapestRoutes:
         return Dijkstra(3.0).routes(part, starts, ())
 
     add = CheapestFirst(Slots(), pushes_max).assign(tiers, ScanResult({}, complex_, ()), sources, routes)  # type: ignore[arg-type]

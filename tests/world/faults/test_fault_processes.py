@@ -136,7 +136,7 @@ def test_a_stale_incarnation_is_refused_and_counted(nothing_left: None) -> None:
                 ghost.join()
         finally:
             ghost.close()
-        assert swarm.link.refused["incarnation"] == 1
+        assert swarm.link.refusals.by_reason["incarnation"] == 1
 
 
 def test_late_commands_of_a_killed_robot_are_refused_in_real_time_and_its_next_incarnation_runs(

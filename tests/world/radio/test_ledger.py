@@ -7,45 +7,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from air import DT_S, Radio, ring
+from air import DT_S, EXAMPLES, Radio, ring
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 from support import scenario
 
-from zwerm.catalogue import RADIO_MODELS
 from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.run.runner import run
 from zwerm.wire.messages import Transmission
 from zwerm.world.radio.links import Links
 
-MODELS: dict[str, dict[str, Any]] = {
-    "range": {"range_m": 1.2},
-    "line_of_sight": {},
-    "path_loss": {"tx_power_dbm": -50.0},
-    "wall_attenuation": {"material": "glass", "margin_db": 1.0},
-    "loss": {"fraction": 0.3},
-    "gilbert_elliott": {"loss_fraction": 0.4, "burst_packets": 3.0},
-    "delay": {"delay_s": 0.05, "jitter_s": 0.2, "distribution": "exponential"},
-    "duplication": {"fraction": 0.5, "copies": 2},
-    "corruption": {"bit_error_rate": 0.02},
-    "rate_limit": {"rate_bytes_s": 60.0, "queue_bytes": 20.0},
-    "collision": {"airtime_s": 0.02},
-}
 WALL = [[50.0, 50.0], [50.0, 60.0]]
 
 
-def table(kind: str, **more: Any) -> dict[str, Any]:
-    return {"kind": kind, **MODELS[kind], **more}
-
-
-def test_these_tests_try_every_radio_model_of_the_catalogue() -> None:
-    assert sorted(MODELS) == sorted(RADIO_MODELS)
-
-
-@pytest.mark.parametrize(("first", "second"), list(product(MODELS, MODELS)))
+@pytest.mark.parametrize(("first", "second"), list(product(EXAMPLES, EXAMPLES)))
 def test_the_ledger_balances_under_every_pair_of_models(first: str, second: str) -> None:
-    radio = Radio(ring(4), [table(first), table(second, senders=[0, 1, 2])], walls=[WALL])
+    radio = Radio(ring(4), [EXAMPLES[first], EXAMPLES[second] | {"senders": [0, 1, 2]}], walls=[WALL])
     outbox = (Transmission("robots", b"broadcast"), Transmission("robots", b"one", to=3))
     for _ in range(12):  # the medium audits itself at every tick
         radio.step({0: outbox, 1: outbox[:1], 2: outbox})
@@ -60,7 +38,7 @@ def test_the_ledger_balances_under_every_pair_of_models(first: str, second: str)
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
-    kinds=st.lists(st.sampled_from(sorted(MODELS)), max_size=4),
+    kinds=st.lists(st.sampled_from(sorted(EXAMPLES)), max_size=4),
     traffic=st.lists(
         st.lists(
             st.tuples(st.integers(0, 4), st.one_of(st.none(), st.integers(0, 4)), st.binary(max_size=20)), max_size=5
@@ -74,7 +52,7 @@ def test_the_ledger_balances_under_every_pair_of_models(first: str, second: str)
 def test_the_ledger_balances_under_any_traffic_with_sleeping_and_crashing_nodes(
     kinds: list[str], traffic: list[Any], asleep: set[int], dies: tuple[int, int, int], seed: int
 ) -> None:
-    radio = Radio(ring(5), [table(kind) for kind in kinds], seed, walls=[WALL])
+    radio = Radio(ring(5), [EXAMPLES[kind] for kind in kinds], seed, walls=[WALL])
     node, down_at, up_at = dies
     sent = 0
     for number, tick in enumerate(traffic):
@@ -106,7 +84,7 @@ def test_an_audit_finds_a_packet_that_vanishes() -> None:
 
 
 def test_the_counts_by_link_are_sorted_and_add_up_to_the_summary() -> None:
-    radio = Radio(ring(4), [table("loss"), table("duplication")])
+    radio = Radio(ring(4), [EXAMPLES["loss"], EXAMPLES["duplication"]])
     summary = radio.all_broadcast(50)
     books = radio.medium.channels["robots"].ledger.by_link()
     assert list(zip(books["sender"], books["receiver"], strict=True)) == [
@@ -210,7 +188,7 @@ def test_a_model_of_a_user_states_whether_its_receivers_are_out_of_reach() -> No
 
 
 def test_the_age_of_information_equals_a_count_at_every_tick() -> None:
-    radio = Radio(ring(3), [table("loss"), table("delay")], seed=5)
+    radio = Radio(ring(3), [EXAMPLES["loss"], EXAMPLES["delay"]], seed=5)
     broadcast = Transmission("robots", b"x")
     newest: dict[tuple[int, int], int] = {}
     ages: dict[tuple[int, int], list[int]] = {}

@@ -113,7 +113,7 @@ class CellsLayer(Layer):
         return [self._lines, self._edges, self._nodes, self._dots]
 
     def show(self, tracks: Tracks, index: int, at_s: float | None) -> None:
-        """Show what was reported by `at_s`."""
+        """Show the reports up to `at_s`."""
         shown = [(line, team) for time_s, line, team in self._slices if at_s is None or time_s <= at_s + 1e-9]
         self._lines.set_segments([np.array([[x, low], [x, high]]) for (x, low, high), _ in shown])
         self._lines.set_color([TEAMS[team % len(TEAMS)] for _, team in shown])
