@@ -1,6 +1,6 @@
 """The loop over a robot's components: deliver, poll, collect, and find the next wake-up."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from zwerm.agents.sensor_coverage.messages.incarnations import ANY, Incarnations
