@@ -265,12 +265,12 @@ def test_what_the_body_of_a_robot_stopped_is_tried_again_when_it_is_dead() -> No
     log = local_map._planner.attempt_log
     for plan in (gap, wall):
         local_map.note_failure(plan, 0.5)
-    local_map.bury(4)
+    local_map.remove_dead(4)
     assert list(log.closed) == [wall.key], "the gap has another shape"
     local_map.note_obstruction(side, 0.5, 5)
-    local_map.bury(4)
+    local_map.remove_dead(4)
     assert list(log.closed) == [wall.key, side.key]
-    local_map.bury(5)
+    local_map.remove_dead(5)
     assert not log.closed
     assert not local_map._obstructed
 

@@ -314,7 +314,7 @@ def crash(at_s: float, more: str = "") -> str:
 def test_the_base_ends_the_run_when_the_coordinator_is_gone_for_good(at_s: float) -> None:
     result = run("sensor-coverage", runner="inline", overrides=[*HALL, crash(at_s)])
     assert result.outcome == "failed"
-    assert result.reason == "node 0 gave up: coordinator-lost: not a word from the coordinator for 120 s"
+    assert result.reason == "node 0 gave up: coordinator-lost: no message from the coordinator for 120 s"
     assert at_s + 90.0 < result.sim_s < at_s + 123.0
 
 
