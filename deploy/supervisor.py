@@ -22,6 +22,7 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 from typing import Any, Final
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.process import main
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.errors import LinkError
@@ -99,7 +100,11 @@ class LocalSupervisor:
         *,
         order: Sequence[int] | None = None,
         stations: Mapping[int, Station] | None = None,
+        confinement: Confinement = UNCONFINED,
     ) -> None:
+        """Raises LinkError where this machine cannot confine robots so."""
+        confinement.check()
+        self._confinement = confinement
         self._endpoint = endpoint
         self._run = credentials.run
         self._terms = credentials.terms
@@ -231,6 +236,7 @@ class LocalSupervisor:
             args=(
                 *(self._run, credential, self._endpoint, self._terms, deadline_s, joined),
                 self._stations.get(credential.node),
+                self._confinement,
             ),
             name=f"node {credential.node}",
             daemon=True,
