@@ -8,8 +8,8 @@ Each run has a schedule of faults that is drawn from its seed:
     restart     one robot crashes, and returns without memory after up to 60 s
     silence     no radio message passes to or from the base for 240 s
 
-The times are drawn over the whole deployment. A run is right if it is `completed` with a reachable coverage of at least
-0.98, and honest if it ends as `failed`. It is wrong if it is `completed` with less, or does not end by itself.
+The times are drawn over the whole deployment. A run is *right* if it is `completed` with a reachable coverage of at least
+0.98, *honest* if it ends as `failed`, and *wrong* if it is `completed` with less or does not end by itself.
 """
 
 import argparse
