@@ -129,7 +129,7 @@ async def run_node(
 ) -> int:
     """Join the run, answer observations until its end, and return the exit code.
 
-    Writes the node's id to `joined` once the node has joined. Raises ZwermError if it cannot join.
+    Writes the node's password to `joined` once the node has joined. Raises ZwermError if it cannot join.
     """
     loop = asyncio.get_running_loop()
     end: asyncio.Future[int] = loop.create_future()
@@ -206,7 +206,7 @@ async def run_node(
             loop.add_reader(parent.sentinel, os._exit, EXIT_LOST)
         if joined is not None:
             with contextlib.suppress(OSError), joined:  # the supervisor does not wait any more
-                joined.send_bytes(str(credential.node).encode())
+                os.write(joined.fileno(), credential.password.encode())
         link.listen(receive_in_loop if welcome.paced else receive)
         code = await end
         if code == EXIT_FAILED:
