@@ -1,8 +1,9 @@
 """Draw the figures of stored measurements: `python docs/figures.py`.
 
-Each figure shows rows of a CSV file in `measurements/`, so it is drawn again from the same file that a table shows.
+Each figure shows rows of a CSV file in `measurements/` or beside the figure, so it is drawn again from the same file.
 """
 
+import csv
 import sys
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +18,7 @@ FOLDER: Final = Path(__file__).parent
 LOSS: Final = "compare-small-hall"
 AXIS: Final = "radio.loss+uplink.loss"
 STYLES: Final = {"central": ("#0072B2", "o"), "decentralised": ("#D55E00", "s")}
-SOAK: Final = "bench-soak-series"
+SOAK: Final = FOLDER / "images" / "soak.csv"  # as `benchmarks/bench_soak.py --series` writes it
 SOAK_PANELS: Final = {
     "memory of the world [MB]": {"world_mb": "world"},
     "memory of a robot [MB]": {"old_robot_mb_mean": "mean of those that live on", "robot_mb_max": "largest"},
@@ -62,7 +63,8 @@ def loss_figure() -> Figure:
 
 def soak_figure() -> Figure:
     """Return memory and descriptors of the world and of its robots over a long run."""
-    rows = _measured.load(SOAK).rows
+    with SOAK.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
     minutes = [float(row["time_s"]) / 60.0 for row in rows]
     figure = Figure(figsize=(10.5, 3.2), layout="constrained")
     for axes, (title, columns) in zip(figure.subplots(1, 3), SOAK_PANELS.items(), strict=True):
