@@ -212,6 +212,7 @@ COMMANDS: Final = {
     "shrink": "zwerm.cli.commands.shrink_command:shrink",
     "study": "zwerm.cli.commands.study_command:study",
     "compare": "zwerm.cli.commands.compare_command:compare",
+    "merge": "zwerm.cli.commands.merge_command:merge",
     "evolve": "zwerm.cli.commands.evolve_command:evolve",
 }
 

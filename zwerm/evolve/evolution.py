@@ -125,7 +125,7 @@ class Evolution:
         best = max(finals, key=lambda run: finals[run][1].max())
         candidates, fitness = finals[best]
         return EvolutionResult(
-            self.genome.parameters(candidates[int(np.argmax(fitness))]),
+            self.genome.parameters(candidates[int(np.argmax(fitness))].tolist()),
             best + 1,
             float(fitness.max()),
             [

@@ -1,4 +1,4 @@
-"""Progress of an evolution on the terminal, its result as a table and as JSON, its figure, and the study of its best controller."""
+"""Progress of an evolution on the terminal, its result as a table, as JSON and as a figure, and the study of its best."""
 
 from dataclasses import asdict
 from pathlib import Path

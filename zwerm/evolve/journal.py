@@ -19,7 +19,10 @@ _GROWING: Final = ("runs", "generations")
 
 
 class Journal:
-    """The fitness of each generation's candidates, by run, in `path`. `final` holds the second evaluation by run and generation."""
+    """The fitness of each generation's candidates, by run, in `path`.
+
+    `final` holds the second evaluation of a run's last candidates, by run and number of generations.
+    """
 
     def __init__(self, path: Path, settings: dict[str, Any]) -> None:
         """Raises ScenarioError where the file cannot be written, or is of other settings or in use."""

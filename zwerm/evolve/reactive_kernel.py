@@ -1,7 +1,7 @@
 """The kernel of a batch: arenas of robots whose wheel speeds depend on one bit of line of sight, compiled by numba.
 
-The arenas are independent rectangles. Each tick a robot senses, its command of `latency` ticks before moves it along an arc, and
-overlaps are pushed apart. Contacts act on positions: each of two overlapping robots moves by half of the overlap, and
+The arenas are independent rectangles. Each tick a robot senses. Its command of `latency` ticks before moves it along an
+arc, and overlaps are pushed apart. Contacts act on positions: each of two overlapping robots moves by half of the overlap, and
 then walls push back. This is the contact model of Enki, the simulator of Ozdemir 2019. Numbers are single precision, in the
 order that is written: no sum is fused or reordered.
 
