@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 import pytest
+import yaml
 from study_files import DEADLINE_S, GRID, TINY, run_here
 from support import ROOT, until
 
@@ -41,6 +42,7 @@ def test_shards_divide_the_trials_and_each_points_seeds_evenly(write: Callable[.
     trials = trials_of(write(GRID), 14)
     shards = [Shard(index, count).of(trials) for index in range(1, count + 1)]
     assert Counter(trial.key for shard in shards for trial in shard) == Counter(trial.key for trial in trials)
+    assert max(map(len, shards)) - min(map(len, shards)) <= 1
     for fingerprint in {trial.point.fingerprint for trial in trials}:
         sizes = [sum(trial.point.fingerprint == fingerprint for trial in shard) for shard in shards]
         assert max(sizes) - min(sizes) <= 1
@@ -166,27 +168,51 @@ def test_a_trial_that_failed_in_one_file_has_its_result_of_another(write: Callab
         out.unlink()
 
 
-def test_merge_and_shards_on_the_command_line(write: Callable[..., Study], tmp_path: Path) -> None:
+# --- manifests and the command line ---------------------------------------------------------------------------------
+
+MANIFESTS = ROOT / "deploy" / "manifests"
+
+
+def test_the_manifests_run_their_shards_and_the_parts_are_merged(write: Callable[..., Study], tmp_path: Path) -> None:
     write(GRID)
+    command = tmp_path / "bin" / "zwerm"
+    command.parent.mkdir()
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -c "from zwerm.cli.app import main; main()" "$@"\n')
+    command.chmod(0o755)
+    path = os.pathsep.join([str(command.parent), os.environ["PATH"]])
 
-    def zwerm(*arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":
-        return subprocess.run(
-            [sys.executable, "-c", "from zwerm.cli.app import main; main()", *arguments],
-            cwd=tmp_path,
-            env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+    def ran(*arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":
+        settings = os.environ | {"PYTHONPATH": str(ROOT), "PATH": path, "STUDY": "tiny.toml"} | environment
+        return subprocess.run(arguments, cwd=tmp_path, env=settings, capture_output=True, text=True, check=False)
 
-    for index in ("0", "1"):
-        ran = zwerm("study", "tiny.toml", "--jobs", "1", "--shard", "auto/2", JOB_COMPLETION_INDEX=index)
-        assert ran.returncode == 0, ran.stderr
-    merged = zwerm("merge", "runs/tiny-shard-1-of-2.parquet", "runs/tiny-shard-2-of-2.parquet")
+    array = {"SLURM_ARRAY_TASK_ID": "1", "SLURM_ARRAY_TASK_MIN": "1", "SLURM_ARRAY_TASK_MAX": "2"}
+    slurm = ran("bash", str(MANIFESTS / "study.slurm"), **array)
+    assert slurm.returncode == 0, slurm.stderr
+    # Kubernetes replaces $(NAME) by the variables of the container.
+    (container,) = yaml.safe_load((MANIFESTS / "study-job.yaml").read_text())["spec"]["template"]["spec"]["containers"]
+    words = [word.replace("$(STUDY)", "tiny.toml").replace("$(SHARDS)", "2") for word in container["command"]]
+    pod = ran(*words, JOB_COMPLETION_INDEX="1")
+    assert pod.returncode == 0, pod.stderr
+    merged = ran("zwerm", "merge", "runs/tiny-shard-1-of-2.parquet", "runs/tiny-shard-2-of-2.parquet")
     assert (merged.returncode, merged.stderr) == (0, "6 rows: runs/tiny.parquet\n")
-    unclear = zwerm("merge", "runs/tiny.parquet")
+    unclear = ran("zwerm", "merge", "runs/tiny.parquet")
     assert unclear.returncode == 2
     assert unclear.stderr == "zwerm: --out: give it: the files are not named as the shards of one study\n"
+
+
+def test_the_job_of_kubernetes_is_valid_by_the_schema_of_its_api() -> None:
+    kubernetes_validate = pytest.importorskip("kubernetes_validate", reason="`make dev` installs the schemas")
+    job = yaml.safe_load((MANIFESTS / "study-job.yaml").read_text())
+    kubernetes_validate.validate(job, kubernetes_validate.latest_version(), strict=True)
+    spec = job["spec"]
+    (container,) = spec["template"]["spec"]["containers"]
+    shards = {each["name"]: each["value"] for each in container["env"]}["SHARDS"]
+    assert int(shards) == spec["completions"]
+    # The negative control: a misspelt key is refused.
+    with pytest.raises(kubernetes_validate.ValidationError):
+        kubernetes_validate.validate(
+            job | {"spec": spec | {"complitions": 3}}, kubernetes_validate.latest_version(), strict=True
+        )
 
 
 # --- the order of trials --------------------------------------------------------------------------------------------

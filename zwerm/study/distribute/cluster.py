@@ -53,7 +53,7 @@ def _rows(client: Any, trials: Sequence[Trial]) -> Generator[Row, None, None]:
         task = client.submit(_work, trial, code, libraries, priority=-index, pure=False)
         tasks[task] = trial
     try:
-        for task in as_completed(list(tasks)):
+        for task in as_completed(list(tasks), loop=client.loop):
             yield _row(task, tasks.pop(task))
             task.release()
     finally:

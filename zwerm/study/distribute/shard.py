@@ -29,16 +29,12 @@ class Shard:
         return rows.with_name(f"{rows.stem}-shard-{self.index}-of-{self.count}{rows.suffix}")
 
     def of(self, trials: Sequence[Trial]) -> list[Trial]:
-        """Return the trials of this shard, in the order of `trials`."""
+        """Return the trials of this shard, in the order of `trials`: any two shards differ by one trial at most."""
         points: dict[tuple[str, str], int] = {}
-        seeds: dict[int, int] = {}
-        chosen = []
-        for trial in trials:
-            point = points.setdefault(trial.key[:2], len(points))
-            seed = seeds.setdefault(trial.seed, len(seeds))
-            if (point + seed) % self.count == self.index - 1:
-                chosen.append(trial)
-        return chosen
+        numbers = [points.setdefault(trial.key[:2], len(points)) for trial in trials]
+        # Point by point, so that each point's seeds are divided evenly, too.
+        dealt = sorted(range(len(trials)), key=numbers.__getitem__)
+        return [trials[index] for index in sorted(dealt[self.index - 1 :: self.count])]
 
 
 def parse_shard(text: str, environment: Mapping[str, str]) -> Shard:
