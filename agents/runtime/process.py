@@ -1,12 +1,12 @@
 """The robot process: an asyncio loop, one Zenoh session and one Node.
 
-The process answers each observation with one command, in order. It exits when the world says goodbye or is lost, on SIGTERM,
+The process answers each observation with one command, in order. It exits when the world sends goodbye or is lost, on SIGTERM,
 and with the process that started it. After a failure of its controller it exits once the world has confirmed the failure, so
-the world always knows the reason first. It ignores SIGINT: the process that started it handles Ctrl-C.
+the world always gets the reason first. It ignores SIGINT: the process that started it handles Ctrl-C.
 
 The loop joins, waits and ends. Zenoh's thread answers observations where it delivers them. Passing each observation to
-the loop's thread costs more than all other work together (measured for one robot tick: 160 us of processor time instead
-of 106). In real time observations are passed to the loop nevertheless. The backlog of a slow controller collects there.
+the loop's thread would cost more than all other work together (measured: 160 instead of 106 us of processor time a
+robot and tick). In real time observations are passed to the loop nevertheless. The backlog of a slow controller collects there.
 If the sending thread answered it, the backlog could block that thread.
 """
 
@@ -145,7 +145,7 @@ async def run_node(
             loop.call_soon_threadsafe(may_exit.set)
 
     async def leave(reason: str) -> None:
-        """Say goodbye, and return when the world has confirmed all messages, or is lost."""
+        """Send goodbye, and wait until the world has confirmed all messages, or is lost."""
         link.send_goodbye(reason, confirmed)
         await may_exit.wait()
 
@@ -249,7 +249,6 @@ _server: int | None = None
 
 
 def serve_robots() -> None:
-    """Note that this process is the server that robots are forked from: a robot ends when its parent is no longer this
-    server."""
+    """Record that robots are forked from this process: a robot ends when its parent is no longer this process."""
     global _server
     _server = os.getpid()

@@ -12,7 +12,7 @@ import msgspec
 
 from zwerm.agents.sensor_coverage.frontier.decisions import Services
 from zwerm.agents.sensor_coverage.frontier.directions import add_wall
-from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
+from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
@@ -53,7 +53,7 @@ GIVEN_UP: Final = {
 }
 
 
-class CoordinatorSetup(Protocol):
+class SensorCoverageSetup(Protocol):
     """The parts of its setup that the coordinator uses."""
 
     @property
@@ -86,7 +86,7 @@ class SensorCoverageCoordinator:
 
     Parameters = PlannerParameters
 
-    def __init__(self, setup: CoordinatorSetup) -> None:
+    def __init__(self, setup: SensorCoverageSetup) -> None:
         parameters: PlannerParameters = msgspec.convert(setup.parameters, PlannerParameters)
         self.parameters = parameters
         self.slots = Slots()
@@ -335,7 +335,7 @@ class SensorCoverageCoordinator:
         redundant = (*self.redundant, *self.walking.idle)
         sources = dict.fromkeys(self.sources.available(), 0.0) | dict.fromkeys(redundant, REDUNDANT_COST)
 
-        def find_routes(complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
+        def find_routes(complex_: FlagComplex, sources: Mapping[int, float]) -> CheapestRoutes:
             return services.paths.routes(complex_, sources, services.frontier.obstacle, shut)
 
         return services.assignment.assign(services.frontier.plans(), self.pushing.scan, sources, find_routes)

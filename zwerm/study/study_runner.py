@@ -1,7 +1,7 @@
 """Run the trials of a study that its file does not have yet, store each row, and summarise all rows.
 
-An interrupted study, or one with new seeds or grid values, continues with the missing trials. Rows of points that are no
-longer in the study stay in the file. Rows of a point are replaced if its scenario or code has changed. Rows with
+An interrupted study, or one with new seeds or grid values, continues with the missing trials. Rows of points that are
+no longer in the study stay in the file. Rows of a point are replaced if its scenario or code has changed. Rows with
 unknown code are never used again.
 """
 
@@ -77,10 +77,10 @@ def run_study(
     """Run the trials of `study` that the file `out` does not have, `jobs` at a time, and return the results.
 
     `seeds` replaces the study's seeds, `sets` overrides its scenarios, `retry` repeats failed trials. A trial without a
-    result after `timeout_s` fails. After Ctrl-C all rows so far are kept, and the result says that it was interrupted. With
-    one job trials run in this process, and nothing ends them early. With the runner `processes` one trial runs at a time, in
-    the same way. With `shard` only its trials run. With `cluster`, the address of a Dask scheduler, its workers run the trials.
-    Raises ScenarioError for errors in the input, before any trial runs.
+    result after `timeout_s` fails. After Ctrl-C all rows so far are kept, and the result says that it was interrupted.
+    With one job trials run in this process, and nothing ends them early. With the runner `processes` one trial runs at
+    a time, in the same way. With `shard` only its trials run. With `cluster`, the address of a Dask scheduler, its workers
+    run the trials. Raises ScenarioError for errors in the input, before any trial runs.
     """
     if jobs is not None and jobs < 1:
         raise ScenarioError([f"jobs: expected >= 1, got {jobs}"])
@@ -129,7 +129,7 @@ def _distinct(trials: Sequence[Trial]) -> list[Trial]:
 
 
 def _trusted(trial: Trial, row: Row) -> bool:
-    """Return whether the code that gave a row is known, and is the code of now."""
+    """Return whether the code that gave a row is known and equals the current code."""
     return not trial.point.modules.unknown and still_same(row.get("modules", ""))
 
 

@@ -22,7 +22,7 @@ def evolve(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Keys the starts, the search and the arenas.")] = 1,
     jobs: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option("--jobs", min=1, help="How many runs to work on at a time; one a core by default."),
+        typer.Option("--jobs", min=1, help="The number of runs that advance at a time; by default one per core."),
     ] = None,
     output: Annotated[
         Optional[Path],  # noqa: UP045

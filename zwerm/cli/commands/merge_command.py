@@ -17,7 +17,7 @@ def merge(
     output: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
-            "--out", metavar="FILE.parquet", help="Where all rows go; by default the study's file beside the shards."
+            "--out", metavar="FILE.parquet", help="The file of all rows; by default the study's, beside the shards."
         ),
     ] = None,
 ) -> None:

@@ -15,7 +15,7 @@ from zwerm.agents.sensor_coverage.frontier.fence import (
     uncovered,
     wedges,
 )
-from zwerm.agents.sensor_coverage.frontier.paths import reach
+from zwerm.agents.sensor_coverage.frontier.paths import cheapest_routes
 from zwerm.maths.simplicial import FlagComplex
 
 Views = dict[int, dict[int, float]]
@@ -154,12 +154,12 @@ def test_a_path_avoids_obstacle_edges_where_the_way_round_is_cheaper() -> None:
     """Figure 9(a): 12, 10, 6, 2; with the first edge at a wall it is dearer than the way round."""
     lists = {12: [10, 11], 10: [12, 6], 6: [10, 2], 2: [6, 11], 11: [12, 2]}
     complex_ = FlagComplex(lists)
-    assert reach(complex_, {12: 0.0}, (), 3.0).path(2) == (12, 11, 2)
-    assert reach(complex_, {12: 0.0}, ((11, 12), (2, 11)), 3.0).path(2) == (12, 10, 6, 2)
+    assert cheapest_routes(complex_, {12: 0.0}, (), 3.0).path(2) == (12, 11, 2)
+    assert cheapest_routes(complex_, {12: 0.0}, ((11, 12), (2, 11)), 3.0).path(2) == (12, 10, 6, 2)
 
 
 def test_the_path_begins_at_the_nearest_of_several_sources() -> None:
     complex_ = FlagComplex({n: [m for m in (n - 1, n + 1) if 0 <= m <= 6] for n in range(7)})
-    ways = reach(complex_, {0: 0.0, 6: 0.0}, (), 3.0)
+    ways = cheapest_routes(complex_, {0: 0.0, 6: 0.0}, (), 3.0)
     assert ways.path(2) == (0, 1, 2)
     assert ways.path(5) == (6, 5)

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
+from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
@@ -99,7 +99,7 @@ class Swarm:
         first = next(iter(self.planner.plans()))
         return [each for each in first if self.robots([(each.key[0], each.key[1])])[0] == pair]
 
-    def routes(self, complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
+    def routes(self, complex_: FlagComplex, sources: Mapping[int, float]) -> CheapestRoutes:
         return Dijkstra(3.0).routes(complex_, sources, self.planner.obstacle)
 
 

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from zwerm.agents.sensor_coverage.frontier.paths import reach
+from zwerm.agents.sensor_coverage.frontier.paths import cheapest_routes
 from zwerm.agents.sensor_coverage.messages.beacons import PathVector, Route
 from zwerm.agents.sensor_coverage.messages.peers import read, write
 from zwerm.agents.sensor_coverage.protocols.path_vector import RENEW_TICKS, PathVectorProtocol
@@ -60,7 +60,7 @@ class Network:
     def true_costs(self) -> dict[int, float]:
         lists = {slot: list(self.beside(slot)) for slot in self.robots}
         obstacle = [each for each, weight in self.weights.items() if weight > 1.0]
-        return reach(FlagComplex(lists), dict.fromkeys(self.roots, 0.0), obstacle, OBSTACLE_COST).cost
+        return cheapest_routes(FlagComplex(lists), dict.fromkeys(self.roots, 0.0), obstacle, OBSTACLE_COST).cost
 
 
 def line(count: int) -> dict[Edge, float]:
