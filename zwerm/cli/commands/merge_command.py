@@ -39,7 +39,7 @@ def merge(
 
 def _study_file(parts: list[Path]) -> Path:
     """Return the file of the study whose shards these are. Raises ScenarioError where that is not clear."""
-    names = {part.parent / (re.sub(r"-shard-\d+-of-\d+$", "", part.stem) + part.suffix) for part in parts}
-    if len(names) != 1 or names & set(parts):
+    first, *others = [part.parent / (re.sub(r"-shard-\d+-of-\d+$", "", part.stem) + part.suffix) for part in parts]
+    if any(other != first for other in others) or first in parts:
         raise ScenarioError(["--out: give it: the files are not named as the shards of one study"])
-    return names.pop()
+    return first
