@@ -40,7 +40,7 @@ OF_CATALOGUE = (
 # A metric that decodes the messages of the algorithm of the recipes.
 OWN_METRIC = '''"""Headcount: the size of a report."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping
 from typing import ClassVar
 
 from zwerm.agents.headcount import ID
@@ -50,7 +50,7 @@ from zwerm.world.metrics import Metric
 class Headcount(Metric):
     """The size of a report [bytes]."""
 
-    names: ClassVar[Sequence[str]] = ("report_bytes",)
+    names: ClassVar[Mapping[str, str]] = {"report_bytes": "size of a report"}
 
     def metrics(self) -> dict[str, float]:
         """Return the size of a report."""
