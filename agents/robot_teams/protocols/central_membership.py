@@ -1,7 +1,7 @@
 """One team of all robots, which the coordinator leads: the robots' messages to it, and its messages to them.
 
-The coordinator makes a view of all robots whose beacons it receives. A robot takes every later view that includes it, and founds
-none. It waits while it receives nothing.
+The coordinator makes a view of all robots whose beacons it receives. A robot takes every later view that includes it, and
+founds none. It waits while it receives nothing.
 """
 
 from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership, later
