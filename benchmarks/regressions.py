@@ -76,7 +76,7 @@ class Tree:
         spent_s, robot_ticks, file = json.loads(line)
         if not Path(file).is_relative_to(self._folder):
             raise RuntimeError(f"{file}: expected the code of {self._folder}")
-        return float(spent_s) / robot_ticks
+        return float(spent_s) / int(robot_ticks)
 
     def close(self) -> None:
         """End the process."""
