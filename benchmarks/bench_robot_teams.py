@@ -1,4 +1,4 @@
-"""Coverage by robot teams over drawn arenas, starts and faults: is it complete, how long does it take, how much is repeated?
+"""Coverage by robot teams over drawn arenas, starts and faults: completeness, duration and repeated coverage.
 
 Every run is drawn from its seed: the arena, or one of three halls, the places and headings at the start, and the fault.
 The arena is the same for every number of robots. Runs are kept in a file and not made again, so that a long measurement
@@ -56,7 +56,7 @@ HALLS: Final[dict[str, tuple[float, float, tuple[str, ...]]]] = {
     "one obstacle": (20.0, 12.0, ("five",)),
     "three obstacles": (28.0, 16.0, ("five", "low", "high")),
 }
-# What is different from the scenario `robot-teams`.
+# Settings that differ from the scenario `robot-teams`.
 SETTINGS: Final = (
     *("none", "loss", "bursts", "range", "death", "death of lead", "death in division", "death in merge"),
     *("partition", "pause", "coordinator", "coordinator loss"),

@@ -18,6 +18,7 @@ from typing import NamedTuple, Self
 
 import msgspec
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import code_of
 from zwerm.deploy.authority import certify
@@ -26,7 +27,7 @@ from zwerm.deploy.identity import WorldIdentity, WorldKeys, issue, renew, router
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.deploy.supervisor import (
     JOIN_DEADLINE_S,
-    LEAVE_PATIENCE_S,
+    LEAVE_WAIT_S,
     LocalSupervisor,
     Progress,
     interrupts_held,
@@ -147,6 +148,7 @@ class LocalSwarm(_Swarm):
         restart: RestartSpec | None = None,
         stations: Mapping[int, Station] | None = None,
         on_refusal: RefusalListener | None = None,
+        confinement: Confinement = UNCONFINED,
     ) -> None:
         """`order` is the order of starting, `deadline_s` the time each process has to join, `paced` means real time.
 
@@ -156,10 +158,11 @@ class LocalSwarm(_Swarm):
         super().__init__(run, members, progress, deadline_s, paced, on_refusal)
         self._order = [node for node in (members if order is None else order) if node not in late_joiners]
         self._restart = restart
+        self._confinement = confinement
         self._stations = stations
         self._ran = set(self._order)
         self._stopped: set[int] = set()
-        self._patience_s = 0.0  # do not wait for nodes that have not joined
+        self._exit_wait_s = 0.0  # do not wait for nodes that have not joined
 
     def _open(self, directory: Path) -> None:
         prepare(len(self._members))
@@ -167,12 +170,14 @@ class LocalSwarm(_Swarm):
         self.credentials = issue(self._run, self._members)
         self._listen(directory, [endpoint])
         self._current = {credential.node: credential for credential in self.credentials.nodes}
-        self.supervisor = LocalSupervisor(endpoint, self.credentials, order=self._order, stations=self._stations)
+        self.supervisor = LocalSupervisor(
+            endpoint, self.credentials, order=self._order, stations=self._stations, confinement=self._confinement
+        )
         self._stack.callback(self._end)
 
     def _gather(self) -> None:
         self.supervisor.start(self._progress, self._deadline_s)
-        self._patience_s = LEAVE_PATIENCE_S
+        self._exit_wait_s = LEAVE_WAIT_S
 
     def kill(self, node: int) -> None:
         """Kill a node with SIGKILL. The link then reports the node lost."""
@@ -213,7 +218,7 @@ class LocalSwarm(_Swarm):
         self._start_next_incarnation(node)
 
     def _start_next_incarnation(self, node: int) -> None:
-        self.link.wait_joined(lambda joined: node not in joined, LEAVE_PATIENCE_S)
+        self.link.wait_joined(lambda joined: node not in joined, LEAVE_WAIT_S)
         credential = renew(self._current[node])
         if self._restart is not None:
             self._members = {**self._members, node: self._restart(node, credential.incarnation)}
@@ -225,7 +230,7 @@ class LocalSwarm(_Swarm):
         for node in sorted(self._stopped):
             self.resume(node)
         self.link.dismiss("the run is over")
-        self.supervisor.stop(self._patience_s)
+        self.supervisor.stop(self._exit_wait_s)
 
 
 class RemoteSwarm(_Swarm):
@@ -309,7 +314,7 @@ class RemoteSwarm(_Swarm):
     def _end(self) -> None:
         self.link.dismiss("the run is over")
         count = len(self.link.joined)
-        while count and self.link.wait_joined(partial(_changed, count), LEAVE_PATIENCE_S):
+        while count and self.link.wait_joined(partial(_changed, count), LEAVE_WAIT_S):
             count = len(self.link.joined)
 
 

@@ -23,7 +23,7 @@ def test_a_beacon_counts_received_missing_and_damaged_packets() -> None:
         hearer.step(Observation(tick, 0.1 * tick, (Packet("robots", frames[number], 1),)))
     damaged = bytes([frames[5][0] ^ 1]) + frames[5][1:]
     hearer.step(Observation(4, 0.4, (Packet("robots", damaged, 1),)))
-    assert (hearer.heard, hearer.missed, hearer.refused) == ({1: 4}, {1: 2}, 1)
+    assert (hearer.received, hearer.missed, hearer.refused) == ({1: 4}, {1: 2}, 1)
 
 
 @pytest.mark.parametrize("kind", ["holonomic", "differential"])
