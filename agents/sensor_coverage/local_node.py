@@ -56,7 +56,8 @@ class LocalNode(Controller):
         situation = self.situation
         situation.observe(observation)
         dead = [node for node in situation.failure_detector.dead if node in situation.motion.frame.seen]
-        self.completion.update(situation.tick, situation.bearings, situation.claims, self._occupied, dead)
+        unproven = situation.local_map.unproven
+        self.completion.update(situation.tick, situation.bearings, situation.claims, self._occupied, dead, unproven)
         self.components.deliver(observation.inbox, situation.tick)
         velocity = situation.advance()
         if self.completion.search != self._search:

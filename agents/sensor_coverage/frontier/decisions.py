@@ -11,6 +11,7 @@ from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
 from zwerm.agents.sensor_coverage.frontier.fence import Fence
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
 from zwerm.maths.simplicial import Edge, FlagComplex
 
 # Returns the cheapest routes from sources (slot: cost to start there) through a complex.
@@ -22,6 +23,7 @@ class FrontierService(Protocol):
 
     attempt_log: AttemptLog
     fence: Fence
+    walls: WallPlans
 
     @property
     def frontier(self) -> tuple[Edge, ...]:

@@ -10,12 +10,12 @@ An obstacle that lies within one triangle is not found. The triangle's sides are
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.fence import Views
 from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
-from zwerm.maths.simplicial import FlagComplex, edge
+from zwerm.maths.simplicial import FlagComplex
 
 # An open arc narrower than this [rad] counts as closed: a body at r_v is 8 degrees wide.
 GAP_RAD: Final = math.radians(6.0)
@@ -23,6 +23,8 @@ GAP_RAD: Final = math.radians(6.0)
 TOUCH_RAD: Final = math.radians(45.0)
 # A walking robot that touches a wall and a standing robot at once closes this angle [rad] between the two.
 POCKET_RAD: Final = math.radians(55.0)
+# Arcs apart by less than this [rad] are stored as one.
+HAIR_RAD: Final = 1e-9
 
 
 class Arc(NamedTuple):
@@ -36,46 +38,66 @@ def open_arcs(
     views: Views, complex_: FlagComplex, walks: Iterable[Walk], touched: Mapping[int, Sequence[float]]
 ) -> dict[int, list[Arc]]:
     """Return the arcs in which each slot is open; `touched` has the directions of walls in touch with a slot."""
-    closed: dict[int, list[Arc]] = {slot: [] for slot in complex_.vertices}
+    closed = {slot: arcs_of_walls(touched.get(slot, ())) for slot in complex_.vertices}
     for i, j, k in complex_.triangles:
         for a, b, c in ((i, j, k), (j, i, k), (k, i, j)):
-            _close(closed[a], views[a][b], views[a][c])
-    for slot, directions in touched.items():
-        if slot in closed:
-            closed[slot] += [Arc(each - TOUCH_RAD, 2.0 * TOUCH_RAD) for each in directions]
+            closed[a].append(arc_between(views[a][b], views[a][c]))
     for walk in walks:
-        _close_along(walk, views, complex_, closed)
-    found = {slot: _complement(arcs) for slot, arcs in closed.items()}
+        before: WalkPoint | None = None
+        for point in walk.points:
+            for slot in point.seen:
+                if slot in closed:
+                    beside = {each: views[slot][each] for each in complex_.neighbours[slot]}
+                    closed[slot] += [arc for _, arc in arcs_of_step(slot, before, point, walk.hand, beside)]
+            before = point
+    found = {slot: complement(arcs) for slot, arcs in closed.items()}
     return {slot: arcs for slot, arcs in found.items() if arcs}
 
 
-def _close_along(walk: Walk, views: Views, complex_: FlagComplex, closed: Mapping[int, list[Arc]]) -> None:
-    """Close the arcs of the triangles of a walk."""
-    before: WalkPoint | None = None
-    for point in walk.points:
-        seen = [slot for slot in point.seen if slot in closed]
-        for slot in seen:
-            there = point.seen[slot]
-            if before is not None and slot in before.seen and (point.in_touch or before.in_touch):
-                step = math.remainder(there - before.seen[slot], math.tau)
-                if step * walk.hand < 0.0:  # the slot and the wall are on different sides of the step
-                    _close(closed[slot], before.seen[slot], there)
-            for other in seen:
-                if other != slot and edge(slot, other) in complex_:
-                    _close(closed[slot], views[slot][other], there)
-            if slot in point.robots and point.walls:
-                off = min((math.remainder(each - there, math.tau) for each in point.walls), key=abs)
-                _close(closed[slot], there, there + math.copysign(min(abs(off), POCKET_RAD), off))
-        before = point
+def arcs_of_walls(directions: Iterable[float]) -> list[Arc]:
+    """Return the arcs that walls in touch close, by their directions [rad]."""
+    return [Arc(each - TOUCH_RAD, 2.0 * TOUCH_RAD) for each in directions]
 
 
-def _close(arcs: list[Arc], a_rad: float, b_rad: float) -> None:
-    """Add the smaller arc between two directions."""
+def arcs_of_step(
+    slot: int, before: WalkPoint | None, point: WalkPoint, hand: int, beside: Mapping[int, float]
+) -> Iterator[tuple[int | None, Arc]]:
+    """Yield the arcs that a point of a walk closes at a slot that it sees, each with the other robot of the triangle, if any.
+
+    `before` is the point before it. `beside` has the directions [rad] of the slots that share an edge with the slot.
+    """
+    there = point.seen[slot]
+    if before is not None and slot in before.seen and (point.in_touch or before.in_touch):
+        step = math.remainder(there - before.seen[slot], math.tau)
+        if step * hand < 0.0:  # the slot and the wall are on different sides of the step
+            yield None, arc_between(before.seen[slot], there)
+    for other in point.seen:
+        if other != slot and other in beside:
+            yield other, arc_between(beside[other], there)
+    if slot in point.robots and point.walls:
+        off = min((math.remainder(each - there, math.tau) for each in point.walls), key=abs)
+        yield None, arc_between(there, there + math.copysign(min(abs(off), POCKET_RAD), off))
+
+
+def arc_between(a_rad: float, b_rad: float) -> Arc:
+    """Return the smaller arc between two directions [rad]."""
     off = math.remainder(b_rad - a_rad, math.tau)
-    arcs.append(Arc(a_rad, off) if off >= 0.0 else Arc(b_rad, -off))
+    return Arc(a_rad, off) if off >= 0.0 else Arc(b_rad, -off)
 
 
-def _complement(arcs: Iterable[Arc]) -> list[Arc]:
+def united(arcs: Iterable[Arc]) -> list[Arc]:
+    """Return disjoint arcs that contain the same directions. Arcs that are apart by less than a hair become one."""
+    found: list[Arc] = []
+    for start, width in sorted((each.start_rad % math.tau, each.width_rad) for each in arcs):
+        if found and start <= found[-1].start_rad + found[-1].width_rad + HAIR_RAD:
+            first = found[-1].start_rad
+            found[-1] = Arc(first, min(math.tau, max(found[-1].width_rad, start + width - first)))
+        else:
+            found.append(Arc(start, width))
+    return found
+
+
+def complement(arcs: Iterable[Arc]) -> list[Arc]:
     """Return the arcs that no given arc contains, without those that are narrower than GAP_RAD."""
     spans = sorted((each.start_rad % math.tau, each.width_rad) for each in arcs)
     if not spans:

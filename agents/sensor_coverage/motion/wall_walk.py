@@ -6,7 +6,7 @@ its way are passed in the same manner, but the robot does not press against them
 """
 
 import math
-from collections.abc import Collection, Generator, Iterable, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
@@ -31,6 +31,14 @@ STUCK_FRACTION: Final = 0.2
 SPACING_M: Final = 0.1
 # Way [m] in which a robot must get clear of its start.
 CLEARING_M_MAX: Final = 3.0
+# A wall within this way [m] is only felt: the space between it and the robot's slot is narrower than a body.
+FEEL_M: Final = 0.12
+# The walking robot leaves its slot by this distance [m] before the next robot takes it: two bodies and some space.
+CLEAR_M: Final = 0.3
+# Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
+LEG_M: Final = 3.0
+# Number of consecutive legs that closed nothing after which a walk ends.
+IDLE_LEGS_MAX: Final = 2
 
 
 class WalkResult(NamedTuple):
@@ -46,9 +54,13 @@ DriveToWalk = Generator[BodyVelocity, None, WalkResult]
 
 
 class WallWalk:
-    """The walk of one robot along walls, over several commands: its trail, and the direction of the wall it has in touch."""
+    """The walk of one robot along walls, over several commands: its trail, and the direction of the wall it has in touch.
+
+    `on_step` is called with each point of a walk along a wall, one a tick.
+    """
 
     def __init__(self, motion: Locomotion) -> None:
+        self.on_step: Callable[[Waypoint], None] = lambda _: None
         self._motion = motion
         self._wall_rad = 0.0
         self._trail: list[Vector] = []
@@ -121,6 +133,7 @@ class WallWalk:
         self._trail = [motion.position]
         self._blind_rad = 0.0
         points = [self._waypoint()]
+        self.on_step(points[0])
         seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
         last, way = motion.position, 0.0
         while way < length_m:
@@ -135,6 +148,7 @@ class WallWalk:
                 yield from self._back(margin_m, keep)
                 return WalkResult(LOST, way, (), tuple(points))
             self._trail.append(motion.position)
+            self.on_step(self._waypoint())
             now, touch = tuple(sorted(frame.seen)), _hands(frame.contacts)
             if now != seen or touch != hands:
                 if before != last:

@@ -5,7 +5,7 @@ A robot plans only for the edges at its own slot, and only as their mover.
 
 import cmath
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import islice
 from typing import Final
 
@@ -21,10 +21,12 @@ from zwerm.agents.sensor_coverage.frontier.fence import VERTEX_BESIDE_RAD, wedge
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.wall_plans import WALLS
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
+from zwerm.agents.sensor_coverage.neighbourhood.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.protocols.path_vector import PathVectorProtocol
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
@@ -33,6 +35,8 @@ from zwerm.maths.simplicial import Edge, FlagComplex, edge
 DOUBT_COST: Final = 1_000.0
 # Added cost of a route to a robot at a gap. Gaps are expanded when no edge can be expanded and no robot is in doubt.
 GAP_COST: Final = 10_000.0
+# The same for a robot with an open arc, from which a robot must follow a wall. That comes after all edges and gaps.
+WALL_COST: Final = 20_000.0
 
 # A body is seen from the other side if the directions to it differ by more than this [rad].
 BEHIND_RAD: Final = math.pi / 2.0
@@ -43,7 +47,8 @@ MakePlanner = Callable[[PlannerParameters, Slots], FrontierService]
 class LocalMap(NeighbourTable):
     """One robot's neighbourhood.
 
-    `plans` expand edges and `gaps` expand gaps around this robot. `obstacle` has the obstacle edges here, and
+    `plans` expand edges and `gaps` expand gaps around this robot, and `wall_plans` lead into open arcs of the `proof` of
+    coverage. `unproven` counts the open arcs without an attempt left. `obstacle` has the obstacle edges here, and
     `obstructed` counts the sides and gaps that the body of a dead robot closes. `path_vectors` has the routes to the
     frontier. `plan_count` counts the times that plans were made. A base station sets `guests`.
     """
@@ -56,6 +61,9 @@ class LocalMap(NeighbourTable):
         self.parameters = parameters
         self.plans: list[Plan] = []
         self.gaps: list[Plan] = []
+        self.wall_plans: list[Plan] = []
+        self.unproven = 0
+        self.proof = SlotProof()
         self.path_vectors = PathVectorProtocol()
         self.obstacle: dict[Edge, None] = {}
         self.obstructed = 0
@@ -112,6 +120,9 @@ class LocalMap(NeighbourTable):
             tuple(log.blocked.get(me, ())),
             self.path_vectors.newest_claim(me),
             tuple(self._obstructed.items()),
+            tuple(self._slots.felt.get(me, ())),
+            tuple(self._planner.walls.tried.get(me, ())),
+            self.proof.memory(),
         )
 
     # --- robots that died or restarted --------------------------------------------------------------------------------
@@ -143,7 +154,8 @@ class LocalMap(NeighbourTable):
         self._learned.clear()
         self._slots = Slots()
         self._planner = self._make_planner(self.parameters, self._slots)
-        self.plans, self.gaps, self.obstacle, self.obstructed = [], [], {}, 0
+        self._drop_plans()
+        self.proof = SlotProof()
         self._obstructed = {}
         self._plan_basis = None
         self._led = None
@@ -173,12 +185,19 @@ class LocalMap(NeighbourTable):
         log.attempts = dict(memory.attempts)
         log.blocked[me] = list(memory.blocked)
         self._obstructed = dict(memory.obstructed)
+        self._slots.felt[me] = list(memory.felt)
+        self._planner.walls.tried[me] = list(memory.explored)
+        self.proof.inherit(memory.proved)
 
     def leave_complex(self) -> None:
         """Leave the complex; the body stays at the slot."""
         self.redundant = True
-        self.plans, self.gaps, self.obstacle, self.obstructed = [], [], {}, 0
+        self._drop_plans()
         self.change()
+
+    def _drop_plans(self) -> None:
+        self.plans, self.gaps, self.wall_plans, self.obstacle = [], [], [], {}
+        self.obstructed = self.unproven = 0
 
     def abandon_push(self, fresh: int, follower: int | None) -> None:
         """Record that this robot led a push and stays: no robot occupies `fresh`, and `follower` should not come."""
@@ -230,6 +249,18 @@ class LocalMap(NeighbourTable):
             (*found.corners, *(side.edge for side in found.sides if (side.edge, side.sign) not in could))
         )
         self.obstructed = self._count_obstructed(scan)
+        if self.parameters.walls == "followed":
+            self._plan_walks(scan)
+
+    def _plan_walks(self, scan: ScanResult) -> None:
+        """Find the open arcs around this robot, and the walks into them. A robot without neighbours has none."""
+        me = self.slot
+        self.proof.update(me, scan, [*self._slots.walls.get(me, ()), *self._slots.felt.get(me, ())])
+        self.wall_plans, self.unproven = [], 0
+        if self.proof.around:
+            self.wall_plans, self.unproven = self._planner.walls.plans_at(
+                me, next(iter(self.proof.around)), self.proof.open_arcs()
+            )
 
     def _count_obstructed(self, scan: ScanResult) -> int:
         """Return the number of sides and gaps here that are open, or closed only by a body behind which no robot has looked.
@@ -279,23 +310,26 @@ class LocalMap(NeighbourTable):
 
     def best_plan(self) -> Plan | None:
         """Return the plan to carry out here, or None."""
-        wanted = self.plans or self.gaps
+        wanted = self.plans or self.gaps or self.wall_plans
         return min(wanted, key=lambda each: each.key) if wanted else None
+
+    def plan_from_base(self, direction_rad: float, hand: int) -> Plan:
+        """Return the plan to follow a wall from the base's point, into an open arc of the base."""
+        return Plan((0, 0, 0, WALLS), 0, direction_rad, self.parameters.hop_m, 0.0, (0,), walk=True, hand=hand)
 
     def note_attempt(self, plan: Plan) -> None:
         """Record that a plan is tried."""
         self._planner.note_attempt(plan)
-        self._plan_basis = None
-        self.change()
+        self.replan()
 
     def reopen(self) -> None:
         """Try again all that has failed: a robot is missing, and the obstacle of that time may be gone."""
         log = self._planner.attempt_log
         log.closed, log.failed, log.attempts = {}, {}, {}
         log.blocked.clear()
+        self._planner.walls.tried.clear()
         self._obstructed = {}
-        self._plan_basis = None
-        self.change()
+        self.replan()
 
     def note_obstruction(self, plan: Plan, driven_m: float, body: int) -> None:
         """Record that a dead robot's body stopped a plan after `driven_m`: this robot does not know what is behind it."""
@@ -311,6 +345,16 @@ class LocalMap(NeighbourTable):
     def note_failure(self, plan: Plan, driven_m: float) -> None:
         """Record that a wall stopped a plan after `driven_m`."""
         self._planner.note_failure(plan, driven_m)
+        self.replan()
+
+    def note_felt(self, directions: Iterable[float]) -> None:
+        """Record walls that a robot felt close to this slot, by their directions [rad]."""
+        for each in directions:
+            self._planner.walls.note_wall(self.slot, each)
+        self.replan()
+
+    def replan(self) -> None:
+        """Make plans again, although neither the view nor a neighbour has changed."""
         self._plan_basis = None
         self.change()
 
@@ -323,7 +367,7 @@ class LocalMap(NeighbourTable):
 
     @property
     def to_gap(self) -> bool:
-        """True if the route leads to a gap."""
+        """True if the route leads to a gap, or to a wall that must be followed."""
         return self.route is not None and self.route.cost >= GAP_COST
 
     @property
@@ -345,7 +389,9 @@ class LocalMap(NeighbourTable):
     def find_route(self, tick: int) -> None:
         """Choose the route to the frontier by the neighbours' routes."""
         placed = self.slot not in (0, NOWHERE)
-        cost = 0.0 if placed and self.plans else GAP_COST if placed and self.gaps else None
+        cost = None
+        if placed:
+            cost = 0.0 if self.plans else GAP_COST if self.gaps else WALL_COST if self.wall_plans else None
         obstacle_cost = self.parameters.obstacle_cost
         weights = {
             state.slot: obstacle_cost if edge(self.slot, state.slot) in self.obstacle else 1.0

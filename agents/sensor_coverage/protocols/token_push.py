@@ -19,13 +19,14 @@ next wake-up.
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
+from zwerm.agents.sensor_coverage.frontier.plan import Plan
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.commands import Sighting
+from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import (
     AllSettled,
     AllStanding,
@@ -39,22 +40,29 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
 )
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import direction_to
+from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, WAVE_TICKS, PushPart
+from zwerm.agents.sensor_coverage.protocols.wall_protocol import WallProtocol
 
 # A dead robot's body within BODY_AHEAD_RAD of a drive's direction is expected to stop the drive. If a drive was stopped
 # without a touch, a dead robot's body within BODY_BESIDE_RAD has stopped it.
 BODY_AHEAD_RAD: Final = 0.3
 BODY_BESIDE_RAD: Final = math.pi / 2.0
+# Bound of the legs of one walk.
+LEGS_MAX: Final = 15
 
 
 class TokenPush(PushPart):
     """One robot's part in one push: what it does on messages, at the end of drives, and at the end of a wait."""
 
+    walls: WallProtocol | None = None
     _situation: Situation
     _map: LocalMap
+    _legs = _idle_legs = 0
+    _is_spare = False  # the walk has ended in sight of the swarm, which needs no robot there
 
     # --- events -------------------------------------------------------------------------------------------------------
 
@@ -63,10 +71,11 @@ class TokenPush(PushPart):
         match body:
             case LeaderReady():
                 self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
-                self._leader_epoch = body.epoch
+                self._leader_epoch, self._walks = body.epoch, body.walk
                 self._enter("armed")
             case TakeSlot():
                 self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
+                self._walks = body.walk
                 self._call()
             case PushAborted():
                 self.close(body)
@@ -81,6 +90,11 @@ class TokenPush(PushPart):
         """Take in that the leader has left its slot."""
         if self.phase == "armed":
             self._call()
+
+    def walk_ended(self) -> None:
+        """Take in that the leader's walk has ended: wait no longer than after another push."""
+        self._walks, self._since = False, self._situation.tick if self.phase == "await" else self._since
+        self._walk_over = self._chain.ahead == self._chain.leader[1]
 
     def member_lost(self, node: int) -> None:
         """Take in that a robot has lost its memory: wait for it no longer."""
@@ -109,8 +123,8 @@ class TokenPush(PushPart):
             self._vacated = True
             self._announce_vacated(self.id)
 
-    def arrived(self, result: DriveResult) -> None:
-        """Take in the end of a drive."""
+    def arrived(self, result: DriveResult | WalkResult) -> None:
+        """Take in the end of a drive or of a walk."""
         PHASES[self.phase].arrived(self, result)
 
     def poll(self) -> None:
@@ -130,9 +144,15 @@ class TokenPush(PushPart):
         """Be the leader, once this robot's view agrees with its neighbours' states."""
         self._enter("holding")
 
+    def lead_from_base(self, direction_rad: float, hand: int) -> None:
+        """Be the leader, from the base's point into an open arc of the base."""
+        self._plan = self._map.plan_from_base(direction_rad, hand)
+        self.lead()
+
     def _offer(self) -> None:
-        self._map.update_plans()
-        self._plan = None if self._first_bearings else self._map.best_plan()
+        if self._plan is None:
+            self._map.update_plans()
+            self._plan = None if self._first_bearings else self._map.best_plan()
         behind = self._chain.behind
         if self._first_bearings or (self._plan is not None and behind is None):
             self._deploy()
@@ -140,10 +160,13 @@ class TokenPush(PushPart):
             self.close(PushAborted(self.id, False))
         else:
             self._enter("offering")
-            ready = LeaderReady(self.id, self._chain.links, self._map.memory(), self._map.epoch)
+            ready = LeaderReady(self.id, self._chain.links, self._map.memory(), self._map.epoch, self._plan.walk)
             self._situation.mailbox.write(behind, ready)
 
     def _deploy(self) -> None:
+        if self._plan is not None and self._plan.walk:
+            self._approach(self._plan)
+            return
         self._enter("deploying")
         parameters = self._map.parameters
         if self._first_bearings:
@@ -171,6 +194,64 @@ class TokenPush(PushPart):
             return
         self._enter("out")
         self._write(AllStanding(self.id))
+
+    # --- the leader at a wall -----------------------------------------------------------------------------------------
+
+    def _approach(self, plan: Plan) -> None:
+        """Drive into an open arc, to a wall."""
+        self._enter("approaching")
+        self._map.note_attempt(plan)
+        self._situation.to_wall(wrapped(plan.direction - self._heading), plan.hop_m, -plan.hand)
+
+    def _approached(self, result: DriveResult | WalkResult) -> None:
+        """Leave the slot to the follower, unless a wall is close to it, or there is no way on."""
+        if not isinstance(result, WalkResult) or result.end == SHUT:
+            felt = tuple(wrapped(each + self._heading) for each in result.touched)
+            at_base = self._map.slot == NOWHERE
+            if not at_base:
+                self._map.note_felt(felt)
+            self._situation.stand()
+            self.close(PushAborted(self.id, True, felt if at_base else ()))
+            return
+        self._walks = result.end != OPEN
+        self._anchors = () if self._walks else self._find_anchors()
+        self._map.occupy(self._fresh)
+        self._enter("out")
+        self._behind_settled = self._chain.is_rear
+        self.cleared()
+        self._write(AllStanding(self.id))
+
+    def _go_on(self) -> None:
+        """Correct the scale, or follow the wall."""
+        if self._walks:
+            self._walk()
+        else:
+            self._correct()
+
+    def _walk(self) -> None:
+        """Follow the wall for one leg."""
+        plan, protocol = self._plan, self.walls
+        if plan is None or protocol is None:
+            self._settled()
+            return
+        self._enter("walking")
+        self._legs += 1
+        protocol.begin(self.id, plan.hand)
+        self._situation.follow_wall(plan.hand, (self._back,) if plan.beside and self._back is not None else ())
+
+    def _walked(self, result: DriveResult | WalkResult) -> None:
+        """Follow the wall further while that closes something; else stand at the new slot where the walk has ended."""
+        protocol = self.walls
+        closed = protocol is not None and protocol.has_closed()
+        self._idle_legs = 0 if closed else self._idle_legs + 1
+        on = isinstance(result, WalkResult) and result.end == STRETCH
+        if on and self._legs < LEGS_MAX and self._idle_legs < IDLE_LEGS_MAX:
+            self._walk()
+            return
+        if protocol is not None:
+            protocol.end(self.id)
+        self._is_spare = isinstance(result, WalkResult) and result.end != LOST
+        self._settled()
 
     def _blocked(self, result: DriveResult) -> None:
         """End the push after a test drive that met a wall; the first robot tries its other bearings before."""
@@ -208,7 +289,8 @@ class TokenPush(PushPart):
         if behind is None:
             self._follow()
         else:
-            self._situation.mailbox.write(behind, TakeSlot(self.id, self._chain.links, self._map.memory()))
+            taken = TakeSlot(self.id, self._chain.links, self._map.memory(), self._walks)
+            self._situation.mailbox.write(behind, taken)
 
     def _follow(self) -> None:
         """Drive to the slot ahead, and inherit it."""
@@ -292,6 +374,8 @@ class TokenPush(PushPart):
         """Send the outcome of the push to the robot behind; join no other push until that is acknowledged."""
         if self._map.moving:
             self._situation.stand()
+        if self._is_spare:
+            self._map.leave_complex()
         self.over = self.end is None or self._back is None
         if self.end is not None:
             self._write(self.end)
@@ -316,7 +400,7 @@ class Phase(NamedTuple):
     """
 
     transitions: tuple[tuple[Callable[[TokenPush], bool], Callable[[TokenPush], None]], ...] = ()
-    arrived: Callable[[TokenPush, DriveResult], None] = lambda push, result: push._situation.stand()
+    arrived: Callable[[TokenPush, Any], None] = lambda push, result: push._situation.stand()
     wake: Callable[[TokenPush], int] = lambda push: push._since + WAVE_TICKS + 1
 
 
@@ -329,7 +413,9 @@ PHASES: Final[Mapping[str, Phase]] = {
     "holding": Phase(((TokenPush._may_offer, TokenPush._offer),), wake=TokenPush._next_tick),
     "offering": Phase(),
     "deploying": Phase(arrived=TokenPush._deployed),
-    "out": Phase(((TokenPush._settled_behind, TokenPush._correct),), wake=TokenPush._wake_for_behind),
+    "approaching": Phase(arrived=TokenPush._approached),
+    "out": Phase(((TokenPush._settled_behind, TokenPush._go_on),), wake=TokenPush._wake_for_behind),
+    "walking": Phase(arrived=TokenPush._walked),
     "correcting": Phase(arrived=lambda push, _: push._settled()),
     # Follower of the leader: wait until the leader's slot is vacant.
     "armed": Phase(((lambda push: push._leader_is_back() or push._waited > ARMED_TICKS,
@@ -344,7 +430,7 @@ PHASES: Final[Mapping[str, Phase]] = {
     "standing": Phase(((TokenPush._settled_behind, TokenPush._straighten),), wake=TokenPush._wake_for_behind),
     "straightening": Phase(arrived=lambda push, _: push._home()),
     "homing": Phase(arrived=lambda push, _: push._settled()),
-    "await": Phase(((TokenPush._waited_for_ahead, lambda push: push.close(PushDone(push.id))),),
+    "await": Phase(((lambda push: push._walk_over or push._waited_for_ahead(), lambda push: push.close(PushDone(push.id))),),
                    wake=TokenPush._wake_for_ahead),
     # All: wait until the view agrees with the neighbours, inform the robot behind, and end.
     "closing": Phase(((TokenPush._may_finish, TokenPush._finish),), wake=TokenPush._next_tick),

@@ -1,0 +1,143 @@
+"""Walks without a coordinator: the walking robot announces its way, and the robots that it passes prove their slots.
+
+Each robot that a point of the walk names takes the point into the proof of its own slot, and answers if that closed
+something. The end of a walk is flooded, because the walking robot is out of range of its push by then. A lost message
+leaves an arc open, which is tried again.
+"""
+
+import math
+from collections.abc import Callable
+from typing import ClassVar, Final, NamedTuple
+
+from zwerm.agents.sensor_coverage.frontier.directions import wrapped
+from zwerm.agents.sensor_coverage.frontier.walks import WalkPoint
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.commands import Waypoint
+from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
+from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, PassedPoint, WalkMessage, WalkOver
+from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
+from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
+
+# A robot makes plans again this many ticks after the latest point that closed something: the walk has passed.
+PASSED_TICKS: Final = 10
+
+
+class _Received(NamedTuple):
+    """The latest point that was received from a walking robot, and the slot where it was received."""
+
+    push: int
+    number: int
+    slot: int
+    point: WalkPoint
+
+
+class WallProtocol(Component):
+    """One robot's part in walks, its own and those of others."""
+
+    channel: ClassVar[str] = CHANNEL
+    accepts: ClassVar[tuple[type, ...]] = (PassedPoint, ArcClosed, WalkOver)
+
+    def __init__(self, situation: Situation, on_over: Callable[[int], None] = lambda _: None) -> None:
+        """Call `on_over` with the number of the push when a walk has ended."""
+        self._situation = situation
+        self._on_over = on_over
+        self._outbox: list[Outgoing] = []
+        self._push: int | None = None  # the push of this robot's own walk
+        self._hand = 1
+        self._number = 0
+        self._closed = False
+        self._received: dict[int, _Received] = {}
+        self._replan_at: int | None = None
+        self._over: dict[int, None] = {}
+
+    # --- this robot's own walk ----------------------------------------------------------------------------------------
+
+    def begin(self, push: int, hand: int) -> None:
+        """Announce the points of the walk that begins now."""
+        if push != self._push:
+            self._push, self._hand, self._number = push, hand, 0
+        self._closed = False
+        self._situation.wall_walk.on_step = self._announce
+
+    def has_closed(self) -> bool:
+        """Return whether a robot answered since the latest `begin` that an open arc became smaller."""
+        return self._closed
+
+    def end(self, push: int) -> None:
+        """Announce that the walk is over."""
+        self._push = None
+        self._situation.wall_walk.on_step = lambda _: None
+        self._spread(push)
+
+    def _announce(self, at: Waypoint) -> None:
+        heading = self._situation.local_map.heading or 0.0
+        self._number += 1
+        point = PassedPoint(
+            self._push or 0,
+            self._number,
+            self._hand,
+            tuple((each.node, wrapped(each.bearing_rad + heading + math.pi)) for each in at.sightings),
+            tuple(wrapped(each + heading) for each in at.touched),
+            at.robots,
+        )
+        self._outbox.append(Outgoing(None, point))
+
+    # --- walks of others ----------------------------------------------------------------------------------------------
+
+    def receive(self, sender: int, message: WalkMessage, tick: int) -> None:
+        """Take in a point of another robot's walk, an answer to this robot's walk, or the end of a walk."""
+        match message:
+            case PassedPoint():
+                self._pass(sender, message, tick)
+            case ArcClosed(push):
+                self._closed = self._closed or push == self._push
+            case WalkOver(push) if push not in self._over:
+                self._spread(push)
+                self._on_over(push)
+            case _:
+                pass
+
+    def _pass(self, sender: int, passed: PassedPoint, tick: int) -> None:
+        """Take a point into the proof of this robot's slot."""
+        local_map = self._situation.local_map
+        slot = local_map.slot
+        if slot == NOWHERE or local_map.moving or local_map.redundant or local_map.heading is None:
+            return
+        slots = {node: state.slot for node, state in local_map.mutual().items()} | {self._situation.node: slot}
+        point = WalkPoint(
+            {slots[node]: direction for node, direction in passed.seen if node in slots},
+            passed.walls,
+            tuple(slots[node] for node in passed.robots if node in slots),
+        )
+        last = self._received.get(sender)
+        self._received[sender] = _Received(passed.push, passed.number, slot, point)
+        follows = last is not None and last[:3] == (passed.push, passed.number - 1, slot)
+        before = last.point if last is not None and follows else None
+        if slot in point.seen and local_map.proof.pass_point(slot, before, point, passed.hand):
+            self._replan_at = tick + PASSED_TICKS
+            self._outbox.append(Outgoing(sender, ArcClosed(passed.push)))
+
+    def _spread(self, push: int) -> None:
+        self._over[push] = None
+        self._outbox.append(Outgoing(None, WalkOver(push)))
+
+    # --- every tick ---------------------------------------------------------------------------------------------------
+
+    def restarted(self, node: int, tick: int) -> None:
+        """Forget the points of a former incarnation."""
+        self._received.pop(node, None)
+
+    def poll(self, tick: int) -> None:
+        """Make plans again once a walk has passed."""
+        if self._replan_at is not None and tick >= self._replan_at:
+            self._replan_at = None
+            self._situation.local_map.replan()
+
+    def outgoing(self) -> list[Outgoing]:
+        """Return the messages to send now."""
+        sent, self._outbox = self._outbox, []
+        return sent
+
+    def next_wake(self) -> int | None:
+        """Return the tick at which plans are made again."""
+        return self._replan_at
