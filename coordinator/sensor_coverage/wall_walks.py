@@ -89,6 +89,7 @@ class WallWalks:
         if walked is None:  # dead
             self._sources.waiting.pop(plan.mover, None)
             return (leader,)
+        self._walls.note_near(plan.mover, [(start + heading, width) for start, width in walked.near])
         if walked.end == SHUT:
             for each in walked.touched:
                 self._walls.note_wall(plan.mover, each + heading)

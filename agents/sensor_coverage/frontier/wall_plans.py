@@ -11,7 +11,8 @@ from zwerm.agents.sensor_coverage.frontier.directions import add_wall
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, open_arcs
+from zwerm.agents.sensor_coverage.frontier.walks import Arc
+from zwerm.agents.sensor_coverage.frontier.wall_proof import open_arcs
 
 # Third and fourth element of the keys of these plans.
 WALLS: Final = 1000
@@ -41,7 +42,7 @@ class WallPlans:
         """Return the arcs in which each slot is open."""
         slots = self._slots
         touched = {slot: [*slots.walls.get(slot, ()), *slots.felt.get(slot, ())] for slot in scan.complex_.vertices}
-        return open_arcs(scan.views, scan.complex_, slots.walks, touched)
+        return open_arcs(scan.views, scan.complex_, slots.walks, touched, slots.near)
 
     def plans(self, scan: ScanResult) -> Iterator[Plan]:
         """Yield a plan for each open arc that has attempts left."""
@@ -118,6 +119,10 @@ class WallPlans:
             self._joined[plan.mover, plan.meet] = self._joined.get((plan.mover, plan.meet), 0) + 1
         else:
             self.tried.setdefault(plan.mover, []).append(plan.direction)
+
+    def note_near(self, slot: int, arcs: Iterable[tuple[float, float]]) -> None:
+        """Record arcs (start, width) [rad] around a slot in which a wall close to it was followed."""
+        self._slots.near[slot] = [*self._slots.near.get(slot, ()), *(Arc(*each) for each in arcs)]
 
     def note_wall(self, slot: int, direction: float) -> None:
         """Record a wall closer than a body [rad] beside a slot."""

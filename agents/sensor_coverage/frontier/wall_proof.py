@@ -11,10 +11,11 @@ An obstacle that lies within one triangle is not found. The triangle's sides are
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.fence import Views
-from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.walks import Arc, Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 
 # An open arc narrower than this [rad] counts as closed: a body at r_v is 8 degrees wide.
@@ -23,35 +24,60 @@ GAP_RAD: Final = math.radians(6.0)
 TOUCH_RAD: Final = math.radians(45.0)
 # A walking robot that touches a wall and a standing robot at once closes this angle [rad] between the two.
 POCKET_RAD: Final = math.radians(55.0)
+# Largest arc [rad] behind a corner in which a slot may lose sight of a walking robot that stays in touch with the wall.
+HIDDEN_RAD: Final = math.radians(30.0)
 # Arcs apart by less than this [rad] are stored as one.
 HAIR_RAD: Final = 1e-9
 
 
-class Arc(NamedTuple):
-    """Directions from `start_rad` to the left, over `width_rad`."""
+class SeenPoint(NamedTuple):
+    """A point of a walk that a slot saw, and its number in the walk."""
 
-    start_rad: float
-    width_rad: float
+    number: int
+    point: WalkPoint
 
 
 def open_arcs(
-    views: Views, complex_: FlagComplex, walks: Iterable[Walk], touched: Mapping[int, Sequence[float]]
+    views: Views,
+    complex_: FlagComplex,
+    walks: Iterable[Walk],
+    touched: Mapping[int, Sequence[float]],
+    near: Mapping[int, Sequence[Arc]] = MappingProxyType({}),
 ) -> dict[int, list[Arc]]:
-    """Return the arcs in which each slot is open; `touched` has the directions of walls in touch with a slot."""
-    closed = {slot: arcs_of_walls(touched.get(slot, ())) for slot in complex_.vertices}
+    """Return the arcs in which each slot is open.
+
+    `touched` has the directions of walls in touch with a slot. `near` has the arcs in which a wall close to it was followed.
+    """
+    closed = {slot: [*arcs_of_walls(touched.get(slot, ())), *near.get(slot, ())] for slot in complex_.vertices}
     for i, j, k in complex_.triangles:
         for a, b, c in ((i, j, k), (j, i, k), (k, i, j)):
             closed[a].append(arc_between(views[a][b], views[a][c]))
     for walk in walks:
-        before: WalkPoint | None = None
-        for point in walk.points:
+        last: dict[int, SeenPoint] = {}
+        touch_since = 0
+        for number, point in enumerate(walk.points):
+            touch_since = touch_since if point.in_touch else number + 1
             for slot in point.seen:
                 if slot in closed:
                     beside = {each: views[slot][each] for each in complex_.neighbours[slot]}
+                    before = point_before(slot, last.get(slot), SeenPoint(number, point), touch_since)
                     closed[slot] += [arc for _, arc in arcs_of_step(slot, before, point, walk.hand, beside)]
-            before = point
+                last[slot] = SeenPoint(number, point)
     found = {slot: complement(arcs) for slot, arcs in closed.items()}
     return {slot: arcs for slot, arcs in found.items() if arcs}
+
+
+def point_before(slot: int, last: SeenPoint | None, now: SeenPoint, touch_since: int) -> WalkPoint | None:
+    """Return the point with which a point of a walk closes an arc at a slot, or None.
+
+    `last` is the latest point that the slot saw before. The slot may have lost the walking robot meanwhile, behind a
+    corner, if the robot was in touch all the time: since the point with the number `touch_since`. Then other robots saw the
+    way between, and are responsible for the space beside it.
+    """
+    if last is None or last.number == now.number - 1:
+        return None if last is None else last.point
+    apart = abs(math.remainder(now.point.seen[slot] - last.point.seen[slot], math.tau))
+    return last.point if last.number >= touch_since and apart <= HIDDEN_RAD else None
 
 
 def arcs_of_walls(directions: Iterable[float]) -> list[Arc]:

@@ -109,9 +109,14 @@ class PushAborted(_PushMessage, frozen=True, tag="aborted"):
 
 
 class AllStanding(_PushMessage, frozen=True, tag="all-standing"):
-    """All robots ahead of the receiver stand still."""
+    """All robots ahead of the receiver stand still.
+
+    From the leader to its follower, `near` has arcs (start, width) [rad] around the slot that the leader has left, in which
+    it followed a wall close to that slot.
+    """
 
     push: int
+    near: tuple[tuple[float, float], ...] = ()
 
 
 class AllSettled(_PushMessage, frozen=True, tag="all-settled"):

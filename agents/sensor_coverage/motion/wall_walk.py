@@ -7,6 +7,7 @@ its way are passed in the same manner, but the robot does not press against them
 
 import math
 from collections.abc import Callable, Collection, Generator, Iterable, Sequence
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
@@ -35,6 +36,8 @@ CLEARING_M_MAX: Final = 3.0
 FEEL_M: Final = 0.12
 # The walking robot leaves its slot by this distance [m] before the next robot takes it: two bodies and some space.
 CLEAR_M: Final = 0.3
+# Points closer [m] to the start have no direction from there.
+NEAR_M_MIN: Final = 0.02
 # Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
 LEG_M: Final = 3.0
 # Number of consecutive legs that closed nothing after which a walk ends.
@@ -48,6 +51,7 @@ class WalkResult(NamedTuple):
     driven_m: float = 0.0
     touched: tuple[float, ...] = ()
     waypoints: tuple[Waypoint, ...] = ()
+    near: tuple[tuple[float, float], ...] = ()
 
 
 DriveToWalk = Generator[BodyVelocity, None, WalkResult]
@@ -106,15 +110,17 @@ class WallWalk:
             return WalkResult(SHUT, done, touched)
         self._wall_rad, self._blind_rad = bearing_rad, 0.0
         way = 0.0
+        near = [_NearPoint(motion.position, bool(frame.contacts))]
         while math.hypot(frame.x_m - start[0], frame.y_m - start[1]) < clear_m:
             if way > CLEARING_M_MAX or self._blind_rad > TURNS_RAD_MAX:
                 yield from motion.drive_to(start)
-                return WalkResult(SHUT, done, touched)
+                return WalkResult(SHUT, done, touched, near=arcs_around(start, near, hand))
             before = motion.position
             yield self._step(hand)
             way += math.dist(before, motion.position)
             self._trail.append(motion.position)
-        return WalkResult(STRETCH, done, touched)
+            near.append(_NearPoint(motion.position, bool(frame.contacts)))
+        return WalkResult(STRETCH, done, touched, near=arcs_around(start, near, hand))
 
     def along(
         self, hand: int, length_m: float, keep: Collection[int], meet: Collection[int], margin_m: float
@@ -218,6 +224,29 @@ class WallWalk:
             if math.hypot(dx, dy) < motion.parameters.tolerance_m:
                 return
             yield motion.velocity(dx, dy)
+
+
+class _NearPoint(NamedTuple):
+    """A point [m] of the way along a wall close to the start, and whether the robot touched anything there."""
+
+    at: Vector
+    in_touch: bool
+
+
+def arcs_around(start: Vector, points: Sequence[_NearPoint], hand: int) -> tuple[tuple[float, float], ...]:
+    """Return the arcs (start, width) [rad] around a start in which a wall was followed in touch, by odometry."""
+    found = []
+    for before, point in pairwise(points):
+        if (
+            not (before.in_touch or point.in_touch)
+            or min(math.dist(start, each.at) for each in (before, point)) < NEAR_M_MIN
+        ):
+            continue
+        a, b = (math.atan2(each.at[1] - start[1], each.at[0] - start[0]) for each in (before, point))
+        step = math.remainder(b - a, math.tau)
+        if step * hand < 0.0:  # the start and the wall are on different sides of the step
+            found.append((b, -step) if step < 0.0 else (a, step))
+    return tuple(found)
 
 
 def swept(wall_rad: float, contacts: Sequence[Touched], hand: int) -> float:

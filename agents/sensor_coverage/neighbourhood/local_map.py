@@ -353,6 +353,11 @@ class LocalMap(NeighbourTable):
             self._planner.walls.note_wall(self.slot, each)
         self.replan()
 
+    def note_near(self, arcs: Iterable[tuple[float, float]]) -> None:
+        """Record arcs (start, width) [rad] in which a robot followed a wall close to this slot."""
+        self.proof.add_near(arcs)
+        self.replan()
+
     def replan(self) -> None:
         """Make plans again, although neither the view nor a neighbour has changed."""
         self._plan_basis = None

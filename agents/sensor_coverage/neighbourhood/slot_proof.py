@@ -8,9 +8,8 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.walks import WalkPoint
+from zwerm.agents.sensor_coverage.frontier.walks import Arc, WalkPoint
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
-    Arc,
     arc_between,
     arcs_of_step,
     arcs_of_walls,
@@ -53,6 +52,10 @@ class SlotProof:
             key = NOWHERE if other is None else other
             self._by_walks[key] = united([*self._by_walks.get(key, ()), arc])
         return sum(each.width_rad for each in self.open_arcs()) < old - NEWS_RAD
+
+    def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
+        """Add arcs (start, width) [rad] in which a wall close to the slot was followed."""
+        self._by_walks[NOWHERE] = united([*self._by_walks.get(NOWHERE, ()), *(Arc(*each) for each in arcs)])
 
     def memory(self) -> tuple[tuple[int, float, float], ...]:
         """Return the arcs that walks closed, for the slot's next occupant."""

@@ -62,6 +62,7 @@ class TokenPush(PushPart):
     _situation: Situation
     _map: LocalMap
     _legs = _idle_legs = 0
+    _near: tuple[tuple[float, float], ...] = ()  # arcs around this robot's slot that the leader has closed
     _is_spare = False  # the walk has ended in sight of the swarm, which needs no robot there
 
     # --- events -------------------------------------------------------------------------------------------------------
@@ -81,6 +82,7 @@ class TokenPush(PushPart):
                 self.close(body)
             case AllStanding():
                 self._ahead_stands = True
+                self._near = body.near
             case AllSettled():
                 self._behind_settled = True
             case PushDone():
@@ -205,10 +207,14 @@ class TokenPush(PushPart):
 
     def _approached(self, result: DriveResult | WalkResult) -> None:
         """Leave the slot to the follower, unless a wall is close to it, or there is no way on."""
+        near: tuple[tuple[float, float], ...] = ()
+        if isinstance(result, WalkResult):
+            near = tuple((start + self._heading, width) for start, width in result.near)
         if not isinstance(result, WalkResult) or result.end == SHUT:
             felt = tuple(wrapped(each + self._heading) for each in result.touched)
             at_base = self._map.slot == NOWHERE
             if not at_base:
+                self._map.note_near(near)
                 self._map.note_felt(felt)
             self._situation.stand()
             self.close(PushAborted(self.id, True, felt if at_base else ()))
@@ -219,7 +225,7 @@ class TokenPush(PushPart):
         self._enter("out")
         self._behind_settled = self._chain.is_rear
         self.cleared()
-        self._write(AllStanding(self.id))
+        self._write(AllStanding(self.id, near))
 
     def _go_on(self) -> None:
         """Correct the scale, or follow the wall."""
@@ -316,6 +322,8 @@ class TokenPush(PushPart):
 
     def _report_standing(self) -> None:
         self._enter("standing")
+        if self._near:
+            self._map.note_near(self._near)
         if self._chain.is_rear:
             self._behind_settled = True
         else:

@@ -11,6 +11,7 @@ from typing import ClassVar, Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.walks import WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, point_before
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
@@ -26,9 +27,8 @@ class _Received(NamedTuple):
     """The latest point that was received from a walking robot, and the slot where it was received."""
 
     push: int
-    number: int
     slot: int
-    point: WalkPoint
+    seen: SeenPoint
 
 
 class WallProtocol(Component):
@@ -44,7 +44,7 @@ class WallProtocol(Component):
         self._outbox: list[Outgoing] = []
         self._push: int | None = None  # the push of this robot's own walk
         self._hand = 1
-        self._number = 0
+        self._number = self._touch_since = 0
         self._closed = False
         self._received: dict[int, _Received] = {}
         self._replan_at: int | None = None
@@ -55,7 +55,7 @@ class WallProtocol(Component):
     def begin(self, push: int, hand: int) -> None:
         """Announce the points of the walk that begins now."""
         if push != self._push:
-            self._push, self._hand, self._number = push, hand, 0
+            self._push, self._hand, self._number, self._touch_since = push, hand, 0, 0
         self._closed = False
         self._situation.wall_walk.on_step = self._announce
 
@@ -72,10 +72,13 @@ class WallProtocol(Component):
     def _announce(self, at: Waypoint) -> None:
         heading = self._situation.local_map.heading or 0.0
         self._number += 1
+        if not (at.touched or at.robots):
+            self._touch_since = self._number + 1
         point = PassedPoint(
             self._push or 0,
             self._number,
             self._hand,
+            self._touch_since,
             tuple((each.node, wrapped(each.bearing_rad + heading + math.pi)) for each in at.sightings),
             tuple(wrapped(each + heading) for each in at.touched),
             at.robots,
@@ -109,11 +112,14 @@ class WallProtocol(Component):
             passed.walls,
             tuple(slots[node] for node in passed.robots if node in slots),
         )
-        last = self._received.get(sender)
-        self._received[sender] = _Received(passed.push, passed.number, slot, point)
-        follows = last is not None and last[:3] == (passed.push, passed.number - 1, slot)
-        before = last.point if last is not None and follows else None
-        if slot in point.seen and local_map.proof.pass_point(slot, before, point, passed.hand):
+        if slot not in point.seen:
+            return
+        received = self._received.get(sender)
+        last = received.seen if received is not None and received[:2] == (passed.push, slot) else None
+        now = SeenPoint(passed.number, point)
+        self._received[sender] = _Received(passed.push, slot, now)
+        before = point_before(slot, last, now, passed.touch_since)
+        if local_map.proof.pass_point(slot, before, point, passed.hand):
             self._replan_at = tick + PASSED_TICKS
             self._outbox.append(Outgoing(sender, ArcClosed(passed.push)))
 
