@@ -24,10 +24,31 @@ GAP_RAD: Final = math.radians(6.0)
 TOUCH_RAD: Final = math.radians(45.0)
 # A walking robot that touches a wall and a standing robot at once closes this angle [rad] between the two.
 POCKET_RAD: Final = math.radians(55.0)
+# Successive points without a contact at which a walking robot still follows the wall: it turns round a corner.
+BLIND_MAX: Final = 3
 # Largest arc [rad] behind a corner in which a slot may lose sight of a walking robot that stays in touch with the wall.
 HIDDEN_RAD: Final = math.radians(30.0)
 # Arcs apart by less than this [rad] are stored as one.
 HAIR_RAD: Final = 1e-9
+
+
+class TouchCounter:
+    """Counts since which point of a walk the robot follows the wall. It may be out of touch for a few points at corners.
+
+    It turns towards the wall meanwhile, and so enters each opening that its body fits through.
+    """
+
+    def __init__(self) -> None:
+        self.since = 0
+        self._blind = BLIND_MAX + 1
+
+    def take(self, number: int, in_touch: bool) -> None:
+        """Take in whether the robot touches anything at the point with this number."""
+        if in_touch and self._blind > BLIND_MAX:
+            self.since = number
+        self._blind = 0 if in_touch else self._blind + 1
+        if self._blind > BLIND_MAX:
+            self.since = number + 1
 
 
 class SeenPoint(NamedTuple):
@@ -54,13 +75,13 @@ def open_arcs(
             closed[a].append(arc_between(views[a][b], views[a][c]))
     for walk in walks:
         last: dict[int, SeenPoint] = {}
-        touch_since = 0
+        touch = TouchCounter()
         for number, point in enumerate(walk.points):
-            touch_since = touch_since if point.in_touch else number + 1
+            touch.take(number, point.in_touch)
             for slot in point.seen:
                 if slot in closed:
                     beside = {each: views[slot][each] for each in complex_.neighbours[slot]}
-                    before = point_before(slot, last.get(slot), SeenPoint(number, point), touch_since)
+                    before = point_before(slot, last.get(slot), SeenPoint(number, point), touch.since)
                     closed[slot] += [arc for _, arc in arcs_of_step(slot, before, point, walk.hand, beside)]
                 last[slot] = SeenPoint(number, point)
     found = {slot: complement(arcs) for slot, arcs in closed.items()}
@@ -70,12 +91,14 @@ def open_arcs(
 def point_before(slot: int, last: SeenPoint | None, now: SeenPoint, touch_since: int) -> WalkPoint | None:
     """Return the point with which a point of a walk closes an arc at a slot, or None.
 
-    `last` is the latest point that the slot saw before. The slot may have lost the walking robot meanwhile, behind a
-    corner, if the robot was in touch all the time: since the point with the number `touch_since`. Then other robots saw the
-    way between, and are responsible for the space beside it.
+    `last` is the latest point that the slot saw before. The robot must have followed the wall since that point: it does
+    since the point with the number `touch_since`. The slot may have lost it meanwhile, behind a corner. Then other robots
+    saw the way between, and are responsible for the space beside it.
     """
-    if last is None or last.number == now.number - 1:
-        return None if last is None else last.point
+    if last is None:
+        return None
+    if last.number == now.number - 1:
+        return last.point if last.number >= touch_since - 1 else None
     apart = abs(math.remainder(now.point.seen[slot] - last.point.seen[slot], math.tau))
     return last.point if last.number >= touch_since and apart <= HIDDEN_RAD else None
 
@@ -93,7 +116,7 @@ def arcs_of_step(
     `before` is the point before it. `beside` has the directions [rad] of the slots that share an edge with the slot.
     """
     there = point.seen[slot]
-    if before is not None and slot in before.seen and (point.in_touch or before.in_touch):
+    if before is not None and slot in before.seen:
         step = math.remainder(there - before.seen[slot], math.tau)
         if step * hand < 0.0:  # the slot and the wall are on different sides of the step
             yield None, arc_between(before.seen[slot], there)

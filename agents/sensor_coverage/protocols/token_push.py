@@ -162,6 +162,8 @@ class TokenPush(PushPart):
             self.close(PushAborted(self.id, False))
         else:
             self._enter("offering")
+            if self._plan.walk:
+                self._map.note_attempt(self._plan)  # before the follower gets the slot's memory
             ready = LeaderReady(self.id, self._chain.links, self._map.memory(), self._map.epoch, self._plan.walk)
             self._situation.mailbox.write(behind, ready)
 
@@ -202,7 +204,6 @@ class TokenPush(PushPart):
     def _approach(self, plan: Plan) -> None:
         """Drive into an open arc, to a wall."""
         self._enter("approaching")
-        self._map.note_attempt(plan)
         self._situation.to_wall(wrapped(plan.direction - self._heading), plan.hop_m, -plan.hand)
 
     def _approached(self, result: DriveResult | WalkResult) -> None:

@@ -11,7 +11,7 @@ from typing import ClassVar, Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.walks import WalkPoint
-from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, point_before
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, point_before
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
@@ -44,7 +44,8 @@ class WallProtocol(Component):
         self._outbox: list[Outgoing] = []
         self._push: int | None = None  # the push of this robot's own walk
         self._hand = 1
-        self._number = self._touch_since = 0
+        self._number = 0
+        self._touch = TouchCounter()
         self._closed = False
         self._received: dict[int, _Received] = {}
         self._replan_at: int | None = None
@@ -55,7 +56,7 @@ class WallProtocol(Component):
     def begin(self, push: int, hand: int) -> None:
         """Announce the points of the walk that begins now."""
         if push != self._push:
-            self._push, self._hand, self._number, self._touch_since = push, hand, 0, 0
+            self._push, self._hand, self._number, self._touch = push, hand, 0, TouchCounter()
         self._closed = False
         self._situation.wall_walk.on_step = self._announce
 
@@ -72,13 +73,12 @@ class WallProtocol(Component):
     def _announce(self, at: Waypoint) -> None:
         heading = self._situation.local_map.heading or 0.0
         self._number += 1
-        if not (at.touched or at.robots):
-            self._touch_since = self._number + 1
+        self._touch.take(self._number, bool(at.touched or at.robots))
         point = PassedPoint(
             self._push or 0,
             self._number,
             self._hand,
-            self._touch_since,
+            self._touch.since,
             tuple((each.node, wrapped(each.bearing_rad + heading + math.pi)) for each in at.sightings),
             tuple(wrapped(each + heading) for each in at.touched),
             at.robots,

@@ -10,6 +10,8 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import open_arcs
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 from zwerm.maths.simplicial import FlagComplex
 
+# Directions of a walk, and the walls that it touches.
+CORNER = ((10, (0.0,)), (20, ()), (30, ()), (40, ()), (60, (0.0,)))
 ALONE = {0: dict[int, float]()}
 
 
@@ -41,6 +43,25 @@ def test_a_walk_around_the_robot_itself_closes_nothing() -> None:
 
 def test_a_walk_without_touch_closes_nothing() -> None:
     assert opened(around(*range(0, 361, 20), hand=-1, touched=False)) == [(0, 360)]
+
+
+def test_a_walk_that_turns_round_a_corner_still_follows_the_wall() -> None:
+    points = [WalkPoint({0: math.radians(each)}, walls, ()) for each, walls in CORNER]
+    assert opened(Walk(0, -1, tuple(points))) == [(60, 310)]
+
+
+def test_a_walk_that_loses_the_wall_no_longer_follows_it() -> None:
+    free = [WalkPoint({0: math.radians(each)}, (), ()) for each in range(20, 100, 10)]
+    assert opened(Walk(0, -1, (WalkPoint({0: 0.0}, (0.0,), ()), *free))) == [(40, 320)]
+
+
+def test_a_robot_may_lose_a_walk_behind_a_corner() -> None:
+    hidden = WalkPoint({}, (0.0,), ())
+    seen = [WalkPoint({0: math.radians(each)}, (0.0,), ()) for each in (10, 35, 70)]
+    assert opened(Walk(0, -1, (seen[0], hidden, seen[1]))) == [(35, 335)]
+    assert opened(Walk(0, -1, (seen[0], hidden, seen[2]))) == [(0, 360)], "too wide an arc"
+    lost = [WalkPoint({}, (), ())] * 4
+    assert opened(Walk(0, -1, (seen[0], *lost, seen[1]))) == [(0, 360)], "the robot was not in touch"
 
 
 def test_a_walk_closes_the_arc_that_it_was_seen_in() -> None:
