@@ -33,8 +33,8 @@ JOINING_MAX: Final = 16
 JOIN_DEADLINE_S: Final = 60.0
 
 # Seconds without any exit after which the remaining processes get SIGTERM, and then SIGKILL.
-LEAVE_PATIENCE_S: Final = 3.0
-TERMINATE_PATIENCE_S: Final = 2.0
+LEAVE_WAIT_S: Final = 3.0
+TERMINATE_WAIT_S: Final = 2.0
 
 # Open files of this process for each robot: two pipes and the router's end of the connection.
 _FILES_PER_ROBOT: Final = 3
@@ -164,27 +164,27 @@ class LocalSupervisor:
         """Send a signal to one robot, such as SIGSTOP and SIGCONT."""
         os.kill(self.pids[node], number)
 
-    def wait(self, patience_s: float | None = None) -> bool:
+    def wait(self, wait_s: float | None = None) -> bool:
         """Wait until all robots have ended, or none ends for `patience_s` seconds. Return whether all have ended."""
         alive: dict[Any, ForkServerProcess] = {process.sentinel: process for process in self._alive()}
         while alive:
-            ended = wait(list(alive), patience_s)
+            ended = wait(list(alive), wait_s)
             if not ended:
                 return False
             for sentinel in ended:
                 alive.pop(sentinel).join()
         return True
 
-    def stop(self, patience_s: float = 0.0) -> None:
+    def stop(self, wait_s: float = 0.0) -> None:
         """End all robots: wait as `wait` does, then send SIGTERM, then SIGKILL. Idempotent."""
         with interrupts_held():
-            if not self.wait(patience_s):
+            if not self.wait(wait_s):
                 for process in self._alive():
                     process.terminate()
-                if not self.wait(TERMINATE_PATIENCE_S):
+                if not self.wait(TERMINATE_WAIT_S):
                     for process in self._alive():
                         process.kill()
-                    self.wait(LEAVE_PATIENCE_S)
+                    self.wait(LEAVE_WAIT_S)
             self._end_children(list(self._processes.values()))
 
     def _end_children(self, ended: Sequence[ForkServerProcess]) -> None:

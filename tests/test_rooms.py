@@ -172,12 +172,12 @@ def test_no_two_classes_share_a_name() -> None:
     assert classes_of(ast.parse("class A:\n    class B: pass\nclass A: pass")) == ["A", "A", "B"]
 
 
-def test_no_folder_has_more_files_than_a_reader_can_oversee() -> None:
+def test_no_folder_has_more_than_fifteen_files() -> None:
     counts = Counter(str(path.parent) for path in MODULES.values() if path.name != "__init__.py")
     assert {folder: count for folder, count in counts.items() if count > FILES_MAX} == {}
 
 
-def test_no_module_imports_itself_around_a_corner_also_not_for_types() -> None:
+def test_no_import_cycle_exists_also_not_for_types() -> None:
     assert cycles(GRAPH) == []
     assert cycles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
 
@@ -209,6 +209,20 @@ def test_no_two_files_that_may_be_open_at_once_share_a_name() -> None:
     twice = {name for name, count in counts.items() if count > 1}
     assert twice - SHARED_NAMES.keys() - algorithms == set()
     assert SHARED_NAMES.keys() <= twice
+
+
+def test_every_room_has_its_tests_in_the_folder_of_its_name() -> None:
+    folders: set[str] = set()
+    for path in MODULES.values():
+        folder = path.parent.parts
+        if folder[0] == "zwerm":
+            folder = folder[1:]
+        if folder and folder[0] not in ("world", "agents", "coordinator"):
+            folders.add("/".join(folder[:2]) if folder[0] == "deploy" else folder[0])
+        elif len(folder) > 1:
+            folders.add("/".join(folder[:2]))
+    assert len(folders) > 25
+    assert [each for each in sorted(folders) if not list((ROOT / "tests" / each).glob("**/test_*.py"))] == []
 
 
 def test_every_class_of_the_catalogue_exists() -> None:

@@ -36,15 +36,15 @@ class Averaging(Controller):
 
     def step(self, observation: Observation) -> Command:
         """Move towards the mean of the values received, and broadcast the own value."""
-        heard = []
+        received = []
         for packet in observation.inbox:
             try:
-                heard.append(_LAYOUT.unpack(unseal(packet.payload))[0])
+                received.append(_LAYOUT.unpack(unseal(packet.payload))[0])
             except ProtocolError:
                 self.refused += 1
         table: Any = self.parameters
-        if heard:
-            self.value += table.gain * (sum(heard) / len(heard) - self.value)
+        if received:
+            self.value += table.gain * (sum(received) / len(received) - self.value)
         outbox: tuple[Transmission, ...] = ()
         if observation.tick % table.every_ticks == 0:
             frame = seal(_LAYOUT.pack(self.value))

@@ -25,13 +25,13 @@ class BeaconTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Beacon(Controller):
-    """Broadcasts (id, number); `heard` and `missed` count packets by sender."""
+    """Broadcasts (id, number); `received` and `missed` count packets by sender."""
 
     Parameters: ClassVar[type[Struct]] = BeaconTable
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
-        self.heard: dict[int, int] = {}
+        self.received: dict[int, int] = {}
         self.missed: dict[int, int] = {}
         self.refused = 0
         self._next: dict[int, int] = {}
@@ -40,14 +40,14 @@ class Beacon(Controller):
 
     def step(self, observation: Observation) -> Command:
         """Count received packets, and send the next beacon if it is due."""
-        heard, missed, following = self.heard, self.missed, self._next
+        received, missed, following = self.received, self.missed, self._next
         for packet in observation.inbox:
             try:
                 sender, number = _LAYOUT.unpack_from(unseal(packet.payload))
             except ProtocolError:
                 self.refused += 1
                 continue
-            heard[sender] = heard.get(sender, 0) + 1
+            received[sender] = received.get(sender, 0) + 1
             expected = following.get(sender, number)
             if number >= expected:
                 missed[sender] = missed.get(sender, 0) + number - expected

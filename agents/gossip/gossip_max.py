@@ -42,12 +42,12 @@ class GossipMax(Controller):
         before = self._reported
         for packet in observation.inbox:
             try:
-                (heard,) = _LAYOUT.unpack(unseal(packet.payload))
+                (received,) = _LAYOUT.unpack(unseal(packet.payload))
             except ProtocolError:
                 self.refused += 1
                 continue
-            if heard > self.largest:
-                self.largest = heard
+            if received > self.largest:
+                self.largest = received
         table: Any = self.parameters
         outbox: tuple[Transmission, ...] = ()
         if observation.tick % table.every_ticks == 0:

@@ -123,7 +123,8 @@ class CentralRobot(Controller):
         """Drive, and answer with the result."""
         result = yield from drive
         self.motion.settle()
-        self.commands.answer(Arrived(cycle, *result))
+        seen = result.used_odometry, result.used_moving_landmarks
+        self.commands.answer(Arrived(cycle, result.ok, *seen, result.driven_m, result.touched))
 
     def _walk(self, cycle: int, walk: DriveToWalk) -> Drive:
         """Drive to a wall or along it, and answer with the result."""

@@ -9,7 +9,7 @@ from zwerm.agents.sensor_coverage.protocols.ending.termination import COVERED
 from zwerm.agents.sensor_coverage.protocols.membership import Membership
 from zwerm.agents.sensor_coverage.protocols.push_scheduler import PushScheduler
 from zwerm.agents.sensor_coverage.protocols.transport.delivery import Delivery
-from zwerm.agents.sensor_coverage.protocols.wall_protocol import WallProtocol
+from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
 from zwerm.wire.messages import Command, Observation, Wake
 
 

@@ -33,7 +33,7 @@ from zwerm.agents.sensor_coverage.protocols.redundant_pool import RedundantPool
 from zwerm.agents.sensor_coverage.protocols.token_push import TokenPush
 from zwerm.agents.sensor_coverage.protocols.transport.delivery import Delivery
 from zwerm.agents.sensor_coverage.protocols.transport.vacancy import VacancyAnnouncer
-from zwerm.agents.sensor_coverage.protocols.wall_protocol import WallProtocol
+from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
 
 
 class PushParticipant(Component):
@@ -114,6 +114,7 @@ class PushParticipant(Component):
         if to is None or not visible or any(node == to for _, node in token.chain):
             push.close(PushAborted(token.push, False))
         else:
+            push.next = to
             self._situation.mailbox.write(to, token)
 
     def _join(self, push: int, fresh: int, chain: Chain, back: int | None, first: bool = False) -> TokenPush:

@@ -35,9 +35,9 @@ class NeighbourReport(NamedTuple):
     value: float
 
 
-def pack(node: int, heard: NeighbourReport) -> bytes:
+def pack(node: int, report: NeighbourReport) -> bytes:
     """Return the packet with this message."""
-    body = _LAYOUT.pack(node, *heard)
+    body = _LAYOUT.pack(node, *report)
     return body + _SUM.pack(zlib.crc32(body))
 
 
@@ -76,7 +76,7 @@ class RadioCoverage(Controller):
         super().__init__(setup)
         self._table: Any = self.parameters
         self._every_ticks = max(1, round(self._table.every_s / setup.dt_s))
-        self._heard: dict[int, NeighbourReport] = {}
+        self._reports: dict[int, NeighbourReport] = {}
 
     def step(self, observation: Observation) -> Command:
         """Return the velocity u = k (C_hat - p) for the latest known positions of the others, and broadcast if it is due."""
@@ -87,9 +87,9 @@ class RadioCoverage(Controller):
         self._listen(observation)
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         samples = []
-        for _, heard in sorted(self._heard.items()):
-            dx, dy = heard.x_m - pose.x_m, heard.y_m - pose.y_m
-            samples.append(NeighbourSample(cos * dx + sin * dy, cos * dy - sin * dx, heard.value))
+        for _, report in sorted(self._reports.items()):
+            dx, dy = report.x_m - pose.x_m, report.y_m - pose.y_m
+            samples.append(NeighbourSample(cos * dx + sin * dy, cos * dy - sin * dx, report.value))
         cell = voronoi_cell(observation.boundary, [(sample.x, sample.y) for sample in samples])
         field = here.value, here.gradient_x, here.gradient_y
         if table.estimate == "quadratic":
@@ -99,21 +99,21 @@ class RadioCoverage(Controller):
         x, y = centroid or nearest_point(observation.boundary)
         moves = bool(samples) and observation.tick > self._every_ticks
         # Robots broadcast at different ticks, so that not all broadcast at once.
-        speaks = (observation.tick + self.setup.node) % self._every_ticks == 0
-        say = NeighbourReport(observation.time_s, pose.x_m, pose.y_m, here.value)
+        is_due = (observation.tick + self.setup.node) % self._every_ticks == 0
+        own = NeighbourReport(observation.time_s, pose.x_m, pose.y_m, here.value)
         return Command(
             drive=BodyVelocity(table.gain_per_s * x, table.gain_per_s * y) if moves else BodyVelocity(),
-            outbox=(Transmission(CHANNEL, pack(self.setup.node, say)),) if speaks else (),
+            outbox=(Transmission(CHANNEL, pack(self.setup.node, own)),) if is_due else (),
             done=moves and math.hypot(x, y) < table.tolerance_m,
         )
 
     def _listen(self, observation: Observation) -> None:
         """Store the newest message of each robot; packets may overtake one another."""
         for packet in observation.inbox:
-            said = unpack(packet.payload) if packet.channel == CHANNEL else None
-            if said is not None and said[0] != self.setup.node:
-                node, heard = said
-                if node not in self._heard or self._heard[node].time_s <= heard.time_s:
-                    self._heard[node] = heard
+            received = unpack(packet.payload) if packet.channel == CHANNEL else None
+            if received is not None and received[0] != self.setup.node:
+                node, report = received
+                if node not in self._reports or self._reports[node].time_s <= report.time_s:
+                    self._reports[node] = report
         oldest_s = observation.time_s - self._table.memory_s
-        self._heard = {node: heard for node, heard in self._heard.items() if heard.time_s >= oldest_s}
+        self._reports = {node: report for node, report in self._reports.items() if report.time_s >= oldest_s}

@@ -71,7 +71,7 @@ class TeamCoordinator:
         self._view = self.membership.view
         self._gather_ticks = round(GATHER_S / setup.dt_s)
         self._every = max(1, round(table.beacon_s / setup.dt_s))
-        self._told = -1, False
+        self._reported = -1, False
 
     def step(self, observation: Observation) -> Command:
         """Receive, decide, and send."""
@@ -93,10 +93,10 @@ class TeamCoordinator:
             if tick % DECIDE_TICKS == 0 and self.lead.decide(tick):
                 urgent = True
         done = self._is_done()
-        outbox = self._say(tick) if urgent or tick % self._every == 0 else ()
+        outbox = self._outgoing(tick) if urgent or tick % self._every == 0 else ()
         telemetry: dict[str, float | bool] = {}
-        if (len(self.map.facts), done) != self._told:
-            self._told = len(self.map.facts), done
+        if (len(self.map.facts), done) != self._reported:
+            self._reported = len(self.map.facts), done
             telemetry = {"certificate_satisfied": done, **findings(self.map, self.membership)}
         return Command(outbox=outbox, done=done, telemetry=telemetry)
 
@@ -108,7 +108,7 @@ class TeamCoordinator:
             self.map.complete_from(None if place is None else self.map.end(place)) for place in places
         )
 
-    def _say(self, tick: int) -> tuple[Transmission, ...]:
+    def _outgoing(self, tick: int) -> tuple[Transmission, ...]:
         beacon = TeamBeacon(
             self._node,
             self.membership.outgoing(),

@@ -242,7 +242,7 @@ def test_no_secret_is_on_a_command_line_in_an_environment_or_in_a_file(nothing_l
         assert "passwords" not in {path.name for path in directory.iterdir()}
 
 
-def test_connections_that_say_nothing_do_not_keep_a_node_from_joining(private_tmp: Path) -> None:
+def test_silent_connections_do_not_prevent_a_node_from_joining(private_tmp: Path) -> None:
     with network(private_tmp) as net, contextlib.ExitStack() as open_sockets:
         for _ in range(500):
             idle = open_sockets.enter_context(socket.socket(socket.AF_UNIX))

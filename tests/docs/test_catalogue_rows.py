@@ -99,11 +99,11 @@ ROWS = [
     ),
     Row(
         "A field",
-        "waves.py",
-        ("world/fields/waves.py",),
+        "ripples.py",
+        ("world/fields/ripples.py",),
         "FIELDS: Final = {",
-        '"waves": "zwerm.world.fields.waves:Waves",',
-        {"waves:Waves": "waves"},
+        '"ripples": "zwerm.world.fields.ripples:Ripples",',
+        {"ripples:Ripples": "ripples"},
     ),
     Row(
         "A drive",
@@ -267,5 +267,5 @@ def test_the_catalogue_and_the_reference_pages_name_what_was_added(tree: Path) -
     python(tree, "docs/pages.py")
     assert "headcount" in python(tree, "-P", "-m", "zwerm", "list")
     reference = "".join(page.read_text(encoding="utf-8") for page in (tree / "docs" / "reference").glob("*.md"))
-    for name in ("lighthouse", "rain", "storm", "waves", "tracks", "travel", "fastest", "headcount"):
+    for name in ("lighthouse", "rain", "storm", "ripples", "tracks", "travel", "fastest", "headcount"):
         assert re.search(rf"[`#] ?.*\b{name}\b", reference), name

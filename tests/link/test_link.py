@@ -346,7 +346,7 @@ def test_closing_the_link_ends_the_wait_for_a_confirmation(net: Network) -> None
         assert heard.wait(20.0)
 
 
-def test_a_node_is_told_when_the_world_is_lost(private_tmp: Path) -> None:
+def test_a_node_is_informed_when_the_world_is_lost(private_tmp: Path) -> None:
     gone = threading.Event()
     with network(private_tmp) as net:
         node = net.node(0, on_lost=gone.set)
@@ -410,7 +410,7 @@ def test_a_paused_process_is_not_lost_and_answers_after_it_resumes(nothing_left:
         assert answer.payload is not None
 
 
-def test_a_node_that_was_lost_is_told_that_it_is_not_taken_back(net: Network) -> None:
+def test_a_lost_node_gets_the_reason_for_which_it_is_not_admitted_again(net: Network) -> None:
     node, other = net.node(0), net.node(1)
     node.join()
     other.join()
@@ -428,7 +428,7 @@ def test_a_node_that_was_lost_is_told_that_it_is_not_taken_back(net: Network) ->
     other.close()
 
 
-def test_a_node_with_other_releases_is_told_both(net: Network) -> None:
+def test_a_node_with_other_releases_gets_both_lists_of_releases(net: Network) -> None:
     session = net.session(net.credentials.nodes[0])
     [answer] = ask(session, 0, encode(Hello(0, 1, "zwerm 9.9")))
     welcome = decode_welcome(answer)

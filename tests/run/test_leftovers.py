@@ -39,7 +39,7 @@ def kill_robots(running: subprocess.Popen[str]) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the kernel does not name the processes of a session")
 @pytest.mark.parametrize("end", [interrupt, kill_robots])
-def test_what_a_controller_has_started_ends_with_the_run(
+def test_processes_that_a_controller_started_end_with_the_run(
     end: Callable[[subprocess.Popen[str]], None], tmp_path: Path
 ) -> None:
     forked = tmp_path / "forked"

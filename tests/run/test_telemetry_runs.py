@@ -66,13 +66,13 @@ def test_a_robot_that_reports_by_the_name_of_a_metric_changes_no_metric() -> Non
         ),
     ],
 )
-def test_what_is_no_telemetry_fails_the_run_with_node_tick_rule_and_value(controller: str, reason: str) -> None:
+def test_invalid_telemetry_fails_the_run_with_node_tick_rule_and_value(controller: str, reason: str) -> None:
     result = run(reporting(controller), 1, "inline")
     assert result.outcome == "failed"
     assert result.reason.startswith(f"node 1 crashed at tick 3: {reason} (reporters.py:")
 
 
-def test_what_is_no_telemetry_is_survived_where_the_scenario_says_so() -> None:
+def test_invalid_telemetry_ends_only_its_node_if_on_crash_is_continue() -> None:
     result = run(reporting("Misreports", on_crash="continue"), 1, "inline")
     assert (result.outcome, result.crashed, result.ticks) == ("time-limit", [1], 20)
 

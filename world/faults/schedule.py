@@ -51,7 +51,7 @@ class ScheduledFault:
         if self._duration is not None:
             self.ends = tick + self._duration
 
-    def look(self, tick: int, scene: Scene) -> None:
+    def begin_if_met(self, tick: int, scene: Scene) -> None:
         """Begin now if the condition is met."""
         if self.begins is None and self.condition is not None and self.condition.met(scene):
             self._begin(tick)
@@ -125,7 +125,7 @@ class Schedule:
     def turn(self, tick: int, scene: Scene, dead: Sequence[int] = ()) -> bool:
         """Begin and end faults at `tick`; return whether the effects changed. `dead` are nodes that never return."""
         for each in self._waiting:
-            each.look(tick, scene)
+            each.begin_if_met(tick, scene)
         now = [each for each in self.faults if each.active(tick)]
         for each in now:
             each.came = True

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from zwerm.maths.cached_voronoi_cell import CachedVoronoiCell
-from zwerm.maths.polygons import Point as Place
+from zwerm.maths.polygons import Point as Corner
 from zwerm.maths.polygons import Polygon, voronoi_cell
 from zwerm.wire.messages import Neighbour
 from zwerm.world.arena.arena import Arena
@@ -56,7 +56,7 @@ class VoronoiCells:
             ]
         )
 
-    def _seen(self, position: Floats) -> tuple[list[list[Place]], list[tuple[Neighbour, ...]]]:
+    def _seen(self, position: Floats) -> tuple[list[list[Corner]], list[tuple[Neighbour, ...]]]:
         """Return the outline and the Voronoi neighbours relative to each of position (n, 2)."""
         pairs = self._tessellation.pairs(position)
         observer, seen = np.concatenate([pairs, pairs[:, ::-1]]).T

@@ -17,7 +17,7 @@ PERCENTS: Final = (50, 90, 99)
 
 
 class SightCoverage(Metric):
-    """Coverage by sight of the living robots, its growth over the run, and the number of robots beside the ideal packing."""
+    """Coverage by sight of the living robots, its curve over the run, and the number of robots beside the ideal packing."""
 
     names: ClassVar[Sequence[str]] = (
         *("coverage_fraction", "reachable_coverage_fraction", "robots_deployed", "hexagonal_packing_robots"),

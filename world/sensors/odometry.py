@@ -42,8 +42,8 @@ class Odometry(Sensor):
         self._position = np.zeros((surroundings.count, 2))
         self._heading = np.zeros(surroundings.count)
         # The robots of the newest reading, and their poses before it.
-        nobody = np.zeros(0, dtype=np.int64)
-        self._before = (nobody, self._known[nobody], self._position[nobody], self._heading[nobody])
+        no_robots = np.zeros(0, dtype=np.int64)
+        self._before = (no_robots, self._known[no_robots], self._position[no_robots], self._heading[no_robots])
 
     def read(self, scene: Scene, robots: Ints) -> list[Displacement]:
         """Return the motion of each of `robots` since it was last read."""

@@ -86,6 +86,14 @@ Record = Annotated[
         help="Record every message and the true state, for Foxglove and similar viewers.",
     ),
 ]
+SecurityLogFile = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--security-log",
+        metavar="FILE",
+        help="Write each refusal by world and router to FILE: denials, wrong passwords, refused messages. Takes time.",
+    ),
+]
 RealTime = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option("--realtime", metavar="FACTOR", help="Pace the run at FACTOR times the wall clock."),

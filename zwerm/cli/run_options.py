@@ -20,6 +20,7 @@ from zwerm.cli.options import (
     RealTime,
     Record,
     ScenarioName,
+    SecurityLogFile,
     Seed,
     Sets,
 )
@@ -42,6 +43,7 @@ class RunOptions:
     sets: Sets = None
     realtime: RealTime = None
     record: Record = None
+    security_log: SecurityLogFile = None
     picture: Picture = None
     picture_at: PictureAt = None
     animate: Animation = None

@@ -56,7 +56,7 @@ class RunResult:
     missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
     series: dict[str, Floats] = field(default_factory=dict)  # (k,) samples by name, time_s among them
     refused: dict[str, int] = field(default_factory=dict)  # refused messages, by reason
-    refused_by: dict[int, dict[str, int]] = field(default_factory=dict)  # of them, by node and reason
+    refused_by: dict[int, dict[str, int]] = field(default_factory=dict)  # of them, by node and reason; -1: not known
     problems: list[str] = field(default_factory=list)  # what could not be written during the run
     tracebacks: dict[int, str] = field(default_factory=dict)  # of controllers that raised, by node
     crash_reasons: dict[int, str] = field(default_factory=dict)  # "tick 5: ..." of programs that ended, by node
@@ -110,7 +110,7 @@ class RunResult:
             "faults": self.faults,
             "refused": {
                 "reasons": self.refused,
-                "nodes": {str(node): reasons for node, reasons in self.refused_by.items()},
+                "nodes": {"unknown" if node < 0 else str(node): each for node, each in self.refused_by.items()},
             },
         }
 

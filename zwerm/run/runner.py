@@ -4,9 +4,9 @@ import gc
 import secrets
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
-from typing import Final, Literal, Protocol, get_args
+from typing import TYPE_CHECKING, Final, Literal, Protocol, get_args
 
 import numpy as np
 
@@ -21,10 +21,12 @@ from zwerm.record.history import History
 from zwerm.run.assembly import assemble_run, observers_of
 from zwerm.run.hang_guard import hang_guard
 from zwerm.run.measurement import measure, truth_of
+from zwerm.run.progress import NullProgress, ProgressListener
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import load
 from zwerm.scenario.nearest import did_you_mean
 from zwerm.scenario.tables import Scenario
+from zwerm.wire.refusals import Refusals
 from zwerm.world.drivers.driver import TickObserver
 from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.drivers.realtime import RealTime
@@ -36,6 +38,9 @@ from zwerm.world.tick.completion import FAILED, INTERRUPTED
 from zwerm.world.tick.node_status import Event
 from zwerm.world.world import World
 
+if TYPE_CHECKING:  # an inline run needs no transport
+    from zwerm.deploy.security_log import SecurityLog
+
 Runner = Literal["processes", "inline"]
 
 # The samples of positions that a run's history holds for pictures, and the progress reports of a run, at most about.
@@ -46,32 +51,6 @@ PROGRESS_REPORTS: Final = 1_000
 HINDRANCES: Final[tuple[Event, ...]] = ("paused", "slow", "late")
 
 
-class ProgressListener(Protocol):
-    """Receives reports on the progress of a run."""
-
-    def joined(self, count: int, total: int) -> None:
-        """Take the report that `count` of `total` robots have joined."""
-
-    def ticked(self, tick: int, ticks: int) -> None:
-        """Take the report that `tick` of `ticks` are done."""
-
-    def covered(self, fraction: float, robots: int) -> None:
-        """Take the report that `robots` robots see a `fraction` of the arena."""
-
-
-class NullProgress:
-    """Ignores all reports."""
-
-    def joined(self, count: int, total: int) -> None:
-        """Ignore it."""
-
-    def ticked(self, tick: int, ticks: int) -> None:
-        """Ignore it."""
-
-    def covered(self, fraction: float, robots: int) -> None:
-        """Ignore it."""
-
-
 def run(
     scenario: str | Path | Scenario,
     seed: int = 1,
@@ -80,12 +59,14 @@ def run(
     realtime: float | None = None,
     watcher: ProgressListener | None = None,
     record: Path | None = None,
+    security_log: Path | None = None,
 ) -> RunResult:
     """Run `scenario` (a built-in name, a path, or a loaded scenario) and return its result.
 
     `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock; `record` is a file
-    to write an MCAP recording to. Raises ScenarioError for a mistake in the scenario, and LinkError where robots cannot
-    be started. A failed or interrupted run is a result like any other: look at its `outcome`.
+    to write an MCAP recording to. `security_log` is a file for all that world and router refuse; with processes it takes over
+    descriptor 1 of this process (see `zwerm.deploy.router_messages`). Raises ScenarioError for a mistake in the scenario, and
+    LinkError where robots cannot be started. A failed or interrupted run is a result like any other: look at its `outcome`.
     """
     if runner not in get_args(Runner):
         expected = " or ".join(map(repr, get_args(Runner)))
@@ -110,21 +91,34 @@ def run(
             lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
             world.schedule.late_joiners,
         )
-        with hang_guard(scenario.time.straggler_s):
-            return drive(world, link, seed, runner, realtime, watcher, record, link, metrics)
+        with hang_guard(scenario.time.straggler_s), _security(security_log, router=False) as security:
+            return drive(world, link, seed, runner, realtime, watcher, record, link, metrics, security)
     _refuse_main(members)
     _try_controllers(members)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
-    with LocalSwarm(
-        new_run_id(),
-        members,
-        progress=watcher.joined,
-        paced=realtime is not None,
-        late_joiners=world.schedule.late_joiners,
-        restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
-    ) as swarm:
-        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics)
+    with (
+        _security(security_log) as security,
+        LocalSwarm(
+            new_run_id(),
+            members,
+            progress=watcher.joined,
+            paced=realtime is not None,
+            late_joiners=world.schedule.late_joiners,
+            restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
+            on_refusal=None if security is None else security.note,
+        ) as swarm,
+    ):
+        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)
+
+
+def _security(path: Path | None, router: bool = True) -> "AbstractContextManager[SecurityLog | None]":
+    """Return the security log of a run, or nothing. It must be open before the router."""
+    if path is None:
+        return nullcontext()
+    from zwerm.deploy.security_log import SecurityLog
+
+    return SecurityLog(path, router)
 
 
 def _refuse_main(specs: Mapping[int, tuple[str, Setup]]) -> None:
@@ -159,6 +153,7 @@ def serve(
     names: Sequence[str] = (),
     lease_s: float = 10.0,
     plain: bool = False,
+    security_log: Path | None = None,
 ) -> RunResult:
     """Run a world whose robots are started elsewhere, with the credentials that are written to `credentials_file`.
 
@@ -179,19 +174,23 @@ def serve(
         raise ScenarioError(["credentials: expected either a file to write them to, or the keys of a world"])
 
     watcher = watcher or NullProgress()
-    with RemoteSwarm(
-        new_run_id(),
-        node_specs(scenario, seed),
-        listen=listen,
-        credentials_file=credentials_file,
-        keys=None if keys_file is None else load_world_keys(keys_file),
-        names=names,
-        lease_s=lease_s,
-        progress=watcher.joined,
-        deadline_s=deadline_s,
-        paced=realtime is not None,
-    ) as swarm:
-        return drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics)
+    with (
+        _security(security_log) as security,
+        RemoteSwarm(
+            new_run_id(),
+            node_specs(scenario, seed),
+            listen=listen,
+            credentials_file=credentials_file,
+            keys=None if keys_file is None else load_world_keys(keys_file),
+            names=names,
+            lease_s=lease_s,
+            progress=watcher.joined,
+            deadline_s=deadline_s,
+            paced=realtime is not None,
+            on_refusal=None if security is None else security.note,
+        ) as swarm,
+    ):
+        return drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, security)
 
 
 def new_run_id() -> str:
@@ -209,6 +208,7 @@ def drive(
     record: Path | None = None,
     programs: NodeProcesses | None = None,
     metrics: Observers | None = None,
+    security: "SecurityLog | None" = None,
 ) -> RunResult:
     """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`.
 
@@ -230,6 +230,8 @@ def drive(
             world.telemetry.listeners.append(recording.telemetry)
             observers.append(ExchangeObserver(world, recording))
         observers.append(sampling)
+        if security is not None:
+            world.intake.refusals.listener = security.note
         driver = (
             LockStep(world, link, observers, programs)
             if realtime is None
@@ -245,10 +247,15 @@ def drive(
             outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
         wall_s = time.monotonic() - start
         sampling.finish()
-        result = _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, link)
+        refusals = world.intake.refusals | link.refusals
+        if security is not None:
+            refusals |= security.router_refusals()
+        result = _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, refusals)
         if recording is not None:
             recording.close()
             result.problems += [recording.error] if recording.error else []
+        if security is not None:
+            result.problems += [security.error] if security.error else []
         return result
 
 
@@ -329,7 +336,7 @@ def _result(
     wall_s: float,
     driver: LockStep | RealTime,
     sampling: Sampling,
-    link: WorldLink,
+    refusals: Refusals,
 ) -> RunResult:
     scenario, status, intake = world.scenario, world.status, world.intake
     metrics = measure(world, sampling.observers)
@@ -338,7 +345,6 @@ def _result(
         metrics["late_commands"] = float(intake.late_count)
         metrics["deadman_stops"] = float(driver.deadman_stops)
         metrics["tick_overruns"] = float(driver.overruns)
-    refusals = intake.refusals | link.refusals
     counts = None
     if scenario.metrics.cells is not None:
         position = world.scene.position[world.scene.present]

@@ -163,7 +163,7 @@ class BaseTable(Table):
         return len(self.poses) if self.poses is not None else self.count or 1
 
     @model_validator(mode="after")
-    def _one_way_to_say_where(self) -> Self:
+    def _at_most_one_placement(self) -> Self:
         given = [name for name in ("pose", "poses", "count") if getattr(self, name) is not None]
         if len(given) > 1:
             raise ValueError(f"expected at most one of pose, poses and count, got {' and '.join(given)}")
@@ -171,7 +171,7 @@ class BaseTable(Table):
 
 
 class CoordinatorTable(Table):
-    """The optional central node. It has no body and no sensors; it hears robots over the `uplink` channel."""
+    """The optional central node. It has no body and no sensors; robots send to it on the channel `uplink`."""
 
     controller: str
     parameters: dict[str, Any] = {}

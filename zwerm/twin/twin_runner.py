@@ -18,7 +18,8 @@ from zwerm.deploy.swarm import LocalSwarm, Members
 from zwerm.errors import LinkError
 from zwerm.link.peer_radio import MET, LogLine, Station, Transport, read_log
 from zwerm.run.assembly import assemble
-from zwerm.run.runner import NullProgress, ProgressListener, new_run_id
+from zwerm.run.progress import NullProgress, ProgressListener
+from zwerm.run.runner import new_run_id
 from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.realtime import RealTime
 from zwerm.world.radio import ROBOTS

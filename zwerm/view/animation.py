@@ -132,6 +132,6 @@ def _write_mp4(path: Path, frames: Iterator[NDArray[np.uint8]], fps: int) -> Non
         with suppress(BrokenPipeError):
             for frame in chain([first], frames):
                 ffmpeg.stdin.write(frame.tobytes())
-        _, said = ffmpeg.communicate()
+        _, output = ffmpeg.communicate()
     if ffmpeg.returncode:
-        raise PictureError(f"{path}: ffmpeg failed: {said.decode(errors='replace').strip().splitlines()[-1]}")
+        raise PictureError(f"{path}: ffmpeg failed: {output.decode(errors='replace').strip().splitlines()[-1]}")

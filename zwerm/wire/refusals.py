@@ -4,18 +4,25 @@ The world's thread reads the counts while a thread of the transport adds to them
 """
 
 from collections import Counter
+from collections.abc import Callable
 
 
 class Refusals:
-    """Counts refused messages. A node of -1 stands for a sender whose message names no node."""
+    """Counts refused messages. A node of -1 stands for a sender whose message names no node.
+
+    `listener` is called with the node and the reason of each refused message, in the thread that counts it.
+    """
 
     def __init__(self) -> None:
+        self.listener: Callable[[int, str], object] | None = None
         self._reasons: dict[int, Counter[str]] = {}
 
     def count(self, node: int, reason: str) -> int:
         """Count one refused message of a node, and return the number of this node's."""
         reasons = self._reasons.setdefault(node, Counter())
         reasons[reason] += 1
+        if self.listener is not None:
+            self.listener(node, reason)
         return reasons.total()
 
     def of_node(self, node: int) -> int:

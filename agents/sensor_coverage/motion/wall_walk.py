@@ -38,6 +38,8 @@ FEEL_M: Final = 0.12
 CLEAR_M: Final = 0.3
 # Points closer [m] to the start have no direction from there.
 NEAR_M_MIN: Final = 0.02
+# Two contacts whose bearings differ by less than this [rad] are with the same wall; a switch is 30 degrees wide.
+SAME_WALL_RAD: Final = math.radians(35.0)
 # Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
 LEG_M: Final = 3.0
 # Number of consecutive legs that closed nothing after which a walk ends.
@@ -55,6 +57,14 @@ class WalkResult(NamedTuple):
 
 
 DriveToWalk = Generator[BodyVelocity, None, WalkResult]
+
+
+class NearPoint(NamedTuple):
+    """A point [m] of the way along a wall close to the start, whether the robot touched anything, and walls [rad]."""
+
+    at: Vector
+    in_touch: bool
+    walls: tuple[float, ...]
 
 
 class WallWalk:
@@ -110,17 +120,17 @@ class WallWalk:
             return WalkResult(SHUT, done, touched)
         self._wall_rad, self._blind_rad = bearing_rad, 0.0
         way = 0.0
-        near = [_NearPoint(motion.position, bool(frame.contacts))]
+        near = [self._near_point()]
         while math.hypot(frame.x_m - start[0], frame.y_m - start[1]) < clear_m:
             if way > CLEARING_M_MAX or self._blind_rad > TURNS_RAD_MAX:
                 yield from motion.drive_to(start)
-                return WalkResult(SHUT, done, touched, near=arcs_around(start, near, hand))
+                return WalkResult(SHUT, done, touched, near=arcs_around(start, near, hand, motion.radius_m))
             before = motion.position
             yield self._step(hand)
             way += math.dist(before, motion.position)
             self._trail.append(motion.position)
-            near.append(_NearPoint(motion.position, bool(frame.contacts)))
-        return WalkResult(STRETCH, done, touched, near=arcs_around(start, near, hand))
+            near.append(self._near_point())
+        return WalkResult(STRETCH, done, touched, near=arcs_around(start, near, hand, motion.radius_m))
 
     def along(
         self, hand: int, length_m: float, keep: Collection[int], meet: Collection[int], margin_m: float
@@ -182,6 +192,9 @@ class WallWalk:
         ux, uy = unit(heading)
         return motion.velocity(ux * motion.step_m, uy * motion.step_m)
 
+    def _near_point(self) -> NearPoint:
+        return NearPoint(self._motion.position, bool(self._motion.frame.contacts), self._motion.frame.touched)
+
     def _waypoint(self) -> Waypoint:
         frame = self._motion.frame
         return Waypoint(
@@ -226,27 +239,35 @@ class WallWalk:
             yield motion.velocity(dx, dy)
 
 
-class _NearPoint(NamedTuple):
-    """A point [m] of the way along a wall close to the start, and whether the robot touched anything there."""
+def arcs_around(
+    start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float
+) -> tuple[tuple[float, float], ...]:
+    """Return the arcs (start, width) [rad] around a start in which a wall was followed in touch, by odometry.
 
-    at: Vector
-    in_touch: bool
-
-
-def arcs_around(start: Vector, points: Sequence[_NearPoint], hand: int) -> tuple[tuple[float, float], ...]:
-    """Return the arcs (start, width) [rad] around a start in which a wall was followed in touch, by odometry."""
+    Two successive points close the arc between them, if the wall is beyond. Two successive contacts with the same wall
+    close the arc between the touched points of the wall.
+    """
     found = []
     for before, point in pairwise(points):
-        if (
-            not (before.in_touch or point.in_touch)
-            or min(math.dist(start, each.at) for each in (before, point)) < NEAR_M_MIN
-        ):
-            continue
-        a, b = (math.atan2(each.at[1] - start[1], each.at[0] - start[0]) for each in (before, point))
-        step = math.remainder(b - a, math.tau)
-        if step * hand < 0.0:  # the start and the wall are on different sides of the step
-            found.append((b, -step) if step < 0.0 else (a, step))
-    return tuple(found)
+        near_m = min(math.dist(start, each.at) for each in (before, point))
+        if (before.in_touch or point.in_touch) and near_m > NEAR_M_MIN:
+            step = _between(start, before.at, point.at)
+            if step[1] * hand < 0.0:  # the start and the wall are on different sides of the step
+                found.append(step)
+        for a, b in ((a, b) for a in before.walls for b in point.walls if _apart(a, b) < SAME_WALL_RAD):
+            found.append(_between(start, _touched_point(before.at, a, radius_m), _touched_point(point.at, b, radius_m)))
+    return tuple((a, width) if width >= 0.0 else (a + width, -width) for a, width in found)
+
+
+def _touched_point(at: Vector, bearing_rad: float, radius_m: float) -> Vector:
+    ux, uy = unit(bearing_rad)
+    return at[0] + radius_m * ux, at[1] + radius_m * uy
+
+
+def _between(start: Vector, a: Vector, b: Vector) -> tuple[float, float]:
+    """Return the direction [rad] of a point from the start, and the angle from there to another point."""
+    first, second = (math.atan2(y - start[1], x - start[0]) for x, y in (a, b))
+    return first, math.remainder(second - first, math.tau)
 
 
 def swept(wall_rad: float, contacts: Sequence[Touched], hand: int) -> float:

@@ -150,7 +150,7 @@ class PushScheduler(Component):
     def _watch_push(self, tick: int, push: int) -> None:
         """End a push that takes too long, and release the next robot in time."""
         self._not_ready_since = tick
-        if tick - self._since > PUSH_TICKS_MAX:
+        if tick - self._since > PUSH_TICKS_MAX or self._rear in self._situation.failure_detector.dead:
             self._end(False)
         elif self._released_at is None and self._rear_has_left() and not self._offers:
             self._let_out(tick)

@@ -23,10 +23,9 @@ from typing import Any, Final, NamedTuple
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.frontier.directions import wrapped
-from zwerm.agents.sensor_coverage.frontier.plan import Plan
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrapped
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, Sighting
+from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import (
     AllSettled,
     AllStanding,
@@ -38,32 +37,28 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     PushToken,
     TakeSlot,
 )
-from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
+from zwerm.agents.sensor_coverage.motion.push_drives import AHEAD_RAD, DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import direction_to
-from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
+from zwerm.agents.sensor_coverage.motion.wall_walk import WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
-from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, WAVE_TICKS, PushPart
-from zwerm.agents.sensor_coverage.protocols.wall_protocol import WallProtocol
+from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS
+from zwerm.agents.sensor_coverage.protocols.walls.wall_push import WallPush
 
-# A dead robot's body within BODY_AHEAD_RAD of a drive's direction is expected to stop the drive. If a drive was stopped
-# without a touch, a dead robot's body within BODY_BESIDE_RAD has stopped it.
+# A dead robot's body within BODY_AHEAD_RAD of a drive's direction may stop the drive. A robot in touch within
+# BODY_BESIDE_RAD has stopped it.
 BODY_AHEAD_RAD: Final = 0.3
 BODY_BESIDE_RAD: Final = math.pi / 2.0
-# Bound of the legs of one walk.
-LEGS_MAX: Final = 15
+# A robot that pushes so many bodies still has a quarter of its speed, and does not count as stuck.
+PUSHED_MAX: Final = 3
 
 
-class TokenPush(PushPart):
+class TokenPush(WallPush):
     """One robot's part in one push: what it does on messages, at the end of drives, and at the end of a wait."""
 
-    walls: WallProtocol | None = None
     _situation: Situation
     _map: LocalMap
-    _legs = _idle_legs = 0
-    _near: tuple[tuple[float, float], ...] = ()  # arcs around this robot's slot that the leader has closed
-    _is_spare = False  # the walk has ended in sight of the swarm, which needs no robot there
 
     # --- events -------------------------------------------------------------------------------------------------------
 
@@ -92,11 +87,6 @@ class TokenPush(PushPart):
         """Take in that the leader has left its slot."""
         if self.phase == "armed":
             self._call()
-
-    def walk_ended(self) -> None:
-        """Take in that the leader's walk has ended: wait no longer than after another push."""
-        self._walks, self._since = False, self._situation.tick if self.phase == "await" else self._since
-        self._walk_over = self._chain.ahead == self._chain.leader[1]
 
     def member_lost(self, node: int) -> None:
         """Take in that a robot has lost its memory: wait for it no longer."""
@@ -146,11 +136,6 @@ class TokenPush(PushPart):
         """Be the leader, once this robot's view agrees with its neighbours' states."""
         self._enter("holding")
 
-    def lead_from_base(self, direction_rad: float, hand: int) -> None:
-        """Be the leader, from the base's point into an open arc of the base."""
-        self._plan = self._map.plan_from_base(direction_rad, hand)
-        self.lead()
-
     def _offer(self) -> None:
         if self._plan is None:
             self._map.update_plans()
@@ -199,72 +184,10 @@ class TokenPush(PushPart):
         self._enter("out")
         self._write(AllStanding(self.id))
 
-    # --- the leader at a wall -----------------------------------------------------------------------------------------
-
-    def _approach(self, plan: Plan) -> None:
-        """Drive into an open arc, to a wall."""
-        self._enter("approaching")
-        self._situation.to_wall(wrapped(plan.direction - self._heading), plan.hop_m, -plan.hand)
-
-    def _approached(self, result: DriveResult | WalkResult) -> None:
-        """Leave the slot to the follower, unless a wall is close to it, or there is no way on."""
-        near: tuple[tuple[float, float], ...] = ()
-        if isinstance(result, WalkResult):
-            near = tuple((start + self._heading, width) for start, width in result.near)
-        if not isinstance(result, WalkResult) or result.end == SHUT:
-            felt = tuple(wrapped(each + self._heading) for each in result.touched)
-            at_base = self._map.slot == NOWHERE
-            if not at_base:
-                self._map.note_near(near)
-                self._map.note_felt(felt)
-            self._situation.stand()
-            self.close(PushAborted(self.id, True, felt if at_base else ()))
-            return
-        self._walks = result.end != OPEN
-        self._anchors = () if self._walks else self._find_anchors()
-        self._map.occupy(self._fresh)
-        self._enter("out")
-        self._behind_settled = self._chain.is_rear
-        self.cleared()
-        self._write(AllStanding(self.id, near))
-
-    def _go_on(self) -> None:
-        """Correct the scale, or follow the wall."""
-        if self._walks:
-            self._walk()
-        else:
-            self._correct()
-
-    def _walk(self) -> None:
-        """Follow the wall for one leg."""
-        plan, protocol = self._plan, self.walls
-        if plan is None or protocol is None:
-            self._settled()
-            return
-        self._enter("walking")
-        self._legs += 1
-        protocol.begin(self.id, plan.hand)
-        self._situation.follow_wall(plan.hand, (self._back,) if plan.beside and self._back is not None else ())
-
-    def _walked(self, result: DriveResult | WalkResult) -> None:
-        """Follow the wall further while that closes something; else stand at the new slot where the walk has ended."""
-        protocol = self.walls
-        closed = protocol is not None and protocol.has_closed()
-        self._idle_legs = 0 if closed else self._idle_legs + 1
-        on = isinstance(result, WalkResult) and result.end == STRETCH
-        if on and self._legs < LEGS_MAX and self._idle_legs < IDLE_LEGS_MAX:
-            self._walk()
-            return
-        if protocol is not None:
-            protocol.end(self.id)
-        self._is_spare = isinstance(result, WalkResult) and result.end != LOST
-        self._settled()
-
     def _blocked(self, result: DriveResult) -> None:
         """End the push after a test drive that met a wall; the first robot tries its other bearings before."""
         if self._plan is not None:
-            bearing_rad = wrapped(self._plan.direction - self._heading)
-            body = None if result.touched else self._situation.dead_ahead(bearing_rad, BODY_BESIDE_RAD)
+            body = self._body_in_the_way(result, wrapped(self._plan.direction - self._heading))
             if body is None:
                 self._map.note_failure(self._plan, result.driven_m)
             else:
@@ -275,6 +198,21 @@ class TokenPush(PushPart):
             return
         self._situation.stand()
         self.close(PushAborted(self.id, True))
+
+    def _body_in_the_way(self, result: DriveResult, bearing_rad: float) -> int | None:
+        """Return the robot that stopped a drive and may hide free space, or None.
+
+        Dead robots yield to a push, and bodies are smooth. So a body ahead that does not yield stands at a wall.
+        """
+        off = [(angle_between(each.bearing_rad, bearing_rad), each.node) for each in result.robots]
+        away_rad, body = min(((angle, node) for angle, node in off if node is not None), default=(math.pi, None))
+        if result.touched or away_rad > BODY_BESIDE_RAD:
+            return None
+        seen = self._situation.motion.frame.seen
+        dead = [node for node in self._situation.failure_detector.dead if node in seen]
+        row = [node for node in dead if angle_between(seen[node], bearing_rad) < BODY_BESIDE_RAD]
+        at_wall = body in dead and away_rad < AHEAD_RAD and len(row) <= PUSHED_MAX
+        return None if at_wall else body
 
     def _find_anchors(self) -> tuple[Sighting, ...]:
         """Return the robots that determine the leader's distance, with their approximate bearings."""
@@ -416,8 +354,8 @@ class Phase(NamedTuple):
 # fmt: off
 PHASES: Final[Mapping[str, Phase]] = {
     # The token passes on along the path.
-    "link": Phase(((lambda push: push._waited > LINK_TICKS, TokenPush._finish),),
-                  wake=lambda push: push._since + LINK_TICKS + 1),
+    "link": Phase(((TokenPush._token_is_lost, lambda push: push.close(PushAborted(push.id, False))),),
+                  wake=lambda push: push._wake_after(LOST_TICKS if push._waited < LOST_TICKS else LINK_TICKS)),
     # Leader: wait until the local map is right, offer the slot, drive, and wait for the followers.
     "holding": Phase(((TokenPush._may_offer, TokenPush._offer),), wake=TokenPush._next_tick),
     "offering": Phase(),

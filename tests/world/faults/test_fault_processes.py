@@ -13,7 +13,8 @@ from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError, ScenarioError, StragglerError
 from zwerm.link.node_link import ZenohNodeLink
 from zwerm.run.assembly import assemble
-from zwerm.run.runner import NullProgress, drive, new_run_id, run, serve
+from zwerm.run.progress import NullProgress
+from zwerm.run.runner import drive, new_run_id, run, serve
 from zwerm.scenario.tables import Scenario
 
 EVERY_FAULT: list[dict[str, Any]] = [

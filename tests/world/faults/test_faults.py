@@ -138,7 +138,7 @@ def test_a_partition_blocks_exactly_the_crossing_links_and_heals() -> None:
     assert life.world.medium.summary()["dropped"] == {"partition": 10 * 5}
 
 
-def test_a_cut_link_is_one_way_unless_it_says_both() -> None:
+def test_a_cut_link_is_one_way_unless_both_is_set() -> None:
     life = Life(faulty({"kind": "cut", "senders": [0], "receivers": [1], "at_s": 0.0}))
     assert life.heard(1, 0) == []
     assert life.heard(0, 1) == ALL[:-1]

@@ -164,8 +164,8 @@ def test_beyond_its_reach_path_loss_lets_no_more_pass_than_it_states() -> None:
         see_all_pairs(radio)
         for _ in range(20):
             radio.step({node: (Transmission("robots", b"x"),) for node in range(40)})
-        books = radio.medium.channels["robots"].ledger.by_link()
-        far = np.array(books["receiver"]) >= 40
-        sent, dropped = np.array(books["sent"])[far].sum(), np.array(books["dropped"]["weak-signal"])[far].sum()
+        counts = radio.medium.channels["robots"].ledger.by_link()
+        far = np.array(counts["receiver"]) >= 40
+        sent, dropped = np.array(counts["sent"])[far].sum(), np.array(counts["dropped"]["weak-signal"])[far].sum()
         assert sent == 20 * 40 * 40
         assert sent - dropped <= 0.01 * sent

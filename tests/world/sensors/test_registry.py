@@ -162,7 +162,7 @@ def test_two_sensors_cannot_fill_the_same_field(make):
     ]
 
 
-def test_other_peoples_sensors_are_gathered_under_their_names(make, scene):
+def test_sensors_of_users_are_collected_in_extra_by_their_names(make, scene):
     sensors = make(
         {"kind": "other_peoples:Thermometer", "unit_m": 0.5}, {"kind": "compass"}, {"kind": "other_peoples:Hygrometer"}
     )

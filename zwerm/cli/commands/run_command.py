@@ -43,5 +43,6 @@ def run(
                 realtime=options.realtime,
                 watcher=progress,
                 record=options.record,
+                security_log=options.security_log,
             )
         output.report(result)

@@ -62,6 +62,7 @@ def world(
                 realtime=options.realtime,
                 watcher=progress,
                 record=options.record,
+                security_log=options.security_log,
                 keys_file=keys,
                 names=names or (),
                 lease_s=outage_s,
