@@ -7,7 +7,7 @@ its way are passed in the same manner, but the robot does not press against them
 
 import math
 from collections.abc import Callable, Collection, Generator, Iterable, Sequence
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
@@ -40,6 +40,8 @@ CLEAR_M: Final = 0.3
 NEAR_M_MIN: Final = 0.02
 # Two contacts whose bearings differ by less than this [rad] are with the same wall; a switch is 30 degrees wide.
 SAME_WALL_RAD: Final = math.radians(35.0)
+# Two contacts at the same point that differ by less than this [rad] are the walls of a corner.
+CORNER_RAD: Final = math.radians(125.0)
 # Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
 LEG_M: Final = 3.0
 # Number of consecutive legs that closed nothing after which a walk ends.
@@ -245,7 +247,8 @@ def arcs_around(
     """Return the arcs (start, width) [rad] around a start in which a wall was followed in touch, by odometry.
 
     Two successive points close the arc between them, if the wall is beyond. Two successive contacts with the same wall
-    close the arc between the touched points of the wall.
+    close the arc between the touched points of the wall. So do two contacts at the same point, because a body does not pass
+    between them.
     """
     found = []
     for before, point in pairwise(points):
@@ -254,6 +257,10 @@ def arcs_around(
             step = _between(start, before.at, point.at)
             if step[1] * hand < 0.0:  # the start and the wall are on different sides of the step
                 found.append(step)
+        for a, b in combinations(point.walls, 2):
+            if _apart(a, b) < CORNER_RAD:
+                ends = (_touched_point(point.at, each, radius_m) for each in (a, b))
+                found.append(_between(start, *ends))
         for a, b in ((a, b) for a in before.walls for b in point.walls if _apart(a, b) < SAME_WALL_RAD):
             found.append(_between(start, _touched_point(before.at, a, radius_m), _touched_point(point.at, b, radius_m)))
     return tuple((a, width) if width >= 0.0 else (a + width, -width) for a, width in found)
