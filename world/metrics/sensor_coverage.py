@@ -86,13 +86,17 @@ class Deployment(Metric):
 
 
 class Conclusion(Metric):
-    """`concluded_early`: 1 where the base station has concluded too early, by the truth at that time, else 0.
+    """`falsely_completed`: 1 where a completed run has unseen space, by the truth at that time, else 0; and
+    `concluded_early`.
+
+    Unseen space is a coverage of the space that robots can reach below `ENOUGH`, measured where `metrics.sight_range_m` is
+    given. `concluded_early` is 1 where the base station has concluded too early.
 
     Too early is a coverage of the space that robots can reach below `ENOUGH`, measured where `metrics.sight_range_m` is given;
     or a claim of a running robot that it stands at a frontier. A robot that has restarted reports its claim again.
     """
 
-    names: ClassVar[Sequence[str]] = ("concluded_early",)
+    names: ClassVar[Sequence[str]] = ("concluded_early", "falsely_completed")
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         variant, range_m = context.scenario.variant, context.scenario.metrics.sight_range_m
@@ -112,12 +116,18 @@ class Conclusion(Metric):
         self._truth = truth
 
     def metrics(self) -> dict[str, float]:
-        """Return whether the conclusion was wrong; nothing where no base station concludes."""
+        """Return whether the conclusion was wrong: by the base station where it concludes, and by coverage if measured."""
         truth = self._truth
-        if not self._applies or truth is None:
+        if truth is None:
             return {}
-        claimed = any(claims and node not in truth.dead for node, claims in self._claims.items())
-        return {"concluded_early": float(truth.completed and (claimed or not self._is_covered(truth)))}
+        found = {}
+        unseen = truth.completed and not self._is_covered(truth)
+        if self._applies:
+            claimed = any(claims and node not in truth.dead for node, claims in self._claims.items())
+            found["concluded_early"] = float(truth.completed and (claimed or unseen))
+        if self._sight is not None:
+            found["falsely_completed"] = float(unseen)
+        return found
 
     def _is_covered(self, truth: Truth) -> bool:
         """Return whether the living robots see the space that they can reach, as far as that is measured."""
