@@ -8,14 +8,13 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.directions import add_wall
-from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.walks import Arc
 from zwerm.agents.sensor_coverage.frontier.wall_proof import open_arcs
 
-# Third and fourth element of the keys of these plans.
-WALLS: Final = 1000
+# Fourth element of the keys of plans to join two parts of the swarm.
 JOIN: Final = 2000
 # Directions to try into an open arc, as fractions of its width, one after the other.
 FRACTIONS: Final = (0.5, 0.5, 0.5, 0.5, 0.25, 0.75, 0.1, 0.9)

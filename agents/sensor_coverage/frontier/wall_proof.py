@@ -14,7 +14,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.fence import Views
 from zwerm.agents.sensor_coverage.frontier.walks import Arc, Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 
@@ -28,8 +27,16 @@ POCKET_RAD: Final = math.radians(55.0)
 BLIND_MAX: Final = 3
 # Largest arc [rad] behind a corner in which a slot may lose sight of a walking robot that stays in touch with the wall.
 HIDDEN_RAD: Final = math.radians(30.0)
+# A point of a walk is news for the walking robot if the open arcs become smaller by this [rad].
+NEWS_RAD: Final = 0.02
+# Stands for the slot at the third corner of a triangle whose third corner is another point of the walk.
+NO_SLOT: Final = -1
 # Arcs apart by less than this [rad] are stored as one.
 HAIR_RAD: Final = 1e-9
+
+
+# The bearing [rad] of each visible slot, by the slot that sees it.
+Views = Mapping[int, Mapping[int, float]]
 
 
 class TouchCounter:
@@ -162,3 +169,52 @@ def complement(arcs: Iterable[Arc]) -> list[Arc]:
     if first + math.tau > reached + GAP_RAD:
         found.append(Arc(reached % math.tau, first + math.tau - reached))
     return found
+
+
+class SlotProof:
+    """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator. It keeps no walks.
+
+    `around` are the slots that share an edge with it, and their directions [rad]. An arc that another standing robot closed
+    together with a walk counts while that robot is a neighbour.
+    """
+
+    def __init__(self) -> None:
+        self.around: Mapping[int, float] = {}
+        self._by_view: list[Arc] = []
+        self._by_walks: dict[int, list[Arc]] = {}  # by the slot at the third corner, or NO_SLOT for a wall
+
+    def update(self, slot: int, view: Mapping[int, float], complex_: FlagComplex, touched: Iterable[float]) -> None:
+        """Take in the slot's view [rad] and the complex around it, and the directions [rad] of walls in touch."""
+        self.around = {each: view[each] for each in complex_.neighbours[slot]}
+        self._by_view = arcs_of_walls(touched)
+        for triangle in complex_.triangles:
+            if slot in triangle:
+                a, b = (each for each in triangle if each != slot)
+                self._by_view.append(arc_between(view[a], view[b]))
+
+    def open_arcs(self) -> list[Arc]:
+        """Return the arcs that nothing closes."""
+        walks = [arc for slot, arcs in self._by_walks.items() if slot == NO_SLOT or slot in self.around for arc in arcs]
+        return complement([*self._by_view, *walks])
+
+    def pass_point(self, slot: int, before: WalkPoint | None, point: WalkPoint, hand: int) -> bool:
+        """Take in a point of a walk that this slot sees, and the point before it; return whether the open arcs are smaller."""
+        old = sum(each.width_rad for each in self.open_arcs())
+        for other, arc in arcs_of_step(slot, before, point, hand, self.around):
+            key = NO_SLOT if other is None else other
+            self._by_walks[key] = united([*self._by_walks.get(key, ()), arc])
+        return sum(each.width_rad for each in self.open_arcs()) < old - NEWS_RAD
+
+    def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
+        """Add arcs (start, width) [rad] in which a wall close to the slot was followed."""
+        self._by_walks[NO_SLOT] = united([*self._by_walks.get(NO_SLOT, ()), *(Arc(*each) for each in arcs)])
+
+    def memory(self) -> tuple[tuple[int, float, float], ...]:
+        """Return the arcs that walks closed, for the slot's next occupant."""
+        return tuple((slot, *arc) for slot, arcs in self._by_walks.items() for arc in arcs)
+
+    def inherit(self, memory: Iterable[tuple[int, float, float]]) -> None:
+        """Take over the arcs that walks closed from the slot's former occupant."""
+        self._by_walks = {}
+        for slot, start, width in memory:
+            self._by_walks.setdefault(slot, []).append(Arc(start, width))

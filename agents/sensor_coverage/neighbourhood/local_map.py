@@ -5,32 +5,36 @@ A robot plans only for the edges at its own slot, and only as their mover.
 
 import cmath
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import islice
 from typing import Final
 
-from zwerm.agents.sensor_coverage.frontier.directions import (
-    angle_between,
-    wrapped,
-)
-from zwerm.agents.sensor_coverage.frontier.fence import VERTEX_BESIDE_RAD, wedges
+from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
+from zwerm.agents.sensor_coverage.frontier.directions import Reference, add_wall, refined_reference, wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
-from zwerm.agents.sensor_coverage.frontier.wall_plans import WALLS
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SlotProof
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
+from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
-from zwerm.agents.sensor_coverage.neighbourhood.slot_map import DOUBT_COST, SlotMap
-from zwerm.maths.simplicial import FlagComplex, edge
+from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
+from zwerm.agents.sensor_coverage.neighbourhood.obstructions import Obstructions
+from zwerm.agents.sensor_coverage.protocols.path_vector import PathVectorProtocol
+from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
+# Cost of a route to a robot that does not know yet whether it is at the frontier. Other robots wait and do not push
+# there.
+DOUBT_COST: Final = 1_000.0
 # Added cost of a route to a robot at a gap. Gaps are expanded when no edge can be expanded and no robot is in doubt.
 GAP_COST: Final = 10_000.0
 # The same for a robot with an open arc, from which a robot must follow a wall. That comes after all edges and gaps.
 WALL_COST: Final = 20_000.0
 
-# A body is seen from the other side if the directions to it differ by more than this [rad].
-BEHIND_RAD: Final = math.pi / 2.0
+MakePlanner = Callable[[PlannerParameters, Slots], FrontierService]
 
 
-class LocalMap(SlotMap):
+class LocalMap(NeighbourTable):
     """One robot's neighbourhood.
 
     `plans` expand edges and `gaps` expand gaps around this robot, and `wall_plans` lead into open arcs of the `proof` of
@@ -38,6 +42,189 @@ class LocalMap(SlotMap):
     `obstructed` counts the sides and gaps that the body of a dead robot closes. `path_vectors` has the routes to the
     frontier. `plan_count` counts the times that plans were made. A base station sets `guests`.
     """
+
+    def __init__(
+        self, node: int, parameters: PlannerParameters, make_planner: MakePlanner, incarnation: int = 1
+    ) -> None:
+        super().__init__(node, incarnation)
+        self.guests: tuple[int, ...] = ()
+        self.parameters = parameters
+        self.plans: list[Plan] = []
+        self.gaps: list[Plan] = []
+        self.wall_plans: list[Plan] = []
+        self.unproven = 0
+        self.proof = SlotProof()
+        self.path_vectors = PathVectorProtocol()
+        self.obstacle: dict[Edge, None] = {}
+        self.obstructed = 0
+        self._bodies = Obstructions()
+        self.plan_count = 0
+        self._make_planner = make_planner
+        self._references: dict[int, Reference] = {}
+        self._learned: dict[int, tuple[int, ...]] = {}
+        self._slots = Slots()
+        self._planner = make_planner(parameters, self._slots)
+        self._plan_basis: object = None
+        self._led: tuple[int, int | None] | None = None  # (new slot, follower) of a push that failed
+
+    # --- memory of the slot -------------------------------------------------------------------------------------------
+
+    def learn_references(self) -> None:
+        """Refine the reference directions to all slots whose robots see this robot too."""
+        if self.heading is None or self.slot == NOWHERE:
+            return
+        for node, state in self.mutual().items():
+            readings = self.epoch, self.samples, state.epoch, state.samples
+            if self._learned.get(node) == readings:
+                continue
+            self._learned[node] = readings
+            there, back = self.seen[node].bearing_rad + self.heading, self._back(node) or 0.0
+            self._references[state.slot] = refined_reference(self._references.get(state.slot), there, back)
+
+    def update_walls(self, bearings: tuple[float, ...]) -> None:
+        """Remember the walls that this robot touches, by their bearings [rad]."""
+        if self.heading is None or self.slot == NOWHERE:
+            return
+        walls = self._slots.walls.setdefault(self.slot, [])
+        for bearing in bearings:
+            if add_wall(walls, wrapped(bearing + self.heading)):
+                self._plan_basis = None
+                self.change()
+
+    def memory(self) -> SlotMemory:
+        """Return the memory of this slot, for its next occupant."""
+        log, me = self._planner.attempt_log, self.slot
+        references = [
+            ReferenceBearing(slot, node, cmath.phase(mean), count)
+            for slot, (mean, count) in sorted(self._references.items())
+            if (node := self.at(slot)) is not None
+        ]
+        return SlotMemory(
+            me,
+            tuple(references),
+            tuple(self._slots.walls.get(me, ())),
+            tuple(log.closed),
+            tuple(key for key, slot in log.failed if slot == me),
+            tuple(log.attempts.items()),
+            tuple(log.blocked.get(me, ())),
+            self.path_vectors.newest_claim(me),
+            tuple(self._bodies.stopped.items()),
+            tuple(self._slots.felt.get(me, ())),
+            tuple(self._planner.walls.tried.get(me, ())),
+            self.proof.memory(),
+        )
+
+    def reopen(self) -> None:
+        """Try again all that has failed: a robot is missing, and the obstacle of that time may be gone."""
+        log = self._planner.attempt_log
+        log.closed, log.failed, log.attempts = {}, {}, {}
+        log.blocked.clear()
+        self._planner.walls.tried.clear()
+        self._bodies.stopped = {}
+        self.replan()
+
+    def replan(self) -> None:
+        """Make plans again, although neither the view nor a neighbour has changed."""
+        self._plan_basis = None
+        self.change()
+
+    # --- robots that died or restarted --------------------------------------------------------------------------------
+
+    def bury(self, node: int) -> None:
+        """Forget a robot that is dead, and end the claims of its slot.
+
+        Without it the gaps around this slot have other directions, so attempts at gaps do not count any more. The
+        directions in which walls stopped drives remain.
+        """
+        slot = self._slot_of(node)
+        if slot != NOWHERE and not self.states[node].moving and not self.path_vectors.is_claimed(slot):
+            self._bodies.finished[node] = None
+        self.path_vectors.forget(node, slot)
+        log = self._planner.attempt_log
+        for known in (log.closed, log.attempts):
+            for key in [key for key in known if key[2] == 0]:
+                del known[key]
+        self._planner.walls.tried.clear()
+        if node in self._bodies.stopped.values():
+            self.reopen()  # a drive that pushes its body finds out what is behind it
+        self._plan_basis = None
+        self.forget(node)
+
+    def restarted(self, node: int) -> None:
+        """Forget a robot that has lost its memory, and end the claims of its slot."""
+        self.path_vectors.forget(node, self._slot_of(node))
+        super().restarted(node)
+
+    def _slot_of(self, node: int) -> int:
+        state = self.states.get(node)
+        return NOWHERE if state is None else state.slot
+
+    # --- slots change hands -------------------------------------------------------------------------------------------
+
+    def vacate(self) -> None:
+        """Occupy no slot, and delete all that is known of the present one."""
+        self.slot = NOWHERE
+        self.redundant = False
+        self._references.clear()
+        self._learned.clear()
+        self._slots = Slots()
+        self._planner = self._make_planner(self.parameters, self._slots)
+        self._drop_plans()
+        self.proof = SlotProof()
+        self._bodies.stopped = {}
+        self._plan_basis = None
+        self._led = None
+        self._handovers = {}
+        self.change()
+
+    def occupy(self, slot: int) -> None:
+        """Be the first robot at a new slot."""
+        self._take(slot)
+
+    def _take(self, slot: int, claims: int = 0) -> None:
+        self.vacate()
+        self.slot = slot
+        self.at_base = False
+        self.path_vectors.take_over(slot, Route(DOUBT_COST, (slot,)), claims)
+
+    def inherit(self, memory: SlotMemory) -> None:
+        """Take over a slot with its memory."""
+        self._take(memory.slot, memory.claims)
+        me = self.slot
+        for each in memory.references:
+            self._references[each.slot] = cmath.rect(1.0, each.direction_rad), each.count
+        self._slots.walls[me] = list(memory.walls)
+        log = self._planner.attempt_log
+        log.closed = dict.fromkeys(memory.closed)
+        log.failed = dict.fromkeys((key, me) for key in memory.failed)
+        log.attempts = dict(memory.attempts)
+        log.blocked[me] = list(memory.blocked)
+        self._bodies.stopped = dict(memory.obstructed)
+        self._slots.felt[me] = list(memory.felt)
+        self._planner.walls.tried[me] = list(memory.explored)
+        self.proof.inherit(memory.proved)
+
+    def leave_complex(self) -> None:
+        """Leave the complex; the body stays at the slot."""
+        self.redundant = True
+        self._drop_plans()
+        self.change()
+
+    def _drop_plans(self) -> None:
+        self.plans, self.gaps, self.wall_plans, self.obstacle = [], [], [], {}
+        self.obstructed = self.unproven = 0
+
+    def abandon_push(self, fresh: int, follower: int | None) -> None:
+        """Record that this robot led a push and stays: no robot occupies `fresh`, and `follower` should not come."""
+        self._led = fresh, follower
+
+    def resolve_duplicate(self) -> None:
+        """Occupy the new slot of an abandoned push if the follower came all the same: no two robots keep one slot."""
+        if self._led is not None:
+            fresh, follower = self._led
+            state = None if follower is None else self.states.get(follower)
+            if state is not None and state.slot == self.slot:
+                self.occupy(fresh)
 
     # --- where to expand ----------------------------------------------------------------------------------------------
 
@@ -76,46 +263,17 @@ class LocalMap(SlotMap):
         self.obstacle = dict.fromkeys(
             (*found.corners, *(side.edge for side in found.sides if (side.edge, side.sign) not in could))
         )
-        self.obstructed = self._count_obstructed(scan)
+        seen = {node: each.bearing_rad + (self.heading or 0.0) for node, each in self.seen.items()}
+        self.obstructed = self._bodies.count(me, scan, planner.fence, seen, self.states, mutual.values())
         if self.parameters.walls == "followed":
             self._plan_walks(scan)
 
     def _plan_walks(self, scan: ScanResult) -> None:
         """Find the open arcs around this robot, and the walks into them. A robot without neighbours has none."""
-        me = self.slot
-        self.proof.update(me, scan, [*self._slots.walls.get(me, ()), *self._slots.felt.get(me, ())])
-        self.wall_plans, self.unproven = [], 0
-        if self.proof.around:
-            self.wall_plans, self.unproven = self._planner.walls.plans_at(
-                me, next(iter(self.proof.around)), self.proof.open_arcs()
-            )
-
-    def _count_obstructed(self, scan: ScanResult) -> int:
-        """Return the number of sides and gaps here that are closed only by the body of a dead robot.
-
-        No robot must look behind a dead robot that did not claim a frontier when it died. The same holds if a neighbour
-        sees the body from the other side.
-        """
-        if not self._obstructed:
-            return 0
-        me = self.slot
-        sides = {(*side.edge, side.sign) for side in self._planner.fence.sides}
-        around = {(me, a) for _, a, _, gap in wedges(scan.views, scan.complex_, [me]) if gap >= 2.0 * VERTEX_BESIDE_RAD}
-        return sum(
-            (key[:3] in sides or (key[2] == 0 and key[:2] in around)) and not self._is_seen_past(body)
-            for key, body in self._obstructed.items()
-        )
-
-    def _is_seen_past(self, body: int) -> bool:
-        seen = self.seen.get(body)
-        if body in self._finished or body in self.states or seen is None:
-            return True
-        here = seen.bearing_rad + (self.heading or 0.0)
-        return any(
-            each.node == body and angle_between(each.direction_rad, here) > BEHIND_RAD
-            for state in self.mutual().values()
-            for each in state.seen
-        )
+        me, slots = self.slot, self._slots
+        self.proof.update(me, scan.views[me], scan.complex_, (*slots.walls.get(me, ()), *slots.felt.get(me, ())))
+        arcs, beside = self.proof.open_arcs(), next(iter(self.proof.around), me)
+        self.wall_plans, self.unproven = self._planner.walls.plans_at(me, beside, arcs if beside != me else ())
 
     def scan(self) -> ScanResult:
         """Return the views of this robot and its neighbours as a scan, by this robot's slot."""
@@ -141,10 +299,6 @@ class LocalMap(SlotMap):
         wanted = self.plans or self.gaps or self.wall_plans
         return min(wanted, key=lambda each: each.key) if wanted else None
 
-    def plan_from_base(self, direction_rad: float, hand: int) -> Plan:
-        """Return the plan to follow a wall from the base's point, into an open arc of the base."""
-        return Plan((0, 0, 0, WALLS), 0, direction_rad, self.parameters.hop_m, 0.0, (0,), walk=True, hand=hand)
-
     def note_attempt(self, plan: Plan) -> None:
         """Record that a plan is tried."""
         self._planner.note_attempt(plan)
@@ -152,13 +306,13 @@ class LocalMap(SlotMap):
 
     def note_obstruction(self, plan: Plan, driven_m: float, body: int) -> None:
         """Record that a robot's body stopped a plan after `driven_m`: if it is dead, nobody may know what is behind it."""
-        self._obstructed[plan.key] = body
+        self._bodies.stopped[plan.key] = body
         self.note_failure(plan, driven_m)
 
     def unblock(self, node: int) -> None:
         """Try again what had failed, if a robot was in the way that is alive again."""
-        self._finished.pop(node, None)
-        if node in self._obstructed.values():
+        self._bodies.finished.pop(node, None)
+        if node in self._bodies.stopped.values():
             self.reopen()
 
     def note_failure(self, plan: Plan, driven_m: float) -> None:
@@ -166,15 +320,11 @@ class LocalMap(SlotMap):
         self._planner.note_failure(plan, driven_m)
         self.replan()
 
-    def note_felt(self, directions: Iterable[float]) -> None:
-        """Record walls that a robot felt close to this slot, by their directions [rad]."""
-        for each in directions:
+    def note_walls(self, felt: Iterable[float], near: Iterable[tuple[float, float]] = ()) -> None:
+        """Record walls felt close to this slot [rad], and arcs (start, width) [rad] in which one was followed close to it."""
+        for each in felt:
             self._planner.walls.note_wall(self.slot, each)
-        self.replan()
-
-    def note_near(self, arcs: Iterable[tuple[float, float]]) -> None:
-        """Record arcs (start, width) [rad] in which a robot followed a wall close to this slot."""
-        self.proof.add_near(arcs)
+        self.proof.add_near(near)
         self.replan()
 
     # --- the route to the frontier ------------------------------------------------------------------------------------

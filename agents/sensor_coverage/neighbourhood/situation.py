@@ -24,8 +24,7 @@ from zwerm.agents.sensor_coverage.motion.wall_walk import (
     WallWalk,
 )
 from zwerm.agents.sensor_coverage.neighbourhood.failure_detector import FailureDetector
-from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
-from zwerm.agents.sensor_coverage.neighbourhood.slot_map import MakePlanner
+from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap, MakePlanner
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 from zwerm.agents.sensor_coverage.protocols.transport.mailbox import ReliableMailbox
 from zwerm.wire.messages import BodyVelocity, Observation

@@ -109,7 +109,7 @@ class PushScheduler(Component):
                 self._offers[slots[0]] = slots
             case PushAborted(push, tried, felt) if push == self._active:
                 if felt:
-                    self._map.note_felt(felt)
+                    self._map.note_walls(felt)
                 self._end(tried)
             case PushDone(push) if push == self._active:
                 self._end(True, True)

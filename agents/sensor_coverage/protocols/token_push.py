@@ -43,7 +43,7 @@ from zwerm.agents.sensor_coverage.motion.wall_walk import WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
-from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS
+from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS, PushPart
 from zwerm.agents.sensor_coverage.protocols.walls.wall_push import WallPush
 
 # A dead robot's body within BODY_AHEAD_RAD of a drive's direction may stop the drive. A robot in touch within
@@ -54,7 +54,7 @@ BODY_BESIDE_RAD: Final = math.pi / 2.0
 PUSHED_MAX: Final = 3
 
 
-class TokenPush(WallPush):
+class TokenPush(PushPart, WallPush):
     """One robot's part in one push: what it does on messages, at the end of drives, and at the end of a wait."""
 
     _situation: Situation
@@ -262,7 +262,7 @@ class TokenPush(WallPush):
     def _report_standing(self) -> None:
         self._enter("standing")
         if self._near:
-            self._map.note_near(self._near)
+            self._map.note_walls((), self._near)
         if self._chain.is_rear:
             self._behind_settled = True
         else:

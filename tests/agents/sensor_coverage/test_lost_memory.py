@@ -272,7 +272,7 @@ def test_what_the_body_of_a_robot_stopped_is_tried_again_when_it_is_dead() -> No
     assert list(log.closed) == [wall.key, side.key]
     local_map.bury(5)
     assert not log.closed
-    assert not local_map._obstructed
+    assert not local_map._bodies.stopped
 
 
 def test_a_swarm_in_a_corridor_that_a_death_has_parted_is_joined_again() -> None:

@@ -6,21 +6,58 @@ leaves an arc open, which is tried again.
 """
 
 import math
-from collections.abc import Callable
-from typing import ClassVar, Final, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import ClassVar, Final, NamedTuple, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.walks import WalkPoint
-from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, point_before
-from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, SlotProof, TouchCounter, point_before
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
 from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, PassedPoint, WalkMessage, WalkOver
-from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 
 # A robot makes plans again this many ticks after the latest point that closed something: the walk has passed.
 PASSED_TICKS: Final = 10
+
+
+class ProvedSlot(Protocol):
+    """What a robot knows of its slot, its neighbours, and the proof of coverage there."""
+
+    slot: int
+    moving: bool
+    redundant: bool
+    heading: float | None
+    proof: SlotProof
+
+    def mutual(self) -> Mapping[int, StateBeacon]:
+        """Return the states of the robots that this robot sees and that see it."""
+
+    def replan(self) -> None:
+        """Make plans again."""
+
+
+class StepReporter(Protocol):
+    """A walk that reports each of its points to `on_step`."""
+
+    on_step: Callable[[Waypoint], None]
+
+
+class WalkSituation(Protocol):
+    """The part of a robot's situation that walks depend on."""
+
+    @property
+    def wall_walk(self) -> StepReporter:
+        """The robot's own walk."""
+
+    @property
+    def node(self) -> int:
+        """The robot's id."""
+
+    @property
+    def local_map(self) -> ProvedSlot:
+        """The robot's slot and its neighbours."""
 
 
 class _Received(NamedTuple):
@@ -37,7 +74,7 @@ class WallProtocol(Component):
     channel: ClassVar[str] = CHANNEL
     accepts: ClassVar[tuple[type, ...]] = (PassedPoint, ArcClosed, WalkOver)
 
-    def __init__(self, situation: Situation, on_over: Callable[[int], None] = lambda _: None) -> None:
+    def __init__(self, situation: WalkSituation, on_over: Callable[[int], None] = lambda _: None) -> None:
         """Call `on_over` with the number of the push when a walk has ended."""
         self._situation = situation
         self._on_over = on_over

@@ -6,33 +6,68 @@ new slot, and the deployment goes on from there.
 """
 
 from abc import abstractmethod
-from typing import Final
+from collections.abc import Collection
+from typing import Final, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
-from zwerm.agents.sensor_coverage.frontier.plan import Plan
+from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import AllStanding, Body, PushAborted
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
-from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
-from zwerm.agents.sensor_coverage.protocols.push_part import PushPart
+from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
 
 # Bound of the legs of one walk.
 LEGS_MAX: Final = 15
 
 
-class WallPush(PushPart):
-    """The part of a push that leads to a wall. `walls` is the robot's protocol of walks."""
+class WallSituation(Protocol):
+    """The part of a robot's situation that a push at a wall depends on."""
+
+    @property
+    def tick(self) -> int:
+        """The number of the current tick."""
+
+    def stand(self) -> None:
+        """End a drive."""
+
+    def to_wall(self, bearing_rad: float, hop_m: float, hand: int) -> None:
+        """Begin to drive to a wall, and along it until the start is clear."""
+
+    def follow_wall(self, hand: int, keep: Collection[int]) -> None:
+        """Begin to follow the wall in touch, in sight of a robot of `keep`, or of any robot if `keep` is empty."""
+
+
+class WallPush:
+    """The part of a push that leads to a wall, beside a `PushPart`. `walls` is the robot's protocol of walks."""
 
     walls: WallProtocol | None = None
-    _situation: Situation
+    id: int
+    phase: str
+    _since: int
+    _fresh: int
+    _back: int | None
+    _chain: PushChain
+    _plan: Plan | None
+    _anchors: tuple[Sighting, ...]
+    _behind_settled: bool
+    _walks: bool
+    _walk_over: bool
+    _situation: WallSituation
     _map: LocalMap
     _legs = _idle_legs = 0
     _near: tuple[tuple[float, float], ...] = ()  # arcs around this robot's slot that the leader has closed
     _is_spare = False  # the walk has ended in sight of the swarm, which needs no robot there
+
+    @property
+    @abstractmethod
+    def _heading(self) -> float: ...
+
+    @abstractmethod
+    def _enter(self, phase: str) -> None: ...
 
     @abstractmethod
     def lead(self) -> None:
@@ -60,7 +95,8 @@ class WallPush(PushPart):
 
     def lead_from_base(self, direction_rad: float, hand: int) -> None:
         """Be the leader, from the base's point into an open arc of the base."""
-        self._plan = self._map.plan_from_base(direction_rad, hand)
+        hop_m = self._map.parameters.hop_m
+        self._plan = Plan((0, 0, 0, WALLS), 0, direction_rad, hop_m, 0.0, (0,), walk=True, hand=hand)
         self.lead()
 
     def walk_ended(self) -> None:
@@ -82,8 +118,7 @@ class WallPush(PushPart):
             felt = tuple(wrapped(each + self._heading) for each in result.touched)
             at_base = self._map.slot == NOWHERE
             if not at_base:
-                self._map.note_near(near)
-                self._map.note_felt(felt)
+                self._map.note_walls(felt, near)
             self._situation.stand()
             self.close(PushAborted(self.id, True, felt if at_base else ()))
             return
