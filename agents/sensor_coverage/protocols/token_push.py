@@ -321,8 +321,7 @@ class TokenPush(PushPart, WallPush):
         """Send the outcome of the push to the robot behind; join no other push until that is acknowledged."""
         if self._map.moving:
             self._situation.stand()
-        if self._is_spare:
-            self._map.leave_complex()
+        self._leave_if_spare()
         self.over = self.end is None or self._back is None
         if self.end is not None:
             self._write(self.end)

@@ -19,6 +19,7 @@ from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkRes
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
+from zwerm.maths.simplicial import may_leave
 
 # Bound of the legs of one walk.
 LEGS_MAX: Final = 15
@@ -161,3 +162,9 @@ class WallPush:
             protocol.end(self.id)
         self._is_spare = isinstance(result, WalkResult) and result.end != LOST
         self._settled()
+
+    def _leave_if_spare(self) -> None:
+        """Leave the complex after a walk, unless that would part the robots around."""
+        slot = self._map.slot
+        if self._is_spare and may_leave(slot, self._map.scan().complex_.neighbours):
+            self._map.leave_complex()
