@@ -94,6 +94,18 @@ def test_a_run_is_completed_only_where_all_is_seen(building: tuple[str, ...]) ->
     assert result.metrics["reachable_coverage_fraction"] > 0.99
 
 
+def test_robots_without_a_coordinator_find_a_door() -> None:
+    result = run("sensor-coverage-narrow", 101, "inline", (*TWO_ROOMS, "services.path=gradient"))
+    assert result.outcome == "completed"
+    assert result.metrics["reachable_coverage_fraction"] > 0.99
+
+
+def test_robots_without_a_coordinator_miss_the_door_by_the_rules_of_the_paper() -> None:
+    paper = ('robots.parameters.walls="paper"', 'base.parameters.walls="paper"')
+    result = run("sensor-coverage-narrow", 101, "inline", (*TWO_ROOMS, "services.path=gradient", *paper))
+    assert result.metrics["falsely_completed"] == 1.0
+
+
 @pytest.mark.xfail(reason="robots that followed walls stay where they are, 1.42 and 1.75 times the packing")
 @pytest.mark.parametrize("heading_rad", [0.0, 0.4])
 def test_the_first_robot_aligns_the_lattice_with_a_wall(heading_rad: float) -> None:
