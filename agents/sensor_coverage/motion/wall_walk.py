@@ -30,7 +30,7 @@ STUCK_TICKS: Final = 5
 STUCK_FRACTION: Final = 0.2
 # Distance [m] between waypoints while nothing else changes.
 SPACING_M: Final = 0.1
-# Way [m] in which a robot must get clear of its start.
+# Distance [m] within which a robot must get clear of its start.
 CLEARING_M_MAX: Final = 3.0
 # A wall within this way [m] is only felt: the space between it and the robot's slot is narrower than a body.
 FEEL_M: Final = 0.12
