@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot, to_steps
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot, all_to_steps
 from zwerm.agents.landmark_exploration.mapping.frontier_status import LANDMARKS_MAX
 from zwerm.wire.messages import BodyVelocity, Observation
 
@@ -27,11 +27,8 @@ class ExplorerView:
         self.tick += 1
         heading = self.heading_rad = observation.compass_rad or 0.0
         seen = observation.landmarks or ()
-        known = [each for each in seen if each.landmark < LANDMARKS_MAX]
-        self.bearing = {each.landmark: each.bearing_rad + heading for each in known}
-        self.snapshot = BearingSnapshot(
-            tuple(self.bearing), tuple([to_steps(bearing_rad) for bearing_rad in self.bearing.values()])
-        )
+        self.bearing = {each.landmark: each.bearing_rad + heading for each in seen if each.landmark < LANDMARKS_MAX}
+        self.snapshot = BearingSnapshot(tuple(self.bearing), all_to_steps(self.bearing.values()))
         self.contacts = tuple([each.bearing_rad + heading for each in observation.touch or ()])
 
     def drive(self, direction_rad: float | None, speed_m_s: float) -> BodyVelocity:

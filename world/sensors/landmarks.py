@@ -22,6 +22,9 @@ from zwerm.world.sensors import Sensor, Surroundings, chosen, portions, random_a
 # A line of sight ends this fraction of its length short, so that a wall does not hide the landmark that hangs on it.
 _SHORT = 1e-9
 
+# Up to this many pairs of a robot and a landmark all distances are computed: a search tree costs more.
+_FEW_PAIRS = 50_000
+
 
 class LandmarksTable(Table):
     """The landmarks that are seen, and the quality of the bearings. With `presence_only` every bearing reads 0: only
@@ -74,6 +77,9 @@ class Landmarks(Sensor):
         if self._range_m is None:
             row, landmark = np.divmod(np.arange(len(robots) * len(landmarks)), len(landmarks))
             return row, landmark
+        if len(robots) * len(landmarks) <= _FEW_PAIRS:
+            dx, dy = landmarks[:, 0] - position[:, :1], landmarks[:, 1] - position[:, 1:]
+            return (dx**2 + dy**2 <= self._range_m**2).nonzero()
         # A little too far, so that one rule, the one below, decides at the very edge.
         reach_m = self._range_m * (1.0 + 1e-9)
         found = cKDTree(position).sparse_distance_matrix(self._tree, reach_m, output_type="ndarray")

@@ -5,7 +5,7 @@ derive the same from an observation because all derive it from these steps.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 STEPS: Final = 256
@@ -23,6 +23,11 @@ class BearingSnapshot(NamedTuple):
 def to_steps(bearing_rad: float) -> int:
     """Return a bearing in steps, in [0, STEPS)."""
     return round(bearing_rad * _PER_RAD) % STEPS
+
+
+def all_to_steps(bearings_rad: Iterable[float]) -> tuple[int, ...]:
+    """Return bearings in steps, each in [0, STEPS)."""
+    return tuple([round(each * _PER_RAD) % STEPS for each in bearings_rad])
 
 
 def to_rad(steps: int) -> float:

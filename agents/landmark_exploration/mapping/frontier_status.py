@@ -5,6 +5,7 @@ IV-A). A status only ever rises, so that statuses from several robots merge by m
 """
 
 from collections.abc import Iterator
+from operator import itemgetter
 from typing import Final
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import HALF, STEPS, BearingSnapshot, is_inside
@@ -42,6 +43,10 @@ class Frontiers:
         self.statuses: dict[int, int] = {}
         self.open: dict[int, None] = {}
         self.open_at: dict[int, int] = {}  # landmark: open frontiers that it is part of
+        self._open_of: dict[int, dict[int, None]] = {}  # landmark: the keys of these
+        # By observed set of landmarks: its frontiers that were not clear at the last observation, as (i, j, key) with the
+        # numbers of both landmarks in the set.
+        self._undecided: dict[tuple[int, ...], list[tuple[int, int, int]]] = {}
 
     def status(self, a: int, b: int) -> int:
         """Return the status of <a, b>."""
@@ -61,11 +66,28 @@ class Frontiers:
             change = 1 if _IS_OPEN[status] else -1
             for landmark in pair_of(key):
                 self.open_at[landmark] = self.open_at.get(landmark, 0) + change
+                if change > 0:
+                    self._open_of.setdefault(landmark, {})[key] = None
+                else:
+                    del self._open_of[landmark][key]
             if change > 0:
                 self.open[key] = None
             else:
                 del self.open[key]
         return True
+
+    def most_at_a_pair(self) -> int:
+        """Return the largest sum of `open_at` over the two landmarks of an open frontier, or 0 without any.
+
+        Landmarks come by descending count. No pair whose larger count is half of the best sum or less can exceed it.
+        """
+        at, best = self.open_at, 0
+        for landmark, count in sorted(at.items(), key=itemgetter(1), reverse=True):
+            if 2 * count <= best:
+                break
+            for key in self._open_of.get(landmark, ()):
+                best = max(best, at[key >> 16] + at[key & 0xFFFF])
+        return best
 
     def note(self, snapshot: BearingSnapshot) -> bool:
         """Take in an observation; return whether any status rose.
@@ -73,23 +95,30 @@ class Frontiers:
         Seen from inside the hull of the landmarks, every frontier that the observer is in is clear. All others become
         unexplored if they were unknown. A pair in line with the observer is neither left nor right.
         """
-        statuses, news = self.statuses, False
         landmarks, bearings = snapshot
-        count, inside = len(landmarks), is_inside(bearings)
-        for i in range(1, count):
-            b, of_b = landmarks[i], bearings[i]
-            for j in range(i):
-                a, relative = landmarks[j], (of_b - bearings[j]) % STEPS
-                forth, back = a << 16 | b, b << 16 | a
-                if inside and relative not in (0, HALF):
-                    if relative > HALF:
-                        forth, back = back, forth
-                    if statuses.get(forth) != CLEAR:
-                        news = self.raise_to(forth, CLEAR) or news
-                elif forth not in statuses:
-                    news = self.raise_to(forth, UNEXPLORED) or news
-                if back not in statuses:
-                    news = self.raise_to(back, UNEXPLORED) or news
+        undecided = self._undecided.get(landmarks)
+        if undecided is None:
+            count = len(landmarks)
+            undecided = [(i, j, landmarks[i] << 16 | landmarks[j]) for j in range(1, count) for i in range(j)]
+            undecided += [(j, i, landmarks[j] << 16 | landmarks[i]) for i, j, _ in undecided]
+            fresh = [key for _, _, key in undecided if key not in self.statuses]
+            news = any([self.raise_to(key, UNEXPLORED) for key in fresh])
+        elif not undecided:
+            return False
+        else:
+            news = False
+        if is_inside(bearings):
+            statuses, left = self.statuses, []
+            for each in undecided:
+                i, j, key = each
+                if statuses[key] == CLEAR:
+                    continue
+                if 0 < (bearings[j] - bearings[i]) % STEPS < HALF:
+                    news = self.raise_to(key, CLEAR) or news
+                else:
+                    left.append(each)
+            undecided = left
+        self._undecided[landmarks] = undecided
         return news
 
     def sharing(self, key: int) -> int:
