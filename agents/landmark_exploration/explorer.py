@@ -32,6 +32,7 @@ from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 from zwerm.agents.landmark_exploration.sharing.upload import Upload
 from zwerm.agents.landmark_exploration.view import ExplorerView, Slide
+from zwerm.agents.landmark_exploration.wayfinding import meet
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError
 from zwerm.wire.messages import Command, Observation, Packet, Transmission
@@ -167,14 +168,18 @@ class Explorer(Controller):
         idle = wander(self.view, self.random, self.parameters.turn_sd_rad)
         if self.parameters.presence_only:
             idle = roam(self.view, self.random, lambda: self._news_at == self.view.tick)
+        meeting = meet(self.view, self.map, self.random, lambda: next(idle))
+        meets = self._carries and not self.parameters.presence_only
         while True:
             if self._task is None:
                 self._choose()
             if self._task is None or self._task.key is None:
                 # If robots carry the map to each other, the idle robots do this. If a coordinator has the map, idle
                 # robots wait for it.
-                waits = not (self._carries or self._cut_off)
-                yield None if self._halted or waits else next(idle)
+                if self._halted or not (self._carries or self._cut_off):
+                    yield None
+                else:
+                    yield next(meeting if meets and self._frozen else idle)
                 continue
             task = self._task
             outcome = yield from self._carry_out(task)

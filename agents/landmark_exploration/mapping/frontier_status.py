@@ -102,7 +102,9 @@ class Frontiers:
             undecided = [(i, j, landmarks[i] << 16 | landmarks[j]) for j in range(1, count) for i in range(j)]
             undecided += [(j, i, landmarks[j] << 16 | landmarks[i]) for i, j, _ in undecided]
             fresh = [key for _, _, key in undecided if key not in self.statuses]
-            news = any([self.raise_to(key, UNEXPLORED) for key in fresh])
+            for key in fresh:
+                self.raise_to(key, UNEXPLORED)
+            news = bool(fresh)
         elif not undecided:
             return False
         else:
