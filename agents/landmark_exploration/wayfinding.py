@@ -22,8 +22,8 @@ TRIES_MAX: Final = 30
 # Ticks of walking about between two tries, and where no way is known.
 ASTRAY_TICKS: Final = 15
 # Ticks at the meeting place, and then of walking about: robots whose maps have no landmark in common have two places.
-MEETING_TICKS: Final = 300
-PARTING_TICKS: Final = 150
+MEETING_TICKS: Final = 1_000
+PARTING_TICKS: Final = 200
 
 
 class Follow(Protocol):
