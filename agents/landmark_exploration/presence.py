@@ -33,6 +33,8 @@ NEAR_STEPS: Final = 1.0
 SEARCH_TICKS: Final = 12
 # If more than half of that is seen, the walks are short at first, and longer each time, up to this.
 LOCAL_SEARCH_TICKS: Final = (2, 4, 6, 8)
+# Searches where nothing of the path is seen, before the robot gives the path up.
+LOST_MAX: Final = 5
 # The deviation of its direction [rad] from the one that leads away from landmarks that are not expected there.
 SEARCH_SD_RAD: Final = 0.8
 
@@ -71,6 +73,10 @@ class PresenceTracker:
                 self.places[landmark] = ahead * dx, ahead * dy
                 self._events[landmark] = [] if tick == 1 else [(-0.5 * dx, -0.5 * dy)]
             self._seen_at[landmark] = tick
+
+    def events(self, landmark: int) -> Sequence[Place]:
+        """Return where the robot was, relative to now [steps], when a landmark last appeared or disappeared."""
+        return self._events.get(landmark, ())
 
     def _cross(self, landmark: int, dx: float, dy: float) -> None:
         """Note that a landmark appeared or disappeared during the step (dx, dy), one range away."""
@@ -125,19 +131,18 @@ def seek(
 ) -> Drive:
     """Follow `path` until `arrived()`, aiming at the farthest vertex of which enough landmarks are seen."""
     until = view.tick + SEEK_TICKS * (len(path) + 1)
-    searches = 0
+    aim, searches, lost = -1, 0, 0
     while not arrived():
-        if view.tick >= until:
+        aim = _aim(view, path, aim)
+        lost = lost + 1 if aim < 0 else 0
+        if view.tick >= until or lost > LOST_MAX:
             return "unreached"
         way = onward = None
         is_near = False
-        for snapshot in reversed(path):
-            shared = sum(landmark in view.bearing for landmark in snapshot.landmarks)
-            if shared >= SHARED_MIN:
-                way = tracker.toward(snapshot.landmarks)
-                onward = tracker.onward(view, snapshot.landmarks)
-                is_near = 2 * shared > len(snapshot.landmarks)
-                break
+        if aim >= 0:
+            landmarks = path[aim].landmarks
+            way, onward = tracker.toward(landmarks), tracker.onward(view, landmarks)
+            is_near = 2 * sum(landmark in view.bearing for landmark in landmarks) > len(landmarks)
         if way is not None and math.hypot(*way) >= NEAR_STEPS:
             yield math.atan2(way[1], way[0])
             continue
@@ -154,3 +159,15 @@ def seek(
             if arrived():
                 break
     return "arrived"
+
+
+def _aim(view: ExplorerView, path: Sequence[BearingSnapshot], aim: int) -> int:
+    """Return the number of the farthest vertex of which enough landmarks are seen, or of `aim` if any of its are; or -1.
+
+    To keep an aim of which little is seen prevents that the robot goes to and fro between two aims.
+    """
+    for number in range(len(path) - 1, -1, -1):
+        shared = sum(landmark in view.bearing for landmark in path[number].landmarks)
+        if shared >= SHARED_MIN or (shared and number == aim):
+            return number
+    return -1
