@@ -243,7 +243,8 @@ class Explorer(Controller):
                 self._no_way_since = None
             elif self._no_way_since is None:
                 self._no_way_since = tick
-            self._cut_off = self._no_way_since is not None and tick - self._no_way_since >= CUT_OFF_TICKS
+            has_no_way = self._no_way_since is not None and tick - self._no_way_since >= CUT_OFF_TICKS
+            self._cut_off = has_no_way or not (frontiers.open or frontiers.has_area)
             self._choose_at = tick + self._patience_ticks
             self._patience_ticks = min(2 * self._patience_ticks, RETRY_TICKS_MAX)
             return
@@ -261,7 +262,12 @@ class Explorer(Controller):
         if not self._claims or self._gossip is None:
             return
         rules = self.parameters
-        if self._task is not None or self.map.frontiers.open or (rules.presence_only and self._news_at == tick):
+        if rules.presence_only:
+            has_news = self._news_at == tick
+        else:
+            # A map without an area is not explored: landmarks are too few, or in one line.
+            has_news = bool(self.map.frontiers.open) or not self.map.frontiers.has_area
+        if self._task is not None or has_news:
             self._quiet_since = tick
         quiet_ticks = rules.stagnation_ticks if rules.presence_only else rules.freeze_ticks
         if not self._frozen and tick - self._quiet_since >= quiet_ticks:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from operator import itemgetter
 from typing import Final
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import HALF, STEPS, BearingSnapshot, is_inside
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import HALF, STEPS, BearingSnapshot, widest_gap
 
 UNKNOWN: Final = 0
 UNEXPLORED: Final = 1
@@ -22,6 +22,10 @@ _IS_OPEN: Final = (False, True, False, True, False, False, False)
 
 # Landmark ids are below this.
 LANDMARKS_MAX: Final = 1 << 16
+
+# The widest angle between adjacent bearings of an observer that is inside beyond doubt: 14 degrees less than a half turn,
+# which is 5 standard deviations of the sensor.
+AREA_GAP_MAX: Final = HALF - 10
 
 Pair = tuple[int, int]
 
@@ -37,9 +41,14 @@ def pair_of(key: int) -> Pair:
 
 
 class Frontiers:
-    """The status of every frontier. `open` holds the keys of those to be explored."""
+    """The status of every frontier. `open` holds the keys of those to be explored.
+
+    `has_area` is true once an observation was inside the hull of its landmarks beyond doubt. An observer on the line between
+    landmarks may seem to be inside because bearings are noisy.
+    """
 
     def __init__(self) -> None:
+        self.has_area = False
         self.statuses: dict[int, int] = {}
         self.open: dict[int, None] = {}
         self.open_at: dict[int, int] = {}  # landmark: open frontiers that it is part of
@@ -109,7 +118,9 @@ class Frontiers:
             return False
         else:
             news = False
-        if is_inside(bearings):
+        gap = widest_gap(bearings)
+        self.has_area |= gap <= AREA_GAP_MAX
+        if gap < HALF:
             statuses, left = self.statuses, []
             for each in undecided:
                 i, j, key = each
