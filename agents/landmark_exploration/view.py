@@ -50,6 +50,8 @@ class Slide:
 
     # Ticks for which a hand is kept after the last contact.
     KEEP_TICKS: Final = 15
+    # Ticks for which it is kept at most: in a corner one hand leads from wall to wall for ever.
+    HAND_TICKS_MAX: Final = 60
     # The wanted direction is turned in steps of this size until it leads away from every contact.
     _TURN_RAD: Final = math.radians(12.0)
 
@@ -57,17 +59,19 @@ class Slide:
         self._random = random
         self._hand = 0
         self._until = 0
+        self._hand_until = 0
 
     def along(self, direction_rad: float | None, view: ExplorerView) -> float | None:
         """Return the direction to drive in; None where every direction is blocked."""
         if direction_rad is None or not view.contacts:
             return direction_rad
-        if view.tick >= self._until:
+        if view.tick >= min(self._until, self._hand_until):
             self._hand = 0
         self._until = view.tick + self.KEEP_TICKS
         if self._is_free(direction_rad, view):
             return direction_rad
         if self._hand == 0:
+            self._hand_until = view.tick + self.HAND_TICKS_MAX
             left, right = self._turned(direction_rad, view, 1), self._turned(direction_rad, view, -1)
             if left is None or right is None:
                 return None

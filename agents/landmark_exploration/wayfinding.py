@@ -21,8 +21,10 @@ from zwerm.agents.landmark_exploration.view import ExplorerView
 TRIES_MAX: Final = 30
 # Ticks of walking about between two tries, and where no way is known.
 ASTRAY_TICKS: Final = 15
-# Ticks at the meeting place, and then of walking about: robots whose maps have no landmark in common have two places.
+# Ticks at the meeting place, and then of walking about: robots whose maps have no landmark in common have two places, and a
+# robot may know no way to the place. VISIT_TICKS: of a robot that has frontiers to explore.
 MEETING_TICKS: Final = 1_000
+VISIT_TICKS: Final = 40
 PARTING_TICKS: Final = 200
 
 
@@ -80,15 +82,28 @@ def way_to(map_: LandmarkMap, landmarks: Sequence[int], goal: Sequence[int]) -> 
     return () if best is None else path_to(best[1], before)
 
 
-def meet(view: ExplorerView, map_: LandmarkMap, random: np.random.Generator, idle: Callable[[], float | None]) -> Drive:
-    """Go to the meeting place, stay for a while, walk about as `idle` does, and so on for ever."""
+def visit(view: ExplorerView, map_: LandmarkMap, random: np.random.Generator, ticks: Callable[[], int]) -> Drive:
+    """Go to the meeting place, and stay there for `ticks()` while its landmark is seen."""
+    place = map_.complex.smallest_landmark()
+    if place is None:
+        return "unreached"
+    outcome = yield from navigate(view, map_, (place,), random)
+    arrived = view.tick
+    while place in view.bearing and view.tick - arrived < ticks():
+        yield view.bearing[place]
+    return outcome
+
+
+def meet(
+    view: ExplorerView,
+    map_: LandmarkMap,
+    random: np.random.Generator,
+    idle: Callable[[], float | None],
+    ticks: Callable[[], int],
+) -> Drive:
+    """Go to the meeting place, stay for `ticks()`, walk about as `idle` does, and so on for ever."""
     while True:
-        place = map_.complex.smallest_landmark()
-        if place is not None:
-            yield from navigate(view, map_, (place,), random)
-            until = view.tick + MEETING_TICKS
-            while view.tick < until and place in view.bearing:
-                yield view.bearing[place]
+        yield from visit(view, map_, random, ticks)
         until = view.tick + PARTING_TICKS
         while view.tick < until:
             yield idle()

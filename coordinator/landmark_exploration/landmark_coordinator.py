@@ -27,9 +27,9 @@ from zwerm.agents.landmark_exploration.mapping.cost_utility import (
     nearest_frontier,
 )
 from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, REOPENED, TIMED_OUT, pair_of
-from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.mapping.landmark_map import FAILURES_MAX, LandmarkMap
 from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, columns, write_report
-from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, CentralStrategy, NonNegative, Ticks
+from zwerm.agents.landmark_exploration.parameters import CentralStrategy, NonNegative, Ticks
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BYTES, Entries, TaskReport, Vector
 from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said

@@ -8,11 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
-from zwerm.agents.landmark_exploration.mapping.frontier_status import BOUNDARY, key_of
+from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, BOUNDARY, TIMED_OUT, UNEXPLORED, key_of
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, Register, RegisterBeacon, Vector
-from zwerm.agents.landmark_exploration.sharing.log_entries import ENTRY_BYTES_MAX, observation_entries, status_entries
+from zwerm.agents.landmark_exploration.sharing.log_entries import (
+    ENTRY_BYTES_MAX,
+    failure_entry,
+    observation_entries,
+    status_entries,
+)
 from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
 from zwerm.agents.landmark_exploration.sharing.packing import ORIGINS_END
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
@@ -238,3 +243,27 @@ def test_no_packet_is_longer_than_the_cap_for_any_identifiers(
     said = gossip.tick(1, lambda: Register(me, 300, 10**7, claim, frozen))
     assert {type(each.message) for each in said} == {Entries, Vector, RegisterBeacon}
     assert max(len(messages.write(each.message)) for each in said) <= messages.SMALL_BYTES
+
+
+@given(st.permutations(range(5)))
+def test_failures_of_all_robots_count_together_in_any_order(order: list[int]) -> None:
+    key = key_of(1, 2)
+    stretches = [Stretch(origin, 0, (failure_entry(key),)) for origin in range(5)]
+    seen = BearingSnapshot((1, 2, 3), (0, 10, 20))
+    statuses = []
+    map_ = LandmarkMap()
+    map_.observe(seen)
+    for origin in order:
+        map_.read(stretches[origin], 0)
+        statuses.append(map_.frontiers.statuses[key])
+    assert statuses == [UNEXPLORED, TIMED_OUT, TIMED_OUT, ABANDONED, ABANDONED]
+
+
+def test_registers_tell_how_long_others_were_not_heard() -> None:
+    registers = Registers(150, 1_500, 3)
+    assert registers.last_heard(0) is None
+    for node, tick in ((0, 90), (1, 10), (2, 50)):
+        registers.merge(Register(node, 1, 1), tick)
+    assert registers.last_heard(0) == 50
+    assert registers.is_fresh(0, 60, 51)
+    assert not registers.is_fresh(0, 60, 50)
