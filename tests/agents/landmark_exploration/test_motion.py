@@ -136,7 +136,7 @@ def test_sliding_keeps_its_hand_in_a_corner() -> None:
 def test_no_hand_leads_round_and_round_in_a_corner() -> None:
     """From a corner at the origin a robot wants to go along the left wall: the other hand leads it down into the corner."""
     slide, place = Slide(random()), np.array([0.0, 0.02])
-    slide.along(math.pi, view_with((-math.pi / 2, math.pi), 0))  # the wrong hand, or the right one
+    slide.along(-1.3, view_with((-math.pi / 2,), 0))  # takes the hand that leads down
     for tick in range(1, 200):
         contacts = tuple(
             direction for near, direction in zip(place <= 0.01, (math.pi, -math.pi / 2), strict=True) if near
