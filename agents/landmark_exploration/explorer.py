@@ -53,7 +53,7 @@ AVOID_TICKS: Final = 300
 FRESH_TICKS: Final = 100
 # A robot goes there before its next frontier, too, if it has not heard of any robot for this many ticks, and twice as many
 # after each visit in vain: it might explore what others have explored.
-LONELY_TICKS: Final = 200
+LONELY_TICKS: Final = 400
 # Ticks between two snapshots that a robot reports to observers of the run.
 TELEMETRY_TICKS: Final = 25
 
