@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: the text of the package's page, the links of a source archive, and a C extension.
+"""Parts of the build that pyproject.toml cannot express: the page of the package, links of a source archive, a C extension.
 
 `ZWERM_COMPILE=1` makes a C extension of the one module in which inline swarms spend most of their time (docs/running.md) with
 mypyc, which needs mypy and a C compiler. The source stays the same, and so does every bit of what it computes: products and

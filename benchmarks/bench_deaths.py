@@ -1,4 +1,4 @@
-"""Deaths and restarts in decentralised sensor coverage: whether every run ends by itself, and `completed` is true.
+"""Deaths and restarts in sensor coverage: whether every run ends by itself, and `completed` is true.
 
 Each run has a schedule of faults that is drawn from its seed:
 
@@ -8,12 +8,19 @@ Each run has a schedule of faults that is drawn from its seed:
     restart     one robot crashes, and returns without memory after up to 60 s
     silence     no radio message passes to or from the base for 240 s
 
-The times are drawn over the whole deployment. A run is right if it is `completed` with a reachable coverage of at least
-0.98, and honest if it ends as `failed`. It is wrong if it is `completed` with less, or does not end by itself.
+The times are drawn over the whole deployment. A run is *right* if it is `completed` with a reachable coverage of at least
+0.98, *honest* if it ends as `failed`, and *wrong* if it is `completed` with less or does not end by itself.
+
+With `--rows FILE` each run is stored when it ends, and runs that are stored are not repeated. So a campaign can be
+carried out in parts. Kinds of faults, halls and losses alternate, so each part is a fair sample.
 """
 
 import argparse
-from collections.abc import Sequence
+import csv
+import subprocess
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import msgspec
@@ -42,6 +49,11 @@ HALLS: Final = {
     "medium": Hall(("arena.size_m=[4.4,3.6]", "base.pose=[0.2,1.8,0.0]", "robots.count=60"), 26, 350.0),
 }
 KINDS: Final = ("at-once", "one-by-one", "base", "restart", "silence")
+# Settings of a variant, and the settings that state the fraction of messages that are lost.
+VARIANTS: Final = {
+    "decentralised": (("services.path=gradient",), ("radio.loss",)),
+    "central": ((), ("radio.loss", "uplink.loss")),
+}
 SHARE: Final = 0.1
 # Fewest robots that die one by one: in a small hall a tenth is one robot.
 DEATHS_MIN: Final = 2
@@ -96,38 +108,80 @@ def verdict(result: RunResult) -> str:
     return "honest" if result.outcome == "failed" else "wrong"
 
 
-def one_run(name: str, kind: str, loss: float, seed: int, more: Sequence[str]) -> dict[str, str]:
+class Case(msgspec.Struct, frozen=True):
+    """One run: its variant, its hall, its kind of faults, the fraction of messages that are lost, and its seed."""
+
+    variant: str
+    hall: str
+    faults: str
+    loss: str
+    seed: str
+
+
+def cases(asked: argparse.Namespace) -> Iterator[Case]:
+    """Yield the runs that are asked for, with the seed as the slowest index."""
+    for seed in range(asked.seeds[0], asked.seeds[1] + 1):
+        for loss in asked.loss:
+            for hall in asked.hall:
+                for variant in asked.variant:
+                    for kind in asked.kind:
+                        yield Case(variant, hall, kind, f"{loss:g}", str(seed))
+
+
+def one_run(case: Case, more: Sequence[str]) -> dict[str, str]:
     """Carry out one run, and return its row."""
-    hall = HALLS[name]
-    faults = schedule(kind, hall, seed)
-    settings = [*hall.settings, "services.path=gradient", f"radio.loss={loss}", f"time.duration_s={DURATION_S}", *more]
+    hall, seed = HALLS[case.hall], int(case.seed)
+    faults = schedule(case.faults, hall, seed)
+    variant, losses = VARIANTS[case.variant]
+    settings = [*hall.settings, *variant, f"time.duration_s={DURATION_S}", *(f"{each}={case.loss}" for each in losses)]
     tables = ", ".join("{" + ", ".join(f"{k} = {_toml(v)}" for k, v in each.items()) + "}" for each in faults)
-    result = run("sensor-coverage", seed=seed, runner="inline", overrides=[*settings, f"faults=[{tables}]"])
+    began = time.process_time()
+    result = run("sensor-coverage", seed=seed, runner="inline", overrides=[*settings, *more, f"faults=[{tables}]"])
     found = result.metrics
     return {
-        "hall": name,
-        "faults": kind,
-        "loss": f"{loss:g}",
-        "seed": str(seed),
+        **msgspec.structs.asdict(case),
         "verdict": verdict(result),
         "outcome": result.outcome,
         "reachable_coverage": f"{found['reachable_coverage_fraction']:.4f}",
-        "concluded_early": f"{found['concluded_early']:g}",
+        "concluded_early": f"{found.get('concluded_early', 0.0):g}",
         "robots_released": f"{found.get('robots_released', 0.0):g}",
         "duration_s": f"{found.get('sim_s', result.sim_s):.1f}",
         "reason": result.reason,
         "faults_missed": f"{found['faults_missed']:g}",
         "schedule": tables,
+        "commit": _commit(),
+        "cpu_s": f"{time.process_time() - began:.1f}",
     }
 
 
+def stored(path: Path | None) -> list[dict[str, str]]:
+    """Return the rows of earlier parts of a campaign."""
+    if path is None or not path.exists():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def append(path: Path | None, row: dict[str, str]) -> None:
+    """Add a row to the file of a campaign."""
+    if path is None:
+        return
+    new = not path.exists()
+    with path.open("a", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(row), lineterminator="\n")
+        if new:
+            writer.writeheader()
+        writer.writerow(row)
+
+
 def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
-    """Return one row for each hall, kind of schedule and loss: how many runs were right, honest or wrong."""
-    groups: dict[tuple[str, str, str], list[dict[str, str]]] = {}
+    """Return one row for each variant, hall, kind of schedule and loss: how many runs were right, honest or wrong."""
+    groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
     for row in rows:
-        groups.setdefault((row["hall"], row["faults"], row["loss"]), []).append(row)
+        groups.setdefault((row["variant"], row["hall"], row["faults"], row["loss"]), []).append(row)
     return [
         {
+            "variant": variant,
             "hall": hall,
             "faults": kind,
             "messages lost": loss,
@@ -137,8 +191,15 @@ def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
             "mean duration [s]": f"{np.mean([float(row['duration_s']) for row in group]):.0f}",
             "faults too late": str(sum(row["faults_missed"] != "0" for row in group)),
         }
-        for (hall, kind, loss), group in groups.items()
+        for (variant, hall, kind, loss), group in sorted(groups.items())
     ]
+
+
+def _commit() -> str:
+    done = subprocess.run(
+        ["git", "describe", "--always", "--dirty", "--exclude=*"], capture_output=True, text=True, check=False
+    )
+    return done.stdout.strip()
 
 
 def _toml(value: Any) -> str:
@@ -148,20 +209,25 @@ def _toml(value: Any) -> str:
 def main() -> None:
     """Run every kind of schedule with every seed, print a row each, and how many runs were right."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--variant", choices=VARIANTS, nargs="+", default=["decentralised"])
     parser.add_argument("--hall", choices=HALLS, nargs="+", default=["small"])
     parser.add_argument("--kind", choices=KINDS, nargs="+", default=list(KINDS))
     parser.add_argument("--loss", type=float, nargs="+", default=[0.0])
     parser.add_argument("--seeds", type=int, nargs=2, default=[1, 3], metavar=("FIRST", "LAST"))
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="a setting of the scenario")
+    parser.add_argument("--rows", type=Path, metavar="FILE", help="store each run here, and skip runs that are stored")
+    parser.add_argument("--minutes", type=float, help="begin no run after this processor time [min]")
     add_csv_option(parser)
     asked = parser.parse_args()
-    rows = []
-    for name in asked.hall:
-        for kind in asked.kind:
-            for loss in asked.loss:
-                for seed in range(asked.seeds[0], asked.seeds[1] + 1):
-                    rows.append(one_run(name, kind, loss, seed, asked.set))
-                    print(*rows[-1].values(), sep="\t", flush=True)
+    rows = stored(asked.rows)
+    known = {tuple(row[each] for each in Case.__struct_fields__) for row in rows}
+    for case in cases(asked):
+        if asked.minutes is not None and time.process_time() > 60.0 * asked.minutes:
+            break
+        if msgspec.structs.astuple(case) not in known:
+            rows.append(one_run(case, asked.set))
+            append(asked.rows, rows[-1])
+            print(*rows[-1].values(), sep="\t", flush=True)
     counts = {each: sum(row["verdict"] == each for row in rows) for each in VERDICTS}
     print(f"{len(rows)} runs: " + ", ".join(f"{count} {word}" for word, count in counts.items()))
     write_csv(asked.csv, summary(rows))

@@ -1,6 +1,6 @@
 """Lock-step throughput with robots in processes, compared with a bare Zenoh echo of as many processes and bytes.
 
-Both are measured alternately, many times, because the placement of a hundred processes on cores changes both rates by a
+Both are measured alternately, many times, because the scheduling of a hundred processes on cores changes both rates by a
 quarter. The ratio is the median over adjacent pairs of measurements, with the range of its middle half. The emulator's rate
 includes physics, sensing, encoding, decoding, controllers and trace. Its robots have a higher niceness than the world; the
 last column is the ratio to an echo with the same niceness.

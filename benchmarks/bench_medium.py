@@ -1,8 +1,8 @@
 """Cost of the radio models: 100 robots broadcast at every tick, without models and with five models.
 
-Robots stand, or drive and so change every distance and line of sight at every tick. The kinds of run alternate in this
-process, so that other load slows all of them; the fastest run of each kind counts. Target: five models reduce the robot-ticks
-per second by at most 25 %.
+In half of the runs the robots drive, which changes every distance and line of sight at every tick. The kinds of run
+alternate in this process, so that other load slows all of them; the fastest run of each kind counts. Target: five
+models reduce the robot-ticks per second by at most 25 %.
 """
 
 import argparse

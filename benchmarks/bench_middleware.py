@@ -26,7 +26,7 @@ def main() -> None:
     scenario = load("computation-free-scaling", (f"robots.count={options.robots}", f"time.duration_s={ticks * 0.1}"))
     with LocalSwarm(new_run_id(), node_specs(scenario, 1)) as swarm:
         result = drive(assemble(scenario, 1), swarm.link, 1, "processes")
-        turned_away = swarm.link.refused.total()
+        turned_away = swarm.link.refusals.by_reason.total()
     print(
         f"outcome {result.outcome} after {result.wall_s:,.0f} s, {result.robot_ticks / result.wall_s:,.0f} robot-ticks/s"
     )

@@ -1,8 +1,8 @@
 """Safety of departures that robots negotiate with their neighbours, and comparison with relative H2.
 
-Part 1: random swarms in a square, over a radio that loses, delays, reorders and duplicates packets. Robots crash, restart
-without memory, are moved and return. A checker compares the Betti numbers of the complex before and after each departure. The
-negative control are robots that leave without locks.
+Part 1: random swarms in a square, over a radio that loses, delays, reorders and duplicates packets. Robots crash,
+restart without memory, are moved and return. A checker compares the Betti numbers of the complex before and after each
+departure. The negative control has robots that leave without locks.
 
 Part 2: the number of robots freed in the same swarms by relative H2 with global knowledge, and by negotiation of neighbours.
 """
@@ -255,8 +255,8 @@ def main() -> None:
         for loss in chosen.losses:
             each = Troubled(chosen.robots, seed=chosen.seed, loss=loss, kind=kind)
             each.run(chosen.decisions if kind is LeaveLock else chosen.decisions // 10)
-            told = f"{loss:>6} {each.decisions:>10,} {each.departures:>10,} {each.violations:>17}"
-            print(f"{told} {each.radio.sent / each.decisions:>20.1f}  {kind.__name__}", flush=True)
+            departures_text = f"{loss:>6} {each.decisions:>10,} {each.departures:>10,} {each.violations:>17}"
+            print(f"{departures_text} {each.radio.sent / each.decisions:>20.1f}  {kind.__name__}", flush=True)
             rows.append(
                 {
                     "robots leave": "with locks" if kind is LeaveLock else "without locks (control)",

@@ -1,7 +1,7 @@
-"""How long the coordinator of sensor coverage takes to continue after it was killed and started again without memory.
+"""Time that the coordinator of sensor coverage takes to continue after it was killed and started again without memory.
 
-The coordinator is killed at several times and returns after 3 s. The time is that from its return to the first complex that
-it reports, by the snapshots of the run: it then knows the swarm, and the next push begins.
+The coordinator is killed at several times and returns after 3 s. The time is measured from its return to the first complex that
+it reports, by the snapshots of the run. Then the next push begins.
 """
 
 import argparse

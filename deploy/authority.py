@@ -1,6 +1,6 @@
 """Certificates of a run over a network: an authority of its own, the world's certificate, and one for each node.
 
-Both ends prove who they are (mutual TLS). The common name of a node's certificate is its user name, and access control
+Both ends are authenticated (mutual TLS). The common name of a node's certificate is its user name, and access control
 binds the node's keys to it. The private key of the authority is deleted at once: no node can be added later. The tool
 `openssl` makes the certificates, in a private directory.
 """

@@ -1,4 +1,4 @@
-"""Zenoh endpoints of a run over a network: which are encrypted, and which reach beyond this machine."""
+"""Zenoh endpoints of a run over a network: whether they are encrypted, and whether they are reachable from other machines."""
 
 from collections.abc import Iterable
 from ipaddress import ip_address
@@ -32,7 +32,7 @@ def is_loopback(endpoint: str) -> bool:
 
 
 def check_encryption(endpoints: Iterable[str]) -> None:
-    """Raise LinkError for an endpoint that would send everything readable and changeable beyond this machine."""
+    """Raise LinkError for an endpoint without encryption that other machines can reach."""
     for endpoint in endpoints:
         if not is_encrypted(endpoint) and not is_loopback(endpoint):
             raise LinkError(

@@ -91,7 +91,7 @@ def router_settings(
     return {
         "listen/endpoints": endpoints,
         "listen/exit_on_failure": True,
-        # Connections that say nothing must not keep nodes from joining: many may wait, and none for long.
+        # Silent connections must not prevent nodes from joining: many may wait, each for a short time.
         "transport/unicast/accept_pending": 2 * capacity + PENDING_MAX,
         "transport/unicast/accept_timeout": ACCEPT_TIMEOUT_MS,
         "transport/unicast/max_sessions": 2 * capacity + 100,
@@ -118,7 +118,7 @@ def access_control(credentials: Credentials, mutual: bool = False) -> dict[str, 
 
     With `mutual` TLS a node is known by user name, Zenoh id and the common name of its certificate, all three.
     """
-    # A session publishes only if it knows of a subscriber, so each node may see the world's subscription.
+    # A session publishes only if it has seen a subscriber, so each node may see the world's subscription.
     listens = _allow("world-listens", command_key(credentials.run, EVERY), "declare_subscriber", "egress")
     rules = [listens]
     policies = []

@@ -22,23 +22,28 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 from typing import Any, Final
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.process import main
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.errors import LinkError
 from zwerm.link.peer_radio import Station
 from zwerm.link.session import Credential, Credentials
 
-# Largest number of robots that start at the same time; more slow each other down.
+# Largest number of robots that start at the same time; with more, all start later.
 JOINING_MAX: Final = 16
 JOIN_DEADLINE_S: Final = 60.0
 
 # Seconds without any exit after which the remaining processes get SIGTERM, and then SIGKILL.
-LEAVE_PATIENCE_S: Final = 3.0
-TERMINATE_PATIENCE_S: Final = 2.0
+LEAVE_WAIT_S: Final = 3.0
+TERMINATE_WAIT_S: Final = 2.0
 
 # Open files of this process for each robot: two pipes and the router's end of the connection.
 _FILES_PER_ROBOT: Final = 3
 _FILES_MIN: Final = 16_384
+
+# Bytes of the reports of robots that one read takes, and a bound of the length of a password: a report may be cut in two.
+READ_BYTES: Final = 65_536
+PASSWORD_BYTES_MAX: Final = 128
 
 # The place of the session id in /proc/PID/stat, after the name.
 _SESSION: Final = 3
@@ -99,7 +104,11 @@ class LocalSupervisor:
         *,
         order: Sequence[int] | None = None,
         stations: Mapping[int, Station] | None = None,
+        confinement: Confinement = UNCONFINED,
     ) -> None:
+        """Raises LinkError where this machine cannot confine robots so."""
+        confinement.check()
+        self._confinement = confinement
         self._endpoint = endpoint
         self._run = credentials.run
         self._terms = credentials.terms
@@ -164,27 +173,27 @@ class LocalSupervisor:
         """Send a signal to one robot, such as SIGSTOP and SIGCONT."""
         os.kill(self.pids[node], number)
 
-    def wait(self, patience_s: float | None = None) -> bool:
+    def wait(self, wait_s: float | None = None) -> bool:
         """Wait until all robots have ended, or none ends for `patience_s` seconds. Return whether all have ended."""
         alive: dict[Any, ForkServerProcess] = {process.sentinel: process for process in self._alive()}
         while alive:
-            ended = wait(list(alive), patience_s)
+            ended = wait(list(alive), wait_s)
             if not ended:
                 return False
             for sentinel in ended:
                 alive.pop(sentinel).join()
         return True
 
-    def stop(self, patience_s: float = 0.0) -> None:
+    def stop(self, wait_s: float = 0.0) -> None:
         """End all robots: wait as `wait` does, then send SIGTERM, then SIGKILL. Idempotent."""
         with interrupts_held():
-            if not self.wait(patience_s):
+            if not self.wait(wait_s):
                 for process in self._alive():
                     process.terminate()
-                if not self.wait(TERMINATE_PATIENCE_S):
+                if not self.wait(TERMINATE_WAIT_S):
                     for process in self._alive():
                         process.kill()
-                    self.wait(LEAVE_PATIENCE_S)
+                    self.wait(LEAVE_WAIT_S)
             self._end_children(list(self._processes.values()))
 
     def _end_children(self, ended: Sequence[ForkServerProcess]) -> None:
@@ -200,9 +209,13 @@ class LocalSupervisor:
         return [process for process in self._processes.values() if process.exitcode is None]
 
     def _launch(self, credentials: Sequence[Credential], deadline_s: float) -> Iterator[int]:
-        """Start a process for each of `credentials`, and yield each node's id once it has joined."""
+        """Start a process for each of `credentials`, and yield each node's id once it has joined.
+
+        A robot reports with its password, because its controller could write to the same pipe: it cannot report for others.
+        """
         waiting = deque(credentials)
         missing: dict[int, tuple[ForkServerProcess, float]] = {}
+        heard = b""
         reader, writer = self._context.Pipe(duplex=False)
         with reader, writer:
             while waiting or missing:
@@ -215,9 +228,11 @@ class LocalSupervisor:
                 sentinels = [process.sentinel for process, _ in missing.values()]
                 ready = wait([reader, *sentinels], max(0.0, end_s - time.monotonic()))
                 if reader in ready:  # before the sentinels: a joined robot may have ended since
-                    node = int(reader.recv_bytes())
-                    del missing[node]
-                    yield node
+                    heard += os.read(reader.fileno(), READ_BYTES)
+                    for node in [node for node in missing if self._credentials[node].password.encode() in heard]:
+                        del missing[node]
+                        yield node
+                    heard = heard[-PASSWORD_BYTES_MAX:]
                     continue
                 for process, _ in missing.values():
                     if process.sentinel in ready:
@@ -231,6 +246,7 @@ class LocalSupervisor:
             args=(
                 *(self._run, credential, self._endpoint, self._terms, deadline_s, joined),
                 self._stations.get(credential.node),
+                self._confinement,
             ),
             name=f"node {credential.node}",
             daemon=True,

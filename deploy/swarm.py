@@ -18,6 +18,7 @@ from typing import NamedTuple, Self
 
 import msgspec
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import code_of
 from zwerm.deploy.authority import certify
@@ -26,7 +27,7 @@ from zwerm.deploy.identity import WorldIdentity, WorldKeys, issue, renew, router
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.deploy.supervisor import (
     JOIN_DEADLINE_S,
-    LEAVE_PATIENCE_S,
+    LEAVE_WAIT_S,
     LocalSupervisor,
     Progress,
     interrupts_held,
@@ -40,6 +41,9 @@ from zwerm.link.world_link import ZenohWorldLink
 from zwerm.wire.messages import encode
 
 Members = Mapping[int, tuple[str, Setup]]
+
+# Called with the node (or -1) and the reason of each refusal by the link.
+RefusalListener = Callable[[int, str], object]
 
 # From a node's id and incarnation to its controller and Setup.
 RestartSpec = Callable[[int, int], tuple[str, Setup]]
@@ -64,8 +68,17 @@ class _Swarm(ABC):
     link: ZenohWorldLink
     credentials: Credentials
 
-    def __init__(self, run: str, members: Members, progress: Progress | None, deadline_s: float, paced: bool) -> None:
+    def __init__(
+        self,
+        run: str,
+        members: Members,
+        progress: Progress | None,
+        deadline_s: float,
+        paced: bool,
+        on_refusal: RefusalListener | None,
+    ) -> None:
         self._run = run
+        self._on_refusal = on_refusal
         self._paced = paced
         self._members = members
         self._progress = progress or (lambda joined, total: None)
@@ -100,6 +113,8 @@ class _Swarm(ABC):
             self.link = ZenohWorldLink(self._run, members, settings)
         finally:
             passwords.unlink()
+        if self._on_refusal is not None:
+            self.link.refusals.listener = self._on_refusal
         self._stack.callback(self.link.close)
 
     def _member(self, credential: Credential) -> ExpectedNode:
@@ -132,19 +147,22 @@ class LocalSwarm(_Swarm):
         late_joiners: Collection[int] = (),
         restart: RestartSpec | None = None,
         stations: Mapping[int, Station] | None = None,
+        on_refusal: RefusalListener | None = None,
+        confinement: Confinement = UNCONFINED,
     ) -> None:
         """`order` is the order of starting, `deadline_s` the time each process has to join, `paced` means real time.
 
         The nodes `late_joiners` start only when `start` is called. `restart` returns the controller and Setup of a node's
         next incarnation; without it they stay the same. Nodes in `stations` send packets over a real network.
         """
-        super().__init__(run, members, progress, deadline_s, paced)
+        super().__init__(run, members, progress, deadline_s, paced, on_refusal)
         self._order = [node for node in (members if order is None else order) if node not in late_joiners]
         self._restart = restart
+        self._confinement = confinement
         self._stations = stations
         self._ran = set(self._order)
         self._stopped: set[int] = set()
-        self._patience_s = 0.0  # do not wait for nodes that have not joined
+        self._exit_wait_s = 0.0  # do not wait for nodes that have not joined
 
     def _open(self, directory: Path) -> None:
         prepare(len(self._members))
@@ -152,12 +170,14 @@ class LocalSwarm(_Swarm):
         self.credentials = issue(self._run, self._members)
         self._listen(directory, [endpoint])
         self._current = {credential.node: credential for credential in self.credentials.nodes}
-        self.supervisor = LocalSupervisor(endpoint, self.credentials, order=self._order, stations=self._stations)
+        self.supervisor = LocalSupervisor(
+            endpoint, self.credentials, order=self._order, stations=self._stations, confinement=self._confinement
+        )
         self._stack.callback(self._end)
 
     def _gather(self) -> None:
         self.supervisor.start(self._progress, self._deadline_s)
-        self._patience_s = LEAVE_PATIENCE_S
+        self._exit_wait_s = LEAVE_WAIT_S
 
     def kill(self, node: int) -> None:
         """Kill a node with SIGKILL. The link then reports the node lost."""
@@ -198,7 +218,7 @@ class LocalSwarm(_Swarm):
         self._start_next_incarnation(node)
 
     def _start_next_incarnation(self, node: int) -> None:
-        self.link.wait_joined(lambda joined: node not in joined, LEAVE_PATIENCE_S)
+        self.link.wait_joined(lambda joined: node not in joined, LEAVE_WAIT_S)
         credential = renew(self._current[node])
         if self._restart is not None:
             self._members = {**self._members, node: self._restart(node, credential.incarnation)}
@@ -210,7 +230,7 @@ class LocalSwarm(_Swarm):
         for node in sorted(self._stopped):
             self.resume(node)
         self.link.dismiss("the run is over")
-        self.supervisor.stop(self._patience_s)
+        self.supervisor.stop(self._exit_wait_s)
 
 
 class RemoteSwarm(_Swarm):
@@ -234,13 +254,14 @@ class RemoteSwarm(_Swarm):
         progress: Progress | None = None,
         deadline_s: float = JOIN_DEADLINE_S,
         paced: bool = False,
+        on_refusal: RefusalListener | None = None,
     ) -> None:
         """`listen` are Zenoh endpoints, such as `tls/0.0.0.0:7447`. All nodes must join within `deadline_s`.
 
         `names` are further host names and addresses of this machine, for its certificate. A node is lost if its
         connection is silent for `lease_s`. Exactly one of `credentials_file` and `keys` is needed.
         """
-        super().__init__(run, members, progress, deadline_s, paced)
+        super().__init__(run, members, progress, deadline_s, paced, on_refusal)
         self._endpoints = list(listen)
         self._credentials_file = credentials_file
         self._keys = keys
@@ -293,7 +314,7 @@ class RemoteSwarm(_Swarm):
     def _end(self) -> None:
         self.link.dismiss("the run is over")
         count = len(self.link.joined)
-        while count and self.link.wait_joined(partial(_changed, count), LEAVE_PATIENCE_S):
+        while count and self.link.wait_joined(partial(_changed, count), LEAVE_WAIT_S):
             count = len(self.link.joined)
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
+import tomli_w
 import typer
 from _objects import object_fields, public_names
 from pydantic import BaseModel
@@ -50,7 +51,7 @@ Schema = dict[str, Any]
 
 
 def in_words(schema: Schema) -> str:
-    """Return what a schema allows, for a person: `number > 0`, `[number, number]`, `array of string`."""
+    """Return the values that a schema allows, in words: `number > 0`, `[number, number]`, `array of string`."""
     if "$ref" in schema:
         return "table"
     if "anyOf" in schema:
@@ -181,7 +182,7 @@ def built_in_scenarios() -> str:
 
 
 def sensor_list() -> str:
-    """Return every built-in sensor: what it is, what it fills and what it takes."""
+    """Return every built-in sensor: description, field of the observation and parameters."""
     parts = []
     for kind, found in ((kind, sensors.find(kind)) for kind in SENSORS):
         module = inspect.getmodule(found)
@@ -189,20 +190,21 @@ def sensor_list() -> str:
         parts.append(f"{heading(f'`{kind}`', 'sensor-' + kind.replace('_', '-'))}\n\n{paragraphs(text)}")
         parts.append(f"Fills `{found.field}` of the observation.")
         parts.append(rows(found.Parameters.model_json_schema()))
+        parts += _example("robots.sensors", kind, found)
     return "\n\n".join(parts)
 
 
 def radio_models() -> str:
-    """Return every radio model: what it is, its cause, and its parameters."""
-    return _kinds({kind: radio.find(kind) for kind in RADIO_MODELS}, RadioModelTable)
+    """Return every radio model: description, cause and parameters."""
+    return _kinds({kind: radio.find(kind) for kind in RADIO_MODELS}, RadioModelTable, "radio.models")
 
 
 def fault_list() -> str:
     """Return every kind of fault and its parameters."""
-    return _kinds({kind: faults.find(kind) for kind in FAULTS}, FaultTable)
+    return _kinds({kind: faults.find(kind) for kind in FAULTS}, FaultTable, "faults")
 
 
-def _kinds(kinds: Mapping[str, type[Any]], base: type[BaseModel]) -> str:
+def _kinds(kinds: Mapping[str, type[Any]], base: type[BaseModel], array: str) -> str:
     parts = []
     for kind, found in kinds.items():
         schema = found.Parameters.model_json_schema()
@@ -213,11 +215,19 @@ def _kinds(kinds: Mapping[str, type[Any]], base: type[BaseModel]) -> str:
             parts.append(f"Drops for `{cause}`.")
         if own:
             parts.append(rows(schema | {"properties": own}))
+        parts += _example(array, kind, found)
     return "\n\n".join(parts)
 
 
+def _example(array: str, kind: str, found: type[Any]) -> list[str]:
+    """Return the example of a plug-in as an item of the array of tables `array` of a scenario, where it has one."""
+    example = getattr(found, "example", {})
+    table = tomli_w.dumps({"kind": kind, **example}).strip()
+    return [f'```toml title="Part of a scenario"\n[[{array}]]\n{table}\n```'] if example else []
+
+
 def field_list() -> str:
-    """Return every kind of scalar field and what it takes."""
+    """Return every kind of scalar field and its parameters."""
     parts = []
     for kind, found in ((kind, fields.find(kind)) for kind in FIELDS):
         parts.append(f"{heading(f'`{kind}`', f'field-{kind}')}\n\n{paragraphs(found.__doc__)}")
@@ -226,12 +236,12 @@ def field_list() -> str:
 
 
 def controller_list() -> str:
-    """Return every built-in controller and what it takes."""
+    """Return every built-in controller and its parameters."""
     return "\n\n".join(_controller(f"`{name}`", f"controller-{name}", name) for name in names(ROBOT))
 
 
 def part_list() -> str:
-    """Return every built-in base station and coordinator and what it takes."""
+    """Return every built-in base station and coordinator, and their parameters."""
     return "\n\n".join(
         _controller(f"`{name}`, {role}", f"{role}-{name}", where)
         for role in (BASE, COORDINATOR)

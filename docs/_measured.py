@@ -107,7 +107,7 @@ def caption(found: Measurement, to_store: str) -> str:
     parts = [counted, _meaning(found), found.plan.get("note", "")]
     where = f"commit `{origin['commit']}`, {origin['date']}, {origin['machine']}"
     if origin["source"] == RECORDED:
-        where = f"recorded in the documentation at {where}"
+        where = f"at the earlier {where}, and not measured again since"
     command = origin["command"]
     if len(command) > COMMAND_LENGTH_MAX:
         command = f"python docs/measure.py {found.name}"

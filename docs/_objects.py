@@ -1,6 +1,6 @@
 """The parts of the documentation about public classes: every public name, and the fields of those that users read.
 
-What a field means is the comment behind it in the source.
+The meaning of a field is the comment behind it in the source.
 """
 
 import inspect

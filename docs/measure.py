@@ -99,7 +99,7 @@ def shown(plan: Mapping[str, Any], seeds: str | None) -> str:
     return shlex.join(["zwerm", *plan["command"], *(["--seeds", seeds] if seeds else [])])
 
 
-# --- what ran, and where --------------------------------------------------------------------------------------------
+# --- commit, machine and versions --------------------------------------------------------------------------------------------
 
 
 def commit_now(*folders: str) -> str:

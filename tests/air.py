@@ -6,14 +6,19 @@ from typing import Any
 import numpy as np
 from support import scenario
 
+from zwerm.catalogue import RADIO_MODELS
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Packet, Transmission
 from zwerm.world.arena.arena import Arena
 from zwerm.world.radio.medium import Medium
+from zwerm.world.radio.registry import find
 from zwerm.world.scene import Scene
 
 DT_S = 0.1
+
+# A table of each radio model of the catalogue, by kind.
+EXAMPLES: dict[str, dict[str, Any]] = {kind: {"kind": kind, **find(kind).example} for kind in RADIO_MODELS}
 
 
 class Radio:

@@ -5,12 +5,15 @@ from typing import Any
 
 import numpy as np
 import shapely
+import shapely.affinity
 from shapely.geometry import MultiPolygon, Point, Polygon
 
 # The free space is opened by a disc a little larger than the body: no gap through which it fits by a hair only.
 OPENING_M = 0.3
 SPACING_M = 0.95
 ORIGIN_M = 0.37
+# The distance of the rows in which robots start where there is no room for one row.
+ROW_M = 0.8
 
 
 def random_arena(seed: int, robots: int) -> tuple[dict[str, Any], list[list[float]]]:
@@ -60,6 +63,8 @@ def start_line(
 ) -> list[list[float]] | None:
     """Return poses in a row, each near a slice of its own, or None where there is no room for such a row."""
     inner = free.buffer(-0.3)
+    if inner.is_empty:
+        return None
     xmin, ymin, xmax, ymax = inner.bounds
     for _ in range(200):
         first = math.ceil((random.uniform(xmin, xmax) - origin_m) / SPACING_M)
@@ -68,3 +73,19 @@ def start_line(
         if all(inner.contains(Point(place)) for place in places):
             return [[round(x, 3), round(y, 3), 0.0] for x, y in places]
     return None
+
+
+def start_group(random: np.random.Generator, free: Polygon, robots: int, origin_m: float) -> list[list[float]]:
+    """Return poses with random headings: in one row if there is room for it, else in as few rows as possible."""
+    for rows in range(1, robots + 1):
+        columns = math.ceil(robots / rows)
+        line = start_line(random, free.intersection(_moved_down(free, rows)), columns, origin_m)
+        if line is not None:
+            places = [(x, y + ROW_M * row) for row in range(rows) for x, y, _ in line][:robots]
+            return [[x, round(y, 3), round(float(random.uniform(-math.pi, math.pi)), 3)] for x, y in places]
+    raise ValueError(f"no room for {robots} robots")
+
+
+def _moved_down(free: Polygon, rows: int) -> Polygon:
+    """Return the places above which there is room for so many rows."""
+    return shapely.intersection_all([shapely.affinity.translate(free, 0.0, -ROW_M * row) for row in range(rows)])

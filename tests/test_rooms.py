@@ -142,12 +142,42 @@ def test_a_generic_file_that_names_an_algorithm_is_found() -> None:
     assert not is_generic(Path("world/metrics/sensor_coverage.py"))
 
 
-def test_no_folder_has_more_files_than_a_reader_can_oversee() -> None:
+def foreign_imports(module: str, imported: set[str]) -> list[str]:
+    """Return what a module of `world/metrics` imports of agents, but for the package that bears its name."""
+    own = f"zwerm.agents.{module.rpartition('.')[2]}"
+    agents = [each for each in sorted(imported) if each.startswith("zwerm.agents")]
+    return [each for each in agents if each != own and not each.startswith(f"{own}.")]
+
+
+def test_a_metric_imports_the_messages_of_its_own_algorithm_only() -> None:
+    metrics = {name: imported for name, imported in GRAPH.items() if name.startswith("zwerm.world.metrics.")}
+    assert len(metrics) > 5
+    assert {name: found for name, imported in metrics.items() if (found := foreign_imports(name, imported))} == {}
+    own = {"zwerm.agents.robot_teams.facts", "zwerm.world.scene"}
+    assert foreign_imports("zwerm.world.metrics.robot_teams", own) == []
+    assert foreign_imports("zwerm.world.metrics.sight", own) == ["zwerm.agents.robot_teams.facts"]
+
+
+def classes_of(tree: ast.AST) -> list[str]:
+    """Return the names of the classes of a file, those inside classes and functions too."""
+    return [node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+
+
+def test_no_two_classes_share_a_name() -> None:
+    counts = Counter(
+        name for path in MODULES.values() for name in classes_of(ast.parse((ROOT / path).read_text(encoding="utf-8")))
+    )
+    assert counts.total() > 400
+    assert [name for name, count in counts.items() if count > 1] == []
+    assert classes_of(ast.parse("class A:\n    class B: pass\nclass A: pass")) == ["A", "A", "B"]
+
+
+def test_no_folder_has_more_than_fifteen_files() -> None:
     counts = Counter(str(path.parent) for path in MODULES.values() if path.name != "__init__.py")
     assert {folder: count for folder, count in counts.items() if count > FILES_MAX} == {}
 
 
-def test_no_module_imports_itself_around_a_corner_also_not_for_types() -> None:
+def test_no_import_cycle_exists_also_not_for_types() -> None:
     assert cycles(GRAPH) == []
     assert cycles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
 
@@ -179,6 +209,20 @@ def test_no_two_files_that_may_be_open_at_once_share_a_name() -> None:
     twice = {name for name, count in counts.items() if count > 1}
     assert twice - SHARED_NAMES.keys() - algorithms == set()
     assert SHARED_NAMES.keys() <= twice
+
+
+def test_every_room_has_its_tests_in_the_folder_of_its_name() -> None:
+    folders: set[str] = set()
+    for path in MODULES.values():
+        folder = path.parent.parts
+        if folder[0] == "zwerm":
+            folder = folder[1:]
+        if folder and folder[0] not in ("world", "agents", "coordinator"):
+            folders.add("/".join(folder[:2]) if folder[0] == "deploy" else folder[0])
+        elif len(folder) > 1:
+            folders.add("/".join(folder[:2]))
+    assert len(folders) > 25
+    assert [each for each in sorted(folders) if not list((ROOT / "tests" / each).glob("**/test_*.py"))] == []
 
 
 def test_every_class_of_the_catalogue_exists() -> None:

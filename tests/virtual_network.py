@@ -8,7 +8,6 @@ killed or hang, and a program may return.
 import heapq
 import itertools
 import random
-from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -21,6 +20,7 @@ from zwerm.link import Arrival
 from zwerm.link.admission import Admission, ExpectedNode
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import Hello
+from zwerm.wire.refusals import Refusals
 from zwerm.world.drivers import lockstep, realtime
 
 LEASE_S = 10.0
@@ -44,12 +44,12 @@ class VirtualTime:
 class VirtualNetwork:
     """The world's end of a simulated network to all nodes of a scenario, with random latencies and the failures asked for.
 
-    `lost_at` is the time at which each node was reported lost, `refused` counts messages and returns that were refused.
+    `lost_at` is the time at which each node was reported lost, `refusals` counts refused messages and refused returns.
     """
 
     def __init__(self, scenario: Scenario, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 0.0
-        self.refused: Counter[str] = Counter()
+        self.refusals = Refusals()
         self.lost_at: dict[int, float] = {}
         self._random = random.Random(seed)
         self._events: list[tuple[float, int, Callable[[], None]]] = []
@@ -84,7 +84,7 @@ class VirtualNetwork:
                 return  # cut again meanwhile
             self._cut.pop(node, None)
             if node not in self.admission.joined:
-                self.refused[self.admission.greet(node, Hello(node, 1))] += 1
+                self.refusals.count(node, self.admission.greet(node, Hello(node, 1)))
 
         self._at(at_s, begin)
         for node in nodes:
@@ -171,7 +171,7 @@ class VirtualNetwork:
 
     def _receive(self, node: int, payload: bytes) -> None:
         if node not in self.admission.joined:
-            self.refused["not-joined"] += 1
+            self.refusals.count(node, "not-joined")
         elif self._cut.get(node, 0.0) > self.now:
             self._later("in", node, lambda: self._receive(node, payload))
         else:

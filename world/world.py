@@ -5,8 +5,8 @@ One tick is, in this order:
 1. `begin`: faults of tick t_k take effect.
 2. `observe`: sense at t_k, for the nodes that are awake; the driver sends the observations.
 3. `precompute`: work ahead while the nodes compute.
-4. `accept`: take each answer; `awaited` are the nodes whose command is still missing. 5. `advance`: apply the commands
-in id order, give their packets to the radio, and move the bodies to t_k+1.
+4. `accept`: take each answer; `awaited` are the nodes whose command is still missing.
+5. `advance`: apply the commands in id order, give their packets to the radio, and move the bodies to t_k+1.
 
 A driver decides when to advance. In lock-step that is when all nodes have answered, in real time by the clock. `ending`
 informs the driver when the run is over.
@@ -45,7 +45,7 @@ from zwerm.world.tick.wakes import WakeEvent, Wakes
 Send = Callable[[int, bytes], object]
 
 
-# A node with this many refused messages is given up: a sound program has none, and each costs the world time.
+# A node with this many refused messages has crashed: a correct program has none, and each costs the world time.
 FLOOD: Final = 1_000
 
 
@@ -75,7 +75,7 @@ class World:
         self.on_flood: Callable[[int], object] = lambda node: None  # stops the messages of a node that floods the world
         self.place_of: Callable[[int], str] = lambda node: (
             ""
-        )  # where a node's controller answers: " (file.py:12, in C.step)"
+        )  # the place of a node's controller: " (file.py:12, in C.step)"
         self._sensing = Sensing(sensors)
         clock = scenario.robots.clock
         self.clocks = None if clock is None else Clocks(clock, robots, nodes, draws)
@@ -150,13 +150,13 @@ class World:
         Raises ProtocolError, and counts its reason, for a stray message; the node is still awaited then. A controller that
         raised has crashed. So has one whose answer is refused: it gives no other.
         """
-        if node in self.status.crashed:  # a program that the run has given up acts for no body
-            self.intake.note_refusal(node, "crashed")
+        if node in self.status.crashed:  # a program that has crashed controls no body any more
+            self.intake.refusals.count(node, "crashed")
             raise ProtocolError("crashed", f"node {node} crashed at tick {self.status.crash_ticks[node]}")
         try:
             answer = self.intake.accept(node, payload, late_allowed)
         except ProtocolError as error:
-            if self.intake.refused_by[node].total() == FLOOD:
+            if self.intake.refusals.of_node(node) == FLOOD:
                 self.bodies.advance_early()
                 self.crash(node, f"flood: {FLOOD} of its messages were refused, the last one as {error}")
                 self.on_flood(node)
@@ -216,7 +216,7 @@ class World:
 
     def refuse_stale(self, node: int) -> None:
         """Count a message that a former incarnation of a node sent."""
-        self.intake.note_refusal(node, "stale-incarnation")
+        self.intake.refusals.count(node, "stale-incarnation")
 
     # --- the truth --------------------------------------------------------------------------------------------------
 

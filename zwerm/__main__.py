@@ -1,4 +1,5 @@
-"""`zwerm` and `python -m zwerm`. Says before anything is loaded what Ctrl-C means: loading takes a while, too."""
+"""`zwerm` and `python -m zwerm`. It defines the effect of Ctrl-C before it loads anything, because loading takes
+time."""
 
 import sys
 

@@ -24,8 +24,9 @@ COORDINATOR: Final[Role] = "coordinator"
 class Variant:
     """The controllers that provide one combination of an algorithm's services.
 
-    `services` has one provider for each service of the algorithm. Controllers that are not named here are the algorithm's
-    own. `decides` is the role that ends the run. A variant with `coordinator=False` runs without that process.
+    `services` has one provider for each service of the algorithm. Controllers that are not named here are the
+    algorithm's own. `decides` is the role that ends the run. A variant with `coordinator=False` runs without that
+    process.
     """
 
     services: Mapping[str, str]
@@ -40,8 +41,9 @@ class Variant:
 class Algorithm:
     """One algorithm: its controllers by the name that a scenario uses, and all that comes with it.
 
-    `variants` are tried in order: the first that agrees with the services a scenario names is taken. `metrics` are measured
-    and `layers` drawn in every run of these controllers. `scenarios` and `studies` are patterns of file names.
+    `variants` are tried in order: the first that agrees with the services a scenario names is taken. `metrics` are
+    measured and `layers` drawn in every run of these controllers. `scenarios` and `studies` are patterns of file names.
+    `reactive` names, by controller, the function that returns the wheel speeds of a robot in a batch (`zwerm.evolve.batch`).
     """
 
     name: str
@@ -53,6 +55,7 @@ class Algorithm:
     metrics: Sequence[str] = ()
     layers: Sequence[str] = ()
     scenarios: Sequence[str] = ()
+    reactive: Mapping[str, str] = field(default_factory=dict)
 
 
 _SENSOR_COVERAGE: Final = "zwerm.agents.sensor_coverage"
@@ -70,7 +73,8 @@ _DECENTRALISED: Final[Controllers] = {
 
 
 def _decentralised(redundancy: str, coordinator: bool = False) -> Variant:
-    """Return the variant of sensor coverage in which neighbours find the path, and `redundancy` the redundant robots."""
+    """Return the variant of sensor coverage in which neighbours find the path, and `redundancy` the redundant
+    robots."""
     services = {"path": "gradient", "redundancy": redundancy}
     return Variant(services, BASE, _DECENTRALISED, coordinator, radio=True, stations_max=1)
 
@@ -156,6 +160,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             }
         },
         scenarios=("computation-free*",),
+        reactive={"computation-free": "zwerm.agents.computation_free.reactive:wheel_fractions"},
     ),
     Algorithm(
         name="robot_teams",
@@ -209,6 +214,8 @@ COMMANDS: Final = {
     "shrink": "zwerm.cli.commands.shrink_command:shrink",
     "study": "zwerm.cli.commands.study_command:study",
     "compare": "zwerm.cli.commands.compare_command:compare",
+    "merge": "zwerm.cli.commands.merge_command:merge",
+    "evolve": "zwerm.cli.commands.evolve_command:evolve",
 }
 
 SENSORS: Final = {
@@ -281,7 +288,7 @@ METRICS: Final = {
 }
 
 
-# Layers of the pictures of every run, each of which applies only where it is asked for.
+# Layers that every picture may have. A layer draws only if the scenario or the command asks for it.
 PICTURE_LAYERS: Final = (
     "zwerm.view.layers.radio_links:RadioLinks",
     "zwerm.view.layers.telemetry_colours:TelemetryColours",

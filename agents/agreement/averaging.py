@@ -1,4 +1,4 @@
-"""Average consensus: every robot moves its value towards the mean of the values that it hears.
+"""Average consensus: every robot moves its value towards the mean of the values that it receives.
 
 With symmetric links and enough steps all values become equal (Olfati-Saber, Fax, Murray 2007). Each part of a partitioned swarm
 agrees on a value of its own; after the partition they agree again. Lost packets move the common value.
@@ -18,7 +18,7 @@ _LAYOUT: Final = Layout(">d")
 
 
 class AveragingTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """The size of a step towards the mean of the values heard, and the ticks between two broadcasts."""
+    """The size of a step towards the mean of the values received, and the ticks between two broadcasts."""
 
     gain: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.3
     every_ticks: Annotated[int, Meta(ge=1)] = 1
@@ -35,16 +35,16 @@ class Averaging(Controller):
         self.refused = 0
 
     def step(self, observation: Observation) -> Command:
-        """Move towards the mean of the values heard, and broadcast the own value."""
-        heard = []
+        """Move towards the mean of the values received, and broadcast the own value."""
+        received = []
         for packet in observation.inbox:
             try:
-                heard.append(_LAYOUT.unpack(unseal(packet.payload))[0])
+                received.append(_LAYOUT.unpack(unseal(packet.payload))[0])
             except ProtocolError:
                 self.refused += 1
         table: Any = self.parameters
-        if heard:
-            self.value += table.gain * (sum(heard) / len(heard) - self.value)
+        if received:
+            self.value += table.gain * (sum(received) / len(received) - self.value)
         outbox: tuple[Transmission, ...] = ()
         if observation.tick % table.every_ticks == 0:
             frame = seal(_LAYOUT.pack(self.value))

@@ -4,10 +4,10 @@ A candidate asks all robots, and stamps the request with its own clock. A robot 
 for `lease_s` and answers with the candidate's stamp. With answers from a majority, itself included, the candidate leads until
 `lease_s - margin_s` after its stamp, by its own clock. It renews the lease while it leads.
 
-Every end is measured by the clock of the robot that waits for it, from a moment of its own. So offsets of clocks do no
-harm, and drift does none while both clocks together gain less than `margin_s` in a lease. With `absolute` a promise ends
-instead when the robot's clock reads the candidate's stamp plus `lease_s`: that is wrong where clocks have offsets, and
-there can be two leaders at a time.
+Each robot measures the end of a lease or promise with its own clock, from a time of its own. So offsets of clocks have no
+effect, and drift has none while both clocks together gain less than `margin_s` in a lease. With `absolute` a promise ends
+when the robot's clock reads the candidate's stamp plus `lease_s`. That is wrong if clocks have offsets: there can be two
+leaders at a time.
 """
 
 from struct import Struct as Layout
@@ -30,7 +30,7 @@ _NEVER_S: Final = float("-inf")
 class LeaseTable(Struct, frozen=True, forbid_unknown_fields=True):
     """`swarm` robots take part. A candidate waits up to `backoff_s` before it asks, and renews after `renew_s`.
 
-    `margin_s` is what a leader gives up of each lease. `absolute` has promises end at a time of the candidate's clock.
+    A leader leads for `margin_s` less than its lease. With `absolute` promises end at a time of the candidate's clock.
     """
 
     swarm: Annotated[int, Meta(ge=1)]
@@ -41,8 +41,9 @@ class LeaseTable(Struct, frozen=True, forbid_unknown_fields=True):
     absolute: bool = False
 
 
-class _Message(NamedTuple):
-    """A request or a promise: `candidate` is whom it concerns, `stamp_s` the time of the request by the candidate's clock."""
+class _LeaseMessage(NamedTuple):
+    """A request or a promise: `candidate` is the robot to support, `stamp_s` the time of the request by the candidate's
+    clock."""
 
     kind: int
     sender: int
@@ -51,7 +52,7 @@ class _Message(NamedTuple):
 
 
 class LeaderLease(Controller):
-    """Asks for a lease when it knows of no leader, and leads while it holds one."""
+    """Requests a lease if it has promised support to no robot, and leads while it holds one."""
 
     Parameters: ClassVar[type[Struct]] = LeaseTable
 
@@ -66,7 +67,7 @@ class LeaderLease(Controller):
         self._ask_at_s: float | None = None
 
     def step(self, observation: Observation) -> Command:
-        """Take in requests and promises, and ask if it is time."""
+        """Receive requests and promises, and send a request if it is due."""
         now_s = observation.time_s  # by this robot's clock
         answers = []
         for packet in observation.inbox:
@@ -74,28 +75,28 @@ class LeaderLease(Controller):
             if message is None:
                 continue
             if message.kind == _REQUEST and self._promise(message, now_s):
-                answers.append(_Message(_PROMISE, self.setup.node, message.candidate, message.stamp_s))
+                answers.append(_LeaseMessage(_PROMISE, self.setup.node, message.candidate, message.stamp_s))
             elif message.kind == _PROMISE:
                 self._count(message)
         if self._is_time(now_s):
             self._stamp_s = now_s
             self._supporters = {}
-            request = _Message(_REQUEST, self.setup.node, self.setup.node, now_s)
+            request = _LeaseMessage(_REQUEST, self.setup.node, self.setup.node, now_s)
             if self._promise(request, now_s):
                 answers.append(request)
-                self._count(_Message(_PROMISE, self.setup.node, self.setup.node, now_s))
+                self._count(_LeaseMessage(_PROMISE, self.setup.node, self.setup.node, now_s))
         sent = [Transmission(channel, seal(_LAYOUT.pack(*each))) for channel in self.setup.channels for each in answers]
         return Command(outbox=tuple(sent), telemetry={"leader": now_s < self._leads_until_s})
 
-    def _decoded(self, payload: bytes) -> _Message | None:
-        """Return a message, or None for what is none."""
+    def _decoded(self, payload: bytes) -> _LeaseMessage | None:
+        """Return the message in a packet, or None if there is none."""
         try:
-            return _Message(*_LAYOUT.unpack(unseal(payload)))
+            return _LeaseMessage(*_LAYOUT.unpack(unseal(payload)))
         except (ProtocolError, LayoutError):
             self.refused += 1
             return None
 
-    def _promise(self, request: _Message, now_s: float) -> bool:
+    def _promise(self, request: _LeaseMessage, now_s: float) -> bool:
         """Promise support to a candidate, unless another promise is in force; return whether it was promised."""
         if now_s < self._promised_until_s and self._promised_to != request.candidate:
             if not self._yields_to(request.candidate, now_s):
@@ -108,14 +109,14 @@ class LeaderLease(Controller):
         return True
 
     def _yields_to(self, candidate: int, now_s: float) -> bool:
-        """Return whether this robot is a candidate without a lease, and gives way to another one: the smaller id goes first.
+        """Return whether this robot is a candidate without a lease and yields to another one: the smaller id has priority.
 
         Without a rule all robots could be candidates that support themselves, for ever.
         """
         return self._promised_to == self.setup.node and now_s >= self._leads_until_s and candidate < self.setup.node
 
-    def _count(self, promise: _Message) -> None:
-        """Lead from the promise that makes a majority."""
+    def _count(self, promise: _LeaseMessage) -> None:
+        """Begin to lead if this promise makes a majority."""
         if promise.candidate != self.setup.node or promise.stamp_s != self._stamp_s:
             return
         self._supporters[promise.sender] = None
@@ -124,7 +125,8 @@ class LeaderLease(Controller):
             self._leads_until_s = max(self._leads_until_s, self._stamp_s + table.lease_s - table.margin_s)
 
     def _is_time(self, now_s: float) -> bool:
-        """Return whether to ask now: a leader renews, others wait until their promise has ended and then a random time."""
+        """Return whether to send a request now: a leader renews; others wait until their promise has ended and then a
+        random time."""
         table: Any = self.parameters
         if now_s < self._leads_until_s:
             return bool(now_s >= self._stamp_s + table.renew_s)

@@ -31,7 +31,7 @@ def wrapped_cauchy(random: np.random.Generator, rho: float) -> float:
 def symmetric_stable(random: np.random.Generator, alpha: float, scale: float) -> float:
     """Return a symmetric alpha-stable variate (Chambers, Mallows, Stuck 1976); alpha = 2 is Gaussian, 1 is Cauchy."""
     angle = math.pi * (random.random() - 0.5)
-    # Of all draws only an exact 0 has no waiting time; the next smallest has 2^-53.
+    # A draw of exactly 0 has no logarithm; the next smallest draw is 2^-53.
     wait = max(-math.log(1.0 - random.random()), 2.0**-54)
     if alpha == 1.0:
         return scale * math.tan(angle)

@@ -3,7 +3,7 @@
 The kit makes and steps the controller as a runner does. The observations are ordinary and unusual: empty readings, many
 readings, malformed packets, a very late tick. The controller must answer each observation with a command that the world
 accepts. Its answers must not depend on other controllers in the process, and it must not do what `purity` detects. All
-violations are reported at once. A controller without violations is not proven correct: the kit uses a few hundred
+violations are reported at once. The kit is no proof: it uses a few hundred
 observations.
 """
 
@@ -144,7 +144,7 @@ class _Examination:
                 self._undeclared_sensors()
         self.violations += monitor.found
 
-    def _note(self, violation: str) -> None:
+    def _record(self, violation: str) -> None:
         if violation not in self.violations:
             self.violations.append(violation)
 
@@ -157,13 +157,13 @@ class _Examination:
             made = self._controller(setup)
         except (msgspec.ValidationError, ControllerError) as error:
             self.fits = False
-            self._note(f"the constructor refuses its Setup: {error}")
+            self._record(f"the constructor refuses its Setup: {error}")
             return None
         except Exception as error:
-            self._note(f"the constructor raised {_in_one_line(error)}")
+            self._record(f"the constructor raised {_in_one_line(error)}")
             return None
         if encode(setup) != sent:
-            self._note("the constructor changes its Setup")
+            self._record("the constructor changes its Setup")
         return made
 
     def _step(self, controller: Any, sent: bytes, when: str) -> bytes | None:
@@ -172,12 +172,12 @@ class _Examination:
         try:
             command = controller.step(observation)
         except Exception as error:
-            self._note(f"step() raised {_in_one_line(error)}, on {when}")
+            self._record(f"step() raised {_in_one_line(error)}, on {when}")
             return None
         if encode(observation) != sent:
-            self._note(f"step() changes the observation, on {when}")
+            self._record(f"step() changes the observation, on {when}")
         if not isinstance(command, Command):
-            self._note(f"step() returned {_short(command)}, expected a Command, on {when}")
+            self._record(f"step() returned {_short(command)}, expected a Command, on {when}")
             return None
         command.tick = observation.tick
         return self._answer(command, when)
@@ -188,26 +188,26 @@ class _Examination:
             payload = encode_command(command)
             open_answer(payload)
         except (TypeError, ValueError, OverflowError, RecursionError) as error:
-            self._note(f"step() returned what cannot be encoded: {error}, on {when}")
+            self._record(f"step() returned what cannot be encoded: {error}, on {when}")
             return None
         except ProtocolError as error:
-            self._note(f"step() returned what the world refuses: {error}, on {when}")
+            self._record(f"step() returned what the world refuses: {error}, on {when}")
             return None
         body = self._setup.body
         if command.drive is not None and body is None:
-            self._note(f"step() drives with {type(command.drive).__name__}, but its Setup names no body, on {when}")
+            self._record(f"step() drives with {type(command.drive).__name__}, but its Setup names no body, on {when}")
         if command.drive is not None and body is not None and type(command.drive) is not _drive_of(body):
             self.fits = False
             expected = f"takes {_drive_of(body).__name__}"
-            self._note(
+            self._record(
                 f"step() drives a {body.kind} body with {type(command.drive).__name__}; it {expected}, on {when}"
             )
         for message in command.outbox:
             if message.channel not in self._setup.channels:
                 known = ", ".join(self._setup.channels) or "none"
-                self._note(f"step() sends on channel {message.channel!r}; its Setup names {known}, on {when}")
+                self._record(f"step() sends on channel {message.channel!r}; its Setup names {known}, on {when}")
             if message.to is not None and message.to < 0:
-                self._note(f"step() sends to node {message.to}, on {when}")
+                self._record(f"step() sends to node {message.to}, on {when}")
         return payload
 
     def _each_alone(self) -> None:
@@ -237,15 +237,15 @@ class _Examination:
             return None
         again = self._run(self._make())
         if number := _first_difference(one, again):
-            self._note(
+            self._record(
                 "two controllers with the same Setup answer the same observations differently: state that instances share,"
                 f" or chance that is not the stream of the Setup ({self._when(number)})"
             )
             return None
         other = self._make(node=1)
         if number := _first_difference(one, self._run(self._make(), beside=other)):
-            self._note(
-                f"its answers change when another controller lives beside it: shared state ({self._when(number)})"
+            self._record(
+                f"its answers change when another controller runs in the same process: shared state ({self._when(number)})"
             )
             return None
         return one
@@ -258,7 +258,7 @@ class _Examination:
         for hash_seed in _HASH_SEEDS:
             digest = _digest_in_new_process(self._controller, self._setup, observations, hash_seed)
             if digest is not None and digest != _digest(self._answers):
-                self._note(
+                self._record(
                     "its answers differ in another process with another PYTHONHASHSEED:"
                     " the order of a set, or hash(), decides something; sort it"
                 )
@@ -283,7 +283,7 @@ class _Examination:
                 del _reads[id(watched)]
         for field in read:
             if field not in self._given:
-                self._note(f"step() reads observation.{field}, which it does not declare in `sensors`")
+                self._record(f"step() reads observation.{field}, which it does not declare in `sensors`")
 
 
 _reads: dict[int, dict[str, None]] = {}

@@ -1,9 +1,9 @@
-"""Detect what a controller must not do: read a clock, draw from a global random stream, use files, network or processes.
+"""Detect forbidden actions of a controller: read a clock, draw from a global random stream, use files, network or processes.
 
 A `PurityMonitor` records the violations of the code that runs inside it, in its own thread, and does not stop the code. It
 detects calls of functions written in C, the interpreter's audit events (PEP 578), changes of the global random streams, and
 printed text. The way a function was imported makes no difference. Imports are allowed. It does not see system calls that C
-code makes without an audit event: it finds mistakes, and is no sandbox.
+code makes without an audit event: it detects mistakes, and is no sandbox.
 """
 
 import contextlib
@@ -100,12 +100,12 @@ class PurityMonitor:
         self._stack.close()
         printed = self._printed.getvalue().strip()
         if printed:
-            self._note(f"prints: {printed.splitlines()[0][:60]!r}", None)
+            self._record(f"prints: {printed.splitlines()[0][:60]!r}", None)
         for name, state in _stream_states().items():
             if _plain(state) != _plain(self._states[name]):
                 what = f"draws from a global random stream: {name}"
                 if not any(each.startswith(f"{what},") for each in self.found):
-                    self._note(what, None)
+                    self._record(what, None)
                 getattr(importlib.import_module(name), _STREAMS[name][1])(self._states[name])
 
     def _called(self, frame: FrameType, event: str, argument: Any) -> None:
@@ -113,22 +113,22 @@ class PurityMonitor:
         if event == "c_call":
             owner = getattr(argument, "__self__", None)
             if owner is self._global_random:
-                self._note("draws from a global random stream: random", frame)
+                self._record("draws from a global random stream: random", frame)
             elif isinstance(owner, type) and argument.__name__ in _NOW and issubclass(owner, datetime.date):
-                self._note(f"reads the wall clock: {owner.__name__}.{argument.__name__}()", frame)
+                self._record(f"reads the wall clock: {owner.__name__}.{argument.__name__}()", frame)
             elif argument in self._functions and not _is_numpy_seeding(frame):
-                self._note(self._functions[argument], frame)
+                self._record(self._functions[argument], frame)
         elif event == "call" and frame.f_code is self._read_environment:
-            self._note("reads the environment: os.environ", frame)
+            self._record("reads the environment: os.environ", frame)
 
     def audited(self, event: str, arguments: tuple[Any, ...]) -> None:
         """Check an audit event of the interpreter."""
         what = next((text for start, text in _AUDITED.items() if event.startswith(start)), None)
         if what is not None:
             detail = f": {arguments[0]!r}" if event == "open" else f" ({event})"
-            self._note(what + detail, sys._getframe())
+            self._record(what + detail, sys._getframe())
 
-    def _note(self, what: str, frame: FrameType | None) -> None:
+    def _record(self, what: str, frame: FrameType | None) -> None:
         if _is_importing(frame):
             return
         line = what + _place(frame)

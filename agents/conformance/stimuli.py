@@ -40,7 +40,7 @@ class Stimulus(NamedTuple):
 
 def make_stimuli(chosen: StimulusSetup) -> list[Stimulus]:
     """Return all stimuli in ascending order of ticks."""
-    random = Draws(1).generator("conformance-story")
+    random = Draws(1).generator("conformance-stimuli")
     stimuli: list[Stimulus] = []
     tick = 0
 

@@ -1,4 +1,4 @@
-"""Two controllers that show what a radio does: the largest id spreads by gossip, and beacons measure links."""
+"""Two controllers that demonstrate the radio: the largest id spreads by gossip, and beacons measure links."""
 
 from zwerm.agents.gossip.beacon import Beacon
 from zwerm.agents.gossip.gossip_max import GossipMax

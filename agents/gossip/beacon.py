@@ -1,6 +1,6 @@
-"""The beacon: every robot broadcasts a numbered packet at even intervals, and counts what it hears of others.
+"""The beacon: every robot broadcasts a numbered packet at even intervals, and counts the packets that it receives from others.
 
-For statistics of links. A receiver that hears number 7 after number 4 knows that two are missing, or late.
+The counts are statistics of links: number 7 after number 4 means that two packets are lost or late.
 """
 
 from struct import Struct as Layout
@@ -25,13 +25,13 @@ class BeaconTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Beacon(Controller):
-    """Broadcasts (id, number); `heard` and `missed` count packets by sender."""
+    """Broadcasts (id, number); `received` and `missed` count packets by sender."""
 
     Parameters: ClassVar[type[Struct]] = BeaconTable
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
-        self.heard: dict[int, int] = {}
+        self.received: dict[int, int] = {}
         self.missed: dict[int, int] = {}
         self.refused = 0
         self._next: dict[int, int] = {}
@@ -39,15 +39,15 @@ class Beacon(Controller):
         self._drive = _straight_on(setup, self.parameters)
 
     def step(self, observation: Observation) -> Command:
-        """Count what was heard, and send the next beacon if it is time."""
-        heard, missed, following = self.heard, self.missed, self._next
+        """Count received packets, and send the next beacon if it is due."""
+        received, missed, following = self.received, self.missed, self._next
         for packet in observation.inbox:
             try:
                 sender, number = _LAYOUT.unpack_from(unseal(packet.payload))
             except ProtocolError:
                 self.refused += 1
                 continue
-            heard[sender] = heard.get(sender, 0) + 1
+            received[sender] = received.get(sender, 0) + 1
             expected = following.get(sender, number)
             if number >= expected:
                 missed[sender] = missed.get(sender, 0) + number - expected
@@ -64,7 +64,7 @@ class Beacon(Controller):
 
 
 def _straight_on(setup: Setup, table: Any) -> BodyVelocity | WheelSpeeds | None:
-    """Return the drive, or None where the node stands."""
+    """Return the drive, or None if the node does not move."""
     speed: float = table.speed_m_s
     if setup.body is None or not speed:
         return None

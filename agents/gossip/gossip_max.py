@@ -1,8 +1,8 @@
-"""Gossip: every robot learns the largest id in the swarm. It broadcasts the largest id that it knows.
+"""Gossip: every robot learns the largest id in the swarm. It broadcasts the largest id that it has received.
 
 The maximum is idempotent, commutative and associative. So lost, copied, late and reordered packets cost time and never
-change the result. A checksum refuses damaged packets. A restarted robot knows only its own id, and learns the largest
-id again.
+change the result. A checksum refuses damaged packets. A restarted robot begins with its own id, and receives the largest id
+again.
 """
 
 from struct import Struct as Layout
@@ -19,14 +19,14 @@ _LAYOUT: Final = Layout(">I")
 
 
 class GossipTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """A broadcast every `every_ticks`; a robot that knows of `done_at`, or a larger id, says that it is done."""
+    """A robot broadcasts every `every_ticks`. It is done once it has received `done_at` or a larger id."""
 
     every_ticks: Annotated[int, Meta(ge=1)] = 1
     done_at: Annotated[int, Meta(ge=0)] | None = None
 
 
 class GossipMax(Controller):
-    """Broadcasts the largest id that it knows, at first its own."""
+    """Broadcasts the largest id that it has received, at first its own."""
 
     Parameters: ClassVar[type[Struct]] = GossipTable
 
@@ -38,16 +38,16 @@ class GossipMax(Controller):
         self._channels = setup.channels
 
     def step(self, observation: Observation) -> Command:
-        """Take in what was heard, and pass it on."""
+        """Take the largest received id, and broadcast it."""
         before = self._reported
         for packet in observation.inbox:
             try:
-                (heard,) = _LAYOUT.unpack(unseal(packet.payload))
+                (received,) = _LAYOUT.unpack(unseal(packet.payload))
             except ProtocolError:
                 self.refused += 1
                 continue
-            if heard > self.largest:
-                self.largest = heard
+            if received > self.largest:
+                self.largest = received
         table: Any = self.parameters
         outbox: tuple[Transmission, ...] = ()
         if observation.tick % table.every_ticks == 0:

@@ -22,7 +22,7 @@ from zwerm.agents.landmark_exploration.mapping.frontier_status import (
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, columns, write_report
 from zwerm.agents.landmark_exploration.motion import Drive, Outcome, explore, roam, travel, wander
-from zwerm.agents.landmark_exploration.parameters import Parameters
+from zwerm.agents.landmark_exploration.parameters import ExplorerParameters
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Message, Register, TaskPart, TaskReport, Vector
 from zwerm.agents.landmark_exploration.sharing.log_entries import failure_entry, observation_entries, status_entries
@@ -65,11 +65,11 @@ class Explorer(Controller):
     """Explores until no frontier is left."""
 
     sensors: ClassVar[tuple[str, ...]] = ("landmarks", "compass_rad", "touch")
-    Parameters: ClassVar[type[Parameters]] = Parameters
+    Parameters: ClassVar[type[ExplorerParameters]] = ExplorerParameters
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
-        rules: Parameters = self.parameters
+        rules: ExplorerParameters = self.parameters
         assert setup.body is not None
         self._speed_m_s = setup.body.max_speed_m_s
         self._bytes_max = rules.message_bytes_max

@@ -14,7 +14,7 @@ Strategy = Literal["cost-utility", "nearest-frontier", "random-walk"]
 CentralStrategy = Literal["cost-utility", "nearest-frontier", "min-pos"]
 
 
-class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
+class ExplorerParameters(Struct, frozen=True, forbid_unknown_fields=True):
     """The robots' parameters; those of choosing frontiers count where robots choose by themselves.
 
     `beta` weighs the cost against the utility. A robot has `cross_ticks` to cross the line of a frontier, and `search_ticks` to

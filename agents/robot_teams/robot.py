@@ -4,7 +4,6 @@ import math
 from collections.abc import Generator
 from typing import Annotated, ClassVar, Final
 
-import msgspec
 from msgspec import Meta, Struct
 
 from zwerm.agents.robot_teams.mapping.facts import (
@@ -33,19 +32,18 @@ from zwerm.agents.robot_teams.protocols.team_messages import (
     FoundSnapshot,
     Status,
     TeamBeacon,
-    decode_beacon,
-    encode_beacon,
     encode_snapshot,
+    read_beacon,
+    write_beacon,
 )
 from zwerm.agents.robot_teams.team_lead import TeamLead, findings
 from zwerm.agents.robot_teams.work import Lost, NoWay, Work
 from zwerm.agents.runtime.contract import Controller, Setup
-from zwerm.errors import ControllerError, ProtocolError
-from zwerm.wire.checksum import seal, unseal
+from zwerm.errors import ControllerError
 from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 
 # In the first second a robot meets every robot that it receives: the robots start together, as one team.
-MUSTER_S: Final = 1.0
+GATHER_S: Final = 1.0
 # A robot nearer than this to an end, or to a robot at that end, counts as standing at it [m].
 PARKED_M: Final = 0.75
 # A wreck hides what is nearer to it than this, beyond two bodies' radii [m].
@@ -121,13 +119,13 @@ class TeamRobot(Controller):
             self._newest_senses,
             self._parked,
         )
-        self._story = self._live()
+        self._activity = self._activities()
         self._waits = True
         self._number = 0
         self._epoch = 0
         self._every = max(1, round(table.beacon_s / setup.dt_s))
         self._urgent = False
-        self._told = -1, False
+        self._reported = -1, False, 0, 0
         self._done = False
         self._left_off = False
 
@@ -136,10 +134,10 @@ class TeamRobot(Controller):
         tick = observation.tick
         senses = self._senses = self._sensing.read(observation, self._wrecks.wrecks)
         if observation.inbox:
-            self._hear(observation, senses)
+            self._receive(observation, senses)
         self._watch(senses)
         membership = self.membership
-        if tick == round(MUSTER_S / self.setup.dt_s):
+        if tick == round(GATHER_S / self.setup.dt_s):
             membership.meet_first(tick)
         membership.poll(tick)
         if membership.view != self._view:
@@ -148,11 +146,11 @@ class TeamRobot(Controller):
             self._urgent = True
         self._done = self.map.complete_from(self.work.here)
         vx, vy = self._stand(senses) if self._done else self._move(senses)
-        if membership.leads and tick % DECIDE_TICKS == 0 and tick * self.setup.dt_s >= MUSTER_S:
+        if membership.leads and tick % DECIDE_TICKS == 0 and tick * self.setup.dt_s >= GATHER_S:
             membership.roster.statuses[self.setup.node] = self._status(senses, tick)
             membership.roster.news_tick[self.setup.node] = tick
             self._urgent = self.lead.decide(tick) or self._urgent
-        outbox = self._say(observation, senses)
+        outbox = self._outgoing(observation, senses)
         sensing = self._sensing
         drive = BodyVelocity(sensing.cos * vx + sensing.sin * vy, sensing.cos * vy - sensing.sin * vx, 0.0)
         telemetry, snapshot = self._telemetry(), self._snapshot()
@@ -177,7 +175,7 @@ class TeamRobot(Controller):
         # The manoeuvre ended: the next may begin in the same tick.
         for _ in range(10):
             failed = pilot.state == FAILED
-            manoeuvre = self._story.throw(Lost()) if failed else next(self._story)
+            manoeuvre = self._activity.throw(Lost()) if failed else next(self._activity)
             self._waits = manoeuvre is None
             if manoeuvre is None:
                 if pilot.state != IDLE:
@@ -189,7 +187,7 @@ class TeamRobot(Controller):
                 break
         return velocity
 
-    def _live(self) -> Generator[Manoeuvre | None, None, None]:
+    def _activities(self) -> Generator[Manoeuvre | None, None, None]:
         """Find an end, then carry out one plan after the other; after a failure find an end again."""
         while True:
             try:
@@ -255,7 +253,7 @@ class TeamRobot(Controller):
         for node in list(self._wrecks.wrecks):
             status = roster.statuses.get(node)
             if status is not None:
-                self._wrecks.lives(node, status.beat)
+                self._wrecks.note_alive(node, status.beat)
 
     def _note_wreck(self, wreck: Wreck, x_m: float, y_m: float) -> None:
         """Add to the map which ends a wreck hides: those nearer to it than another body can come."""
@@ -272,13 +270,12 @@ class TeamRobot(Controller):
 
     # --- receiving and sending ----------------------------------------------------------------------------------------
 
-    def _hear(self, observation: Observation, senses: Senses) -> None:
+    def _receive(self, observation: Observation, senses: Senses) -> None:
         tick = observation.tick
         table: TeamTable = self.parameters
         for packet in observation.inbox:
-            try:
-                beacon: TeamBeacon = decode_beacon(unseal(packet.payload))
-            except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
+            beacon = read_beacon(packet.payload)
+            if beacon is None:
                 self.refused += 1
                 continue
             near = False
@@ -287,11 +284,11 @@ class TeamRobot(Controller):
                     apart = math.hypot(status.x_mm / 1000.0 - senses.x_m, status.y_mm / 1000.0 - senses.y_m)
                     near = apart <= table.meeting_m
             self.membership.receive(beacon, tick, near)
-            if self.membership.knows(beacon.sender) or near:
+            if self.membership.accepts(beacon.sender) or near:
                 self.exchange.receive(beacon, tick)
             else:
                 self.exchange.forget(beacon.sender)
-            if self.membership.knows(beacon.sender) and not self.membership.leads:
+            if self.membership.accepts(beacon.sender) and not self.membership.leads:
                 self.lead.follow(beacon.plans)
 
     def _status(self, senses: Senses, tick: int) -> Status:
@@ -316,7 +313,7 @@ class TeamRobot(Controller):
             (view.epoch, view.lead),
         )
 
-    def _say(self, observation: Observation, senses: Senses) -> tuple[Transmission, ...]:
+    def _outgoing(self, observation: Observation, senses: Senses) -> tuple[Transmission, ...]:
         tick = observation.tick
         if not self._channels or not (self._urgent or (tick + self.setup.node) % self._every == 0):
             return ()
@@ -335,15 +332,16 @@ class TeamRobot(Controller):
             len(self.map.facts),
             *parcel,
         )
-        frame = seal(encode_beacon(beacon))
+        frame = write_beacon(beacon)
         return tuple([Transmission(channel, frame) for channel in self._channels])
 
     def _telemetry(self) -> dict[str, float | bool]:
-        """Return the certificate and the team's results, whenever the map has grown."""
-        facts = self.map.facts
-        if (len(facts), self._done) == self._told:
+        """Return the certificate and the team's results, whenever one of them may have changed."""
+        membership = self.membership
+        news = len(self.map.facts), self._done, membership.divisions, membership.merges
+        if news == self._reported:
             return {}
-        self._told = len(facts), self._done
+        self._reported = news
         return {"certificate_satisfied": self._done, **findings(self.map, self.membership)}
 
     def _snapshot(self) -> bytes:

@@ -21,7 +21,7 @@ from zwerm.agents.robot_teams.motion.manoeuvres import (
 from zwerm.agents.robot_teams.motion.senses import Senses
 from zwerm.agents.robot_teams.protocols.team_messages import HUNTS, SWEEPS, TRAVELS, CorridorPlan
 
-Story = Generator[Manoeuvre | None, None, None]
+Activity = Generator[Manoeuvre | None, None, None]
 
 # Largest number of steps of a journey or a hunt. Beyond it, the robot has lost its position in the map.
 STEPS_MAX: Final = 400
@@ -85,7 +85,7 @@ class Work:
 
     # --- finding a first end ------------------------------------------------------------------------------------------
 
-    def localise(self, side: int, swept_by_others: Callable[[int], bool]) -> Story:
+    def localise(self, side: int, swept_by_others: Callable[[int], bool]) -> Activity:
         """Find an end from anywhere: go to a slice and along it to its end on `side`; sweep it if it is new."""
         self.at = self.sweeping = None
         seek = Seek(self._grid)
@@ -106,7 +106,7 @@ class Work:
         yield from self.sweep()
         yield from self._hunt(up.slice, RIGHT, swept_by_others)
 
-    def link(self, direction: int, swept_by_others: Callable[[int], bool]) -> Story:
+    def link(self, direction: int, swept_by_others: Callable[[int], bool]) -> Activity:
         """Walk back to the predecessor's slice. This joins the maps of robots that began apart."""
         self.found = self.spare = False
         self.phase = HUNTS
@@ -117,7 +117,7 @@ class Work:
 
     # --- single steps -------------------------------------------------------------------------------------------------
 
-    def sweep(self, frontier_mm: int | None = None) -> Story:
+    def sweep(self, frontier_mm: int | None = None) -> Activity:
         """Sweep the slice from the end where the robot is to the other end, or to a virtual frontier in between."""
         start = self.at
         if start is None:
@@ -161,7 +161,7 @@ class Work:
             raise Lost
         return end.slice != start.slice
 
-    def travel(self, stop: End) -> Story:
+    def travel(self, stop: End) -> Activity:
         """Go to a known end by the shortest known way, without the steps that led elsewhere before.
 
         If a wall is almost parallel to a slice, robots measure its end far apart, and there may be no way to one of
@@ -191,7 +191,7 @@ class Work:
                 astray[start, step.direction] = None
         raise NoWay
 
-    def _go_straight(self, start: End, goal: End) -> Story:
+    def _go_straight(self, start: End, goal: End) -> Activity:
         if start.slice != goal.slice or abs(start.y_mm - goal.y_mm) > STRAIGHT_MM:
             raise NoWay
         yield Approach(goal, self._grid, self._parked)
@@ -216,7 +216,7 @@ class Work:
         """The known end at which the robot stands, or from which it set out; None where it does not know."""
         return None if self.at is None else self.map.end(self.at)
 
-    def _approach(self, end: End) -> Story:
+    def _approach(self, end: End) -> Activity:
         senses = self._sense()
         dx, dy = senses.x_m - self._grid.x_m(end.slice), senses.y_m - end.y_mm / 1000.0
         if dx * dx + dy * dy > AT_END_M**2:
@@ -224,7 +224,7 @@ class Work:
 
     # --- a corridor ---------------------------------------------------------------------------------------------------
 
-    def corridor(self, plan: CorridorPlan, mates: "Mates") -> Story:
+    def corridor(self, plan: CorridorPlan, mates: "Mates") -> Activity:
         """Take a slice of a corridor, sweep it, and hunt back to the predecessor's slice."""
         self.found = self.spare = False
         self.claim = self.room = None
@@ -279,7 +279,7 @@ class Work:
 
     def _hunt(
         self, k: int, direction: int, swept_by_others: Callable[[int], bool], frontier_mm: int | None = None
-    ) -> Story:
+    ) -> Activity:
         """Walk round the slab behind slice k, and sweep new segments, until the reached end is swept.
 
         Fig. 4 (i) and (ii) of the paper are both this loop.

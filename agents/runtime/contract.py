@@ -1,8 +1,8 @@
 """The contract between a controller and the program that runs it: observation in, command out.
 
 A controller is a plain object. It does no I/O, reads no clock and imports no global randomness. Its `Setup` holds all
-that it may know of itself. Each `Observation` holds all that it may know of its surroundings. `Controller` is a
-convenience: any class with the same constructor and `step` will do.
+information about the node itself. Each `Observation` holds all information about its surroundings. `Controller` is a
+convenience: any class with the same constructor and `step` is accepted.
 """
 
 from typing import Any, ClassVar, Protocol
@@ -20,7 +20,7 @@ class NoParameters(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Body(Struct, frozen=True, forbid_unknown_fields=True):
-    """The body of a robot, as the robot knows it."""
+    """The properties of a robot's body that its controller gets."""
 
     kind: str  # the drive: differential, holonomic or module:Class
     radius_m: float  # of the round body [m]
@@ -30,9 +30,9 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Setup(Struct, frozen=True, forbid_unknown_fields=True):
-    """All that a node knows before its first observation.
+    """All information that a node gets before its first observation.
 
-    The `bases`, ids of base stations, only a coordinator knows. `services` names the provider of each service. A node
+    Only a coordinator gets `bases`, the ids of base stations. `services` names the provider of each service. A node
     that has lost its memory is a later `incarnation`.
     """
 

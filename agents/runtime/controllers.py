@@ -66,7 +66,7 @@ def code_of(name: str) -> str:
 
 
 def step_place(found: type[Any]) -> str:
-    """Return where a controller answers, such as " (mine.py:12, in Mine.step)", or "" where that is not known."""
+    """Return the place of a controller's `step`, such as " (mine.py:12, in Mine.step)", or "" where that is not known."""
     code = getattr(inspect.unwrap(found.step), "__code__", None)
     return "" if code is None else f" ({Path(code.co_filename).name}:{code.co_firstlineno}, in {found.__name__}.step)"
 

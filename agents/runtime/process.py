@@ -1,12 +1,12 @@
 """The robot process: an asyncio loop, one Zenoh session and one Node.
 
-The process answers each observation with one command, in order. It exits when the world says goodbye or is lost, on SIGTERM,
+The process answers each observation with one command, in order. It exits when the world sends goodbye or is lost, on SIGTERM,
 and with the process that started it. After a failure of its controller it exits once the world has confirmed the failure, so
-the world always knows the reason first. It ignores SIGINT: the process that started it handles Ctrl-C.
+the world always gets the reason first. It ignores SIGINT: the process that started it handles Ctrl-C.
 
 The loop joins, waits and ends. Zenoh's thread answers observations where it delivers them. Passing each observation to
-the loop's thread costs more than all other work together (measured for one robot tick: 160 us of processor time instead
-of 106). In real time observations are passed to the loop nevertheless. The backlog of a slow controller collects there.
+the loop's thread would cost more than all other work together (measured: 160 instead of 106 us of processor time a
+robot and tick). In real time observations are passed to the loop nevertheless. The backlog of a slow controller collects there.
 If the sending thread answered it, the backlog could block that thread.
 """
 
@@ -26,6 +26,7 @@ from typing import Any, Final, TextIO
 import msgspec
 import uvloop
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import code_of
 from zwerm.agents.runtime.node import Node
@@ -55,6 +56,7 @@ def main(
     deadline_s: float,
     joined: Connection,
     station: Station | None = None,
+    confinement: Confinement = UNCONFINED,
 ) -> None:
     """Run one robot and exit: 0 end of the run, 1 the controller failed, 2 could not join, 3 lost the world.
 
@@ -79,8 +81,10 @@ def main(
     try:
         if station is not None:
             enter_namespace(station.namespace)
+        elif is_local(endpoint):
+            confinement.leave_network()
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            code = runner.run(run_node(run, credential, endpoint, terms, deadline_s, joined, station))
+            code = runner.run(run_node(run, credential, endpoint, terms, deadline_s, joined, station, confinement))
     except ZwermError as error:
         sys.stderr.write(f"zwerm: {error}\n")
         code = EXIT_REFUSED
@@ -121,10 +125,11 @@ async def run_node(
     deadline_s: float = 30.0,
     joined: Connection | None = None,
     station: Station | None = None,
+    confinement: Confinement = UNCONFINED,
 ) -> int:
     """Join the run, answer observations until its end, and return the exit code.
 
-    Writes the node's id to `joined` once the node has joined. Raises ZwermError if it cannot join.
+    Writes the node's password to `joined` once the node has joined. Raises ZwermError if it cannot join.
     """
     loop = asyncio.get_running_loop()
     end: asyncio.Future[int] = loop.create_future()
@@ -145,7 +150,7 @@ async def run_node(
             loop.call_soon_threadsafe(may_exit.set)
 
     async def leave(reason: str) -> None:
-        """Say goodbye, and return when the world has confirmed all messages, or is lost."""
+        """Send goodbye, and wait until the world has confirmed all messages, or is lost."""
         link.send_goodbye(reason, confirmed)
         await may_exit.wait()
 
@@ -186,6 +191,9 @@ async def run_node(
         welcome = link.join()
         loop.add_signal_handler(signal.SIGTERM, finish, 0)
         try:
+            confinement.apply(credential.node)  # after the connection, whose socket only the world's user may open
+            if confinement.first_user is not None:  # the kernel forgets the request when the user changes
+                die_with_parent(_server)
             answer = _node(welcome, radio, fail).answer
         except ControllerError as error:
             link.send(encode(Failure(0, str(error), "")))
@@ -198,7 +206,7 @@ async def run_node(
             loop.add_reader(parent.sentinel, os._exit, EXIT_LOST)
         if joined is not None:
             with contextlib.suppress(OSError), joined:  # the supervisor does not wait any more
-                joined.send_bytes(str(credential.node).encode())
+                os.write(joined.fileno(), credential.password.encode())
         link.listen(receive_in_loop if welcome.paced else receive)
         code = await end
         if code == EXIT_FAILED:
@@ -249,7 +257,6 @@ _server: int | None = None
 
 
 def serve_robots() -> None:
-    """Note that this process is the server that robots are forked from: a robot ends when its parent is no longer this
-    server."""
+    """Record that robots are forked from this process: a robot ends when its parent is no longer this process."""
     global _server
     _server = os.getpid()

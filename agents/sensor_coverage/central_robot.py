@@ -41,7 +41,7 @@ from zwerm.agents.sensor_coverage.protocols.component_loop import Codec, Compone
 from zwerm.agents.sensor_coverage.protocols.transport.deduplication import RequestDeduplicator
 from zwerm.wire.messages import BodyVelocity, Command, Observation, Wake
 
-# A robot within this distance [m] of the point where it came out has not left the depot's door.
+# A robot within this distance [m] of the point where it came out still stands at the exit of the depot.
 HOME_M: Final = 0.05
 
 UPLINK_CODEC: Final = Codec(read_request, write)
@@ -123,7 +123,8 @@ class CentralRobot(Controller):
         """Drive, and answer with the result."""
         result = yield from drive
         self.motion.settle()
-        self.commands.answer(Arrived(cycle, *result))
+        seen = result.used_odometry, result.used_moving_landmarks
+        self.commands.answer(Arrived(cycle, result.ok, *seen, result.driven_m, result.touched))
 
     def _walk(self, cycle: int, walk: DriveToWalk) -> Drive:
         """Drive to a wall or along it, and answer with the result."""

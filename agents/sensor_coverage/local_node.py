@@ -55,7 +55,8 @@ class LocalNode(Controller):
         """Observe, receive messages, go on with the activity, poll the components, and send their messages."""
         situation = self.situation
         situation.observe(observation)
-        dead = [node for node in situation.failure_detector.dead if node in situation.motion.frame.seen]
+        silent, seen = situation.failure_detector.dead, situation.motion.frame.seen
+        dead = [node for node in silent if node in seen] if silent else ()
         self.completion.update(situation.tick, situation.bearings, situation.claims, self._occupied, dead)
         self.components.deliver(observation.inbox, situation.tick)
         velocity = situation.advance()

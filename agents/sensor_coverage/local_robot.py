@@ -108,6 +108,7 @@ class PushParticipant(Component):
         if to is None or not visible or any(node == to for _, node in token.chain):
             push.close(PushAborted(token.push, False))
         else:
+            push.next = to
             self._situation.mailbox.write(to, token)
 
     def _join(self, push: int, fresh: int, chain: Chain, back: int | None, first: bool = False) -> TokenPush:

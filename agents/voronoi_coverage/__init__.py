@@ -1,8 +1,8 @@
 """Voronoi coverage with sensory feedback (Schwager, McLurkin, Rus 2006), and its variants.
 
-`coverage` is the algorithm as printed; `swarmbot` the paper's hardware experiment, with a limited range and no sense of
-the boundary; `fixed_point` its integer arithmetic; `radio` learns neighbours from packets instead of sensing them, and
-`quadratic` estimates the field from what they say.
+`coverage` is the algorithm as printed; `swarmbot` the paper's hardware experiment, with a limited range and without a
+boundary sensor; `fixed_point` its integer arithmetic; `radio` gets neighbours from packets instead of a sensor, and
+`quadratic` estimates the field from the values of neighbours.
 """
 
 from zwerm.agents.voronoi_coverage.coverage import VoronoiCoverage

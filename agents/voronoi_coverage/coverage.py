@@ -1,6 +1,6 @@
 """The coverage control algorithm as printed: a robot moves towards the estimated centroid of its own Voronoi cell.
 
-The robot knows the positions of its neighbours relative to itself, the corners of the region, and the field's value and
+The robot senses the positions of its neighbours, the corners of the region, and the field's value and
 gradient at its place. All are in its body frame, so it needs no compass. The cache between two observations saves time
 and changes no answer.
 
@@ -17,7 +17,7 @@ from zwerm.wire.messages import BodyVelocity, Command, Observation
 
 
 class CoverageTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """The gain k of eq. 8 [1/s], and the error at and below which the robot says that it is done [m]; 0 is never."""
+    """The gain k of eq. 8 [1/s], and the error at and below which the robot is done [m]; with 0 it is never done."""
 
     gain_per_s: Annotated[float, Meta(gt=0.0)] = 5.0
     tolerance_m: Annotated[float, Meta(ge=0.0)] = 0.0

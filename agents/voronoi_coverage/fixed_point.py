@@ -48,7 +48,7 @@ def clip(polygon: Sequence[Corner], a: int, b: int, twice_c: int) -> list[Corner
 
 
 def voronoi_cell(region: Sequence[Corner], others: Iterable[Corner]) -> Sequence[Corner]:
-    """Return what of `region` is no nearer to any of `others` than to the origin."""
+    """Return the part of `region` that is no nearer to any of `others` than to the origin."""
     cell = region
     for x, y in others:
         distance2 = x * x + y * y
@@ -89,7 +89,7 @@ def centroid(cell: Sequence[Corner], value: int, gx: int, gy: int) -> Corner | N
 
 
 def target(region: Sequence[Corner], others: Iterable[Corner], value: int, gx: int, gy: int) -> Corner:
-    """Return where a robot at the origin should go, in whole units; the origin itself where there is no telling."""
+    """Return the goal of a robot at the origin, in whole units; the origin itself if the goal is undefined."""
     cell = voronoi_cell(region, others)
     positive = cell
     for x, y in cell:

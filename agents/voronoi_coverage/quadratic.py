@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from zwerm.maths.polygons import Point, Polygon, estimated_centroid, moments
 
-# A determinant of the normal equations this small, relative to what it could be, leaves the curvature open.
+# If the determinant of the normal equations is below this fraction of its upper bound, the curvature is undetermined.
 _SINGULAR: Final = 1e-9
 
 # Tolerance, as a factor: a bisector is a side of the cell if a corner's distance equals its own up to this.
@@ -44,9 +44,10 @@ def bordering(cell: Polygon, samples: list[NeighbourSample]) -> list[NeighbourSa
 
 
 def fit(value: float, gx: float, gy: float, samples: list[NeighbourSample]) -> Curvature | None:
-    """Return the curvature that fits the samples best in the sense of least squares, or None where they leave it open.
+    """Return the curvature that fits the samples best in the sense of least squares, or None if it is undetermined.
 
-    Each sample's equation is divided by the square of its distance: what is fitted is the curvature seen towards it.
+    Each sample's equation is divided by the square of its distance: the fitted values are the curvatures in the
+    directions of the samples.
     """
     # Normal equations of  residual = xx a + xy b + yy c.
     aa = ab = ac = bb = bc = cc = ra = rb = rc = 0.0
@@ -87,7 +88,8 @@ def third_moments(polygon: Polygon, ox: float, oy: float) -> tuple[float, float,
 
 
 def quadratic_centroid(cell: Polygon, value: float, gx: float, gy: float, bend: Curvature | None) -> Point | None:
-    """Return the centroid of `cell` under the quadratic estimate, or the linear one's where that is safer."""
+    """Return the centroid of `cell` under the quadratic estimate, or under the linear one if the quadratic one may be
+    negative."""
     if bend is None or not cell or _lowest(cell, value, gx, gy, bend) < 0.0:
         return estimated_centroid(cell, value, gx, gy)
     xx, xy, yy = bend
@@ -106,7 +108,7 @@ def quadratic_centroid(cell: Polygon, value: float, gx: float, gy: float, bend: 
 
 
 def _lowest(cell: Polygon, value: float, gx: float, gy: float, bend: Curvature) -> float:
-    """Return a lower bound of the estimate on `cell`: its linear part's lowest, less what the curvature can take off."""
+    """Return a lower bound of the estimate on `cell`: the minimum of its linear part, minus a bound of its quadratic part."""
     mean, difference = 0.5 * (bend.xx + bend.yy), 0.5 * (bend.xx - bend.yy)
     flattest = mean - math.hypot(difference, bend.xy)
     reach2 = max([x * x + y * y for x, y in cell])

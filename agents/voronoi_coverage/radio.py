@@ -1,10 +1,10 @@
-"""Voronoi coverage with neighbours learned by radio instead of sensed, so that lost and late packets matter.
+"""Voronoi coverage with neighbours known from packets instead of a sensor, so lost and late packets have an effect.
 
-Every robot knows its own pose, and broadcasts it with the field's value there. It assumes that the other robots are at
-the places of their latest packets. It forgets a robot from which no packet came for `memory_s`. It listens for one
-period before it first moves. A robot that knows no other robot stays at its place, as the SwarmBots did: its cell would
-be the whole region. A packet carries a checksum; one that is not ours, or is damaged, is passed over. With `estimate =
-"quadratic"` the values heard bend the estimate of the field.
+Every robot senses its own pose, and broadcasts it with the field's value there. It assumes that the other robots are at
+the places of their latest packets. It removes a robot from which no packet came for `memory_s`. It listens for one
+period before it first moves. A robot without another robot stays at its place, as the SwarmBots did: its cell would
+be the whole region. A packet carries a checksum; foreign and damaged packets are ignored. With `estimate =
+"quadratic"` the received values add a quadratic term to the estimate of the field.
 """
 
 import math
@@ -35,14 +35,14 @@ class NeighbourReport(NamedTuple):
     value: float
 
 
-def pack(node: int, heard: NeighbourReport) -> bytes:
-    """Return the packet that says it."""
-    body = _LAYOUT.pack(node, *heard)
+def pack(node: int, report: NeighbourReport) -> bytes:
+    """Return the packet with this message."""
+    body = _LAYOUT.pack(node, *report)
     return body + _SUM.pack(zlib.crc32(body))
 
 
 def unpack(payload: bytes) -> tuple[int, NeighbourReport] | None:
-    """Return who said what, or None for a packet that is not ours, or is damaged."""
+    """Return the sender and its message, or None for a foreign or damaged packet."""
     if len(payload) != _LAYOUT.size + _SUM.size:
         return None
     body = payload[: _LAYOUT.size]
@@ -53,8 +53,8 @@ def unpack(payload: bytes) -> tuple[int, NeighbourReport] | None:
 
 
 class RadioCoverageTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """The gain k, the period of broadcasts [s], the time for which packets are remembered [s], and how the field is
-    estimated.
+    """The gain k, the period of broadcasts [s], the time for which packets are kept [s], and the estimate of the
+    field.
 
     It is done while its own error is below `tolerance_m`.
     """
@@ -76,7 +76,7 @@ class RadioCoverage(Controller):
         super().__init__(setup)
         self._table: Any = self.parameters
         self._every_ticks = max(1, round(self._table.every_s / setup.dt_s))
-        self._heard: dict[int, NeighbourReport] = {}
+        self._reports: dict[int, NeighbourReport] = {}
 
     def step(self, observation: Observation) -> Command:
         """Return the velocity u = k (C_hat - p) for the latest known positions of the others, and broadcast if it is due."""
@@ -87,9 +87,9 @@ class RadioCoverage(Controller):
         self._listen(observation)
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         samples = []
-        for _, heard in sorted(self._heard.items()):
-            dx, dy = heard.x_m - pose.x_m, heard.y_m - pose.y_m
-            samples.append(NeighbourSample(cos * dx + sin * dy, cos * dy - sin * dx, heard.value))
+        for _, report in sorted(self._reports.items()):
+            dx, dy = report.x_m - pose.x_m, report.y_m - pose.y_m
+            samples.append(NeighbourSample(cos * dx + sin * dy, cos * dy - sin * dx, report.value))
         cell = voronoi_cell(observation.boundary, [(sample.x, sample.y) for sample in samples])
         field = here.value, here.gradient_x, here.gradient_y
         if table.estimate == "quadratic":
@@ -98,22 +98,22 @@ class RadioCoverage(Controller):
             centroid = estimated_centroid(cell, *field)
         x, y = centroid or nearest_point(observation.boundary)
         moves = bool(samples) and observation.tick > self._every_ticks
-        # Robots take turns, so that not all broadcast at once.
-        speaks = (observation.tick + self.setup.node) % self._every_ticks == 0
-        say = NeighbourReport(observation.time_s, pose.x_m, pose.y_m, here.value)
+        # Robots broadcast at different ticks, so that not all broadcast at once.
+        is_due = (observation.tick + self.setup.node) % self._every_ticks == 0
+        own = NeighbourReport(observation.time_s, pose.x_m, pose.y_m, here.value)
         return Command(
             drive=BodyVelocity(table.gain_per_s * x, table.gain_per_s * y) if moves else BodyVelocity(),
-            outbox=(Transmission(CHANNEL, pack(self.setup.node, say)),) if speaks else (),
+            outbox=(Transmission(CHANNEL, pack(self.setup.node, own)),) if is_due else (),
             done=moves and math.hypot(x, y) < table.tolerance_m,
         )
 
     def _listen(self, observation: Observation) -> None:
         """Store the newest message of each robot; packets may overtake one another."""
         for packet in observation.inbox:
-            said = unpack(packet.payload) if packet.channel == CHANNEL else None
-            if said is not None and said[0] != self.setup.node:
-                node, heard = said
-                if node not in self._heard or self._heard[node].time_s <= heard.time_s:
-                    self._heard[node] = heard
+            received = unpack(packet.payload) if packet.channel == CHANNEL else None
+            if received is not None and received[0] != self.setup.node:
+                node, report = received
+                if node not in self._reports or self._reports[node].time_s <= report.time_s:
+                    self._reports[node] = report
         oldest_s = observation.time_s - self._table.memory_s
-        self._heard = {node: heard for node, heard in self._heard.items() if heard.time_s >= oldest_s}
+        self._reports = {node: report for node, report in self._reports.items() if report.time_s >= oldest_s}

@@ -1,10 +1,10 @@
-"""Voronoi coverage as the paper's robots ran it: neighbours within a radius only, no sense of the boundary, a noisy light.
+"""Voronoi coverage as the paper's robots ran it: neighbours within a radius only, no boundary sensor, and noisy light.
 
 Differences from the algorithm as printed (section V-B and figures 6, 7 and 9): Phi_offset + light is the field;
 - a robot whose target is within a threshold of where it stands remains there.
 
-The lengths of the rules and the magnitude of the gradient are not in the paper; those here are our choice. So is that no
-cell reaches further than the range, of which the robot knows nothing.
+The lengths of the rules and the magnitude of the gradient are not in the paper; those here are our choice. The
+limit of a cell to the range is our choice, too.
 """
 
 import math
@@ -26,7 +26,7 @@ _IN_LINE_RAD: Final = 1e-9
 class SwarmBotTable(Struct, frozen=True, forbid_unknown_fields=True):
     """Lengths in m. `gradient_magnitude` is per metre, in the unit of the field; without it the gradient is as sensed.
 
-    The first `beacons` robots are stationary: they only stand there to be neighbours.
+    The first `beacons` robots are stationary: they serve as neighbours only.
     """
 
     gain_per_s: PositiveNumber = 2.0
@@ -43,7 +43,7 @@ class SwarmBotTable(Struct, frozen=True, forbid_unknown_fields=True):
 def closed_cell(others: list[Point], table: SwarmBotTable) -> Polygon:
     """Return the cell of a robot at the origin [m], closed by the three rules; empty for a robot without neighbours.
 
-    One at the same place is no neighbour: it lies in no direction.
+    A robot at the same place is no neighbour: it has no direction.
     """
     others = [other for other in others if math.hypot(*other) > COINCIDENT_M]
     if not others:

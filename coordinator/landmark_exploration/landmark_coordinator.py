@@ -63,7 +63,7 @@ class CoordinatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
     message_bytes_max: int = LARGE_BYTES
 
 
-class CoordinatorSetup(Protocol):
+class LandmarkCoordinatorSetup(Protocol):
     """The setup of the coordinator."""
 
     @property
@@ -107,7 +107,7 @@ class LandmarkCoordinator:
 
     Parameters = CoordinatorParameters
 
-    def __init__(self, setup: CoordinatorSetup) -> None:
+    def __init__(self, setup: LandmarkCoordinatorSetup) -> None:
         rules = msgspec.convert(setup.parameters, CoordinatorParameters)
         self.map = LandmarkMap()
         self.replica = Replica()

@@ -12,10 +12,8 @@ from msgspec import Meta, Struct
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.protocols.central_membership import CoordinatorMembership
 from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
-from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, decode_beacon, encode_beacon
+from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, read_beacon, write_beacon
 from zwerm.agents.robot_teams.team_lead import TeamLead, findings
-from zwerm.errors import ProtocolError
-from zwerm.wire.checksum import seal, unseal
 from zwerm.wire.messages import Command, Observation, Transmission
 
 # Time that the coordinator waits for the robots' first reports [s], and ticks between its decisions after that.
@@ -73,15 +71,14 @@ class TeamCoordinator:
         self._view = self.membership.view
         self._gather_ticks = round(GATHER_S / setup.dt_s)
         self._every = max(1, round(table.beacon_s / setup.dt_s))
-        self._told = -1, False
+        self._reported = -1, False
 
     def step(self, observation: Observation) -> Command:
         """Receive, decide, and send."""
         tick = observation.tick
         for packet in observation.inbox:
-            try:
-                beacon: TeamBeacon = decode_beacon(unseal(packet.payload))
-            except (ProtocolError, msgspec.DecodeError, UnicodeDecodeError):
+            beacon = read_beacon(packet.payload)
+            if beacon is None:
                 self.refused += 1
                 continue
             self.membership.receive(beacon, tick, near=False)
@@ -96,10 +93,10 @@ class TeamCoordinator:
             if tick % DECIDE_TICKS == 0 and self.lead.decide(tick):
                 urgent = True
         done = self._is_done()
-        outbox = self._say(tick) if urgent or tick % self._every == 0 else ()
+        outbox = self._outgoing(tick) if urgent or tick % self._every == 0 else ()
         telemetry: dict[str, float | bool] = {}
-        if (len(self.map.facts), done) != self._told:
-            self._told = len(self.map.facts), done
+        if (len(self.map.facts), done) != self._reported:
+            self._reported = len(self.map.facts), done
             telemetry = {"certificate_satisfied": done, **findings(self.map, self.membership)}
         return Command(outbox=outbox, done=done, telemetry=telemetry)
 
@@ -111,7 +108,7 @@ class TeamCoordinator:
             self.map.complete_from(None if place is None else self.map.end(place)) for place in places
         )
 
-    def _say(self, tick: int) -> tuple[Transmission, ...]:
+    def _outgoing(self, tick: int) -> tuple[Transmission, ...]:
         beacon = TeamBeacon(
             self._node,
             self.membership.outgoing(),
@@ -122,4 +119,4 @@ class TeamCoordinator:
             len(self.map.facts),
             *self._exchange.outgoing(tick),
         )
-        return (Transmission("uplink", seal(encode_beacon(beacon))),)
+        return (Transmission("uplink", write_beacon(beacon)),)

@@ -12,7 +12,7 @@ import msgspec
 
 from zwerm.agents.sensor_coverage.frontier.decisions import Services
 from zwerm.agents.sensor_coverage.frontier.directions import add_wall
-from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
+from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
@@ -45,7 +45,7 @@ WATCH_TICKS: Final = 50
 # Explanations of the outcomes other than `covered`.
 GIVEN_UP: Final = {
     "depot-dry": "the depot is empty",
-    "source-blocked": "no robot gets away from the base",
+    "source-blocked": "no robot can leave the base",
     "source-lost": "no base station answers",
     "cut-off": "no path leads to the frontier",
     "no-end": "too many cycles",
@@ -53,7 +53,7 @@ GIVEN_UP: Final = {
 }
 
 
-class CoordinatorSetup(Protocol):
+class SensorCoverageSetup(Protocol):
     """The parts of its setup that the coordinator uses."""
 
     @property
@@ -86,7 +86,7 @@ class SensorCoverageCoordinator:
 
     Parameters = PlannerParameters
 
-    def __init__(self, setup: CoordinatorSetup) -> None:
+    def __init__(self, setup: SensorCoverageSetup) -> None:
         parameters: PlannerParameters = msgspec.convert(setup.parameters, PlannerParameters)
         self.parameters = parameters
         self.slots = Slots()
@@ -181,7 +181,7 @@ class SensorCoverageCoordinator:
         return moved
 
     def _run(self) -> Routine[None]:
-        """Call the roll, carry out the algorithm, and report the numbers."""
+        """Send the roll call, carry out the algorithm, and report the numbers."""
         self.mailbox.roll_call(RollCall(1), ROLL_CALL_COPIES if self._restarted else 1)
         yield from self._algorithm_1()
         self.outcome = self.outcome or "no-end"
@@ -335,7 +335,7 @@ class SensorCoverageCoordinator:
         redundant = (*self.redundant, *self.walking.idle)
         sources = dict.fromkeys(self.sources.available(), 0.0) | dict.fromkeys(redundant, REDUNDANT_COST)
 
-        def find_routes(complex_: FlagComplex, sources: Mapping[int, float]) -> Reach:
+        def find_routes(complex_: FlagComplex, sources: Mapping[int, float]) -> CheapestRoutes:
             return services.paths.routes(complex_, sources, services.frontier.obstacle, shut)
 
         return services.assignment.assign(services.frontier.plans(), self.pushing.scan, sources, find_routes)
@@ -364,7 +364,7 @@ class SensorCoverageCoordinator:
         return "source-blocked" if alone else "cut-off"
 
     def _reconsider_outcome(self) -> Routine[None]:
-        """Go on after all if silent stations may be a first loss, or if the covered space is to be watched."""
+        """Continue if silent stations may be a first loss, or if `watch_until_s` has not passed."""
         if self.outcome == "source-lost" and self.mailbox.suspect_loss():
             self.outcome = ""
             for slot, base in self.sources.stations.items():

@@ -77,7 +77,7 @@ def test_an_error_of_many_robots_is_printed_once_with_the_line_of_the_user(tmp_p
     assert said[-1] == "zwerm: node 0 crashed at tick 3: ValueError: no luck for 0 (debugged.py:12, in step)"
 
 
-def test_errors_from_different_lines_or_of_different_kinds_are_apart() -> None:
+def test_errors_from_different_lines_or_of_different_kinds_are_printed_separately() -> None:
     one, other = 'File "a.py", line 1, in f\n', 'File "a.py", line 2, in f\n'
     head = "Traceback (most recent call last):\n  "
     found = grouped(
@@ -98,7 +98,7 @@ def test_a_breakpoint_opens_the_debugger_and_the_run_goes_on_with_the_same_trace
     assert trace_of(ran.stdout) == trace_of(run(tmp_path, "Plain", "--inline").stdout)
 
 
-def test_to_quit_the_debugger_ends_the_run_as_interrupted(tmp_path: Path) -> None:
+def test_quitting_the_debugger_ends_the_run_as_interrupted(tmp_path: Path) -> None:
     ran = run(tmp_path, "Stops", "--inline", typed="q\n")
     assert ran.returncode == 130
     assert "zwerm: interrupted at tick 3" in ran.stderr

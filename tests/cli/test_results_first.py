@@ -33,7 +33,7 @@ def test_the_json_object_is_printed_although_the_disk_is_full(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("runner", ["--inline", "--processes"])
-def test_what_a_controller_prints_does_not_spoil_the_json_object(tmp_path: Path, runner: str) -> None:
+def test_the_output_of_a_controller_does_not_change_the_json_object(tmp_path: Path, runner: str) -> None:
     for name in ("ends.py",):
         (tmp_path / name).write_text((ROBOTS / name).read_text())
     ran = zwerm(

@@ -128,7 +128,7 @@ def _reason(run: str, credential: Credential, endpoint: str, terms: Terms) -> st
 @pytest.mark.parametrize(
     "endpoint", ["tcp/0.0.0.0:7447", "tcp/192.0.2.1:7447", "tcp/[::]:7447", "tcp/example.org:7447"]
 )
-def test_what_is_not_encrypted_does_not_leave_the_machine_unasked(endpoint: str, tmp_path: Path) -> None:
+def test_an_endpoint_without_encryption_beyond_the_machine_needs_an_option(endpoint: str, tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="expected tls/ or quic/ beyond this machine"):
         check_encryption([endpoint])
     check_encryption(["tls/0.0.0.0:1", "quic/0.0.0.0:1", "tcp/127.0.0.1:1", "tcp/[::1]:1", "tcp/localhost:1"])

@@ -48,7 +48,7 @@ def intruder(net: Network) -> Iterator[zenoh.Session]:
 
 
 def after_all_before(net: Network, session: zenoh.Session) -> None:
-    """Return when the world has taken in everything that `session` sent, which its own next command proves."""
+    """Wait until the world has received everything that `session` sent: its next command arrives after that."""
     session.put(command_key(RUN, INTRUDER), b"control")
     assert net.link.receive(20.0) == Arrival(INTRUDER, b"control")
 
@@ -84,7 +84,7 @@ def test_a_node_cannot_send_commands_as_another_node(
     intruder.delete(command_key(RUN, INTRUDER))
     after_all_before(net, intruder)
     assert victim.receive(0.0) is None
-    assert net.link.refused == {}
+    assert net.link.refusals.by_reason == {}
     victim.send(b"real")
     assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
 
@@ -138,7 +138,7 @@ def test_a_session_with_a_wrong_password_is_refused(net: Network) -> None:
             net.session(wrong)
     with net.session(right) as session:
         assert [decode_welcome(reply).refused for reply in ask(session, INTRUDER, hello(INTRUDER))] == [""]
-    assert net.link.refused == {}
+    assert net.link.refusals.by_reason == {}
 
 
 def test_a_refused_node_gets_an_error_of_one_line(net: Network) -> None:
@@ -179,7 +179,7 @@ def test_a_second_session_with_the_same_credentials_is_refused_and_the_first_sta
 
 def test_a_second_hello_of_a_joined_node_is_refused_and_counted(net: Network, intruder: zenoh.Session) -> None:
     assert [decode_welcome(reply) for reply in ask(intruder, INTRUDER, hello(INTRUDER))] == [Welcome(refused="joined")]
-    assert net.link.refused == {"joined": 1}
+    assert net.link.refusals.by_reason == {"joined": 1}
     after_all_before(net, intruder)
 
 
@@ -242,7 +242,7 @@ def test_no_secret_is_on_a_command_line_in_an_environment_or_in_a_file(nothing_l
         assert "passwords" not in {path.name for path in directory.iterdir()}
 
 
-def test_connections_that_say_nothing_do_not_keep_a_node_from_joining(private_tmp: Path) -> None:
+def test_silent_connections_do_not_prevent_a_node_from_joining(private_tmp: Path) -> None:
     with network(private_tmp) as net, contextlib.ExitStack() as open_sockets:
         for _ in range(500):
             idle = open_sockets.enter_context(socket.socket(socket.AF_UNIX))

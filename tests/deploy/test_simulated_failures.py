@@ -73,7 +73,7 @@ def test_every_run_in_lock_step_ends_in_time_and_with_a_reason(on_crash: str, mo
                 assert network.now - min(first_s, first_loss_s) <= NAMED_WITHIN_S + LEASE_S, seed
         assert driver.lost == 0, (seed, "nothing was lost on the way")
         network.advance(network.now + 200.0)
-        assert set(network.refused) <= {"returned", "not-joined"}, seed
+        assert set(network.refusals.by_reason) <= {"returned", "not-joined"}, seed
         assert not set(network.lost_at) & set(network.admission.joined), (seed, "a lost node was taken back")
     assert outcomes == {"failed", "time-limit"}, "the seeds reach both"
 

@@ -28,7 +28,7 @@ ECHO = "small_controllers:Echo"
 PRIVATE_MB_MAX = 8.0
 
 # Longer than a robot that failed once waited for the world at most.
-PATIENCE_S = 6.0
+WAIT_S = 6.0
 
 
 def members(count: int, controller: str = ECHO) -> dict[int, tuple[str, Setup]]:
@@ -112,7 +112,7 @@ def test_a_failed_robot_exits_only_after_the_world_has_confirmed_its_failure(not
         with swarm.link._changed:  # the world takes in messages, and confirms nothing
             swarm.link.send(0, encode(Observation(5, 0.0)))
             until(lambda: swarm.link._arrivals, "the failure arrived")
-            assert not swarm.supervisor.wait(PATIENCE_S), "no time limit ends its wait"
+            assert not swarm.supervisor.wait(WAIT_S), "no time limit ends its wait"
         said, end = swarm.link.receive(20.0), swarm.link.receive(20.0)
         assert said is not None
         assert isinstance(open_answer(said.payload or b""), Failure)

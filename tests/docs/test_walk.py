@@ -29,7 +29,9 @@ def test_files_are_saved_and_commands_run_in_order_in_one_shell(tmp_path: Path) 
         (block("console", "$ echo old") + block("console", "$ echo new") + block("text", "old"), "not printed: old"),
     ],
 )
-def test_what_is_not_true_is_reported_with_its_line(tmp_path: Path, page: str, message: str) -> None:
+def test_a_statement_of_a_page_that_is_not_true_is_reported_with_its_line(
+    tmp_path: Path, page: str, message: str
+) -> None:
     with pytest.raises(AssertionError, match=message):
         Reader(tmp_path).follow(page)
 

@@ -34,6 +34,7 @@ from zwerm.wire.messages import (
     encode,
     open_answer,
 )
+from zwerm.wire.refusals import Refusals
 
 NODES = range(3)
 Open = Callable[[Answer], WorldLink]
@@ -198,9 +199,9 @@ HELLOS = {
 def test_a_wrong_hello_is_refused_and_counted_by_its_reason(net: Network) -> None:
     session = net.session(net.credentials.nodes[0])
     for payload, reason in HELLOS.items():
-        net.link.refused.clear()
+        net.link.refusals = Refusals()
         assert [decode_welcome(answer) for answer in ask(session, 0, payload)] == [Welcome(refused=reason)], payload
-        assert net.link.refused == {reason: 1}
+        assert net.link.refusals.by_reason == {reason: 1}
     assert net.link.joined == frozenset()
     assert [decode_welcome(answer).refused for answer in ask(session, 0, hello(0))] == [""]
     assert net.link.joined == {0}
@@ -214,7 +215,7 @@ def test_a_hello_of_an_unexpected_node_is_refused(private_tmp: Path) -> None:
         with pytest.raises(LinkError, match=r"^node 1 at unixsock-stream/.*: the world refuses it: unknown: "):
             node.join()
         node.close()
-        assert net.link.refused == {"unknown": 1}
+        assert net.link.refusals.by_reason == {"unknown": 1}
 
 
 def test_a_command_of_a_node_that_has_not_joined_is_counted_and_discarded(net: Network) -> None:
@@ -222,7 +223,7 @@ def test_a_command_of_a_node_that_has_not_joined_is_counted_and_discarded(net: N
     session.put(command_key(RUN, 0), b"early")
     ask(session, 0, hello(0, 9))  # answered after the command has arrived
     assert net.link.receive(0.0) is None
-    assert net.link.refused == {"not-joined": 1, "incarnation": 1}
+    assert net.link.refusals.by_reason == {"not-joined": 1, "incarnation": 1}
     ask(session, 0, hello(0))
     session.put(command_key(RUN, 0), b"later")
     assert net.link.receive(20.0) == Arrival(0, b"later")
@@ -244,7 +245,7 @@ def test_a_node_that_has_not_joined_cannot_block_the_world(net: Network) -> None
             assert not flooding.done(), "the world returned while messages still came"
         finally:
             over.set()
-    assert net.link.refused["not-joined"] > 0
+    assert net.link.refusals.by_reason["not-joined"] > 0
     session.close()
 
 
@@ -345,7 +346,7 @@ def test_closing_the_link_ends_the_wait_for_a_confirmation(net: Network) -> None
         assert heard.wait(20.0)
 
 
-def test_a_node_is_told_when_the_world_is_lost(private_tmp: Path) -> None:
+def test_a_node_is_informed_when_the_world_is_lost(private_tmp: Path) -> None:
     gone = threading.Event()
     with network(private_tmp) as net:
         node = net.node(0, on_lost=gone.set)
@@ -388,7 +389,7 @@ def test_a_killed_process_is_reported_lost_and_restarts_as_a_new_incarnation(not
         assert open_answer(answer.payload).tick == 7
         swarm.restart(2)
         assert swarm.link.receive(20.0) == Arrival(2, None)
-        assert swarm.link.refused == {}
+        assert swarm.link.refusals.by_reason == {}
     assert set(swarm.supervisor.exit_codes.values()) == {0}
 
 
@@ -409,7 +410,7 @@ def test_a_paused_process_is_not_lost_and_answers_after_it_resumes(nothing_left:
         assert answer.payload is not None
 
 
-def test_a_node_that_was_lost_is_told_that_it_is_not_taken_back(net: Network) -> None:
+def test_a_lost_node_gets_the_reason_for_which_it_is_not_admitted_again(net: Network) -> None:
     node, other = net.node(0), net.node(1)
     node.join()
     other.join()
@@ -422,12 +423,12 @@ def test_a_node_that_was_lost_is_told_that_it_is_not_taken_back(net: Network) ->
     other.send(b"control")
     assert net.link.receive(20.0) == Arrival(1, b"control")
     assert net.link.joined == {1}
-    assert net.link.refused["returned"] == 1
+    assert net.link.refusals.by_reason["returned"] == 1
     again.close()
     other.close()
 
 
-def test_a_node_with_other_releases_is_told_both(net: Network) -> None:
+def test_a_node_with_other_releases_gets_both_lists_of_releases(net: Network) -> None:
     session = net.session(net.credentials.nodes[0])
     [answer] = ask(session, 0, encode(Hello(0, 1, "zwerm 9.9")))
     welcome = decode_welcome(answer)

@@ -65,7 +65,7 @@ def gudhi_relative_b2(complex_: FlagComplex, fence: list[tuple[int, int]]) -> in
 
 
 def gudhi_b1_coned(complex_: FlagComplex, cycles: list[tuple[int, ...]]) -> int:
-    """The holes that are left when those that the cycles go around are filled."""
+    """The holes that remain after the holes of the cycles are filled."""
     tree = gudhi.SimplexTree()
     for simplex in (*((v,) for v in complex_.vertices), *complex_.edges, *complex_.triangles):
         tree.insert(list(simplex))
@@ -113,7 +113,7 @@ def test_three_robots_that_all_see_each_other_are_a_triangle() -> None:
         (wheel(6), (1, 0)),
     ],
 )
-def test_pieces_and_holes_of_small_complexes(lists: Graph, expected: tuple[int, int]) -> None:
+def test_betti_numbers_of_small_complexes_are_known(lists: Graph, expected: tuple[int, int]) -> None:
     assert betti(FlagComplex(lists)) == expected
 
 
@@ -140,12 +140,12 @@ def test_an_open_fence_makes_no_robot_redundant() -> None:
     assert find_redundant(FlagComplex(lists), [edge(*each) for each in ring(6)][:4]).redundant == ()
 
 
-def test_a_robot_in_no_triangle_is_never_spared_from_single_file() -> None:
+def test_a_robot_in_no_triangle_is_never_redundant() -> None:
     lists = graph((0, 1), (1, 2), (2, 3), (2, 4), (3, 4))
     assert 1 not in find_redundant(FlagComplex(lists), [(2, 3), (3, 4), (2, 4)]).redundant
 
 
-def test_the_way_around_a_hole_is_the_shortest_there_is() -> None:
+def test_the_cycle_around_a_hole_is_a_shortest_one() -> None:
     """A square within a hexagon, one hole: the square is the way. Beside it another, of five."""
     outer, inner = ring(6), ring(4, 6)
     spokes = [(0, 6), (1, 6), (1, 7), (2, 7), (3, 7), (3, 8), (4, 8), (4, 9), (5, 9), (0, 9)]
@@ -153,7 +153,7 @@ def test_the_way_around_a_hole_is_the_shortest_there_is() -> None:
     assert hole_cycles(FlagComplex(lists)) == [(6, 7, 8, 9), (20, 21, 22, 23, 24)]
 
 
-def test_a_disc_has_no_way_around_a_hole() -> None:
+def test_a_disc_has_no_cycle_around_a_hole() -> None:
     assert hole_cycles(FlagComplex(wheel(6))) == []
 
 
@@ -162,7 +162,7 @@ def test_a_disc_has_no_way_around_a_hole() -> None:
 
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(graphs())
-def test_ways_around_holes_are_as_many_as_there_are_and_none_can_be_filled(lists: Graph) -> None:
+def test_there_is_one_cycle_for_each_hole_and_no_cycle_is_a_boundary(lists: Graph) -> None:
     complex_ = FlagComplex(lists)
     cycles = hole_cycles(complex_)
     for cycle in cycles:

@@ -97,7 +97,7 @@ def test_a_start_shifted_by_a_picometre_changes_the_trace() -> None:
     assert run(starting_at(0.5), 1, "inline").trace != run(starting_at(0.5 + 1e-12), 1, "inline").trace
 
 
-def test_adding_a_robot_out_of_everyones_way_changes_nobody_elses_draws() -> None:
+def test_an_additional_robot_far_away_changes_no_other_robots_draws() -> None:
     poses = [[0.5, 0.5, 0.0], [1.0, 0.5, 1.0], [1.5, 1.5, 2.0]]
     body = {"drive_noise_fraction": 0.05}
     walk = {"controller": "random-walk", "body": body, "sensors": []}

@@ -33,13 +33,13 @@ def interrupt(running: subprocess.Popen[str]) -> None:
 
 
 def kill_robots(running: subprocess.Popen[str]) -> None:
-    """End the run as it ends when its robots fail."""
+    """End the run as failing robots end it."""
     running.send_signal(signal.SIGTERM)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the kernel does not name the processes of a session")
 @pytest.mark.parametrize("end", [interrupt, kill_robots])
-def test_what_a_controller_has_started_ends_with_the_run(
+def test_processes_that_a_controller_started_end_with_the_run(
     end: Callable[[subprocess.Popen[str]], None], tmp_path: Path
 ) -> None:
     forked = tmp_path / "forked"

@@ -24,7 +24,7 @@ STATIONS = ("arena.size_m=[4.2,2.6]", "robots.count=40", "base.poses=[[0.2,1.3,0
         (("robots.count=6",), "depot-dry: the depot is empty; frontier edges left: 6"),
         (
             ("arena.size_m=[0.5,0.5]", "base.pose=[0.2,0.2,0.0]", 'coordinator.parameters.walls="paper"'),
-            "source-blocked: no robot gets away from the base; frontier edges left: 0",
+            "source-blocked: no robot can leave the base; frontier edges left: 0",
         ),
         (
             ('faults=[{kind="crash",at_s=30,nodes=["base"]}]',),
@@ -37,7 +37,7 @@ STATIONS = ("arena.size_m=[4.2,2.6]", "robots.count=40", "base.poses=[[0.2,1.3,0
         (("coordinator.parameters.cycles_max=5",), "no-end: too many cycles; frontier edges left: 5"),
     ],
 )
-def test_a_deployment_that_cannot_go_on_says_why(settings: tuple[str, ...], reason: str) -> None:
+def test_a_deployment_that_cannot_continue_states_its_reason(settings: tuple[str, ...], reason: str) -> None:
     result = run("sensor-coverage", runner="inline", overrides=[*HALL, *settings])
     assert result.outcome == "failed"
     assert result.reason == f"node {result.robots} gave up: {reason}"
@@ -96,7 +96,7 @@ def test_a_node_that_dies_or_stops_on_its_way_is_replaced_or_found_again(fault: 
     assert result.metrics["holes"] == 0.0
 
 
-def test_a_coordinator_that_begins_anew_finds_the_swarm_as_it_is() -> None:
+def test_a_coordinator_that_restarts_finds_the_current_state_of_the_swarm() -> None:
     fault = 'faults=[{kind="crash",at_s=60,for_s=3,nodes=["coordinator"]}]'
     through, anew = (run("sensor-coverage", runner="inline", overrides=[*HALL, *more]) for more in ((), (fault,)))
     assert anew.metrics["robots_deployed"] == through.metrics["robots_deployed"]
@@ -117,21 +117,21 @@ def with_dead_motors(robot: int, from_tick: int) -> Callable[[int, Link], Link]:
 
 
 @pytest.mark.parametrize(("robot", "from_tick"), [(3, 350), (5, 350), (7, 350), (7, 640)])
-def test_a_robot_that_cannot_get_to_its_place_is_given_up_and_another_comes(robot: int, from_tick: int) -> None:
+def test_a_robot_that_cannot_reach_its_slot_is_replaced_by_another(robot: int, from_tick: int) -> None:
     scenario = load("sensor-coverage", HALL)
     outcome, world = drive(scenario, around=with_dead_motors(robot, from_tick))
     assert outcome == "completed"
     assert measure(world)["coverage_fraction"] >= 0.99
 
 
-def test_of_two_stations_one_may_die() -> None:
+def test_with_two_stations_the_deployment_continues_if_one_dies() -> None:
     fault = 'faults=[{kind="crash",at_s=20,nodes=[1]}]'
     result = run("sensor-coverage-multi-source", runner="inline", overrides=[*STATIONS, fault])
     assert result.outcome == "completed"
     assert result.metrics["coverage_fraction"] >= 0.99
 
 
-def test_of_two_stations_one_may_be_blocked() -> None:
+def test_with_two_stations_the_deployment_continues_if_one_is_blocked() -> None:
     box = "arena.walls=[[[3.85,1.1],[3.85,1.5]],[[3.85,1.1],[4.2,1.1]],[[3.85,1.5],[4.2,1.5]]]"
     result = run("sensor-coverage-multi-source", runner="inline", overrides=[*STATIONS, box])
     assert result.outcome == "completed"

@@ -29,7 +29,9 @@ def test_a_controller_that_raises_fails_the_run_with_its_traceback(runner: Runne
 
 
 @pytest.mark.parametrize("runner", ["inline", "processes"])
-def test_a_controller_that_raises_is_survived_where_the_scenario_says_so(runner: Runner, nothing_left: None) -> None:
+def test_a_controller_that_raises_ends_only_its_node_if_on_crash_is_continue(
+    runner: Runner, nothing_left: None
+) -> None:
     result = run(scenario(robots=troubled("Raises", on_crash="continue")), runner=runner)
     assert (result.outcome, result.crashed, result.ticks) == ("time-limit", [2], 20)
     tracks = result.history.arrays()
@@ -43,7 +45,7 @@ def test_a_robot_killed_mid_run_fails_the_run_and_is_named(nothing_left: None) -
     assert result.reason == "node 2 crashed at tick 5: its process was ended by signal 9 (SIGKILL)"
 
 
-def test_a_robot_killed_mid_run_is_survived_where_the_scenario_says_so(nothing_left: None) -> None:
+def test_a_robot_killed_mid_run_does_not_end_the_run_if_on_crash_is_continue(nothing_left: None) -> None:
     result = run(scenario(robots=troubled("Dies", on_crash="continue")))
     assert (result.outcome, result.crashed, result.ticks) == ("time-limit", [2], 20)
     assert result.middleware_lost == 0

@@ -40,7 +40,7 @@ def relay(faults: list[dict[str, Any]], **tables: Any) -> Scenario:
 
 
 def harmless(count: int) -> list[dict[str, Any]]:
-    """Return faults of every kind under which the largest id still gets around."""
+    """Return faults of every kind under which the largest id still reaches all robots."""
     kinds: list[dict[str, Any]] = [
         {"kind": "pause", "nodes": [0], "for_s": 0.3},
         {"kind": "slow", "nodes": [2], "every_ticks": 2, "for_s": 0.4},
@@ -71,7 +71,7 @@ def test_the_planted_faults_are_found_among_forty_random_ones_and_both_are_neede
         assert not failing.of(run(relay([fault]), 1, "inline"))
 
 
-def test_what_is_written_runs_again_as_it_did(tmp_path: Path) -> None:
+def test_a_written_scenario_gives_the_same_run_again(tmp_path: Path) -> None:
     chosen = with_faults(relay(harmless(5)), PLANTED)
     written = tmp_path / "shrunk.toml"
     written.write_text(write_toml(tables_of(chosen)))
@@ -86,7 +86,9 @@ def test_what_is_written_runs_again_as_it_did(tmp_path: Path) -> None:
         (PLANTED, "ticks > 1", "small.toml: with seed 1 the run fails without any fault"),
     ],
 )
-def test_where_there_is_nothing_to_shrink_it_says_so(faults: list[dict[str, Any]], failing: str, line: str) -> None:
+def test_a_schedule_that_cannot_be_shrunk_is_refused_in_one_line(
+    faults: list[dict[str, Any]], failing: str, line: str
+) -> None:
     with pytest.raises(ScenarioError) as caught:
         Shrinker(relay(faults), 1, parse_failing(failing)).shrink()
     assert caught.value.mistakes == [line]
@@ -100,7 +102,7 @@ def test_where_there_is_nothing_to_shrink_it_says_so(faults: list[dict[str, Any]
         ("outcome < failed", "--failing: an outcome is == or != another, got 'outcome < failed'"),
     ],
 )
-def test_a_condition_that_is_none_is_one_line(text: str, line: str) -> None:
+def test_an_invalid_condition_is_one_line(text: str, line: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         parse_failing(text)
     assert caught.value.mistakes == [line]

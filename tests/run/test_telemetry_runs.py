@@ -66,13 +66,13 @@ def test_a_robot_that_reports_by_the_name_of_a_metric_changes_no_metric() -> Non
         ),
     ],
 )
-def test_what_is_no_telemetry_fails_the_run_with_node_tick_rule_and_value(controller: str, reason: str) -> None:
+def test_invalid_telemetry_fails_the_run_with_node_tick_rule_and_value(controller: str, reason: str) -> None:
     result = run(reporting(controller), 1, "inline")
     assert result.outcome == "failed"
     assert result.reason.startswith(f"node 1 crashed at tick 3: {reason} (reporters.py:")
 
 
-def test_what_is_no_telemetry_is_survived_where_the_scenario_says_so() -> None:
+def test_invalid_telemetry_ends_only_its_node_if_on_crash_is_continue() -> None:
     result = run(reporting("Misreports", on_crash="continue"), 1, "inline")
     assert (result.outcome, result.crashed, result.ticks) == ("time-limit", [1], 20)
 
@@ -82,7 +82,7 @@ def test_forged_telemetry_on_the_wire_crashes_its_node_is_counted_and_does_not_s
     world.observe()
     forged = encode(Command()).replace(b"\x81\xa4type", b"\x82\xa9telemetry\x81\xa7complex\x80\xa4type")
     world.accept(1, forged)
-    assert world.intake.refused == {"telemetry": 1}
+    assert world.intake.refusals.by_reason == {"telemetry": 1}
     assert list(world.status.crashed) == [1]
     assert world.status.crashed[1].startswith("its command was refused: telemetry: ")
     assert world.awaited() == [0, 2, 3]

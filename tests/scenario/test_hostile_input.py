@@ -111,7 +111,7 @@ def test_a_deleted_working_directory_is_an_error_of_one_line(tmp_path: Path) -> 
     )
 
 
-def test_nothing_that_a_robot_says_reaches_the_terminal_as_a_control_character() -> None:
+def test_no_text_of_a_robot_reaches_the_terminal_with_control_characters() -> None:
     assert printable("\x1b[2J\x07\x9b1m\udcff\tok\n") == "\\x1b[2J\\x07\\x9b1m\\udcff\tok\n"
     result = run(scenario(robots={"controller": "ends:Escapes"}), runner="inline")
     assert "\x1b" not in result.reason + "".join(result.tracebacks.values())

@@ -158,7 +158,7 @@ def test_an_unknown_scenario_is_one_line_with_the_known_ones() -> None:
     assert caught.value.mistakes == ["gone.toml: expected a scenario file or the name of a built-in one"]
 
 
-def test_a_mistake_of_an_override_is_blamed_on_the_command_line_and_another_on_the_file(tmp_path: Path) -> None:
+def test_a_mistake_of_an_override_names_the_command_line_and_another_names_the_file(tmp_path: Path) -> None:
     path = written(tmp_path, GOOD + "cuont = 3\n")
     with pytest.raises(ScenarioError) as caught:
         load(path, ("robots.body.radius_m=0", "robots.count=-4"))

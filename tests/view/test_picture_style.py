@@ -54,7 +54,7 @@ def test_robots_have_the_colour_of_what_they_have_reported_at_that_time(pairs: R
     assert colour_at(start, 1.69, 0.985) == colour_at(end, 1.29, 0.985) == greatest  # 3, the largest of all
 
 
-def test_links_connect_robots_that_have_heard_each_other(pairs: RunResult, tmp_path: Path) -> None:
+def test_links_connect_robots_between_which_a_packet_has_arrived(pairs: RunResult, tmp_path: Path) -> None:
     assert pairs._links() == [(0, 1), (2, 3)]
     shown = pairs.picture(tmp_path / "links.png", bare=True)
     hidden = pairs.picture(tmp_path / "none.png", bare=True, links=False)
@@ -62,13 +62,13 @@ def test_links_connect_robots_that_have_heard_each_other(pairs: RunResult, tmp_p
     assert colour_at(shown, 1.0, 1.0) == (255, 255, 255)
 
 
-def test_a_name_that_nobody_reported_is_refused_in_one_line(pairs: RunResult, tmp_path: Path) -> None:
+def test_telemetry_that_no_robot_reported_is_refused_as_a_colour_in_one_line(pairs: RunResult, tmp_path: Path) -> None:
     with pytest.raises(PictureError) as caught:
         pairs.picture(tmp_path / "a.png", colour_by="larges")
     assert str(caught.value) == "colour_by: expected a name of telemetry that the run has (largest), got 'larges'"
 
 
-def test_the_size_of_the_arena_is_that_asked_for(pairs: RunResult, tmp_path: Path) -> None:
+def test_the_arena_in_a_picture_has_the_requested_size(pairs: RunResult, tmp_path: Path) -> None:
     sizes = []
     for side in (2.0, 4.0):
         with Image.open(pairs.picture(tmp_path / "a.png", size_in=(side, 9.0), bare=True)) as image:
@@ -77,7 +77,7 @@ def test_the_size_of_the_arena_is_that_asked_for(pairs: RunResult, tmp_path: Pat
     assert sizes[1][1] - sizes[0][1] == pytest.approx(300, abs=2)
 
 
-def test_a_bare_picture_has_no_words_and_an_animation_takes_the_same_choices(pairs: RunResult, tmp_path: Path) -> None:
+def test_a_bare_picture_has_no_text_and_an_animation_takes_the_same_options(pairs: RunResult, tmp_path: Path) -> None:
     full = pairs.picture(tmp_path / "full.svg").read_text()
     bare = pairs.picture(tmp_path / "bare.svg", bare=True).read_text()
     assert "gossip-max, seed 1" in full

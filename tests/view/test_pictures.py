@@ -101,7 +101,7 @@ def test_the_arena_is_white_inside_its_walls_and_grey_outside_and_in_its_pillars
     assert look.at(2.0, 1.5) == WHITE
 
 
-def test_robots_are_where_they_are_with_the_nose_ahead_and_absent_ones_nowhere() -> None:
+def test_robots_are_drawn_at_their_positions_with_the_nose_ahead_and_absent_ones_are_not() -> None:
     look = drawn(2, since=2)
     assert look.at(0.93, 0.5) == BLUE
     assert near(look.at(1.05, 0.5), DARK)
@@ -111,13 +111,13 @@ def test_robots_are_where_they_are_with_the_nose_ahead_and_absent_ones_nowhere()
     assert drawn(0, since=0).at(0.45, 1.5) == BLUE
 
 
-def test_paths_are_drawn_from_where_they_are_asked_for() -> None:
+def test_paths_are_drawn_from_the_requested_sample() -> None:
     assert drawn(2, since=0).at(0.6, 0.5) != WHITE
     assert drawn(2, since=1).at(0.6, 0.5) == WHITE
     assert drawn(2, since=1).at(0.8, 0.5) != WHITE
 
 
-def test_what_is_covered_is_tinted_as_far_as_the_arena_goes() -> None:
+def test_the_covered_area_inside_the_arena_is_tinted() -> None:
     look = drawn(2, coverage_radius_m=0.7)
     tint = tuple(round(255 * 0.75 + each * 0.25) for each in SKY)
     assert near(look.at(1.0, 1.1), tint, 2)
@@ -163,7 +163,7 @@ def test_a_dead_robot_is_crossed_out_where_it_died() -> None:
     assert [each.get_label() for each in swarm.legend()] == ["1 robot at 0 s", "dead robots"]
 
 
-def test_what_is_in_sight_is_tinted_and_not_what_is_behind_a_wall() -> None:
+def test_the_area_in_sight_is_tinted_and_the_area_behind_a_wall_is_not() -> None:
     sheet = Sheet(ARENA, "trial")
     swarm = Swarm(sheet, ARENA, HISTORY.arrays(), RADIUS_M, sight=SeenArea(ARENA, 2.0))
     swarm.show(2, 2)
@@ -190,7 +190,7 @@ MOMENT = SimpleNamespace(
 
 
 def deployment(cycles: int = 3) -> RunView:
-    """A run of `cycles` s; the complex is told of once a second, and turns from frontier to obstacle at the last."""
+    """A run of `cycles` s; the complex is reported once a second, and turns from frontier to obstacle at the last."""
     history = history_of(*[(TRIANGLE.tolist(), [True] * 3) for _ in range(cycles + 1)])
     reported = [
         TelemetryRecord(
@@ -226,7 +226,7 @@ def test_the_complex_shows_triangles_frontier_obstacle_and_the_push() -> None:
     assert shown(view, None).at(1.0, 0.8) == WHITE
 
 
-def test_a_swarm_that_tells_of_no_complex_is_shown_with_the_true_one(tmp_path: Path) -> None:
+def test_without_a_reported_complex_the_true_one_is_drawn(tmp_path: Path) -> None:
     # Robot 1 is behind the wall without thickness, robot 4 is out of range, robot 5 dead.
     places = np.array([(1.9, 0.5), (2.1, 0.5), (1.5, 0.5), (1.7, 0.9), (0.3, 1.8), (1.8, 0.6)])
     standing = np.array([True, True, True, True, True, False])
@@ -251,7 +251,7 @@ def test_several_paths_are_all_shown() -> None:
     assert look.at(1.0, 0.5) == look.at(0.75, 0.9) == tuple(round(255 * each) for each in to_rgb(PUSH))
 
 
-def test_the_growth_is_by_cycle_where_there_are_cycles_and_else_by_time() -> None:
+def test_the_coverage_curve_is_over_cycles_if_there_are_any_and_else_over_time() -> None:
     view = deployment()
     curve = Composition(view).curve
     assert curve is not None
@@ -300,7 +300,7 @@ def test_a_layer_of_a_users_own_is_drawn_and_a_wrong_name_is_one_line(tmp_path: 
         draw_run(tmp_path / "none.png", replace(VIEW, layers=("own_layers:Line2D",)))
 
 
-def test_robots_that_have_left_are_told_from_those_that_never_came() -> None:
+def test_robots_that_left_are_distinguished_from_those_that_never_entered() -> None:
     assert gone_at_the_end(HISTORY.arrays()).tolist() == [1]
 
 
@@ -319,7 +319,7 @@ def test_the_outline_of_an_area_keeps_its_holes_and_leaves_out_lines() -> None:
         ("deployment_cycles", "deployment cycles"),
     ],
 )
-def test_a_metric_reads_as_words(name: str, words: str) -> None:
+def test_the_label_of_a_metric_in_a_picture_is_words(name: str, words: str) -> None:
     assert readable(name) == words
 
 
@@ -332,14 +332,14 @@ def picture(path: Path, arena: Arena = ARENA, history: History = HISTORY) -> Pat
 
 
 @pytest.mark.parametrize("suffix", [".png", ".PNG", ".svg", ".pdf"])
-def test_a_picture_makes_its_folder_and_is_of_the_kind_its_name_says(tmp_path: Path, suffix: str) -> None:
+def test_a_picture_creates_its_folder_and_has_the_format_of_its_suffix(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / "new" / f"run{suffix}"
     assert picture(path) == path
     assert path.read_bytes()[:4] in (b"\x89PNG", b"<?xm", b"%PDF")
 
 
 @pytest.mark.parametrize("size_m", [(0.3, 30.0), (30.0, 0.3), (3.0, 3.0)])
-def test_any_shape_of_arena_fits_on_a_sheet_of_some_inches(tmp_path: Path, size_m: tuple[float, float]) -> None:
+def test_an_arena_of_any_shape_fits_on_a_sheet(tmp_path: Path, size_m: tuple[float, float]) -> None:
     arena = Arena(box(0, 0, *size_m))
     history = history_of(([(0.1, 0.1)], [True]))
     with Image.open(picture(tmp_path / "run.png", arena, history)) as sheet:
@@ -353,7 +353,7 @@ def test_a_run_whose_robots_have_all_left_can_be_drawn(tmp_path: Path) -> None:
     assert picture(tmp_path / "run.png", history=history).stat().st_size > 0
 
 
-def test_an_animation_shows_the_whole_run_and_tells_how_far_it_is(tmp_path: Path) -> None:
+def test_an_animation_shows_the_whole_run_and_reports_its_progress(tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     path = animate_run(
         tmp_path / "run.gif", VIEW, fps=10, speed_up=1.0,
@@ -370,7 +370,7 @@ def test_an_animation_shows_the_whole_run_and_tells_how_far_it_is(tmp_path: Path
     assert (np.abs(first - last).sum(axis=2) > 60).sum() > 100
 
 
-def test_an_animation_lasts_some_ten_seconds_unless_told_otherwise(tmp_path: Path) -> None:
+def test_an_animation_lasts_about_ten_seconds_by_default(tmp_path: Path) -> None:
     history = history_of(*[([(0.5 + index / 100, 0.5)], [True]) for index in range(200)], every_s=5.0)
     told: list[int] = []
     animate_run(

@@ -19,6 +19,7 @@ def test_an_obstacle_makes_four_cells_in_a_ring() -> None:
     assert len(found.middles) == 4
     degree = np.bincount(np.array(found.edges).ravel(), minlength=4)
     assert degree.tolist() == [2, 2, 2, 2]
+    assert sorted(map(tuple, found.gates.tolist())) == [(1.5, 1.5), (1.5, 7.5), (4.5, 1.5), (4.5, 7.5)]
 
 
 def test_the_order_of_slices_and_sweeps_in_parts_have_no_influence() -> None:

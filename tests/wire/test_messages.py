@@ -284,7 +284,7 @@ def test_trailing_bytes_are_malformed(trailing: bytes) -> None:
     "length",
     [b"\xdd\xff\xff\xff\xff", b"\xdc\xff\xff", b"\x91\x92\xa1a\xc6\xff\xff\xff\xff", b"\x91\x92\xdb\xff\xff\xff\xff"],
 )
-def test_a_length_that_promises_more_than_there_is_costs_nothing(length: bytes) -> None:
+def test_a_length_beyond_the_end_of_a_message_allocates_no_memory(length: bytes) -> None:
     assert reason_of(b"\x82\xa4type\xa9command/1\xa6outbox" + length) == "malformed"
 
 

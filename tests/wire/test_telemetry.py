@@ -33,7 +33,7 @@ LONG = "a" * 65
         ([1.0], "telemetry: expected a dict of numbers by name, got [1.0]"),
     ],
 )
-def test_what_is_no_telemetry_is_refused_at_the_node_with_rule_name_and_value(given: object, line: str) -> None:
+def test_invalid_telemetry_is_refused_at_the_node_with_rule_name_and_value(given: object, line: str) -> None:
     with pytest.raises((TypeError, ValueError)) as caught:
         encode_command(Command(telemetry=given))  # type: ignore[arg-type]
     assert str(caught.value) == line

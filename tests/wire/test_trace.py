@@ -22,7 +22,7 @@ def trace_of(ticks: Sequence[Tick], scenario: bytes = b"") -> str:
 RUN: list[Tick] = [(0, [0, 1, 5], [b"o0", b"o1", b"o5"], [b"c0", b"", b"c5"]), (1, [1], [b"o1'"], [b"c1'"])]
 
 
-def test_the_same_run_has_the_same_trace_today_and_tomorrow() -> None:
+def test_a_known_run_has_its_known_trace() -> None:
     assert trace_of(RUN) == trace_of(RUN) == "3ee39c4a5efa73da66a6c6286a1f4b37"
 
 
@@ -57,7 +57,7 @@ def test_the_same_run_has_the_same_trace_today_and_tomorrow() -> None:
         "bytes moved between observations",
     ],
 )
-def test_any_difference_shows(changed: list[Tick]) -> None:
+def test_any_difference_between_two_runs_changes_the_trace(changed: list[Tick]) -> None:
     assert trace_of(changed) != trace_of(RUN)
 
 
@@ -88,5 +88,5 @@ def ticks(draw: st.DrawFn) -> Tick:
 
 
 @given(st.lists(ticks(), max_size=2), st.lists(ticks(), max_size=2))
-def test_two_runs_share_a_trace_only_if_they_are_the_same_run(one: list[Tick], other: list[Tick]) -> None:
+def test_two_runs_have_the_same_trace_only_if_they_are_the_same_run(one: list[Tick], other: list[Tick]) -> None:
     assert (trace_of(one) == trace_of(other)) == (one == other)

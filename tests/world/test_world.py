@@ -59,7 +59,7 @@ def test_a_drive_is_in_the_body_frame_and_persists() -> None:
 
 
 @pytest.mark.parametrize("latency", [0, 1, 3])
-def test_a_command_acts_as_many_ticks_late_as_the_body_says(latency: int) -> None:
+def test_a_command_acts_after_the_latency_of_the_body(latency: int) -> None:
     body = {"kind": "holonomic", "max_speed_m_s": 1.0, "latency_ticks": latency}
     world = world_at((2.0, 2.0, 0.0), robots={"body": body})
     tick(world, n0=Command(drive=BodyVelocity(1.0)))
@@ -193,7 +193,7 @@ def test_radio_packets_arrive_one_tick_later_and_every_one_is_accounted_for() ->
     }
 
 
-def test_walls_block_radio_where_the_scenario_says_so() -> None:
+def test_walls_block_the_radio_if_the_scenario_sets_line_of_sight() -> None:
     tables = {"radio": {"line_of_sight": True}}
     walled = scenario(
         arena={"size_m": [4.0, 4.0], "walls": [[[2.0, 0.0], [2.0, 3.0]]]},
@@ -313,7 +313,7 @@ def test_a_base_station_releases_robots_one_by_one_and_decides_when_the_run_is_c
     assert world.completed
 
 
-def test_the_coordinator_hears_everyone_over_the_uplink_and_senses_nothing() -> None:
+def test_the_coordinator_receives_from_all_robots_over_the_uplink_and_senses_nothing() -> None:
     coordinator = {"controller": "sensor-coverage"}
     world = world_at(
         (1.0, 1.0, 0.0), (3.0, 3.0, 0.0), coordinator=coordinator, radio={"range_m": 0.1},

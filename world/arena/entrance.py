@@ -54,7 +54,7 @@ class EntrySchedule:
 class Depots:
     """The base stations, robots 0 to n - 1, and the depots in which the other robots wait.
 
-    The robots are dealt to the depots in turn, and leave each in id order.
+    The robots are distributed to the depots one by one, and leave each depot in id order.
     """
 
     def __init__(self, table: BaseTable, count: int, arena: Arena, radius_m: float, draws: Draws) -> None:

@@ -1,7 +1,7 @@
 """Start positions: robots are drawn one after the other, each until it is clear of walls and of the robots before it.
 
-The tries of robot i are keyed by its id and the number of the try. So one robot more moves no robot with a lower id,
-and none whose place it does not take. Robots start only where they can move, not in a pocket behind a narrow gap. This
+The tries of robot i are keyed by its id and the number of the try. So an additional robot moves no robot with a lower id,
+and no robot whose place stays free. Robots start only where they can move, not in a pocket behind a narrow gap. This
 is the largest part of each polygon of free space that a disc of their radius can reach. Given poses may be anywhere in
 free space. Walls without thickness close off nothing here.
 """

@@ -13,7 +13,7 @@ Velocities = tuple[Floats, Floats | None, Floats]
 class Drive(ABC):
     """The kinematics of a kind of body: the base class of the plug-in kind `drive`.
 
-    `command` is the type of drive that a controller commands, `has_wheels` whether the robot knows its wheel base.
+    `command` is the type of drive that a controller commands. With `has_wheels` the robot's Setup has its wheel base.
     """
 
     command: ClassVar[type[BodyVelocity] | type[WheelSpeeds]]

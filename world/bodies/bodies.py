@@ -1,4 +1,4 @@
-"""The bodies of one run: where they stand, what drives them, and which of them enter or leave the arena.
+"""The bodies of one run: their poses, their drives, and their entry into and exit from the arena.
 
 `scene` is the truth at the current tick. If drives act a tick or more after their command, the next scene does not
 depend on the commands of this tick; `advance_early` then moves the bodies while the nodes still work.

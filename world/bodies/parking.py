@@ -55,7 +55,7 @@ class Parking:
         `position` (n, 2) [m]; `present` (n,) are the bodies in the arena, `driven` (n,) those with a velocity command.
         """
         if self._tick < self._search_tick and not (driven & self.parked).any():
-            return _NOBODY, _NOBODY
+            return _NO_ROBOTS, _NO_ROBOTS
         self._search_tick = self._tick + SEARCH_TICKS
         awake = present & (driven | (self._moved_tick >= self._tick - _STILL_TICKS))
         count, total = np.count_nonzero(awake), np.count_nonzero(present)
@@ -81,4 +81,4 @@ class Parking:
             awake[newest] = True
 
 
-_NOBODY: Ints = np.zeros(0, dtype=np.int64)
+_NO_ROBOTS: Ints = np.zeros(0, dtype=np.int64)

@@ -1,7 +1,7 @@
 """The order of one tick, the same for every driver.
 
-A driver decides how long it waits for answers and how programs are started and stopped. The world decides everything else,
-also when the run ends.
+A driver decides how long it waits for answers and how programs are started and stopped. The world decides everything
+else, and the end of the run, too.
 """
 
 from abc import ABC, abstractmethod
@@ -49,7 +49,7 @@ class Driver(ABC):
         return ending.outcome
 
     def _stop_flood(self, node: int) -> None:
-        """Drop what a node sends from now on where it arrives, and end its program where that runs on this machine."""
+        """Drop all further messages of a node on arrival, and end its program if it runs on this machine."""
         self._evicted = True
         self._link.evict(node)
         if self._programs is not None:

@@ -80,7 +80,7 @@ class LockStep(Driver):
                     self._take(arrival)
                     missing = len(world.awaited())
                     continue
-                with contextlib.suppress(ProtocolError):  # the world has counted it
+                with contextlib.suppress(ProtocolError):  # the world has counted the refusal
                     accept(node, payload)
                     missing -= 1
             if self._evicted:
@@ -90,10 +90,10 @@ class LockStep(Driver):
                 deadline = min(deadline, time.monotonic() + CRASH_GRACE_S)
 
     def _take(self, arrival: Arrival) -> None:
-        """Give an arrival to the world."""
+        """Pass an arrival to the world."""
         node, payload = arrival
         if payload is None:
             self._lose(node, EXIT_CODE_S)
             return
-        with contextlib.suppress(ProtocolError):  # the world has counted it
+        with contextlib.suppress(ProtocolError):  # the world has counted the refusal
             self._world.accept(node, payload)

@@ -1,6 +1,6 @@
 """Process control: carries out on nodes' programs the actions that faults demand.
 
-In lock-step `ProcessController` does, and virtual time stands still meanwhile. After an action the node is dead and its
+In lock-step `ProcessController` carries them out, and virtual time stops meanwhile. After an action the node is dead and its
 end has been reported, or it has joined. Messages of its former incarnation are refused as stale, and cannot be taken
 for messages of its successor. In real time the world cannot wait for a program to end or to start: `ActionThread`
 carries out actions in a thread of its own.
@@ -77,7 +77,7 @@ class ProcessController:
     def __init__(
         self, world: World, link: WorldLink, programs: NodeProcesses | None, take: Callable[[Arrival], object]
     ) -> None:
-        """`take` receives what other nodes send meanwhile."""
+        """`take` receives the messages that other nodes send meanwhile."""
         self._world = world
         self._link = link
         self._programs = programs
@@ -93,7 +93,7 @@ class ProcessController:
                 self._drop_stale(action.node)
 
     def _drop_stale(self, node: int) -> None:
-        """Refuse what the former incarnation left: the new one has received nothing and has sent no answer."""
+        """Refuse the messages of the former incarnation: the new one has received nothing and has sent no answer."""
         while (arrival := self._link.receive(0.0)) is not None:
             if arrival.node != node:
                 self._take(arrival)
@@ -101,7 +101,7 @@ class ProcessController:
                 self._world.refuse_stale(node)
 
     def _await_exit(self, node: int) -> None:
-        """Return when the link has reported the node lost. Raises LinkError after EXIT_DEADLINE_S."""
+        """Wait until the link has reported the node lost. Raises LinkError after EXIT_DEADLINE_S."""
         deadline = time.monotonic() + EXIT_DEADLINE_S
         while (arrival := self._link.receive(max(0.0, deadline - time.monotonic()))) is not None:
             if arrival.node != node:

@@ -3,7 +3,7 @@
 A command that misses its tick is counted and applied when it arrives. A robot without an answer for the deadman time is
 stopped until it answers again. A node with too many unanswered observations is not observed until it answers one. So
 all messages to it fit into the buffers of the link, and sending never blocks. While a fault kills or starts a program,
-its node is not observed either. Runs in real time are not repeatable, and their trace promises nothing.
+its node is not observed either. Runs in real time are not repeatable, and their traces differ.
 """
 
 import contextlib
@@ -29,7 +29,7 @@ UNANSWERED_BYTES_MAX: Final = 131_072
 class RealTime(Driver):
     """Drives a world at `factor` times the speed of the wall clock.
 
-    `deadman_stops` counts robots stopped for their silence, `overruns` ticks that took longer than their time.
+    `deadman_stops` counts robots stopped because they were silent, `overruns` ticks that took longer than their period.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class RealTime(Driver):
         self._stop_the_silent(time_s)
 
     def _listen(self, deadline_s: float) -> None:
-        """Take what arrives until `deadline_s` on the monotonic clock; once, without waiting, where it has passed."""
+        """Take all arrivals until `deadline_s` on the monotonic clock; if that has passed, take those that wait."""
         if time.monotonic() > deadline_s:
             self.overruns += 1
         while (arrival := self._link.receive(max(0.0, deadline_s - time.monotonic()))) is not None:
@@ -113,7 +113,7 @@ class RealTime(Driver):
         time.sleep(max(0.0, deadline_s - time.monotonic()))
 
     def _take(self, arrival: Arrival) -> None:
-        """Give an arrival to the world, unless it is of a program that is being killed."""
+        """Pass an arrival to the world, unless it is of a program that is being killed."""
         node, payload = arrival
         if self._dying[node]:
             if payload is None:
@@ -126,12 +126,12 @@ class RealTime(Driver):
             return
         self._silent_since_s.pop(node, None)
         self._stopped.pop(node, None)
-        with contextlib.suppress(ProtocolError):  # the world has counted it
+        with contextlib.suppress(ProtocolError):  # the world has counted the refusal
             self._world.accept(node, payload, late_allowed=True)
         self._note_answer(node)
 
     def _note_answer(self, node: int) -> None:
-        """Forget the observations that a node has answered, and count those that it skipped: nodes answer in order."""
+        """Remove the observations that a node has answered, and count those that it skipped: nodes answer in order."""
         unanswered, newest = self._unanswered.get(node), self._world.newest_answer(node)
         if not unanswered:
             return

@@ -35,7 +35,7 @@ class WhenTable(Table):
 
 
 class FaultTable(Table):
-    """The begin of a fault, `at_s` or `when`, and its end, `for_s` or `until_s`; without either, the end of the run.
+    """The beginning of a fault, `at_s` or `when`, and its end, `for_s` or `until_s`; without either, the end of the run.
 
     With `between_s`, the fault begins at a random time in that interval, by the seed.
     """
@@ -84,7 +84,7 @@ class Fault:
     """One fault of a run: the base class of the plug-in kind `fault`.
 
     The effects are methods: on programs, on the radio, on sensors. Each does nothing here; a subclass overrides those that it
-    has, and states as class attributes all that other parts need to know. Times are not its business.
+    has, and states as class attributes all that other parts need to know. The schedule keeps the times.
     """
 
     Parameters: ClassVar[type[FaultTable]] = FaultTable
@@ -118,7 +118,7 @@ class Fault:
     # --- effects while it is active -----------------------------------------------------------------------------------
 
     def strike(self, scene: Scene, dead: Sequence[int]) -> Sequence[int]:
-        """Choose at random the nodes that the fault strikes, if it does so; return them, once. `dead` are down for good.
+        """Choose the nodes that the fault strikes, if they are random, and return them once. `dead` are down for good.
 
         Called at every tick while the fault is active, before the other effects.
         """

@@ -57,7 +57,7 @@ def checked(path: str, table: OpenTable, scenario: Scenario) -> tuple[type[Fault
 
 
 def _wrong_times(kind: type[Fault], table: FaultTable, scenario: Scenario) -> list[str]:
-    """Return a line for each mistake in the begin and the end of a fault."""
+    """Return a line for each mistake in the beginning and the end of a fault."""
     found: list[str] = []
     duration_s = scenario.time.duration_s
     if [table.at_s, table.when, table.between_s].count(None) != 2:

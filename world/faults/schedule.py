@@ -51,7 +51,7 @@ class ScheduledFault:
         if self._duration is not None:
             self.ends = tick + self._duration
 
-    def look(self, tick: int, scene: Scene) -> None:
+    def begin_if_met(self, tick: int, scene: Scene) -> None:
         """Begin now if the condition is met."""
         if self.begins is None and self.condition is not None and self.condition.met(scene):
             self._begin(tick)
@@ -65,12 +65,12 @@ class ScheduledFault:
         return self.ends is None or tick < self.ends
 
     def pending(self, tick: int) -> bool:
-        """Return whether it has not begun before or at `tick`."""
+        """Return whether it begins after `tick`."""
         return self.begins is None or tick < self.begins
 
     @property
     def in_words(self) -> str:
-        """Its kind, and its begin, if that is known."""
+        """Its kind, and the time of its beginning, if that is known."""
         if self.begins is None:
             return f"{self.kind} on a condition"
         return f"{self.kind} at {self.begins * self._dt_s:g} s"
@@ -125,7 +125,7 @@ class Schedule:
     def turn(self, tick: int, scene: Scene, dead: Sequence[int] = ()) -> bool:
         """Begin and end faults at `tick`; return whether the effects changed. `dead` are nodes that never return."""
         for each in self._waiting:
-            each.look(tick, scene)
+            each.begin_if_met(tick, scene)
         now = [each for each in self.faults if each.active(tick)]
         for each in now:
             each.came = True

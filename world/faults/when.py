@@ -1,4 +1,4 @@
-"""Conditions: what a fault may wait for, looked at once a tick until it is met."""
+"""Conditions for the beginning of a fault, evaluated once a tick until they are met."""
 
 from zwerm.scenario.tables import Scenario
 from zwerm.world.faults import WhenTable
@@ -7,7 +7,7 @@ from zwerm.world.scene import Scene
 
 
 class Condition:
-    """A condition that `table` describes, in a scenario that measures what it asks for."""
+    """The condition that `table` describes. The scenario must measure the metric of the condition."""
 
     def __init__(self, table: WhenTable, scenario: Scenario) -> None:
         self._table = table

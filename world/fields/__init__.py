@@ -1,7 +1,7 @@
 """Scalar fields over the arena: the quantity that robots sense, and its exact gradient. One file a kind.
 
-A scenario's `[field]` table names one by `kind`, or as `module:Class`. A field is known everywhere, also outside the arena,
-and never changes.
+A scenario's `[field]` table names one by `kind`, or as `module:Class`. A field is defined everywhere, also outside the arena,
+and is constant.
 """
 
 from abc import ABC, abstractmethod

@@ -1,7 +1,7 @@
-"""A picture whose shades are values."""
+"""A field from a picture: each shade is a value."""
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
@@ -12,6 +12,23 @@ from zwerm.world.fields import Box, Field, FieldPlace
 from zwerm.world.scene import Floats
 
 
+class BitmapTable(Table):
+    """The picture, its position, and the values of black and white. `file` is relative to the scenario."""
+
+    file: str
+    low: Finite = 0.0
+    high: Finite = 1.0
+    size_m: Size | None = None
+    origin_m: Point | None = None
+
+    @field_validator("origin_m")
+    @classmethod
+    def _with_size(cls, origin_m: Point | None, table: ValidationInfo) -> Point | None:
+        if origin_m is not None and table.data.get("size_m", origin_m) is None:
+            raise ValueError("expected size_m beside it")
+        return origin_m
+
+
 class Bitmap(Field):
     """A picture: black is `low`, white `high`, bilinear between centres of pixels, constant beyond the outer ones.
 
@@ -19,21 +36,7 @@ class Bitmap(Field):
     The gradient jumps at a point where four pixels meet; there it is that of the upper right patch.
     """
 
-    class Parameters(Table):
-        """The picture, where it lies and what its shades mean. `file` is relative to the scenario."""
-
-        file: str
-        low: Finite = 0.0
-        high: Finite = 1.0
-        size_m: Size | None = None
-        origin_m: Point | None = None
-
-        @field_validator("origin_m")
-        @classmethod
-        def _with_size(cls, origin_m: Point | None, table: ValidationInfo) -> Point | None:
-            if origin_m is not None and table.data.get("size_m", origin_m) is None:
-                raise ValueError("expected size_m beside it")
-            return origin_m
+    Parameters: ClassVar[type[Table]] = BitmapTable
 
     @classmethod
     def make(cls, parameters: Any, place: FieldPlace) -> Self:

@@ -1,5 +1,7 @@
 """A lamp above the floor."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from zwerm.scenario.types import Finite, Point, Positive, Table
@@ -7,18 +9,21 @@ from zwerm.world.fields import Field
 from zwerm.world.scene import Floats
 
 
-class Lamp(Field):
-    """A lamp `height_m` above `center_m`, as a sensor that faces it from the floor sees it.
+class LampTable(Table):
+    """The lamp."""
 
-    `peak` right below, and from there as one over the square of the distance.
+    peak: Finite
+    center_m: Point
+    height_m: Positive
+
+
+class Lamp(Field):
+    """The light of a lamp `height_m` above `center_m`, on a sensor on the floor that faces the lamp.
+
+    The value is `peak` directly below the lamp, and falls with the square of the distance from the lamp.
     """
 
-    class Parameters(Table):
-        """The lamp."""
-
-        peak: Finite
-        center_m: Point
-        height_m: Positive
+    Parameters: ClassVar[type[Table]] = LampTable
 
     def __init__(self, peak: float, center_m: Point, height_m: float) -> None:
         self._peak, self._center, self._height2 = peak, np.array(center_m), height_m**2

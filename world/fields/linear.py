@@ -1,5 +1,7 @@
 """A plane."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from zwerm.scenario.types import Finite, Point, Table
@@ -7,14 +9,17 @@ from zwerm.world.fields import Field
 from zwerm.world.scene import Floats
 
 
+class LinearTable(Table):
+    """The plane."""
+
+    offset: Finite = 0.0
+    gradient_per_m: Point
+
+
 class Linear(Field):
     """A plane: `offset` at the origin, rising by `gradient_per_m`."""
 
-    class Parameters(Table):
-        """The plane."""
-
-        offset: Finite = 0.0
-        gradient_per_m: Point
+    Parameters: ClassVar[type[Table]] = LinearTable
 
     def __init__(self, offset: float, gradient_per_m: Point) -> None:
         self._offset, self._gradient = offset, np.array(gradient_per_m)

@@ -1,4 +1,4 @@
-"""Integrals over convex polygons of fields that are known everywhere: the truth that robots estimate.
+"""Integrals of exact fields over convex polygons: the true values of the quantities that robots estimate.
 
 Polygons are split into triangles around a point inside. Each triangle is integrated by the Gauss-Legendre rule on Duffy's
 square. It is exact for polynomials up to degree 14, and to about 1e-12 for fields that vary on the scale of a cell. For fields

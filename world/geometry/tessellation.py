@@ -190,7 +190,7 @@ def _triangulate(position: Floats) -> tuple[_Mesh | None, Ints]:
     triangles[clockwise] = triangles[clockwise][:, ::-1]
     across[clockwise] = across[clockwise][:, ::-1]
     starts, ends = triangles[:, [1, 2, 0]], triangles[:, [2, 0, 1]]  # the side opposite each corner
-    mesh = _Mesh(_inner_edges(triangles, starts, ends, across), _rim(triangles, starts, ends, across))
+    mesh = _Mesh(_inner_edges(triangles, starts, ends, across), _hull_edges(triangles, starts, ends, across))
     pairs = _pairs_of(mesh, count)
     if len(found.coplanar):
         return None, _with_coincident(pairs, found.coplanar[:, [0, 2]].astype(np.int64), count)
@@ -206,7 +206,7 @@ def _inner_edges(triangles: Ints, starts: Ints, ends: Ints, across: Ints) -> Int
     return np.array([a, b, c, d, row, other])
 
 
-def _rim(triangles: Ints, starts: Ints, ends: Ints, across: Ints) -> Ints:
+def _hull_edges(triangles: Ints, starts: Ints, ends: Ints, across: Ints) -> Ints:
     """Return (5, h) the hull's corners: before, corner, after, and the triangle on the side to that."""
     row, corner = np.nonzero(across < 0)
     start, end = starts[row, corner], ends[row, corner]

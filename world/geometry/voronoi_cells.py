@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from zwerm.maths.cached_voronoi_cell import CachedVoronoiCell
-from zwerm.maths.polygons import Point as Place
+from zwerm.maths.polygons import Point as Corner
 from zwerm.maths.polygons import Polygon, voronoi_cell
 from zwerm.wire.messages import Neighbour
 from zwerm.world.arena.arena import Arena
@@ -28,7 +28,7 @@ def outline_of(arena: Arena) -> Floats:
 
 
 class VoronoiCells:
-    """The Voronoi cells of a convex arena, and what a field makes of them."""
+    """The Voronoi cells of a convex arena, and integrals of a field over them."""
 
     def __init__(self, arena: Arena, field: Field) -> None:
         self._outline, self._field = outline_of(arena), field
@@ -43,7 +43,7 @@ class VoronoiCells:
         ]
 
     def targets(self, position: Floats) -> Floats:
-        """Return (n, 2) the way of each of position (n, 2) to where an undisturbed robot there would go [m]."""
+        """Return (n, 2) the vector from each of position (n, 2) to the goal of an undisturbed robot there [m]."""
         if len(self._cells) != len(position):
             self._cells = [CachedVoronoiCell() for _ in position]
         value, gradient = self._field.value(position).tolist(), self._field.gradient(position).tolist()
@@ -56,8 +56,8 @@ class VoronoiCells:
             ]
         )
 
-    def _seen(self, position: Floats) -> tuple[list[list[Place]], list[tuple[Neighbour, ...]]]:
-        """Return what is around each of position (n, 2), relative to it: the outline, and the Voronoi neighbours."""
+    def _seen(self, position: Floats) -> tuple[list[list[Corner]], list[tuple[Neighbour, ...]]]:
+        """Return the outline and the Voronoi neighbours relative to each of position (n, 2)."""
         pairs = self._tessellation.pairs(position)
         observer, seen = np.concatenate([pairs, pairs[:, ::-1]]).T
         order = np.argsort(observer, kind="stable")
@@ -84,7 +84,7 @@ class VoronoiCells:
 
 
 class Rings:
-    """Rings of equal width about a peak, out to the arena's farthest corner, less what of them lies outside."""
+    """Rings of equal width about a peak, out to the arena's farthest corner, without their parts outside the arena."""
 
     def __init__(self, arena: Arena, peak_m: tuple[float, float], count: int) -> None:
         self._peak = np.array(peak_m)

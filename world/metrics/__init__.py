@@ -81,5 +81,5 @@ class Metric:
         return {}
 
     def series(self) -> dict[str, list[float]]:
-        """Return what was sampled, by name: one value for each sample. Called only where `every_s` applies."""
+        """Return the series by name: one value for each sample. Called only where `every_s` applies."""
         return {}

@@ -1,4 +1,4 @@
-"""Metrics of agreement, from what robots report: how far their values are apart, and how many lead at a time."""
+"""Metrics of agreement, from the robots' telemetry: the spread of their values, and the number of leaders."""
 
 import math
 from collections.abc import Sequence

@@ -2,7 +2,7 @@
 
 A place is covered if the set of all landmarks that are visible there is a face of the complex. The completion is the
 covered fraction of a grid of points in free space. The union of the simplices' hulls saturates below 1, because hulls
-do not reach the walls. Truth is used here, and only here: robots know no place.
+do not reach the walls. These metrics use true positions, to which no robot has access.
 """
 
 import math
@@ -31,12 +31,12 @@ MILESTONES: Final = (90.0, 91.5, 95.0)
 
 
 def milestone(percent: float) -> str:
-    """Return the name of the metric that says when the completion first was so much."""
+    """Return the name of the metric for the first time of this completion."""
     return f"iterations_to_{percent:g}_percent_completion".replace(".", "_")
 
 
 class MapCompletion:
-    """The places that the complex does not cover yet; simplices only ever cover more."""
+    """The places that the complex does not cover yet; a new simplex never uncovers a place."""
 
     def __init__(self, arena: Arena, landmarks: Floats, range_m: float) -> None:
         places = _places(arena, range_m / PLACES_PER_RANGE)
@@ -129,13 +129,13 @@ class Exploration(Metric):
         self._truth: Truth | None = None
 
     def report(self, record: TelemetryRecord) -> None:
-        """Take what a node says of its map."""
+        """Take the report of a node on its map."""
         report = read_report(record.snapshot) if record.snapshot else None
         if isinstance(report, MapReport):
             self._reports.append((record.tick, record.node, report))
 
     def sample(self, truth: Truth) -> None:
-        """Take the tick, and who is dead."""
+        """Take the tick and the dead robots."""
         self._truth = truth
 
     def metrics(self) -> dict[str, float]:
@@ -186,7 +186,7 @@ class Exploration(Metric):
 class Navigation(Metric):
     """The fraction of goals that robots reached, and the iterations that took.
 
-    A goal counts as reached where the robot said so, and all landmarks of the goal were indeed visible.
+    A goal counts as reached if the robot reported it and all landmarks of the goal were visible.
     """
 
     names: ClassVar[Sequence[str]] = ("navigation_goals", "navigation_success_fraction", "navigation_iterations_mean")
@@ -197,7 +197,7 @@ class Navigation(Metric):
         self._truth: Truth | None = None
 
     def report(self, record: TelemetryRecord) -> None:
-        """Take the end of a way."""
+        """Take the report on the end of a path."""
         report = read_report(record.snapshot) if record.snapshot else None
         if isinstance(report, GoalReport):
             self._ends.append((record.position[record.node].copy(), report))

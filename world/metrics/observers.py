@@ -1,4 +1,4 @@
-"""The metrics of one run: which classes the scenario asks for, when they take samples, and what they found."""
+"""The metrics of one run: their classes, the times of their samples, and their values."""
 
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
@@ -80,7 +80,7 @@ class Observers:
 
 
 def make_observers(scenario: Scenario, arena: Arena, field: Field | None) -> Observers:
-    """Return the metrics that a scenario asks for: by key of `[metrics]`, by algorithm, and its user's own.
+    """Return the metrics that a scenario switches on: by key of `[metrics]`, by algorithm, and its user's own.
 
     Raises ScenarioError with every mistake, each `metrics.<key>: rule`.
     """
@@ -121,7 +121,7 @@ def algorithms(scenario: Scenario) -> list[Algorithm]:
 
 
 def _asked_for(scenario: Scenario) -> Iterator[tuple[str, Any]]:
-    """Yield every metric class of the catalogue that a scenario asks for, as `module:Class`, and its parameters."""
+    """Yield every metric class of the catalogue that a scenario switches on, as `module:Class`, and its parameters."""
     for key, path in METRICS.items():
         parameters = getattr(scenario.metrics, key)
         if class_named(path, "metric", METRICS).Parameters is None:  # the key is a switch

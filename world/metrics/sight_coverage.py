@@ -1,4 +1,4 @@
-"""`metrics.sight_range_m`: how much of the arena is in sight of the robots, and how many robots that takes."""
+"""`metrics.sight_range_m`: the fraction of the arena in sight of the robots, and the number of robots."""
 
 import math
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ PERCENTS: Final = (50, 90, 99)
 
 
 class SightCoverage(Metric):
-    """Coverage by sight of the living robots, its growth over the run, and the number of robots beside the ideal packing."""
+    """Coverage by sight of the living robots, its curve over the run, and the number of robots beside the ideal packing."""
 
     names: ClassVar[Sequence[str]] = (
         *("coverage_fraction", "reachable_coverage_fraction", "robots_deployed", "hexagonal_packing_robots"),

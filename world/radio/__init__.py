@@ -1,14 +1,14 @@
-"""Radio: every packet between nodes passes here, and every packet is counted in a ledger.
+"""Radio: all packets between nodes, and the ledger that counts every packet.
 
 A **radio model** is one reason why a packet does not arrive, or not as it was sent. It judges the packets of a tick
 together and returns a verdict for each packet: dropped, delayed, copied or damaged. The models of a channel judge in the
-order of the scenario; a packet that one model drops does not reach the next. `models` holds one file a model, the catalogue
+order of the scenario; a packet that one model drops does not reach the next. `models` holds one file per model; the catalogue
 names them.
 """
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Literal, NamedTuple, Protocol
 
@@ -165,6 +165,8 @@ class RadioModel(ABC):
     """
 
     Parameters: ClassVar[type[RadioModelTable]] = RadioModelTable
+    # Parameters of an example. The tests try the model with them, and the reference page shows them.
+    example: ClassVar[Mapping[str, Any]] = {}
 
     # The name under which the ledger counts the packets that the model drops.
     cause: ClassVar[str] = "lost"
@@ -172,7 +174,7 @@ class RadioModel(ABC):
     draw_key: ClassVar[str] = ""
     # The model is defined between bodies only: not on the channel to the coordinator.
     needs_positions: ClassVar[bool] = False
-    # Receivers of dropped packets are out of reach, by no chance. Otherwise the packets are losses.
+    # The receivers of dropped packets are out of reach, without randomness. Otherwise the packets are losses.
     out_of_reach: ClassVar[bool] = False
     # The verdict on a packet depends on no other packet: the channel need not show it packets that a later model drops.
     memoryless: ClassVar[bool] = False

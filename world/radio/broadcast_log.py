@@ -51,7 +51,7 @@ class BroadcastLog:
     def senders(self) -> Ints:
         """Return the nodes that sent a broadcast, ascending."""
         self._close()
-        return np.unique(np.concatenate([_NOBODY, *(each.sender for each in self._periods)]))
+        return np.unique(np.concatenate([_NO_NODES, *(each.sender for each in self._periods)]))
 
     def link_count(self) -> int:
         """Return the number of links of all broadcasts."""
@@ -87,4 +87,4 @@ class BroadcastLog:
             self._count[sender] = 0
 
 
-_NOBODY: Ints = np.zeros(0, dtype=np.int64)
+_NO_NODES: Ints = np.zeros(0, dtype=np.int64)

@@ -85,7 +85,7 @@ class Medium:
         return channel.stopped(scene, [self._absent, self._off, *self.faults[name], *chosen])
 
     def switch_off(self, node: int, cause: str) -> None:
-        """Let a node receive nothing; drop the packets in its inbox, and those that become due, for `cause`."""
+        """Switch a node off: it receives nothing. Drop the packets in its inbox, and those that become due, for `cause`."""
         self._off.switch(node, True)
         self._causes[node] = cause
         for channel in self.channels.values():

@@ -95,7 +95,7 @@ class Reach:
         return np.concatenate(ids), np.concatenate(counts)
 
     def _kept(self, position: Floats, senders: Ints, bound_m: float) -> tuple[Ints, Ints]:
-        """Look among the pairs that were near lately."""
+        """Search the kept pairs, which are within the bound and its margin."""
         if self._pairs is None or not self._pairs.valid_for(position, bound_m):
             self._pairs = _NearPairs(position, self._ids, bound_m)
         return self._pairs.receivers(position, senders)

@@ -1,6 +1,6 @@
-"""Sensors: the parts of the scene that a robot may know. One file a sensor, each with its noise model.
+"""Sensors: the parts of the scene that a robot may observe. One file per sensor, with its noise model.
 
-Every sensor reads the truth, adds its noise from keyed draws, and returns what crosses the wire. Robots that are not
+Every sensor reads the truth, adds its noise from keyed draws, and returns the values that cross the wire. Robots that are not
 present are neither sensed nor read. The set of robots that are read changes no reading, except for `odometry`, whose reading
 covers the time since the last one. A tick may be read more than once, and not always for the same robots: a sensor keeps the
 state of its last reading.
@@ -9,7 +9,7 @@ state of its last reading.
 import dataclasses
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, ClassVar, TypeVar
 
@@ -29,7 +29,7 @@ Item = TypeVar("Item")
 class Surroundings:
     """The constant data of a run that a sensor may need; its constructor gets them.
 
-    `count` robots have ids below it; `visibility` is shared, so that no line of sight is looked along twice.
+    `count` robots have ids below it; `visibility` is shared by all sensors, so that each line of sight is tested once.
     """
 
     arena: Arena
@@ -48,6 +48,8 @@ class Sensor(ABC):
 
     field: ClassVar[str]
     Parameters: ClassVar[type[Table]] = Table
+    # Parameters of an example. The tests try the sensor with them, and the reference page shows them.
+    example: ClassVar[Mapping[str, Any]] = {}
 
     # The field of `Wake` that asks for an observation when the `signature` of the reading changes, or "".
     wake_event: ClassVar[str] = ""

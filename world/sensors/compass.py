@@ -1,4 +1,4 @@
-"""The robot's heading in the frame of the arena: the one sensor that lets robots agree on a direction.
+"""The robot's heading in the frame of the arena: the only sensor that gives all robots a common direction.
 
 The noise is Gaussian and independent for each tick and robot, plus one bias that all share.
 """

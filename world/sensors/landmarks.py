@@ -2,7 +2,7 @@
 
 As in Ramaithitima and Bhattacharya 2018, a robot sees every landmark within `range_m` if no wall blocks the line. A
 landmark on a wall is seen from the side it faces. The noise is Gaussian and independent for each tick, robot and
-landmark. Robots do not hide landmarks. A robot that stands still asks the arena nothing.
+landmark. Robots do not hide landmarks. A line of sight is tested again only after its robot has moved.
 """
 
 import math
@@ -19,7 +19,7 @@ from zwerm.world.geometry.visibility import WallVerdicts
 from zwerm.world.scene import Bools, Ints, Scene
 from zwerm.world.sensors import Sensor, Surroundings, chosen, portions, random_angle
 
-# A line of sight ends this fraction of its length short, so that a wall does not hide the landmark that hangs on it.
+# A line of sight ends this fraction of its length short, so that a wall does not hide a landmark on its surface.
 _SHORT = 1e-9
 
 # Up to this many pairs of a robot and a landmark all distances are computed: a search tree costs more.
@@ -80,7 +80,7 @@ class Landmarks(Sensor):
         if len(robots) * len(landmarks) <= _FEW_PAIRS:
             dx, dy = landmarks[:, 0] - position[:, :1], landmarks[:, 1] - position[:, 1:]
             return (dx**2 + dy**2 <= self._range_m**2).nonzero()
-        # A little too far, so that one rule, the one below, decides at the very edge.
+        # Slightly too far, so that only the exact comparison below decides at the edge of the range.
         reach_m = self._range_m * (1.0 + 1e-9)
         found = cKDTree(position).sparse_distance_matrix(self._tree, reach_m, output_type="ndarray")
         order = np.argsort(found["i"] * len(landmarks) + found["j"])

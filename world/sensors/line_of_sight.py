@@ -14,7 +14,7 @@ from zwerm.scenario.types import Fraction, Positive, Table
 from zwerm.world.scene import Bools, Ints, Scene
 from zwerm.world.sensors import Sensor, Surroundings
 
-# So many (observer, other) pairs are worked on at a time: few enough for a core's cache (measured).
+# Number of (observer, other) pairs that are computed at a time: they fit into a core's cache (measured).
 _PAIRS_AT_ONCE = 1 << 15
 
 
@@ -83,7 +83,7 @@ class LineOfSightSensor(Sensor):
             size = (last - first) * total
             across, on_line = self._across[:size], self._on_line[:size]
             grid, product = self._across_grid[: last - first], self._product_grid[: last - first]
-            # Squared distance of each centre from the ray: elementwise, so that every machine rounds alike.
+            # Squared distance of each centre from the ray: elementwise, so that every machine rounds in the same way.
             np.multiply(cos_column[first:last], y, out=grid)
             np.multiply(sin_column[first:last], x, out=product)
             np.subtract(grid, product, out=grid)

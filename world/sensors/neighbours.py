@@ -1,7 +1,7 @@
 """The positions of the robots in sight, in the body frame, as range-and-bearing hardware gives them.
 
-Visibility is that of `bearings`. The noise is Gaussian, alike and independent in x and y, for each tick, observer and
-robot seen. Headings of others are not sensed.
+Visibility is that of `bearings`. The noise is Gaussian, with the same deviation in x and y, independent for each axis,
+tick, observer and robot seen. Headings of others are not sensed.
 
 With `voronoi` only those are reported whose Voronoi cells border on the observer's in the plane. Voronoi coverage
 assumes that a robot can measure these (Schwager et al. 2006). In a swarm without a range the reading is then much
@@ -71,7 +71,7 @@ class NeighboursSensor(Sensor):
         ids = scene.present_ids()
         found = self._tessellation.pairs(scene.position[ids])
         range_m, through_walls, _ = self._sight
-        # Without a range or walls everyone sees the same robots until the triangulation changes.
+        # Without a range and walls each robot sees the same robots until the triangulation changes.
         lasting = range_m is None and (through_walls or scene.arena.is_convex) and len(robots) == len(ids)
         if lasting and self._last is not None and found is self._last[0]:
             last = self._last[1]

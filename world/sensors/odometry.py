@@ -41,13 +41,13 @@ class Odometry(Sensor):
         self._known = np.zeros(surroundings.count, dtype=np.bool_)
         self._position = np.zeros((surroundings.count, 2))
         self._heading = np.zeros(surroundings.count)
-        # The robots of the newest reading, and what was known of them before it.
-        nobody = np.zeros(0, dtype=np.int64)
-        self._before = (nobody, self._known[nobody], self._position[nobody], self._heading[nobody])
+        # The robots of the newest reading, and their poses before it.
+        no_robots = np.zeros(0, dtype=np.int64)
+        self._before = (no_robots, self._known[no_robots], self._position[no_robots], self._heading[no_robots])
 
     def read(self, scene: Scene, robots: Ints) -> list[Displacement]:
         """Return the motion of each of `robots` since it was last read."""
-        if scene.tick == self._tick:  # the same tick again: as if it had not been read
+        if scene.tick == self._tick:  # a second reading of the same tick replaces the first
             last, *before = self._before
             self._known[last], self._position[last], self._heading[last] = before
         self._tick = scene.tick

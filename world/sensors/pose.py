@@ -1,7 +1,7 @@
 """The position and heading of the robot in the frame of the arena, as from a positioning system.
 
-The noise is Gaussian and independent for each tick and robot: `sd_m` in x and in y, `sd_rad` in the heading. A robot
-that has this sensor is not lost; algorithms without metric information must do without it.
+The noise is Gaussian and independent for each tick and robot: `sd_m` in x and in y, `sd_rad` in the heading. For
+algorithms that assume localisation.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Sensors by name: those of the catalogue, and `module:Class` for any other.
 
-A scenario's `[[robots.sensors]]` tables go in, sensors that fill different fields of the observation come out, or every
+Input: the `[[robots.sensors]]` tables of a scenario. Output: sensors that fill different fields of the observation, or every
 mistake in the tables at once.
 """
 

@@ -1,10 +1,10 @@
 """A ring of touch switches: which of them are closed, and so roughly in which directions the robot is touched.
 
-As in Ramaithitima et al. 2015: `switches` of them, evenly spaced from straight ahead, each good for half its sector to
-either side. A wall or a robot within `reach_m` of the body's surface closes the switch that faces its nearest point. So
-a wall closes one switch for each of its straight pieces, not every switch whose sector it touches. Each tick a closed
-switch reads open with probability `false_negative`, an open one closed with `false_positive`. The reading contains no
-force, and does not say whether a wall or a robot is touched.
+As in Ramaithitima et al. 2015: `switches` of them, evenly spaced from straight ahead, each closed by contacts within
+half its sector to either side. A wall or a robot within `reach_m` of the body's surface closes the switch that faces
+its nearest point. So a wall closes one switch for each of its straight pieces, not every switch whose sector it
+touches. Each tick a closed switch reads open with probability `false_negative`, an open one closed with
+`false_positive`. The reading contains no force, and does not say whether a wall or a robot is touched.
 """
 
 import math
@@ -53,7 +53,7 @@ class Touch(Sensor):
         """Return the closed switches of each of `robots`."""
         here = scene.position[robots]
         walls = scene.arena.walls_within(here, scene.radius_m + self._reach_m)
-        # A wall thin enough to stand between two bodies in reach is in reach of both: it need not be looked for.
+        # A wall between two bodies in reach is in reach of both, so no line between bodies has to be tested.
         others = self._visibility.sightings(scene, robots, 2.0 * scene.radius_m + self._reach_m, through_walls=True)
         errs = self._false_negative > 0.0 or self._false_positive > 0.0
         if not (errs or len(walls.point) or len(others.observer)):

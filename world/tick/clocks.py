@@ -27,7 +27,7 @@ class Clocks:
         self.drift: Floats = table.drift_ppm_max * _PPM * drift  # (nodes,)
 
     def local_s(self, time_s: float, nodes: Sequence[int]) -> list[float]:
-        """Return what the clock of each node reads at a virtual time [s]."""
+        """Return the reading of each node's clock at a virtual time [s]."""
         chosen = list(nodes)
         local: list[float] = ((1.0 + self.drift[chosen]) * time_s + self.offset_s[chosen]).tolist()
         return local

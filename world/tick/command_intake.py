@@ -1,16 +1,16 @@
-"""Command intake: collects the answers to one tick's observations and refuses what no node may send.
+"""Command intake: collects the answers to one tick's observations and refuses forbidden messages.
 
 Each observed node is accepted once a tick, and only with a command that this world can carry out. Every other message is
 refused for a reason, counted, and changes nothing. If the driver allows late answers (real time), an answer to an
 earlier tick is accepted too, in order.
 """
 
-from collections import Counter
 from collections.abc import Collection, Sequence
 from typing import Final, NamedTuple, Protocol
 
 from zwerm.errors import ProtocolError
 from zwerm.wire.messages import BodyVelocity, Command, Failure, Transmission, WheelSpeeds, open_answer, traced_bytes
+from zwerm.wire.refusals import Refusals
 
 NO_ANSWER: Final = b""
 
@@ -41,7 +41,7 @@ class CommandIntake:
     """Collects the answers of one tick at a time.
 
     `exchange` holds the messages of the tick that ended last. `observed_count` counts observations, `late_count` answers that
-    came after their tick, `refused` refusals by reason.
+    came after their tick.
     """
 
     def __init__(
@@ -53,8 +53,7 @@ class CommandIntake:
     ) -> None:
         """A body of kind `body` takes the drive type `drive`; the nodes in `fixed` have no body that moves."""
         self.exchange = Exchange(-1, (), (), (), ())
-        self.refused: Counter[str] = Counter()
-        self.refused_by: dict[int, Counter[str]] = {}  # refusals by node and reason
+        self.refusals = Refusals()
         self.late_count = 0
         self.observed_count = 0
         self._drive = drive
@@ -94,7 +93,7 @@ class CommandIntake:
             ):
                 self._check_content(node, answer)
         except ProtocolError as error:
-            self.note_refusal(node, error.reason)
+            self.refusals.count(node, error.reason)
             raise
         if late:
             self._late.append((node, answer))
@@ -107,13 +106,6 @@ class CommandIntake:
         if late_allowed:
             self._newest[node] = answer.tick
         return answer
-
-    def note_refusal(self, node: int, reason: str) -> int:
-        """Count a refused message of a node, and return how many there are of this node."""
-        self.refused[reason] += 1
-        reasons = self.refused_by.setdefault(node, Counter())
-        reasons[reason] += 1
-        return reasons.total()
 
     def is_pending(self, node: int) -> bool:
         """Return whether a node's answer to the observation of this tick has not been accepted."""

@@ -1,8 +1,14 @@
 """Completion: the one rule that decides when a run ends, and with which outcome.
 
-A run ends for one of these reasons, in this order of precedence: a node crashed and the scenario says `robots.on_crash
-= "fail"`; a deciding node gave up; the task is done; every robot is lost for good; the time limit is reached. Both drivers
-ask the same rule after every tick.
+A run ends for one of these reasons, in this order of precedence:
+
+1. A node crashed, and the scenario has `robots.on_crash = "fail"`.
+2. A deciding node gave up.
+3. The task is done.
+4. Every robot is lost for good.
+5. The time limit is reached.
+
+Both drivers apply this rule after every tick.
 """
 
 from collections.abc import Collection, Mapping
@@ -50,12 +56,13 @@ class Completion:
         self._gave_up = ""
 
     def report(self, node: int, done: bool) -> None:
-        """Take the `done` field of a node's newest command; needless while no node was `any_done` and `done` is false."""
+        """Take the `done` field of a node's newest command. A false `done` needs no call while no node has reported
+        `any_done`."""
         self._done[node] = done
         self.any_done = True
 
     def give_up(self, node: int, reason: str, dead: Collection[int]) -> None:
-        """Take that a node gave up; it counts only from a node that decides.
+        """Record that a node gave up; it has an effect only if the node decides.
 
         A base station decides beside a deciding coordinator only while the coordinator is in `dead`.
         """

@@ -69,7 +69,7 @@ class Lifecycle:
         status = self._status
         if kind == "kill":
             alive = status.crashed.pop(node, None) is None
-            status.note("crashed", node)
+            status.record("crashed", node)
             status.drop_unfinished(node)
             self._retire(node, CRASHED)
             self._completion.restart(node)
@@ -77,7 +77,7 @@ class Lifecycle:
             return alive
         if kind == "start":
             if node in status.ever("crashed"):
-                status.note("restarted", node)
+                status.record("restarted", node)
             if node not in self._bodies.exited:
                 self._medium.switch_on(node)
             present = self._bodies.scene.present

@@ -45,7 +45,7 @@ class NodeStatus:
         self._held: dict[int, list[NodeAnswer]] = {}  # answers of slow nodes, by the tick at which they act
         self._hindered = bool(late_joiners)
         for node in late_joiners:
-            self.note("late", node)
+            self.record("late", node)
 
     @property
     def dead(self) -> list[int]:
@@ -56,7 +56,7 @@ class NodeStatus:
         """Return the nodes to which `event` ever happened, in order."""
         return self.history.get(event, [])
 
-    def note(self, event: Event, node: int) -> None:
+    def record(self, event: Event, node: int) -> None:
         """Add a node to the history of an event, once."""
         nodes = self.history.setdefault(event, [])
         if node not in nodes:
@@ -68,7 +68,7 @@ class NodeStatus:
         for node in np.flatnonzero((down != self.down) | (paused != self.paused)).tolist():
             if down[node] and not self.down[node]:
                 actions.append(ProcessAction("kill", node))
-                self.note("crashed", node)
+                self.record("crashed", node)
             elif self.down[node] and not down[node]:
                 actions.append(ProcessAction("start", node))
             # A started program is not paused; a killed one is not resumed.
@@ -76,11 +76,11 @@ class NodeStatus:
             is_paused = bool(paused[node] and not down[node])
             if is_paused and not was_paused:
                 actions.append(ProcessAction("pause", node))
-                self.note("paused", node)
+                self.record("paused", node)
             elif was_paused and not is_paused and not down[node]:
                 actions.append(ProcessAction("resume", node))
         for node in np.flatnonzero(answer_ticks > self.answer_ticks).tolist():
-            self.note("slow", node)
+            self.record("slow", node)
         self.down, self.paused, self.answer_ticks = down, paused, answer_ticks
         slow = bool((answer_ticks > FULL_SPEED_TICKS).any())
         self._hindered = bool(down.any() or paused.any() or slow or self._held)

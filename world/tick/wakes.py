@@ -1,4 +1,4 @@
-"""Wake rule: which nodes are observed at a tick. It is the same in every runner, and a sleeping robot costs nothing.
+"""Wake rule: which nodes are observed at a tick. It is the same in every runner, and a sleeping robot costs no time.
 
 A node that gave no wake is observed at every tick. A node with a wake sleeps until its time comes or one of its events
 happens. Events are a packet for it, and a sensor reading that differs from the last one it observed. A sensor states
@@ -50,7 +50,7 @@ class Wakes:
         self._stale = True
 
     def retire(self, node: int) -> None:
-        """Observe a node no more."""
+        """Stop observing a node."""
         self._rouse(node)
         self._due[node] = NEVER
         self._stale = True

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-if TYPE_CHECKING:  # progress needs neither
+if TYPE_CHECKING:  # progress needs neither of them
     from zwerm.run.result import RunResult
 
 
@@ -76,7 +76,7 @@ FILE_KINDS: Final = {
 
 
 def print_file(console: Console, path: Path) -> None:
-    """Print the path of a file that a run has written, and what it is."""
+    """Print the path of a file that a run has written, and its kind."""
     console.print(f"{FILE_KINDS[path.suffix.lower()]}: {path}", markup=False, highlight=False, soft_wrap=True)
 
 

@@ -14,10 +14,11 @@ from typing import Any
 
 
 class _Debugger(pdb.Pdb):
-    """Ends the run where the user quits: a controller's error would let the run go on without its node."""
+    """A debugger that ends the run if the user quits. An error of a controller would let the run go on without its
+    node."""
 
     def trace_dispatch(self, frame: FrameType, event: str, arg: Any) -> Any:
-        """Trace as Pdb does. Raises KeyboardInterrupt where the user quits."""
+        """Trace as Pdb does. Raises KeyboardInterrupt if the user quits."""
         try:
             return super().trace_dispatch(frame, event, arg)
         except BdbQuit:

@@ -13,7 +13,7 @@ _ENDPOINT: Final = re.compile(r"[a-z][a-z-]*/\S+")
 
 
 def check_endpoint(option: str, endpoint: str) -> None:
-    """Raise ScenarioError, in one line, where an option is given what is no Zenoh endpoint."""
+    """Raise ScenarioError, in one line, if the value of an option is no Zenoh endpoint."""
     if not _ENDPOINT.fullmatch(endpoint):
         raise ScenarioError([f"{option}: expected an endpoint such as tcp/0.0.0.0:7447, got {endpoint!r}"])
 
@@ -36,7 +36,7 @@ ScenarioName = Annotated[
         help="A built-in scenario (see `zwerm list`) or a TOML file.", autocompletion=built_in_names("scenarios")
     ),
 ]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Keys all randomness of the run.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="The seed of all random numbers of the run.")]
 Sets = Annotated[
     Optional[list[str]],  # noqa: UP045 - typer reads it
     typer.Option("--set", metavar="PATH=VALUE", help="Override a setting of the scenario; may be given often."),
@@ -48,7 +48,7 @@ Picture = Annotated[
     typer.Option(
         "--picture",
         metavar="FILE",
-        help="Where to draw the run: .png, .pdf or .svg; runs/SCENARIO-seedN.png by default. Settings are part of the name.",
+        help="The file of the picture: .png, .pdf or .svg; runs/SCENARIO-seedN.png by default. Settings are part of the name.",
     ),
 ]
 PictureSize = Annotated[
@@ -84,6 +84,30 @@ Record = Annotated[
         "--record",
         metavar="FILE.mcap",
         help="Record every message and the true state, for Foxglove and similar viewers.",
+    ),
+]
+SecurityLogFile = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--security-log",
+        metavar="FILE",
+        help="Write each refusal by world and router to FILE: denials, wrong passwords, refused messages. Takes time.",
+    ),
+]
+RobotUsers = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option(
+        "--robot-users", metavar="FIRST", help="Run robot N as the user id FIRST + N, without a network. Needs root."
+    ),
+]
+RobotMemory = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option("--robot-memory", min=1, metavar="MIB", help="Memory that each robot may allocate after it joins."),
+]
+RobotProcesses = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option(
+        "--robot-processes", min=0, metavar="N", help="Processes that each robot may start. Needs --robot-users."
     ),
 ]
 RealTime = Annotated[

@@ -30,7 +30,9 @@ class OutputFile(NamedTuple):
 
 def check_outputs(files: Sequence[OutputFile]) -> None:
     """Raise ScenarioError with a line for every file that cannot be written; files without a path are left out."""
-    found = [f"{file.option}: {said}" for file in files if file.path is not None for said in _mistakes(file, file.path)]
+    found = [
+        f"{file.option}: {mistake}" for file in files if file.path is not None for mistake in _mistakes(file, file.path)
+    ]
     if found:
         raise ScenarioError(found)
 

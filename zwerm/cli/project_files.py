@@ -40,7 +40,7 @@ class MyRobot(Controller):
         return Command(outbox=(packet,), telemetry={"value": self.value})
 '''
 
-METRIC: Final = '''"""A metric: a function of the truth, which you see and no robot does."""
+METRIC: Final = '''"""A metric: a function of the truth, to which no robot has access."""
 
 from zwerm import Truth
 

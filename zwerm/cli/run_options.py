@@ -1,4 +1,5 @@
-"""The options that `zwerm run` and `zwerm world` share, as one object that a command takes as its parameter `options`."""
+"""The options that `zwerm run` and `zwerm world` share, as one object that a command takes as its parameter
+`options`."""
 
 import inspect
 from collections.abc import Callable
@@ -19,11 +20,12 @@ from zwerm.cli.options import (
     RealTime,
     Record,
     ScenarioName,
+    SecurityLogFile,
     Seed,
     Sets,
 )
 
-if TYPE_CHECKING:  # --help needs none of them
+if TYPE_CHECKING:  # not above: --help needs none of them
     from zwerm.cli.run_output import RunOutput
     from zwerm.scenario.tables import Scenario
 
@@ -41,6 +43,7 @@ class RunOptions:
     sets: Sets = None
     realtime: RealTime = None
     record: Record = None
+    security_log: SecurityLogFile = None
     picture: Picture = None
     picture_at: PictureAt = None
     animate: Animation = None

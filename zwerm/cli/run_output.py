@@ -28,8 +28,8 @@ _MOMENT: Final = re.compile(r"(?P<cycle>\d+)|(?P<at_s>\d+(\.\d+)?)s")
 class RunOutput:
     """The output options of a command.
 
-    `radio_table` is the number of links to print, or None for no table. Raises ScenarioError for a moment that is neither a
-    cycle nor a time, and for files that cannot be written.
+    `radio_table` is the number of links to print, or None for no table. Raises ScenarioError for a moment that is
+    neither a cycle nor a time, and for files that cannot be written.
     """
 
     picture: Path | None
@@ -56,7 +56,7 @@ class RunOutput:
             OutputFile("--animate", self.animation, ANIMATIONS, "matplotlib", "all"),
             OutputFile("--record", self.record, RECORDINGS, "mcap", "record"),
         ]
-        if self.draws_by_default or self.moments:  # where they go without an option
+        if self.draws_by_default or self.moments:  # the files that are written without an option
             files.append(OutputFile("runs", Path("runs") / "picture.png", PICTURES))
         try:
             check_outputs(files)

@@ -42,7 +42,7 @@ _reserved: TextIO | None = None
 
 
 def reserve_stdout() -> None:
-    """From now on only `print_json` writes to standard output; what anything else writes there goes to standard error.
+    """From now on only `print_json` writes to standard output; all other output to it goes to standard error.
 
     Processes started later inherit this. A controller or a library that prints does not spoil the JSON object.
     """

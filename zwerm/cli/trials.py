@@ -20,21 +20,23 @@ Seeds = Annotated[
 ]
 Jobs = Annotated[
     Optional[int],  # noqa: UP045
-    typer.Option("--jobs", min=1, help="How many trials to run at a time; one a core by default."),
+    typer.Option("--jobs", min=1, help="The number of trials that run at a time; by default one per core."),
 ]
 Out = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option(
         "--out",
         metavar="FILE",
-        help="Where the rows go: .parquet, or .csv for both; runs/NAME.parquet by default.",
+        help="The file of rows: .parquet, or .csv for both; runs/NAME.parquet by default.",
     ),
 ]
 Timeout = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option("--timeout", min=1.0, metavar="S", help="End a trial without a result after S seconds: it failed."),
+    typer.Option(
+        "--timeout", min=1.0, metavar="S", help="End a trial without a result after S seconds; it has failed."
+    ),
 ]
-Retry = Annotated[bool, typer.Option("--retry", help="Run trials again that failed.")]
+Retry = Annotated[bool, typer.Option("--retry", help="Repeat failed trials.")]
 
 
 @contextmanager

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any, Final, NamedTuple, Protocol
 
+from zwerm.wire.refusals import Refusals
+
 
 class Arrival(NamedTuple):
     """A message from a node. `payload` None means that the node is lost: its process ended without a goodbye."""
@@ -21,7 +23,9 @@ arrival: Final[Callable[[Iterable[Any]], Arrival]] = partial(tuple.__new__, Arri
 
 
 class WorldLink(Protocol):
-    """The world's end of the link to all nodes."""
+    """The world's end of the link to all nodes. `refusals` counts the messages that the link refused."""
+
+    refusals: Refusals
 
     def send(self, node: int, payload: bytes) -> None:
         """Send one message to a node that has joined."""

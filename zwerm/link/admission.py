@@ -55,7 +55,7 @@ class Admission:
         self._ended: dict[int, int] = {}
 
     def greet(self, node: int, message: Hello | Goodbye) -> str:
-        """Take what a node says on its own key: admit it, or note its goodbye. Return the reason of a refusal, or ""."""
+        """Admit a node that sends hello, or record its goodbye. Return the reason of a refusal, or ""."""
         if isinstance(message, Goodbye):
             return "" if node in self.joined else NOT_JOINED
         expected = self._expected.get(node)
@@ -79,7 +79,7 @@ class Admission:
         return self._expected[node]
 
     def lose(self, node: int) -> bool:
-        """Note that a node's connection has ended; return whether the node had joined."""
+        """Record that a node's connection has ended; return whether the node had joined."""
         incarnation = self.joined.pop(node, None)
         if incarnation is None:
             return False

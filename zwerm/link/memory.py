@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 from zwerm.errors import LinkError
 from zwerm.link import Answer, Arrival, arrival
+from zwerm.wire.refusals import Refusals
 
 
 class MemoryLink:
@@ -20,6 +21,7 @@ class MemoryLink:
         make: Callable[[int, int], Answer] | None = None,
         late_joiners: Sequence[int] = (),
     ) -> None:
+        self.refusals = Refusals()  # none: a node in memory is never refused
         self._nodes = {node: answer for node, answer in nodes.items() if node not in late_joiners}
         self._make = make
         self._incarnation = dict.fromkeys(self._nodes, 1)

@@ -10,6 +10,7 @@ import ctypes
 import json
 import os
 import socket
+import stat
 import threading
 from collections.abc import Mapping
 from pathlib import Path
@@ -150,10 +151,13 @@ def close_without_waiting() -> None:
     and so delays the detection of each further loss by 10 s. There is no setting for it in Zenoh.
     """
     for path in list(Path("/dev/fd").iterdir()):
-        # An OSError comes of the descriptor of the listing itself, or of one that is no socket.
-        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(int(path.name))) as connection:
-            if connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER.size) == _ZENOH_LINGER:
-                connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
+        with contextlib.suppress(OSError):  # the descriptor of the listing is closed; another thread may close one
+            number = int(path.name)
+            if not stat.S_ISSOCK(os.fstat(number).st_mode):
+                continue
+            with socket.socket(fileno=os.dup(number)) as connection:
+                if connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER.size) == _ZENOH_LINGER:
+                    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
 
 
 _LINGER: Final = Layout("ii")

@@ -1,7 +1,7 @@
 """The world's end of a Zenoh link: a session that is also the router, so each message takes one hop.
 
 Only expected and welcomed nodes are received, one incarnation of each at a time. Messages of a node arrive in the order sent,
-and the end of its process after its last message. `refused` counts refused messages by reason. The access control in the
+and the end of its process after its last message. `refusals` counts the refused messages. The access control in the
 router's settings decides which node may connect and use which key.
 
 Zenoh's thread receives messages, and wakes the world only when as many have arrived as the world waits for. A thread switch
@@ -10,7 +10,7 @@ for each message would cost more than the work on the message.
 
 import contextlib
 import threading
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Final
 
@@ -25,6 +25,7 @@ from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threa
 from zwerm.link.software import software
 from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
 from zwerm.wire.messages import REFUSABLE, Goodbye, Welcome, decode_hello, encode, refusal
+from zwerm.wire.refusals import Refusals
 
 # Largest number of waiting arrivals. Lock-step needs fewer: one for each node. At this number Zenoh's thread blocks, and then
 # the senders do.
@@ -36,8 +37,7 @@ class ZenohWorldLink:
 
     def __init__(self, run: str, members: Mapping[int, ExpectedNode], settings: Mapping[str, Any]) -> None:
         """Open the router's session, without waiting for nodes. Raises LinkError if it cannot listen."""
-        self.refused: Counter[str] = Counter()
-        self.refused_by: dict[int, Counter[str]] = {}  # refusals by node and reason
+        self.refusals = Refusals()
         self._evicted: set[int] = set()
         self._run = run
         self._members = Admission(members, software())
@@ -178,11 +178,7 @@ class ZenohWorldLink:
     def _refuse_command(self, node: int) -> None:
         """Count a command of a node that has not joined or was evicted."""
         with self._changed:
-            self._note_refusal(node, EVICTED if node in self._evicted else NOT_JOINED)
-
-    def _note_refusal(self, node: int, reason: str) -> None:
-        self.refused[reason] += 1
-        self.refused_by.setdefault(node, Counter())[reason] += 1
+            self.refusals.count(node, EVICTED if node in self._evicted else NOT_JOINED)
 
     def _on_liveliness(self, sample: zenoh.Sample) -> None:
         """Handle a liveliness token; it vanishes after the node's last message. Runs in a thread of its own."""
@@ -206,7 +202,7 @@ class ZenohWorldLink:
                 welcome = Welcome(refused=IDENTITY)
             if welcome.refused:
                 with self._changed:
-                    self._note_refusal(_node_in(key), welcome.refused)
+                    self.refusals.count(_node_in(key), welcome.refused)
             query.reply(key, encode(welcome))
 
     def _welcome(self, node: int, payload: bytes) -> Welcome:

@@ -1,8 +1,9 @@
 """Keyed random numbers: a draw is a function of (seed, purpose, ids), and independent of the number of draws before it.
 
-One robot, sensor or fault more changes no other draw, and neither does the order of draws. The counter-based generator is the
-finaliser of SplitMix64 (Steele, Lea, Flood 2014), chained over the parts of the key and vectorised over arrays of ids.
-Controllers receive a numpy Generator over Philox, keyed in the same way. It is not fit for cryptography.
+An additional robot, sensor or fault changes no other draw, and neither does the order of draws. The counter-based
+generator is the finaliser of SplitMix64 (Steele, Lea, Flood 2014), chained over the parts of the key and vectorised
+over arrays of ids. Controllers receive a numpy Generator over Philox, keyed in the same way. It is not fit for
+cryptography.
 """
 
 from collections.abc import Sequence
@@ -73,7 +74,8 @@ class Draws:
         return blake2b(key.encode(), digest_size=16, person=b"zwerm-draws").digest()
 
     def states(self, purpose: str, *ids: ArrayLike) -> NDArray[np.uint64]:
-        """Return the states of the chain after `ids`, at least one-dimensional, for many draws with a common head of the key.
+        """Return the states of the chain after `ids`, at least one-dimensional, for many draws with a common head of
+        the key.
 
         `splitmix64(splitmix64(states(purpose, a) ^ key_part(b)))` is `bits(purpose, a, b)`.
         """
@@ -96,7 +98,8 @@ class Draws:
         return word
 
     def _few(self, purpose: str, ids: Sequence[Any]) -> list[int] | None:
-        """Return the words for a key that ends with a short array of ids, after single numbers; None for any other key."""
+        """Return the words for a key that ends with a short array of ids, after single numbers; None for any other
+        key."""
         if not ids:
             return None
         *first, last = ids

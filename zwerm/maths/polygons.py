@@ -2,9 +2,10 @@
 
 A polygon is a list of (x, y) [m], counter-clockwise. All functions are plain arithmetic on Python floats. The polygons
 of Voronoi coverage have about six corners, and arrays are several times slower for so few. Nothing here integrates
-numerically. Repeated corners and polygons without area are allowed; what they give is stated where it matters.
+numerically. Repeated corners and polygons without area are allowed; each function states its result for them.
 
-Source: Schwager, McLurkin, Rus: Distributed Coverage Control with Sensory Feedback for Networked Robots, 2006, section III.
+Source: Schwager, McLurkin, Rus: Distributed Coverage Control with Sensory Feedback for Networked Robots, 2006, section
+III.
 """
 
 from collections.abc import Iterable, Sequence
@@ -49,10 +50,11 @@ def clip(polygon: Polygon, a: float, b: float, c: float) -> list[Point]:
 
 
 def voronoi_cell(region: Polygon, others: Iterable[Point]) -> Polygon:
-    """Return what of `region` is no nearer to any of `others` than to the origin; empty where there is nothing.
+    """Return the part of `region` that is no nearer to any of `others` than to the origin; an empty list if there is
+    none.
 
-    Others that do not border on the cell change nothing, so it is enough to know those that do. One at the origin itself
-    has the same cell, by the definition with <=, and is passed over.
+    Others that do not border on the cell do not change it, so a robot needs to know only its Voronoi neighbours. By the
+    definition with <=, another robot at the origin has the same cell; it is skipped.
     """
     cell = region
     order = sorted([(x * x + y * y, x, y) for x, y in others])
@@ -106,13 +108,14 @@ def moments(polygon: Polygon, ox: float = 0.0, oy: float = 0.0) -> Moments:
 
 
 def linear_centroid(polygon: Polygon, value: float, gx: float, gy: float) -> tuple[float, float, float]:
-    """Return mass and centroid (M, x, y) of `polygon` under the density value + gx x + gy y. Schwager 2006, eqs. 14 to 18.
+    """Return mass and centroid (M, x, y) of `polygon` under the density value + gx x + gy y. Schwager 2006, eqs. 14 to
+    18.
 
     The density must not be negative on the polygon. If the mass is 0 the centroid is a corner.
 
     Misprints of the paper, corrected here:
-    - eq. 14 has the integral of q^T q, a number; what (q - p) grad(phi)^T q comes to is the integral of q q^T, a matrix,
-      as eq. 17 then has it;
+    - eq. 14 has the integral of q^T q, a number. The term (q - p) grad(phi)^T q needs the integral of q q^T, a matrix,
+      as in eq. 17;
     - eq. 15's second term has a stray p_i: it is grad(phi)^T times the integral of q, as in eq. 18. As printed it is not
       even a number;
     - c_1 is defined twice: [c_1 c_2]^T = grad(phi) should read [c_2 c_3]^T, as used in eqs. 17 and 18.
@@ -134,7 +137,8 @@ def linear_centroid(polygon: Polygon, value: float, gx: float, gy: float) -> tup
 
 
 def estimated_centroid(cell: Polygon, value: float, gx: float, gy: float) -> Point | None:
-    """Return the centroid of `cell` under the linear estimate value + gx x + gy y, truncated to V+. Schwager 2006, eq. 10.
+    """Return the centroid of `cell` under the linear estimate value + gx x + gy y, truncated to V+. Schwager 2006, eq.
+    10.
 
     V+ is where the estimate is not negative (eq. 12). A field that is zero or negative all over the cell has no mass.
     Then the centroid is that of a constant field, the cell's own. A cell without area has none: None.

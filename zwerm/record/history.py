@@ -1,4 +1,4 @@
-"""The history of a run: a thinned record of where the robots were, enough to draw it.
+"""The history of a run: a thinned record of the robots' positions, from which pictures are drawn.
 
 Memory is bounded. When more than `held_max` samples are held, every second one is dropped, and from then on only every
 second one is taken. So the samples stay evenly spaced over the whole run. The first and the newest sample are always
@@ -33,7 +33,7 @@ class SceneLike(Protocol):
 
     @property
     def present(self) -> Bools:
-        """(n,) whether the robot is a body in the arena; where it is not, its position means nothing."""
+        """(n,) whether the robot is a body in the arena; otherwise its position has no meaning."""
 
 
 class HistorySample(NamedTuple):
@@ -82,7 +82,7 @@ class History:
         return len(self._samples())
 
     def append(self, moment: SceneLike, dead: Sequence[int] = ()) -> None:
-        """Take a copy of `moment`, and of who is dead then; ids beyond the robots' are not theirs."""
+        """Copy `moment` and the dead robots at that time; ids above those of the robots are ignored."""
         down = np.zeros(len(moment.present), dtype=np.bool_)
         down[[robot for robot in dead if robot < len(down)]] = True
         sample = HistorySample(
@@ -97,9 +97,9 @@ class History:
             self._stride *= 2
 
     def arrays(self) -> Tracks:
-        """Return what is held, oldest first.
+        """Return the samples held, the oldest first.
 
-        Raises ValueError where nothing was appended.
+        Raises ValueError if no sample was appended.
         """
         samples = self._samples()
         if not samples:

@@ -1,9 +1,9 @@
 """A recording of a run in MCAP, the log format of robotics (opens in Foxglove, Lichtblick and the `mcap` command).
 
-Topics: `/node/<id>/obs` and `/node/<id>/cmd` carry the messages as they crossed the wire (MessagePack); `/node/<id>/telemetry`
-carries the numbers that a node reports (JSON, an object of numbers by name); `/truth/poses` carries the true positions of
-the robots (JSON), which no robot knows. Times are virtual. A recording that is closed, after Ctrl-C too,
-is complete and indexed; one cut off by a kill holds all chunks written until then.
+Topics: `/node/<id>/obs` and `/node/<id>/cmd` carry the messages as they crossed the wire (MessagePack);
+`/node/<id>/telemetry` carries the numbers that a node reports (JSON, an object of numbers by name); `/truth/poses`
+carries the true positions of the robots (JSON), to which no robot has access. Times are virtual. A recording that is
+closed, after Ctrl-C too, is complete and indexed; one cut off by a kill holds all chunks written until then.
 """
 
 import contextlib
@@ -81,7 +81,8 @@ class Recording:
     def exchange(
         self, tick: int, nodes: Sequence[int], observations: Sequence[bytes], answers: Sequence[bytes], scene: Scene
     ) -> None:
-        """Write one tick: what `nodes` were sent, what they answered (b"" for nothing), and where all robots were."""
+        """Write one tick: the observations sent to `nodes`, their answers (b"" for none), and the positions of all
+        robots."""
         robots = scene.present_ids()
         poses = {
             "tick": tick,
@@ -114,7 +115,7 @@ class Recording:
                 self._file.close()
 
     def _fail(self, error: OSError) -> None:
-        """Record no more: the run goes on without a recording."""
+        """Stop recording; the run goes on without it."""
         self.error = f"{self._path}: the recording is incomplete: {error.strerror}"
 
     def _channel(self, topic: str, encoding: str = "msgpack", schema: int = 0) -> int:

@@ -12,7 +12,7 @@ from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
 from zwerm.scenario.overrides import blame
 from zwerm.scenario.parameter_files import with_file_texts
-from zwerm.scenario.plugin_names import look_in
+from zwerm.scenario.plugin_names import search_first
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.arena.scatter import with_landmarks
@@ -38,7 +38,7 @@ def assemble_run(scenario: Scenario, seed: int) -> tuple[World, Observers]:
 
     Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the faults and the placement.
     """
-    look_in(scenario.folder)
+    search_first(scenario.folder)
     scenario = _with_landmarks(scenario, seed)
     arena, sensors, observers = prepare(scenario)
     mistakes: list[str] = []
@@ -69,7 +69,7 @@ def prepare(scenario: Scenario) -> Prepared:
 
     Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
     """
-    look_in(scenario.folder)
+    search_first(scenario.folder)
     scenario = _with_landmarks(scenario, 1)
     mistakes: list[str] = []
     field, table = None, scenario.field

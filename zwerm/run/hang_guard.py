@@ -1,7 +1,7 @@
 """The deadline of controllers that run inline: a controller that does not answer in time is interrupted, and has crashed.
 
 In processes the world waits at the barrier and names the silent nodes. Inline the world itself would hang. An interval timer
-looks twice in a deadline whether the same call of a controller still runs. It costs a run nothing. It works in the main thread
+checks twice in a deadline whether the same call of a controller still runs. Its cost is negligible. It works in the main thread
 only, and not while something else uses the timer (`SIGALRM`).
 """
 
@@ -15,8 +15,8 @@ from typing import Final
 
 from zwerm.agents.runtime import node
 
-# A call that lasts for this many looks at least, half a deadline apart, has exceeded the deadline.
-LOOKS: Final = 3
+# A call that runs at this many successive checks, half a deadline apart, has exceeded the deadline.
+CHECKS: Final = 3
 
 
 class HangError(BaseException):
@@ -32,7 +32,7 @@ def hang_guard(deadline_s: float) -> Iterator[None]:
         return
     seen: list[FrameType] = []
 
-    def look(number: int, frame: FrameType | None) -> None:
+    def check(number: int, frame: FrameType | None) -> None:
         if sys.gettrace() is not None:  # a user debugs the controller
             seen.clear()
             return
@@ -42,11 +42,11 @@ def hang_guard(deadline_s: float) -> Iterator[None]:
             seen.clear()
         if frame is not None:
             seen.append(frame)
-        if len(seen) >= LOOKS:
+        if len(seen) >= CHECKS:
             seen.clear()
             raise HangError(f"no answer within {deadline_s:g} s")
 
-    signal.signal(signal.SIGALRM, look)
+    signal.signal(signal.SIGALRM, check)
     signal.setitimer(signal.ITIMER_REAL, deadline_s / 2, deadline_s / 2)
     try:
         yield

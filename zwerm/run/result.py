@@ -56,7 +56,7 @@ class RunResult:
     missed_faults: list[str] = field(default_factory=list)  # in words, those that never came
     series: dict[str, Floats] = field(default_factory=dict)  # (k,) samples by name, time_s among them
     refused: dict[str, int] = field(default_factory=dict)  # refused messages, by reason
-    refused_by: dict[int, dict[str, int]] = field(default_factory=dict)  # of them, by node and reason
+    refused_by: dict[int, dict[str, int]] = field(default_factory=dict)  # of them, by node and reason; -1: not known
     problems: list[str] = field(default_factory=list)  # what could not be written during the run
     tracebacks: dict[int, str] = field(default_factory=dict)  # of controllers that raised, by node
     crash_reasons: dict[int, str] = field(default_factory=dict)  # "tick 5: ..." of programs that ended, by node
@@ -65,7 +65,7 @@ class RunResult:
 
     @property
     def ok(self) -> bool:
-        """Return whether the run ended as runs should: completed, or at its time limit."""
+        """Return whether the run ended without failure: completed, or at its time limit."""
         return self.outcome in ("completed", "time-limit")
 
     @property
@@ -79,10 +79,9 @@ class RunResult:
     def to_frame(self, kind: FrameKind = "positions") -> "DataFrame":
         """Return a pandas frame of the run.
 
-        `positions`: time_s, node, x_m, y_m, heading_rad, present, a row for each sample and robot. `metrics`: time_s and a
-        column for each metric that was sampled during the run. `telemetry`: tick, time_s, node, name, value, a row for each
-        number.
-        Raises MissingExtraError without pandas, and ValueError for another kind.
+        `positions`: time_s, node, x_m, y_m, heading_rad, present, a row for each sample and robot. `metrics`: time_s
+        and a column for each metric that was sampled during the run. `telemetry`: tick, time_s, node, name, value, a
+        row for each number. Raises MissingExtraError without pandas, and ValueError for another kind.
         """
         return frame_of(kind, self.positions, self.series, self.telemetry)
 
@@ -111,7 +110,7 @@ class RunResult:
             "faults": self.faults,
             "refused": {
                 "reasons": self.refused,
-                "nodes": {str(node): reasons for node, reasons in self.refused_by.items()},
+                "nodes": {"unknown" if node < 0 else str(node): each for node, each in self.refused_by.items()},
             },
         }
 
@@ -128,10 +127,10 @@ class RunResult:
     ) -> Path:
         """Draw the run at its end, at a deployment cycle or at a time [s] at `path`, and return the path.
 
-        The suffix chooses the format: .png, .pdf or .svg. `size_in` is the greatest width and height [inches] of the arena. A
-        `bare` picture has no title, numbers, legend and curve. `colour_by` names the telemetry that colours robots, and `links`
-        connects robots whose packets have arrived; by default the scenario's `[pictures]` decides on both.
-        Raises PictureError where the file cannot be written, or the moment is not of the run.
+        The suffix chooses the format: .png, .pdf or .svg. `size_in` is the greatest width and height [inches] of the
+        arena. A `bare` picture has no title, numbers, legend and curve. `colour_by` names the telemetry that colours
+        robots, and `links` connects robots whose packets have arrived; by default the scenario's `[pictures]` decides
+        on both. Raises PictureError where the file cannot be written, or the moment is not of the run.
         """
         from zwerm.view.stills import draw_run
 

@@ -3,14 +3,14 @@
 import gc
 import secrets
 import time
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
-from typing import Final, Literal, Protocol, get_args
+from typing import TYPE_CHECKING, Final, Literal, Protocol, get_args
 
 import numpy as np
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import make
 from zwerm.agents.runtime.node import Node
@@ -22,10 +22,12 @@ from zwerm.record.history import History
 from zwerm.run.assembly import assemble_run, observers_of
 from zwerm.run.hang_guard import hang_guard
 from zwerm.run.measurement import measure, truth_of
+from zwerm.run.progress import NullProgress, ProgressListener
 from zwerm.run.result import RunResult
 from zwerm.scenario.load import load
 from zwerm.scenario.nearest import did_you_mean
 from zwerm.scenario.tables import Scenario
+from zwerm.wire.refusals import Refusals
 from zwerm.world.drivers.driver import TickObserver
 from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.drivers.realtime import RealTime
@@ -37,6 +39,9 @@ from zwerm.world.tick.completion import FAILED, INTERRUPTED
 from zwerm.world.tick.node_status import Event
 from zwerm.world.world import World
 
+if TYPE_CHECKING:  # an inline run needs no transport
+    from zwerm.deploy.security_log import SecurityLog
+
 Runner = Literal["processes", "inline"]
 
 # The samples of positions that a run's history holds for pictures, and the progress reports of a run, at most about.
@@ -47,32 +52,6 @@ PROGRESS_REPORTS: Final = 1_000
 HINDRANCES: Final[tuple[Event, ...]] = ("paused", "slow", "late")
 
 
-class ProgressListener(Protocol):
-    """Receives reports on the progress of a run."""
-
-    def joined(self, count: int, total: int) -> None:
-        """Take the report that `count` of `total` robots have joined."""
-
-    def ticked(self, tick: int, ticks: int) -> None:
-        """Take the report that `tick` of `ticks` are done."""
-
-    def covered(self, fraction: float, robots: int) -> None:
-        """Take the report that `robots` robots see a `fraction` of the arena."""
-
-
-class NullProgress:
-    """Ignores all reports."""
-
-    def joined(self, count: int, total: int) -> None:
-        """Ignore it."""
-
-    def ticked(self, tick: int, ticks: int) -> None:
-        """Ignore it."""
-
-    def covered(self, fraction: float, robots: int) -> None:
-        """Ignore it."""
-
-
 def run(
     scenario: str | Path | Scenario,
     seed: int = 1,
@@ -81,12 +60,16 @@ def run(
     realtime: float | None = None,
     watcher: ProgressListener | None = None,
     record: Path | None = None,
+    security_log: Path | None = None,
+    confinement: Confinement = UNCONFINED,
 ) -> RunResult:
     """Run `scenario` (a built-in name, a path, or a loaded scenario) and return its result.
 
     `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock; `record` is a file
-    to write an MCAP recording to. Raises ScenarioError for a mistake in the scenario, and LinkError where robots cannot
-    be started. A failed or interrupted run is a result like any other: look at its `outcome`.
+    to write an MCAP recording to. `security_log` is a file for all that world and router refuse; with processes it takes over
+    descriptor 1 of this process (see `zwerm.deploy.router_messages`). `confinement` limits the robots' processes.
+    Raises ScenarioError for a mistake in the scenario, and LinkError where robots cannot be started. A failed or
+    interrupted run is a result like any other: look at its `outcome`.
     """
     if runner not in get_args(Runner):
         expected = " or ".join(map(repr, get_args(Runner)))
@@ -104,6 +87,8 @@ def run(
     members = node_specs(scenario, seed)
     watcher = watcher or NullProgress()
     if runner == "inline":
+        if confinement != UNCONFINED:
+            raise ScenarioError(["runner: only robots that are processes can be confined, got 'inline'"])
         nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
         watcher.joined(len(nodes), len(nodes))
         link = MemoryLink(
@@ -111,21 +96,35 @@ def run(
             lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
             world.schedule.late_joiners,
         )
-        with hang_guard(scenario.time.straggler_s):
-            return drive(world, link, seed, runner, realtime, watcher, record, link, metrics)
+        with hang_guard(scenario.time.straggler_s), _security(security_log, router=False) as security:
+            return drive(world, link, seed, runner, realtime, watcher, record, link, metrics, security)
     _refuse_main(members)
     _try_controllers(members)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
-    with LocalSwarm(
-        new_run_id(),
-        members,
-        progress=watcher.joined,
-        paced=realtime is not None,
-        late_joiners=world.schedule.late_joiners,
-        restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
-    ) as swarm:
-        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics)
+    with (
+        _security(security_log) as security,
+        LocalSwarm(
+            new_run_id(),
+            members,
+            progress=watcher.joined,
+            paced=realtime is not None,
+            late_joiners=world.schedule.late_joiners,
+            restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
+            on_refusal=None if security is None else security.note,
+            confinement=confinement,
+        ) as swarm,
+    ):
+        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)
+
+
+def _security(path: Path | None, router: bool = True) -> "AbstractContextManager[SecurityLog | None]":
+    """Return the security log of a run, or nothing. It must be open before the router."""
+    if path is None:
+        return nullcontext()
+    from zwerm.deploy.security_log import SecurityLog
+
+    return SecurityLog(path, router)
 
 
 def _refuse_main(specs: Mapping[int, tuple[str, Setup]]) -> None:
@@ -160,6 +159,7 @@ def serve(
     names: Sequence[str] = (),
     lease_s: float = 10.0,
     plain: bool = False,
+    security_log: Path | None = None,
 ) -> RunResult:
     """Run a world whose robots are started elsewhere, with the credentials that are written to `credentials_file`.
 
@@ -180,19 +180,23 @@ def serve(
         raise ScenarioError(["credentials: expected either a file to write them to, or the keys of a world"])
 
     watcher = watcher or NullProgress()
-    with RemoteSwarm(
-        new_run_id(),
-        node_specs(scenario, seed),
-        listen=listen,
-        credentials_file=credentials_file,
-        keys=None if keys_file is None else load_world_keys(keys_file),
-        names=names,
-        lease_s=lease_s,
-        progress=watcher.joined,
-        deadline_s=deadline_s,
-        paced=realtime is not None,
-    ) as swarm:
-        return drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics)
+    with (
+        _security(security_log) as security,
+        RemoteSwarm(
+            new_run_id(),
+            node_specs(scenario, seed),
+            listen=listen,
+            credentials_file=credentials_file,
+            keys=None if keys_file is None else load_world_keys(keys_file),
+            names=names,
+            lease_s=lease_s,
+            progress=watcher.joined,
+            deadline_s=deadline_s,
+            paced=realtime is not None,
+            on_refusal=None if security is None else security.note,
+        ) as swarm,
+    ):
+        return drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, security)
 
 
 def new_run_id() -> str:
@@ -210,6 +214,7 @@ def drive(
     record: Path | None = None,
     programs: NodeProcesses | None = None,
     metrics: Observers | None = None,
+    security: "SecurityLog | None" = None,
 ) -> RunResult:
     """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`.
 
@@ -231,6 +236,8 @@ def drive(
             world.telemetry.listeners.append(recording.telemetry)
             observers.append(ExchangeObserver(world, recording))
         observers.append(sampling)
+        if security is not None:
+            world.intake.refusals.listener = security.note
         driver = (
             LockStep(world, link, observers, programs)
             if realtime is None
@@ -246,10 +253,15 @@ def drive(
             outcome, reason = INTERRUPTED, f"interrupted at tick {world.tick}"
         wall_s = time.monotonic() - start
         sampling.finish()
-        result = _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, link)
+        refusals = world.intake.refusals | link.refusals
+        if security is not None:
+            refusals |= security.router_refusals()
+        result = _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, refusals)
         if recording is not None:
             recording.close()
             result.problems += [recording.error] if recording.error else []
+        if security is not None:
+            result.problems += [security.error] if security.error else []
         return result
 
 
@@ -310,12 +322,6 @@ class ExchangeObserver:
         self._scene = world.scene
 
 
-def _refusals(*counts: Mapping[int, Counter[str]]) -> dict[int, dict[str, int]]:
-    """Return the sum of refusals by node and reason, ascending."""
-    nodes = sorted({node for each in counts for node in each})
-    return {node: dict(sum((each.get(node, Counter()) for each in counts), Counter())) for node in nodes}
-
-
 @contextmanager
 def _collecting_seldom() -> Iterator[None]:
     """Let Python search for garbage cycles 100 times less often: messages form no cycles, and most objects are messages."""
@@ -336,11 +342,11 @@ def _result(
     wall_s: float,
     driver: LockStep | RealTime,
     sampling: Sampling,
-    link: WorldLink,
+    refusals: Refusals,
 ) -> RunResult:
     scenario, status, intake = world.scenario, world.status, world.intake
     metrics = measure(world, sampling.observers)
-    metrics["refused_messages"] = float(intake.refused.total())
+    metrics["refused_messages"] = float(intake.refusals.by_reason.total())
     if isinstance(driver, RealTime):
         metrics["late_commands"] = float(intake.late_count)
         metrics["deadman_stops"] = float(driver.deadman_stops)
@@ -372,8 +378,8 @@ def _result(
         arena=world.scene.arena,
         history=sampling.history,
         cell_counts=counts,
-        refused=dict(intake.refused + Counter(getattr(link, "refused", {}))),
-        refused_by=_refusals(intake.refused_by, getattr(link, "refused_by", {})),
+        refused=dict(refusals.by_reason),
+        refused_by=refusals.by_node,
         series={name: np.array(values) for name, values in sampling.observers.series().items()},
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,

@@ -1,4 +1,4 @@
-"""Every mistake in a scenario at once, of whichever stage: its tables, or what is made of them.
+"""Every mistake in a scenario at once, of both stages: its tables, and the objects that are made of them.
 
 Objects can be made of correct tables only. So wrong tables are left out, and the other tables are checked as if they
 were complete. Mistakes at, around or inside a place that was left out are then ignored, because the omission may cause
@@ -40,7 +40,8 @@ def scenario_mistakes(name: str, overrides: tuple[str, ...] = ()) -> list[str]:
 def own_controller_mistakes(scenario: Scenario) -> list[str]:
     """Return how the scenario's own controllers, `module:Class`, break the contract; one line for each violation.
 
-    The conformance kit makes and steps one controller of each role in this process, with the node's Setup of the scenario.
+    The conformance kit makes and steps one controller of each role in this process, with the node's Setup of the
+    scenario.
     """
     found: dict[str, None] = {}
     tried: set[str] = set()
@@ -75,7 +76,8 @@ def _mistakes_of_the_rest(name: str, overrides: tuple[str, ...]) -> list[str]:
 
 
 def _leave_out_unsound(tables: dict[str, Any]) -> list[Path]:
-    """Take out of `tables` what is unsound, and return where it was; of an array all goes, so that no number shifts."""
+    """Remove the wrong entries from `tables`, and return their paths. An array is removed as a whole, so that no index
+    shifts."""
     try:
         Scenario.model_validate(tables)
     except ValidationError as error:
@@ -101,7 +103,7 @@ def _keys(where: tuple[int | str, ...]) -> Path:
 
 
 def _touches(line: str, path: Path) -> bool:
-    """Return whether a line is about a place that is, is inside of, or is around `path`."""
+    """Return whether the path of a line is `path`, or one of the two contains the other."""
     place = tuple(line.partition(": ")[0].split("."))
     shared = min(len(place), len(path))
     return place[:shared] == path[:shared]

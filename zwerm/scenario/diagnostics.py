@@ -1,4 +1,4 @@
-"""A user's mistakes as a person would say them: one line for each, `place: path: rule, got value`."""
+"""The mistakes of a user in plain words: one line for each, `place: path: rule, got value`."""
 
 import json
 import re
@@ -68,7 +68,8 @@ _GOT_LENGTH_MAX = 60
 
 
 def _mistake(each: ErrorDetails) -> tuple[tuple[int | str, ...], str, str | None]:
-    """Return where the mistake is, the rule, and the value as the file has it, or None where that says nothing."""
+    """Return the path of the mistake, the rule, and the value as the file has it; None for a value that does not
+    help."""
     where, kind, context, got = each["loc"], each["type"], each.get("ctx", {}), each["input"]
     if kind == "extra_forbidden":
         return where, "unknown key", None
@@ -112,7 +113,7 @@ def struct_mistakes(kind: type[Struct], given: dict[str, Any], path: str) -> lis
 
 
 def _as_ours(rule: str) -> str:
-    """Return a rule of msgspec's in the words of the others: `expected a number`, `expected >= 1`."""
+    """Return a rule of msgspec in the words that the other rules have: `expected a number`, `expected >= 1`."""
     rule = re.sub(r"^Expected (float|int) (?=[<>])", "expected ", re.sub(r", got \w+$", "", rule))
     for theirs, ours in (("float", "a number"), ("int", "an integer"), ("str", "a string"), ("bool", "true or false")):
         rule = re.sub(rf"\b{theirs}\b", ours, rule)

@@ -43,7 +43,8 @@ def locate(name: str) -> Path:
 
 
 def suggestion(name: str, known: Iterable[str], command: str) -> str:
-    """Return the three known names that are most similar to `name`, and the command that lists all, as part of a line."""
+    """Return the three known names that are most similar to `name`, and the command that lists all, as part of a
+    line."""
     similar = nearest(name, known, count=3, similarity=0.3)
     return f"; nearest are {', '.join(similar)}; `{command}` names all" if similar else f"; `{command}` names all"
 
@@ -64,14 +65,16 @@ def read(path: Path) -> dict[str, Any]:
 def load(name: str, overrides: tuple[str, ...] = (), blamed: tuple[str, ...] | None = None) -> Scenario:
     """Return the scenario `name` (built in, or a path) with each `path=value` of `overrides` applied.
 
-    `blamed` are those that a mistake names as its place, all by default. Raises ScenarioError with every mistake.
+    `blamed` are the overrides that a mistake may name as its place, by default all. Raises ScenarioError with every
+    mistake.
     """
     tables, path = tables_of(name, overrides)
     return validate(tables, str(path), path.parent, overrides if blamed is None else blamed)
 
 
 def tables_of(name: str, overrides: tuple[str, ...] = ()) -> tuple[dict[str, Any], Path]:
-    """Return what `load` would validate, and the scenario's file. Raises ScenarioError where there is none to validate."""
+    """Return what `load` would validate, and the scenario's file. Raises ScenarioError where there is none to
+    validate."""
     path = locate(name)
     tables = read(path)
     rename(tables, str(path))

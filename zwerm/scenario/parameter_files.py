@@ -1,4 +1,4 @@
-"""Files among the parameters of a controller: a controller reads none, it gets the text.
+"""Files among the parameters of a controller: a controller reads no file; it gets the text.
 
 A parameter whose name ends in `_file` is a path, relative to the scenario. The starter of a node puts the file's text
 in its place. So a robot process on another machine needs no file.

@@ -18,7 +18,7 @@ from zwerm.scenario.nearest import did_you_mean
 _OWN: Final = Path(__file__).parents[1].resolve()
 
 
-def look_in(folder: Path) -> None:
+def search_first(folder: Path) -> None:
     """Look for modules in a scenario's folder before any other place from now on."""
     found = folder.resolve()
     if found.parent in (_OWN, _OWN.parent) and found.name == "scenarios":

@@ -51,12 +51,12 @@ class TimeTable(Table):
 
 
 class ArenaTable(Table):
-    """The space robots live in: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
+    """The space in which robots move: exactly one of size_m, polygon, wkt, geojson or map, less obstacles and walls.
 
-    `map` is a ROS map_server YAML, a bitmap (dark is wall) with `resolution_m` or `size_m`, or a grid map (MovingAI `.map`, or
-    `.mcpp`) with `resolution_m`; `start` is a place [m] in the part to keep, else the largest is. Paths are relative to the
-    scenario. `scale` multiplies all lengths, or `free_area_m2` is the free space after scaling. Then gaps narrower than
-    `passage_m` are closed, and what lies behind them is left out."""
+    `map` is a ROS map_server YAML, a bitmap (dark is wall) with `resolution_m` or `size_m`, or a grid map (MovingAI
+    `.map`, or `.mcpp`) with `resolution_m`; `start` is a place [m] in the part to keep, else the largest is. Paths are
+    relative to the scenario. `scale` multiplies all lengths, or `free_area_m2` is the free space after scaling. Then
+    gaps narrower than `passage_m` are closed, and what lies behind them is left out."""
 
     size_m: Size | None = None
     polygon: list[Point] | None = Field(default=None, min_length=3)
@@ -96,8 +96,8 @@ class PlacementTable(Table):
     or at `roots`.
 
     `disc` takes `radius_m` and optionally `center_m` (else a random one that fits); `cell` takes `grid` and `radius_m`
-    about the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad]; `roots` are the start
-    cells of a `.mcpp` map.
+    about the centre of a random cell, or of `cell` where given; `poses` are [x_m, y_m, heading_rad]; `roots` are the
+    start cells of a `.mcpp` map.
     """
 
     kind: Literal["uniform", "disc", "cell", "poses", "roots"] = "uniform"
@@ -119,8 +119,8 @@ class EntranceTable(Table):
 class ClockTable(Table):
     """Clocks that differ: each robot's reads (1 + drift) * t + offset, both drawn from the seed.
 
-    The offset is uniform in +-`offset_s_max`, the drift in +-`drift_ppm_max` millionths. A robot's `time_s` and its wakes are
-    by its own clock; the tick of an observation is not.
+    The offset is uniform in +-`offset_s_max`, the drift in +-`drift_ppm_max` millionths. A robot's `time_s` and its
+    wakes are by its own clock; the tick of an observation is not.
     """
 
     offset_s_max: NonNegative = 0.0
@@ -128,7 +128,7 @@ class ClockTable(Table):
 
 
 class RobotsTable(Table):
-    """The swarm: how many, what they are, what they sense, what runs on them."""
+    """The swarm: the number of robots, their body, sensors and start positions, and their controller."""
 
     count: Annotated[int, Field(ge=1, le=100_000)]
     controller: str
@@ -146,8 +146,8 @@ class BaseTable(Table):
 
     It stands at its `pose`, else at a random free place. With several `poses`, or `count` at random places, there are
     as many base stations: robots 0, 1, ... Each has a depot of its own, and the other robots are distributed to the
-    depots in turn. With `heading = "drawn"` the seed draws the heading, and that of `pose` and `poses` has no effect. The
-    robots of a station have its heading when they come out.
+    depots in turn. With `heading = "drawn"` the seed draws the heading, and that of `pose` and `poses` has no effect.
+    The robots of a station have its heading when they come out.
     """
 
     controller: str
@@ -163,7 +163,7 @@ class BaseTable(Table):
         return len(self.poses) if self.poses is not None else self.count or 1
 
     @model_validator(mode="after")
-    def _one_way_to_say_where(self) -> Self:
+    def _at_most_one_placement(self) -> Self:
         given = [name for name in ("pose", "poses", "count") if getattr(self, name) is not None]
         if len(given) > 1:
             raise ValueError(f"expected at most one of pose, poses and count, got {' and '.join(given)}")
@@ -171,7 +171,7 @@ class BaseTable(Table):
 
 
 class CoordinatorTable(Table):
-    """The optional central node. It has no body and no sensors; it hears robots over the `uplink` channel."""
+    """The optional central node. It has no body and no sensors; robots send to it on the channel `uplink`."""
 
     controller: str
     parameters: dict[str, Any] = {}
@@ -212,8 +212,8 @@ _PER_H: Final = "_per_h"
 class RandomFaultsTable(Table):
     """Faults at random times. `KIND_per_h` is the mean number of faults of a kind per hour, over the whole swarm.
 
-    Each fault lasts `mean_s` on average. `seed`, by default that of the run, determines the schedule; the result of the run has
-    it as `[[faults]]` tables.
+    Each fault lasts `mean_s` on average. `seed`, by default that of the run, determines the schedule; the result of the
+    run has it as `[[faults]]` tables.
     """
 
     model_config = ConfigDict(extra="allow")

@@ -26,14 +26,14 @@ from zwerm.study.trial_plan import Trial
 def run_trials(trials: Sequence[Trial], jobs: int, timeout_s: float | None = None) -> Generator[Row, None, None]:
     """Yield the row of every trial. Close the iterator to stop early.
 
-    A trial without a result after `timeout_s` is ended and becomes a failed row. With one job trials run in this process, where
-    nothing ends them.
+    A trial without a result after `timeout_s` is ended and becomes a failed row. With one job trials run in this
+    process, where nothing ends them.
     """
     if jobs == 1:
         yield from map(run_trial, trials)
         return
     with warnings.catch_warnings():
-        # joblib warns of unread results when it is closed early, and of workers that it replaces.
+        # joblib warns of unread results if it is closed early, and of workers that it replaces.
         warnings.simplefilter("ignore", UserWarning)
         try:
             with parallel_config(backend="loky", inner_max_num_threads=1):

@@ -55,7 +55,7 @@ class SummaryLine:
         """True if the paper's value agrees with the measured mean; None for too few trials or no value."""
         if self.difference is None or self.published is None or math.isnan(self.sample.sd):
             return None
-        # The smallest of many means is lower over fewer trials, for any swarm.
+        # The smallest of many means increases with the number of trials, for any swarm.
         if self.metric in CELL_METRICS and self.sample.n < (self.paper_trials or 0):
             return None
         margin = half_width(self.sample.sd, self.sample.n, self.paper_trials) + (self.published.tolerance or 0.0)

@@ -1,9 +1,9 @@
-"""The identity of a trial: all that decides its result, but for the seed.
+"""The identity of a trial: all that decides its result, except the seed.
 
 It depends on the scenario, the arena, the files that the scenario names, and the user's modules that the trial can
 load. It also depends on Zwerm, and on the versions of Python and of the libraries that Zwerm computes with. Zwerm
-counts by its version, and by the content of its code where it runs from a source tree, whose version says nothing about
-changes.
+counts by its version, and by the content of its code where it runs from a source tree, whose version does not change
+with the code.
 
 Import statements do not name every module. So a row also records the user's modules that its trial loaded by a computed
 name. It is used again only while their files are the same. Code that cannot be known is stated in words; its rows are
@@ -32,7 +32,7 @@ LIBRARIES: Final = ("numpy", "scipy", "shapely", "pymunk", "pillow", "pyyaml")
 _DESCRIPTIVE: Final = {"name", "summary", "source"}
 _PATH_CHARS_MAX: Final = 255
 # Folders of Zwerm whose code decides no result.
-_SHOWING: Final = ("cli", "compare", "network", "record", "study", "twin", "view")
+_SHOWING: Final = ("cli", "compare", "evolve", "network", "record", "study", "twin", "view")
 
 # The digest of each user module's file when this process was first known to have imported it, by path.
 _imported: dict[str, str] = {}
@@ -111,7 +111,8 @@ def _code_digest(algorithms: tuple[str, ...]) -> str:
 
 
 def _code_files(package: Path) -> Iterator[Path]:
-    """Yield the source files below Zwerm's package. The rooms are links in a source tree, which a glob does not follow."""
+    """Yield the source files below Zwerm's package. The rooms are links in a source tree, which a glob does not
+    follow."""
     for folder in (package, *(each for each in package.iterdir() if each.is_symlink())):
         yield from folder.rglob("*.py")
 
@@ -120,7 +121,7 @@ class LoadedModules:
     """The user's modules that a trial loads, against those that its point was planned with."""
 
     def __init__(self, planned: UserModules, in_processes: bool = False) -> None:
-        """Remember how the planned files are now. `in_processes` means that robots import them again in every trial."""
+        """Record the current content of the planned files. `in_processes`: robots import them again in every trial."""
         self._planned = planned
         self._in_processes = in_processes
         self._changed = self._first_changed()
@@ -160,7 +161,8 @@ class LoadedModules:
 
 
 def still_same(recorded: str) -> bool:
-    """Return whether the modules that a row recorded, as `LoadedModules.others` returned them, have the same files now."""
+    """Return whether the modules that a row recorded, as `LoadedModules.others` returned them, have the same files
+    now."""
     if not recorded:
         return True
     for name, digest in json.loads(recorded).items():

@@ -29,7 +29,7 @@ class Point:
     settings: dict[str, Setting]
     scenario: Scenario
     fingerprint: str
-    metrics: tuple[str, ...] = ()  # names of what it measures, where `*` stands for any characters
+    metrics: tuple[str, ...] = ()  # names of its metrics, where `*` stands for any characters
     modules: UserModules = field(default_factory=UserModules)
 
     @property

@@ -73,7 +73,8 @@ def compare(run: TwinRun) -> dict[str, Any]:
 
 
 def _real(run: TwinRun) -> tuple[dict[Link, list[int]], dict[Link, set[int]], list[int], list[int]]:
-    """Return by link the packet numbers sent and arrived; for all packets the delays [ns] and the ticks until received."""
+    """Return by link the packet numbers sent and arrived; for all packets the delays [ns] and the ticks until
+    received."""
     audience: dict[tuple[str, int], list[int]] = defaultdict(list)
     for name, pairs in run.links.items():
         for sender, receiver in pairs:
@@ -117,7 +118,7 @@ def lost_runs(sent: list[int], arrived: set[int]) -> list[int]:
 
 
 class LinkCounts(NamedTuple):
-    """Packets of a link: modelled, passed in the model, sent, arrived; `variance_factor` is the variance factor g of bursts."""
+    """Packets of a link: modelled, passed in the model, sent, arrived; `variance_factor` is the factor g for bursts."""
 
     modelled: int
     passed: int

@@ -10,7 +10,7 @@ from rich.console import Console
 from zwerm.deploy.network.impairments import supported
 from zwerm.link.peer_radio import Transport
 from zwerm.run.assembly import assemble
-from zwerm.run.runner import ProgressListener
+from zwerm.run.progress import ProgressListener
 from zwerm.scenario.tables import Scenario
 from zwerm.twin.packet_comparison import compare
 from zwerm.twin.twin_report import print_twin

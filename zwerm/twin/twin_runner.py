@@ -1,8 +1,8 @@
 """Run a scenario in real time with its packets on a real network.
 
 Observations and commands go over a Unix socket that loses nothing. Packets between nodes go over the network, and nodes
-receive only the packets that arrive there. The world gets a copy of each packet sent, and its models decide about it. So each
-packet has a modelled and a real result, at the same tick and the same positions.
+receive only the packets that arrive there. The world gets a copy of each packet sent, and its models decide about it.
+So each packet has a modelled and a real result, at the same tick and the same positions.
 """
 
 import time
@@ -18,7 +18,8 @@ from zwerm.deploy.swarm import LocalSwarm, Members
 from zwerm.errors import LinkError
 from zwerm.link.peer_radio import MET, LogLine, Station, Transport, read_log
 from zwerm.run.assembly import assemble
-from zwerm.run.runner import NullProgress, ProgressListener, new_run_id
+from zwerm.run.progress import NullProgress, ProgressListener
+from zwerm.run.runner import new_run_id
 from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.realtime import RealTime
 from zwerm.world.radio import ROBOTS
@@ -165,7 +166,7 @@ def _stations(
 
 
 def _wait_until_connected(logs: dict[int, Path]) -> None:
-    """Return when each pair of nodes has exchanged hellos. Raises LinkError after MEET_DEADLINE_S."""
+    """Wait until each pair of nodes has exchanged hellos. Raises LinkError after MEET_DEADLINE_S."""
     end_s = time.monotonic() + MEET_DEADLINE_S
     waiting = list(logs)
     while waiting := [node for node in waiting if not any(line.what == MET for line in read_log(logs[node]))]:

@@ -124,7 +124,7 @@ def _write_mp4(path: Path, frames: Iterator[NDArray[np.uint8]], fps: int) -> Non
     first = next(frames)
     height, width = first.shape[:2]
     raw = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{width}x{height}", "-r", str(fps), "-i", "-"]
-    # Players want even sizes and this pixel format.
+    # Players need even sizes and this pixel format.
     out = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p", str(path)]
     command = ["ffmpeg", "-loglevel", "error", "-y", *raw, *out]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
@@ -132,6 +132,6 @@ def _write_mp4(path: Path, frames: Iterator[NDArray[np.uint8]], fps: int) -> Non
         with suppress(BrokenPipeError):
             for frame in chain([first], frames):
                 ffmpeg.stdin.write(frame.tobytes())
-        _, said = ffmpeg.communicate()
+        _, output = ffmpeg.communicate()
     if ffmpeg.returncode:
-        raise PictureError(f"{path}: ffmpeg failed: {said.decode(errors='replace').strip().splitlines()[-1]}")
+        raise PictureError(f"{path}: ffmpeg failed: {output.decode(errors='replace').strip().splitlines()[-1]}")

@@ -44,7 +44,7 @@ LINE_HEIGHT: Final = 0.2
 HEAD_GAP: Final = 0.06
 AXIS_HEIGHT: Final = 0.52
 PLOT_HEIGHT: Final = 1.4
-# The scale bar is at most that much of the arena's width, and that far below the arena [inches].
+# The greatest length of the scale bar as a fraction of the arena's width, and its distance below the arena [inches].
 SCALE_FRACTION: Final = 0.2
 SCALE_DROP: Final = 0.3
 LEGEND_ROW: Final = 0.23
@@ -83,7 +83,7 @@ class Sheet:
         dpi: int = 150,
     ) -> None:
         xmin, ymin, xmax, ymax = arena.bounds
-        # A little air around the arena, so that its walls are seen whole.
+        # A margin around the arena, so that its walls are drawn in full.
         air = 0.015 * max(xmax - xmin, ymax - ymin)
         extent = (xmax - xmin + 2 * air, ymax - ymin + 2 * air)
         scale = min(arena_inches[0] / extent[0], arena_inches[1] / extent[1])
@@ -119,7 +119,7 @@ class Sheet:
         self.plot = self._place(LEFT, foot + AXIS_HEIGHT, inner, PLOT_HEIGHT) if with_plot else None
 
     def freeze(self, moving: Sequence[Artist]) -> None:
-        """Draw everything but `moving` (and walls and note, which lie above it) once, for `frame`."""
+        """Draw all artists once, for `frame`, except `moving`, and the walls and the note above them."""
         self._moving = [*sorted(moving, key=Artist.get_zorder), self.walls, self.note]
         for artist in self._moving:
             artist.set_animated(True)
@@ -127,7 +127,7 @@ class Sheet:
         self._still = self.canvas.copy_from_bbox(self.figure.bbox)
 
     def frame(self) -> NDArray[np.uint8]:
-        """Return the sheet as it is now as (height, width, 4) RGBA; what was frozen is not drawn again."""
+        """Return the current sheet as (height, width, 4) RGBA; frozen artists are not drawn again."""
         self.canvas.restore_region(self._still)
         for artist in self._moving:
             self.figure.draw_artist(artist)

@@ -1,4 +1,4 @@
-"""A run put on a sheet: the swarm, its layers, the coverage curve, and the words above them."""
+"""A run on a sheet: the swarm, its layers, the coverage curve, and the text above them."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -61,7 +61,8 @@ class Composition:
         raise PictureError(f"{self._stage_word} {number}: expected one that the run reported, which are {known}")
 
     def legend_entries(self, tracks: Tracks | None = None) -> int:
-        """Return the number of entries that the legend needs at most; of a still with `tracks`, else of an animation."""
+        """Return the number of entries that the legend needs at most; of a still with `tracks`, else of an
+        animation."""
         more = sum(kind.more_entries for kind in self.layers)
         own = max((kind.legend_entries for kind in self.layers), default=0)
         if own or len([kind for kind in self.layers if not kind.more_entries]):

@@ -57,7 +57,7 @@ def draw_curve(axes: Axes, curve: CoverageCurve) -> Line2D:
     beside.plot(curve.x, curve.robots, color=ROBOTS, linewidth=1.4, linestyle=(0, (4, 1.5)))
     if curve.ideal is not None:
         beside.axhline(curve.ideal, color=ROBOTS, linewidth=0.8, linestyle=":")
-        label = f"{curve.ideal:.0f} would do in hexagonal packing"
+        label = f"{curve.ideal:.0f} in an ideal hexagonal packing"
         beside.annotate(
             label, (0.0, curve.ideal), xycoords=("axes fraction", "data"), textcoords="offset points",
             xytext=(3, 2), ha="left", fontsize=7.5, color=ROBOTS,

@@ -1,4 +1,4 @@
-"""Picture layers: what an algorithm or a user draws over the arena, below the robots.
+"""Picture layers: drawings of an algorithm or a user over the arena, below the robots.
 
 A layer is a plug-in of one class. The catalogue names the layers of each algorithm; `module:Class` names a user's own.
 """
@@ -38,7 +38,8 @@ class Stage(Protocol):
 
 
 class Layer(ABC):
-    """Draws on one sheet; `names` asks for labels that suit a still picture. The base class of the plug-in kind `layer`."""
+    """Draws on one sheet; `names` asks for labels that suit a still picture. The base class of the plug-in kind
+    `layer`."""
 
     # Colours that the palette of an animation keeps.
     colours: ClassVar[Sequence[str]] = ()
@@ -52,7 +53,7 @@ class Layer(ABC):
     headline: ClassVar[Sequence[str]] = ()
     # Name of the layer's stages: the label of the axis below the picture.
     stage_name: ClassVar[str] = "stage"
-    # The robots are drawn without paths and noses, because the layer is to be seen.
+    # The robots are drawn without paths and noses, so that the layer stays visible.
     plain_swarm: ClassVar[bool] = False
 
     @abstractmethod
@@ -76,7 +77,8 @@ class Layer(ABC):
 
     @abstractmethod
     def show(self, tracks: Tracks, index: int, at_s: float | None) -> None:
-        """Show the state at sample `index` of the tracks: at time `at_s` [s], or at the end of the run where it is None."""
+        """Show the state at sample `index` of the tracks: at time `at_s` [s], or at the end of the run where it is
+        None."""
 
     @abstractmethod
     def legend(self) -> Sequence[Line2D | Patch]:

@@ -1,13 +1,13 @@
 """All messages on the wire: one `Observation` to a node, one `Command` back, and the messages that open and close a
 connection.
 
-Messages are MessagePack maps with field names, so that a node can be written in any language. Small parts that occur in
-numbers (a bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as
+Messages are MessagePack maps with field names, so that a node can be written in any language. Small parts that occur
+often (a bearing, a contact) are MessagePack arrays. Every message carries its kind and the protocol version as
 `type`, for example "command/1". Decoding is strict: unknown fields, wrong types, other versions, non-finite numbers and
 trailing bytes are refused, each with a reason that is counted.
 
-New fields go last, with defaults; a field at its default is left out of a message (except in drives). Angles are radians in
-(-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
+New fields go last, with defaults; a field at its default is left out of a message (except in drives). Angles are
+radians in (-pi, pi], counter-clockwise; a bearing is measured in the body frame, x forward and y left.
 """
 
 import re
@@ -30,39 +30,39 @@ MESSAGE_BYTES_MAX: Final = 65_536
 # Structs of numbers and bytes are part of no reference cycle: with `gc=False` the collector ignores them.
 
 
-class _Part(Struct, frozen=True, gc=False, array_like=True, forbid_unknown_fields=True):
+class _WirePart(Struct, frozen=True, gc=False, array_like=True, forbid_unknown_fields=True):
     """A part that may occur many times in a message: an array on the wire."""
 
 
-class _Message(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True, tag_field="type"):
+class _WireMessage(Struct, frozen=True, gc=False, forbid_unknown_fields=True, omit_defaults=True, tag_field="type"):
     """A whole message: a map on the wire, led by its type and the protocol version."""
 
 
 # --- what a node senses ---------------------------------------------------------------------------------------------
 
 
-class Bearing(_Part, frozen=True):
+class Bearing(_WirePart, frozen=True):
     """A robot seen, by its id, in the direction `bearing_rad` of the body frame. No range."""
 
     node: int
     bearing_rad: float
 
 
-class LandmarkBearing(_Part, frozen=True):
+class LandmarkBearing(_WirePart, frozen=True):
     """A landmark seen, by its id, in the direction `bearing_rad` of the body frame. No range."""
 
     landmark: int
     bearing_rad: float
 
 
-class Contact(_Part, frozen=True):
+class Contact(_WirePart, frozen=True):
     """One closed touch switch: contact within +-half_width_rad of bearing_rad, in the body frame."""
 
     bearing_rad: float
     half_width_rad: float
 
 
-class Neighbour(_Part, frozen=True):
+class Neighbour(_WirePart, frozen=True):
     """A robot's position relative to this one, in the body frame."""
 
     node: int
@@ -70,7 +70,7 @@ class Neighbour(_Part, frozen=True):
     y_m: float
 
 
-class FieldSample(_Part, frozen=True):
+class FieldSample(_WirePart, frozen=True):
     """A scalar field's value where the robot stands, and its gradient [1/m] in the body frame."""
 
     value: float
@@ -78,7 +78,7 @@ class FieldSample(_Part, frozen=True):
     gradient_y: float
 
 
-class Pose(_Part, frozen=True):
+class Pose(_WirePart, frozen=True):
     """Position and heading in the frame of the arena."""
 
     x_m: float
@@ -86,7 +86,7 @@ class Pose(_Part, frozen=True):
     heading_rad: float
 
 
-class Displacement(_Part, frozen=True):
+class Displacement(_WirePart, frozen=True):
     """Motion since the node's previous observation, in the body frame it had then."""
 
     forward_m: float
@@ -94,7 +94,7 @@ class Displacement(_Part, frozen=True):
     turn_rad: float
 
 
-class Packet(_Part, frozen=True):
+class Packet(_WirePart, frozen=True):
     """A radio packet delivered now. `sender` is None on an anonymous channel."""
 
     channel: str
@@ -102,7 +102,7 @@ class Packet(_Part, frozen=True):
     sender: int | None = None
 
 
-class Observation(_Message, frozen=True, tag=f"observation/{PROTOCOL_VERSION}"):
+class Observation(_WireMessage, frozen=True, tag=f"observation/{PROTOCOL_VERSION}"):
     """The input of a node at one tick. A sensor that the node does not have is None, and not on the wire."""
 
     tick: int
@@ -146,7 +146,7 @@ class WheelSpeeds(Struct, frozen=True, gc=False, forbid_unknown_fields=True, tag
     right_m_s: float = 0.0
 
 
-class Transmission(_Part, frozen=True):
+class Transmission(_WirePart, frozen=True):
     """A radio packet to send: to every node that hears it, or to the one node `to`."""
 
     channel: str
@@ -177,9 +177,9 @@ class Command(
     """A node's answer to one observation.
 
     `drive` None leaves the drive as it was, and it persists while the node sleeps. `wake` None asks for an observation
-    at every tick. `release` is the base station's: let one robot out of the depot. `done` says that the node's part of
-    the task is complete, `gave_up`, unless empty, why it never will be. The program that runs the controller sets
-    `tick`: the tick of the observation answered.
+    at every tick. `release`: a base station lets one robot out of its depot. `done`: the node's part of the task is
+    complete. `gave_up`, if not empty, is the reason why that part cannot be completed. The program that runs the
+    controller sets `tick`: the tick of the observation answered.
 
     `telemetry` is named numbers for the observers of the run; no node receives them. `snapshot` is one record in the
     algorithm's own encoding for its metric and picture classes. The trace covers neither.
@@ -196,7 +196,7 @@ class Command(
     snapshot: bytes = b""
 
 
-class Failure(_Message, frozen=True, tag=f"failure/{PROTOCOL_VERSION}"):
+class Failure(_WireMessage, frozen=True, tag=f"failure/{PROTOCOL_VERSION}"):
     """A controller raised: the last message of a node, in place of its command."""
 
     tick: int
@@ -207,7 +207,7 @@ class Failure(_Message, frozen=True, tag=f"failure/{PROTOCOL_VERSION}"):
 # --- how a node joins and leaves ------------------------------------------------------------------------------------
 
 
-class Hello(_Message, frozen=True, tag=f"hello/{PROTOCOL_VERSION}"):
+class Hello(_WireMessage, frozen=True, tag=f"hello/{PROTOCOL_VERSION}"):
     """A node asks to join under the incarnation it was started with.
 
     `software` names its releases (`zwerm.link.software`); a node on the world's own machine leaves it empty.
@@ -218,7 +218,7 @@ class Hello(_Message, frozen=True, tag=f"hello/{PROTOCOL_VERSION}"):
     software: str = ""
 
 
-class Welcome(_Message, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
+class Welcome(_WireMessage, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
     """The world's answer to `Hello`: the node's controller and setup, or the reason of a refusal.
 
     In a `paced` run (real time) observations come also while the node has not answered the one before.
@@ -232,8 +232,8 @@ class Welcome(_Message, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
     code: str = ""  # a digest of the controller's file in the world, to be compared with the node's
 
 
-class Goodbye(_Message, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
-    """The world ends a node's run and gives the reason; the node closes and exits. Or a node announces that it leaves."""
+class Goodbye(_WireMessage, frozen=True, tag=f"goodbye/{PROTOCOL_VERSION}"):
+    """The world ends a node's run and gives the reason; the node closes and exits. Or a node leaves."""
 
     reason: str
 
@@ -280,8 +280,8 @@ def refusal(error: Exception) -> ProtocolError:
 def open_answer(payload: bytes) -> Command | Failure:
     """Return the command or failure in `payload`.
 
-    Raises ProtocolError with the reasons of `refusal`, or `oversized`; or `not-finite` for a number in the drive or the wake;
-    or `telemetry` for a name or number that breaks the rules of `zwerm.wire.telemetry_rules`.
+    Raises ProtocolError with the reasons of `refusal`, or `oversized`; or `not-finite` for a number in the drive or the
+    wake; or `telemetry` for a name or number that breaks the rules of `zwerm.wire.telemetry_rules`.
     """
     if len(payload) > MESSAGE_BYTES_MAX:
         raise ProtocolError("oversized", f"{len(payload)} bytes, at most {MESSAGE_BYTES_MAX}")

@@ -22,14 +22,14 @@ Digest = Annotated[int, Meta(ge=0, le=2**62)]
 Bytes = Annotated[bytes, Meta(max_length=LARGE_BYTES)]
 
 
-class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class _MapMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, led by its tag."""
 
 
 # --- the map ---------------------------------------------------------------------------------------------------------
 
 
-class Entries(_Message, frozen=True, tag="e"):
+class Entries(_MapMessage, frozen=True, tag="e"):
     """Successive entries of a log, from number `first` on."""
 
     origin: Count
@@ -37,7 +37,7 @@ class Entries(_Message, frozen=True, tag="e"):
     entries: tuple[Bytes, ...]
 
 
-class Vector(_Message, frozen=True, tag="v"):
+class Vector(_MapMessage, frozen=True, tag="v"):
     """The sender's version vector for all origins in [low, high): origin, count, origin, count, ...
 
     An origin that is not named has no entries. With `ask` the receiver sends the entries that the sender lacks.
@@ -63,7 +63,7 @@ class Register(Struct, frozen=True, array_like=True, forbid_unknown_fields=True)
     frozen: Digest = 0
 
 
-class RegisterBeacon(_Message, frozen=True, tag="b"):
+class RegisterBeacon(_MapMessage, frozen=True, tag="b"):
     """The digest of the sender's version vector, and registers, the sender's own first."""
 
     digest: Digest
@@ -73,7 +73,7 @@ class RegisterBeacon(_Message, frozen=True, tag="b"):
 # --- robots and coordinator --------------------------------------------------------------------------------------------
 
 
-class TaskReport(_Message, frozen=True, tag="r"):
+class TaskReport(_MapMessage, frozen=True, tag="r"):
     """To the coordinator: the robot has the order `order` of the coordinator's incarnation `coordinator_incarnation`, and, if
     `free`, has finished it.
 
@@ -89,7 +89,7 @@ class TaskReport(_Message, frozen=True, tag="r"):
     landmarks: Bytes
 
 
-class TaskPart(_Message, frozen=True, tag="o"):
+class TaskPart(_MapMessage, frozen=True, tag="o"):
     """To a robot: part `part` of `parts` of the order number `order`, in bytes.
 
     The module `orders` defines the format of all parts together. `incarnation` is that of the robot it is meant for.

@@ -9,6 +9,8 @@ A dead robot is an obstacle. A fact that a robot observed at such an obstacle na
 robot is a fact too. It makes all facts void that name one of the robot's earlier wrecks.
 """
 
+from bisect import insort
+from itertools import islice
 from typing import Final, NamedTuple
 from zlib import crc32
 
@@ -119,11 +121,19 @@ Fact = SweptSegment | TracedArc | Void | FrontierCut | Return
 
 
 class FactSet:
-    """A grow-only set of facts. `digest` is equal for equal sets, and with certainty 1 - 2**-32 only for those."""
+    """A grow-only set of facts. `digest` is equal for equal sets, and with certainty 1 - 2**-32 only for those.
+
+    The facts of each kind are kept sorted, so that the order of arrival has no influence.
+    """
 
     def __init__(self) -> None:
         self._facts: dict[Fact, None] = {}
         self.digest = 0
+        self.alive_ticks: dict[int, int] = {}  # the newest proof of life of each robot that was wrongly taken for dead
+        self._segments: list[SweptSegment] = []
+        self._arcs: list[TracedArc] = []
+        self._voids: list[Void] = []
+        self._cuts: list[FrontierCut] = []
 
     def __len__(self) -> int:
         return len(self._facts)
@@ -137,44 +147,45 @@ class FactSet:
             return False
         self._facts[fact] = None
         self.digest ^= crc32(repr(tuple(fact)).encode())
+        if isinstance(fact, TracedArc):
+            insort(self._arcs, fact)
+        elif isinstance(fact, SweptSegment):
+            insort(self._segments, fact)
+        elif isinstance(fact, Void):
+            insort(self._voids, fact)
+        elif isinstance(fact, FrontierCut):
+            insort(self._cuts, fact)
+        else:
+            self.alive_ticks[fact.node] = max(fact.tick, self.alive_ticks.get(fact.node, fact.tick))
         return True
 
     def since(self, count: int) -> list[Fact]:
         """Return the facts in the order in which they were added, without the first `count`."""
-        return list(self._facts)[count:]
-
-    @property
-    def alive_ticks(self) -> dict[int, int]:
-        """The newest proof of life of every robot that was wrongly taken for dead."""
-        found: dict[int, int] = {}
-        for fact in self._facts:
-            if isinstance(fact, Return):
-                found[fact.node] = max(fact.tick, found.get(fact.node, fact.tick))
-        return found
+        return list(islice(self._facts, count, None))
 
     @property
     def segments(self) -> list[SweptSegment]:
-        """The swept segments that hold, sorted: the order of arrival has no influence."""
-        return sorted([fact for fact in self._facts if isinstance(fact, SweptSegment) and self._holds(fact.wrecks)])
+        """The swept segments that hold, sorted."""
+        return (
+            [fact for fact in self._segments if self._holds(fact.wrecks)] if self.alive_ticks else self._segments.copy()
+        )
 
     @property
     def voids(self) -> list[Void]:
         """The facts about ends that wrecks hide, sorted."""
-        return sorted([fact for fact in self._facts if isinstance(fact, Void) and self._holds(fact.wrecks)])
+        return [fact for fact in self._voids if self._holds(fact.wrecks)] if self.alive_ticks else self._voids.copy()
 
     @property
     def cuts(self) -> list[FrontierCut]:
         """The cuts of slices by virtual frontiers, sorted."""
-        return sorted([fact for fact in self._facts if isinstance(fact, FrontierCut)])
+        return self._cuts.copy()
 
     @property
     def arcs(self) -> list[TracedArc]:
         """The traced arcs that hold, sorted."""
-        return sorted([fact for fact in self._facts if isinstance(fact, TracedArc) and self._holds(fact.wrecks)])
+        return [fact for fact in self._arcs if self._holds(fact.wrecks)] if self.alive_ticks else self._arcs.copy()
 
     def _holds(self, wrecks: tuple[Wreck, ...]) -> bool:
         """Return whether no robot that is named in `wrecks` was alive later."""
-        if not wrecks:
-            return True
         alive = self.alive_ticks
         return all(wreck.tick >= alive.get(wreck.node, wreck.tick) for wreck in wrecks)

@@ -70,6 +70,7 @@ class SliceMap:
         self._voids: list[Void] = []
         self._across: dict[End, Step] = {}
         self._closed: dict[End, bool] = {}
+        self._distances: dict[End, dict[End, int]] = {}
         self._certificate = CoverageCertificate(0, (), ())
 
     def add(self, fact: Fact) -> bool:
@@ -152,7 +153,12 @@ class SliceMap:
 
     def distances(self, start: End) -> dict[End, int]:
         """Return the length [mm] of the shortest known way from a known end to every end that can be reached."""
-        return {end: length for end, (length, _) in self._shortest(start).items()}
+        self._derive()
+        found = self._distances.get(start)
+        if found is None:
+            found = {end: length for end, (length, _) in self._shortest(start).items()}
+            self._distances[start] = found
+        return found
 
     def route(self, start: End, stop: End, avoid: Collection[Port] = ()) -> list[tuple[End, Step]] | None:
         """Return the shortest known way as (end, step) pairs; empty where start is stop, None where there is none.
@@ -198,6 +204,7 @@ class SliceMap:
             return
         self._known = len(self.facts)
         self._closed.clear()
+        self._distances.clear()
         segments, arcs, voids = self.facts.segments, self.facts.arcs, self.facts.voids
         self._voids = voids
         measured = [end for arc in arcs for end in (arc.start, arc.stop)]
@@ -211,13 +218,20 @@ class SliceMap:
         # An observation beside a wreck comes first: it is the way that is free now.
         for segment in sorted(segments, key=_wrecks_first):
             self._by_slice.setdefault(segment.slice, []).append(segment)
-            mated.update([known for known in map(self._known_end, segment.ends) if known is not None])
-            if not any(_blocks(void, segment) for void in voids):
-                self._mate(segment)
+            top, bottom = map(self._known_end, segment.ends)
+            mated.update([known for known in (top, bottom) if known is not None])
+            if top is None or bottom is None or any(_blocks(void, segment) for void in voids):
+                continue
+            length = segment.top_mm - segment.bottom_mm
+            self._mates.setdefault(top, Step(0, bottom, length))
+            self._mates.setdefault(bottom, Step(0, top, length))
         for arc in sorted(arcs, key=_wrecks_first):
-            found = [(self._known_end(end), side) for end, side in arc.ports]
-            joined.update([(known, side) for known, side in found if known is not None])
-            self._join(arc)
+            (one, there), (other, back) = arc.ports
+            start, stop = self._known_end(one), self._known_end(other)
+            joined.update([(known, side) for known, side in ((start, there), (stop, back)) if known is not None])
+            if start is not None and stop is not None:
+                self._arcs.setdefault((start, there), Step(there, stop, arc.length_mm))
+                self._arcs.setdefault((stop, back), Step(back, start, arc.length_mm))
         self._find_across()
         counting = [end for end in ends if not self._is_passed(end)]
         self._certificate = CoverageCertificate(
@@ -251,21 +265,6 @@ class SliceMap:
         """Return whether a robot swept past an end."""
         low, high = end.y_mm - TOLERANCE_MM, end.y_mm + TOLERANCE_MM
         return any(segment.bottom_mm < low and high < segment.top_mm for segment in self._by_slice.get(end.slice, ()))
-
-    def _mate(self, segment: SweptSegment) -> None:
-        top, bottom = map(self._known_end, segment.ends)
-        if top is None or bottom is None:
-            return
-        length = segment.top_mm - segment.bottom_mm
-        self._mates.setdefault(top, Step(0, bottom, length))
-        self._mates.setdefault(bottom, Step(0, top, length))
-
-    def _join(self, arc: TracedArc) -> None:
-        (start, there), (stop, back) = ((self._known_end(end), side) for end, side in arc.ports)
-        if start is None or stop is None:
-            return
-        self._arcs.setdefault((start, there), Step(there, stop, arc.length_mm))
-        self._arcs.setdefault((stop, back), Step(back, start, arc.length_mm))
 
 
 def _wrecks_first(fact: SweptSegment | TracedArc) -> tuple[bool, int, SweptSegment | TracedArc]:

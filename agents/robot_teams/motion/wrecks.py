@@ -18,7 +18,7 @@ STILL_S: Final = 8.0
 # More than this is motion [m].
 MOVED_M: Final = 0.03
 # Largest error of the place of a wreck that a teammate reported [m].
-TOLD_M: Final = 0.1
+REPORTED_M: Final = 0.1
 
 
 class _Track:
@@ -41,8 +41,8 @@ class WreckWatch:
         self._still_ticks = round(STILL_S / dt_s)
         self._silence_ticks = round(2.0 * silence_s / dt_s)
 
-    def watch(self, senses: Senses, told: Iterable[Void]) -> list[int]:
-        """Take in one tick's senses and the wrecks that teammates reported (`told`); return the robots that are new
+    def watch(self, senses: Senses, reported: Iterable[Void]) -> list[int]:
+        """Take in one tick's senses and the wrecks that teammates `reported`; return the robots that are new
         wrecks."""
         found = []
         self.moved.clear()
@@ -56,8 +56,8 @@ class WreckWatch:
                 track.touched += 1
             if other.node in self.wrecks:
                 continue
-            for void in told:
-                if void.wreck.node == other.node and abs(void.x_mm / 1000.0 - other.x_m) < TOLD_M:
+            for void in reported:
+                if void.wreck.node == other.node and abs(void.x_mm / 1000.0 - other.x_m) < REPORTED_M:
                     self.wrecks[other.node] = void.wreck
             if (
                 other.node not in self.wrecks
@@ -69,7 +69,7 @@ class WreckWatch:
                 found.append(other.node)
         return found
 
-    def lives(self, node: int, tick: int) -> None:
+    def note_alive(self, node: int, tick: int) -> None:
         """Record that a robot was alive at `tick`."""
         wreck = self.wrecks.get(node)
         if wreck is not None and tick > wreck.tick:

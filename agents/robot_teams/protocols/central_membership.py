@@ -16,7 +16,7 @@ class CoordinatedMembership(TeamMembership):
         """Never: the coordinator decides."""
         return False
 
-    def knows(self, sender: int) -> bool:
+    def accepts(self, sender: int) -> bool:
         """Return whether facts and plans of a sender are taken over: those of the coordinator are."""
         return True
 
@@ -42,7 +42,7 @@ class CoordinatorMembership(TeamMembership):
         super().__init__(node, dt_s, silence_s)
         self.view = View(1, node, ())
 
-    def knows(self, sender: int) -> bool:
+    def accepts(self, sender: int) -> bool:
         """Return whether facts of a sender are taken over: those of all robots are."""
         return True
 

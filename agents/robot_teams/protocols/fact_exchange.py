@@ -28,7 +28,7 @@ class FactExchange:
         self._new_ticks = round(NEW_S / dt_s)
         self._different_ticks = round(DIFFERENT_S / dt_s)
         self._all_every_ticks = round(ALL_EVERY_S / dt_s)
-        self._told: list[tuple[int, int]] = []  # the tick at which the set first had this number of facts
+        self._counts: list[tuple[int, int]] = []  # the tick at which the set first had this number of facts
         self._differs_since: dict[int, int] = {}
         self._all_tick = -self._all_every_ticks
         self._page = 0
@@ -48,12 +48,12 @@ class FactExchange:
     def outgoing(self, tick: int) -> Parcel:
         """Return the facts to send now."""
         facts = self._map.facts
-        if not self._told or self._told[-1][1] != len(facts):
-            self._told.append((tick, len(facts)))
-        while len(self._told) > 1 and self._told[1][0] <= tick - self._new_ticks:
-            self._told.pop(0)
+        if not self._counts or self._counts[-1][1] != len(facts):
+            self._counts.append((tick, len(facts)))
+        while len(self._counts) > 1 and self._counts[1][0] <= tick - self._new_ticks:
+            self._counts.pop(0)
         # Everything that came after the newest count that is old enough.
-        old = self._told[0][1] if self._told[0][0] <= tick - self._new_ticks else 0
+        old = self._counts[0][1] if self._counts[0][0] <= tick - self._new_ticks else 0
         send = facts.since(old)
         pending = any(tick - since >= self._different_ticks for since in self._differs_since.values())
         if pending and tick - self._all_tick >= self._all_every_ticks:

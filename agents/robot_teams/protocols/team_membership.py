@@ -94,7 +94,7 @@ class TeamMembership:
         elif theirs.lead in self._met:
             self._met[theirs.lead] = theirs, self._met[theirs.lead][1]
 
-    def knows(self, sender: int) -> bool:
+    def accepts(self, sender: int) -> bool:
         """Return whether facts and plans of a sender are taken over: those of teammates are."""
         return sender in self.view.members
 

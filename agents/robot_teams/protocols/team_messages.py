@@ -4,12 +4,14 @@ Beacons carry states, not changes: any beacon may be lost, late or copied, and t
 forward statuses, so a team may be larger than the radio's range.
 """
 
+from collections.abc import Callable
 from typing import Final
 
 import msgspec
 from msgspec import Struct
 
 from zwerm.agents.robot_teams.mapping.facts import End, FrontierCut, Return, SweptSegment, TracedArc, Void
+from zwerm.wire.checksum import Sealed
 
 # The phases of a robot's work on its slice, in order.
 READY: Final = 0  # has finished the plan
@@ -113,5 +115,6 @@ def decode_snapshot(payload: bytes) -> FoundSnapshot | None:
     return found
 
 
-encode_beacon: Final = msgspec.msgpack.Encoder().encode
-decode_beacon: Final = msgspec.msgpack.Decoder(TeamBeacon).decode
+_beacons: Final = Sealed(TeamBeacon)
+write_beacon: Final[Callable[[TeamBeacon], bytes]] = _beacons.write
+read_beacon: Final[Callable[[bytes], TeamBeacon | None]] = _beacons.read

@@ -9,12 +9,12 @@ from typing import NamedTuple, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
 from zwerm.agents.sensor_coverage.frontier.fence import Fence
-from zwerm.agents.sensor_coverage.frontier.paths import Reach
+from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.maths.simplicial import Edge, FlagComplex
 
 # Returns the cheapest routes from sources (slot: cost to start there) through a complex.
-FindRoutes = Callable[[FlagComplex, Mapping[int, float]], Reach]
+FindRoutes = Callable[[FlagComplex, Mapping[int, float]], CheapestRoutes]
 
 
 class FrontierService(Protocol):
@@ -56,7 +56,7 @@ class PathService(Protocol):
         sources: Mapping[int, float],
         obstacle: Collection[Edge],
         shut: Collection[int] = (),
-    ) -> Reach:
+    ) -> CheapestRoutes:
         """Return the cheapest routes from `sources` (slot: cost to start there); edges of `obstacle` cost more.
 
         A route may begin at a slot in `shut` but does not lead through one.

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
 
-class Reach(NamedTuple):
+class CheapestRoutes(NamedTuple):
     """The cost of the cheapest route to every reachable vertex, and the vertex before it (None at a source)."""
 
     cost: dict[int, float]
@@ -25,13 +25,13 @@ class Reach(NamedTuple):
         return tuple(reversed(found))
 
 
-def reach(
+def cheapest_routes(
     complex_: FlagComplex,
     sources: Mapping[int, float],
     obstacle: Collection[Edge],
     obstacle_cost: float,
     shut: Collection[int] = (),
-) -> Reach:
+) -> CheapestRoutes:
     """Return the cheapest routes from `sources` (vertex: cost to start there).
 
     An edge costs 1, and an edge of `obstacle` costs `obstacle_cost`. A route may begin at a vertex in `shut` but does
@@ -50,7 +50,7 @@ def reach(
             if each not in cost and each not in shut:
                 step = obstacle_cost if edge(vertex, each) in obstacle else 1.0
                 heapq.heappush(heap, (spent + step, each, vertex))
-    return Reach(cost, before)
+    return CheapestRoutes(cost, before)
 
 
 class Dijkstra:
@@ -65,6 +65,6 @@ class Dijkstra:
         sources: Mapping[int, float],
         obstacle: Collection[Edge],
         shut: Collection[int] = (),
-    ) -> Reach:
+    ) -> CheapestRoutes:
         """Return the cheapest routes from `sources` (slot: cost to start there); none leads through a slot in `shut`."""
-        return reach(complex_, sources, obstacle, self._obstacle_cost, shut)
+        return cheapest_routes(complex_, sources, obstacle, self._obstacle_cost, shut)

@@ -25,7 +25,8 @@ VERTEX_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 60, -60, 30, 
 END_TURNS_RAD: Final = tuple(math.radians(each) for each in (0, 30, -30, 60, -60, 90, -90))
 END_RAD: Final = math.radians(285.0)
 # Last element of the keys of bridges and of last attempts. Keys of gaps end with the number of the offset, which is
-# smaller.
+# smaller; those of ends of single files are counted from END_FIRST, because they name other directions.
+END_FIRST: Final = 20
 BRIDGE: Final = 100
 LAST: Final = 200
 # A drive that a wall stopped also rules out directions within this angle.
@@ -148,7 +149,7 @@ class Planner:
             end = gap > END_RAD
             for number, turn in enumerate(END_TURNS_RAD if end else VERTEX_TURNS_RAD):
                 direction = self._views[i][a] + gap / 2.0 + turn
-                key = (i, a, 0, number)
+                key = (i, a, 0, END_FIRST + number if end else number)
                 narrow = gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD
                 if narrow or key in self.attempt_log.closed or self._walled(i, direction):
                     continue

@@ -18,11 +18,11 @@ CHANNEL: Final = "uplink"
 Count = Annotated[int, Meta(ge=0, le=2**62)]
 
 
-class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class _AdviceMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, which begins with its tag."""
 
 
-class StandingReport(_Message, frozen=True, tag="standing"):
+class StandingReport(_AdviceMessage, frozen=True, tag="standing"):
     """The sender's part of the complex.
 
     `number` grows with every new report. `listed` are the robots that the sender sees, ascending, in its neighbour list
@@ -38,17 +38,17 @@ class StandingReport(_Message, frozen=True, tag="standing"):
     willing: bool
 
 
-class ReportNoted(_Message, frozen=True, tag="noted"):
+class ReportNoted(_AdviceMessage, frozen=True, tag="noted"):
     """The coordinator has noted the receiver's report of this number."""
 
     number: Count
 
 
-class CollectReports(_Message, frozen=True, tag="collect"):
+class CollectReports(_AdviceMessage, frozen=True, tag="collect"):
     """The coordinator lacks the receiver's report."""
 
 
-class RedundantAdvice(_Message, frozen=True, tag="redundant"):
+class RedundantAdvice(_AdviceMessage, frozen=True, tag="redundant"):
     """The receiver is redundant while it sees exactly these neighbours, and each has its list of this version."""
 
     versions: tuple[tuple[Count, Count], ...]

@@ -14,15 +14,15 @@ NOWHERE: Final = -1
 FAR: Final = 1000
 
 
-class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class _BeaconPart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A part of a message."""
 
 
-class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class _BeaconMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, which begins with its tag."""
 
 
-class SeenRobot(_Part, frozen=True):
+class SeenRobot(_BeaconPart, frozen=True):
     """A visible robot: the number of its latest drive, the slot that it holds, and its direction [rad]."""
 
     node: int
@@ -31,7 +31,7 @@ class SeenRobot(_Part, frozen=True):
     direction_rad: float
 
 
-class Attempt(_Part, frozen=True):
+class Attempt(_BeaconPart, frozen=True):
     """The sender's attempts at one side of the edge between its slot and the slot `other`."""
 
     other: int
@@ -41,7 +41,7 @@ class Attempt(_Part, frozen=True):
     closed: bool
 
 
-class Route(_Part, frozen=True):
+class Route(_BeaconPart, frozen=True):
     """The route to the nearest frontier robot: its cost, and its slots, the sender's first.
 
     `claim` is the number of the claim of the last slot that it is at the frontier. Each slot counts its own claims.
@@ -52,7 +52,7 @@ class Route(_Part, frozen=True):
     claim: int = 0
 
 
-class PathVector(_Message, frozen=True, tag="path"):
+class PathVector(_BeaconMessage, frozen=True, tag="path"):
     """The route from a slot, by the robot at the slot; `number` counts the sender's path vectors.
 
     `ended` has (slot, claim): this claim of the slot and all earlier ones have ended, the newest last. `home` is the
@@ -70,7 +70,7 @@ class PathVector(_Message, frozen=True, tag="path"):
 NO_PATH_VECTOR: Final = PathVector(0, NOWHERE, None)
 
 
-class StateBeacon(_Message, frozen=True, tag="state"):
+class StateBeacon(_BeaconMessage, frozen=True, tag="state"):
     """The state of a robot, as its neighbours need it.
 
     `number` counts the sender's states, `epoch` its drives, and `samples` its averages of bearings. `expandable` has the
@@ -93,7 +93,7 @@ class StateBeacon(_Message, frozen=True, tag="state"):
     guests: tuple[int, ...] = ()
 
 
-class StateRequest(_Message, frozen=True, tag="state-request"):
+class StateRequest(_BeaconMessage, frozen=True, tag="state-request"):
     """A request that these robots, or all if there are none, broadcast their states."""
 
     nodes: tuple[int, ...]

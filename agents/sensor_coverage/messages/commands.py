@@ -26,22 +26,22 @@ LOST: Final = "lost"
 MET: Final = "met"
 
 
-class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class _UplinkPart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A part of a message."""
 
 
-class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class _UplinkMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, which begins with its tag."""
 
 
-class Sighting(_Part, frozen=True):
+class Sighting(_UplinkPart, frozen=True):
     """A visible robot and its bearing [rad], averaged while nothing moved."""
 
     node: int
     bearing_rad: float
 
 
-class Landmark(_Part, frozen=True):
+class Landmark(_UplinkPart, frozen=True):
     """The bearing [rad] of a robot as seen from the goal of a move. `still`: the robot does not move meanwhile."""
 
     node: int
@@ -49,7 +49,7 @@ class Landmark(_Part, frozen=True):
     still: bool
 
 
-class Waypoint(_Part, frozen=True):
+class Waypoint(_UplinkPart, frozen=True):
     """A point of a walk along walls: the position [m] by odometry, and the bearings [rad] of what the robot sees and touches.
 
     `touched` are bearings of touched walls. `robots` are touched robots.
@@ -65,32 +65,32 @@ class Waypoint(_Part, frozen=True):
 # --- to a robot -----------------------------------------------------------------------------------------------------
 
 
-class RollCall(_Message, frozen=True, tag="roll-call"):
+class RollCall(_UplinkMessage, frozen=True, tag="roll-call"):
     """To all: stop, average bearings again, and report."""
 
     cycle: int
 
 
-class ScanRequest(_Message, frozen=True, tag="scan"):
+class ScanRequest(_UplinkMessage, frozen=True, tag="scan"):
     """Report visible robots and touched walls. The robots in `moved` have moved since the last scan."""
 
     cycle: int
     moved: tuple[int, ...]
 
 
-class NegotiateLeave(_Message, frozen=True, tag="negotiate-leave"):
+class NegotiateLeave(_UplinkMessage, frozen=True, tag="negotiate-leave"):
     """Leave the complex if the neighbours agree, and report. Sent to robots that are not on the fence."""
 
     cycle: int
 
 
-class Release(_Message, frozen=True, tag="release"):
+class Release(_UplinkMessage, frozen=True, tag="release"):
     """To a base station: release a robot from the depot."""
 
     cycle: int
 
 
-class Deploy(_Message, frozen=True, tag="deploy"):
+class Deploy(_UplinkMessage, frozen=True, tag="deploy"):
     """Drive into unknown space along a bearing [rad], up to `hop_m`. Drive back if a wall stops the robot before `clear_m`."""
 
     cycle: int
@@ -99,7 +99,7 @@ class Deploy(_Message, frozen=True, tag="deploy"):
     clear_m: float
 
 
-class Move(_Message, frozen=True, tag="move"):
+class Move(_UplinkMessage, frozen=True, tag="move"):
     """Drive to the slot about `hop_m` away along a bearing [rad], from which the landmarks have the given bearings."""
 
     cycle: int
@@ -108,7 +108,7 @@ class Move(_Message, frozen=True, tag="move"):
     landmarks: tuple[Landmark, ...]
 
 
-class Correct(_Message, frozen=True, tag="correct"):
+class Correct(_UplinkMessage, frozen=True, tag="correct"):
     """Correct the scale: break and re-establish the visual link to each anchor in turn.
 
     `anchors` give the approximate bearing of each.
@@ -118,7 +118,7 @@ class Correct(_Message, frozen=True, tag="correct"):
     anchors: tuple[Sighting, ...]
 
 
-class ToWall(_Message, frozen=True, tag="to-wall"):
+class ToWall(_UplinkMessage, frozen=True, tag="to-wall"):
     """Drive along a bearing [rad] to a wall within `hop_m`, and along it until `clear_m` from the start.
 
     A wall within `feel_m` is only felt, and the robot returns. `hand` is +1 if the wall is on the left, else -1.
@@ -132,7 +132,7 @@ class ToWall(_Message, frozen=True, tag="to-wall"):
     hand: int
 
 
-class FollowWall(_Message, frozen=True, tag="follow-wall"):
+class FollowWall(_UplinkMessage, frozen=True, tag="follow-wall"):
     """Follow the wall in touch for `length_m`, in sight of a robot of `keep`, or of any robot if `keep` is empty.
 
     Stop where a robot of `meet` is in sight, and one that is not of `meet`.
@@ -148,7 +148,7 @@ class FollowWall(_Message, frozen=True, tag="follow-wall"):
 # --- from a robot ---------------------------------------------------------------------------------------------------
 
 
-class Report(_Message, frozen=True, tag="report"):
+class Report(_UplinkMessage, frozen=True, tag="report"):
     """The answer to a scan request or a roll call.
 
     `sightings` is None if nothing has changed. `touched` are bearings [rad] of touched walls. `home`: the robot still
@@ -165,25 +165,25 @@ class LeftComplex(Report, frozen=True, tag="left-complex"):
     """The same report from a robot that has left the complex by agreement, and whose body still stands there."""
 
 
-class Released(_Message, frozen=True, tag="released"):
+class Released(_UplinkMessage, frozen=True, tag="released"):
     """The base station's answer to a release: the robot that came out, or None."""
 
     robot: int | None
 
 
-class Emerged(_Message, frozen=True, tag="emerged"):
+class Emerged(_UplinkMessage, frozen=True, tag="emerged"):
     """The robot has come out of the depot and sees these robots."""
 
     sightings: tuple[Sighting, ...]
 
 
-class Cleared(_Message, frozen=True, tag="cleared"):
+class Cleared(_UplinkMessage, frozen=True, tag="cleared"):
     """The deploying robot has driven far enough for its follower to take its slot."""
 
     cycle: int
 
 
-class Arrived(_Message, frozen=True, tag="arrived"):
+class Arrived(_UplinkMessage, frozen=True, tag="arrived"):
     """The end of a drive.
 
     With `ok` False the robot is back at its start, or did not reach its goal. `used_odometry`: bearings did not
@@ -199,7 +199,7 @@ class Arrived(_Message, frozen=True, tag="arrived"):
     touched: tuple[float, ...]
 
 
-class Walked(_Message, frozen=True, tag="walked"):
+class Walked(_UplinkMessage, frozen=True, tag="walked"):
     """The end of a drive to a wall or along it, after `driven_m`; `end` is one of OPEN, SHUT, STRETCH, LOST and MET.
 
     (x, y) [m] is the way from the place where the robot stood before it drove to the wall, by odometry. `touched` are
@@ -215,7 +215,7 @@ class Walked(_Message, frozen=True, tag="walked"):
     waypoints: tuple[Waypoint, ...]
 
 
-class Ack(_Message, frozen=True, tag="ack"):
+class Ack(_UplinkMessage, frozen=True, tag="ack"):
     """The command has arrived and is being carried out."""
 
 

@@ -7,11 +7,11 @@ from msgspec import Meta, Struct
 Count = Annotated[int, Meta(ge=0, le=2**62)]
 
 
-class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class _LockMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, which begins with its tag."""
 
 
-class NeighbourList(_Message, frozen=True, tag="neighbours"):
+class NeighbourList(_LockMessage, frozen=True, tag="neighbours"):
     """The robots that the sender sees, ascending; another list always has another version.
 
     `released` is the number of the latest `LockRelease`, in case that message was lost.
@@ -22,32 +22,32 @@ class NeighbourList(_Message, frozen=True, tag="neighbours"):
     released: Count = 0
 
 
-class LockRequest(_Message, frozen=True, tag="lock-request"):
+class LockRequest(_LockMessage, frozen=True, tag="lock-request"):
     """To all neighbours: the sender wants to leave, and relies on these (neighbour, version of its list)."""
 
     number: Count
     versions: tuple[tuple[Count, Count], ...]
 
 
-class LockGrant(_Message, frozen=True, tag="grant"):
+class LockGrant(_LockMessage, frozen=True, tag="grant"):
     """The sender will stand still for the requester."""
 
     number: Count
 
 
-class LockDenial(_Message, frozen=True, tag="deny"):
+class LockDenial(_LockMessage, frozen=True, tag="deny"):
     """The sender will not stand still for the requester."""
 
     number: Count
 
 
-class LockRelease(_Message, frozen=True, tag="lock-release"):
+class LockRelease(_LockMessage, frozen=True, tag="lock-release"):
     """To all neighbours: the sender has left, or will never leave by this or an earlier request."""
 
     number: Count
 
 
-class ListRequest(_Message, frozen=True, tag="list-request"):
+class ListRequest(_LockMessage, frozen=True, tag="list-request"):
     """A request that these robots send their neighbour lists to the sender."""
 
     nodes: tuple[int, ...]

@@ -7,15 +7,15 @@ frame of the base.
 from msgspec import Struct
 
 
-class _Part(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class _PushMessagePart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A part of a message."""
 
 
-class _Message(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class _PushMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, which begins with its tag."""
 
 
-class SlotVacated(_Message, frozen=True, tag="vacated"):
+class SlotVacated(_PushMessage, frozen=True, tag="vacated"):
     """To all: the leader of a push has left its slot for good. Receivers forward it `hops` times."""
 
     push: int
@@ -25,7 +25,7 @@ class SlotVacated(_Message, frozen=True, tag="vacated"):
 # --- bodies of segments ---------------------------------------------------------------------------------------------
 
 
-class ReferenceBearing(_Part, frozen=True):
+class ReferenceBearing(_PushMessagePart, frozen=True):
     """The reference direction [rad] to another slot, the number of its readings, and the robot at that slot."""
 
     slot: int
@@ -34,7 +34,7 @@ class ReferenceBearing(_Part, frozen=True):
     count: int
 
 
-class SlotMemory(_Part, frozen=True):
+class SlotMemory(_PushMessagePart, frozen=True):
     """The memory of a slot, which the next occupant inherits.
 
     `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
@@ -55,7 +55,7 @@ class SlotMemory(_Part, frozen=True):
 Chain = tuple[tuple[int, int], ...]
 
 
-class PushToken(_Message, frozen=True, tag="token"):
+class PushToken(_PushMessage, frozen=True, tag="token"):
     """A push searches its leader: forward along the path vectors, first to `via`. `fresh` is the new slot."""
 
     push: int
@@ -64,7 +64,7 @@ class PushToken(_Message, frozen=True, tag="token"):
     via: int
 
 
-class LeaderReady(_Message, frozen=True, tag="ready"):
+class LeaderReady(_PushMessage, frozen=True, tag="ready"):
     """The leader to its follower: this will be your slot once I am gone. The leader stands there since drive `epoch`."""
 
     push: int
@@ -73,7 +73,7 @@ class LeaderReady(_Message, frozen=True, tag="ready"):
     epoch: int
 
 
-class TakeSlot(_Message, frozen=True, tag="take-slot"):
+class TakeSlot(_PushMessage, frozen=True, tag="take-slot"):
     """To the follower: take my slot, because I leave it now."""
 
     push: int
@@ -81,46 +81,46 @@ class TakeSlot(_Message, frozen=True, tag="take-slot"):
     memory: SlotMemory
 
 
-class PushAborted(_Message, frozen=True, tag="aborted"):
+class PushAborted(_PushMessage, frozen=True, tag="aborted"):
     """The push has ended and no robot has moved. `tried`: its leader tried to drive."""
 
     push: int
     tried: bool
 
 
-class AllStanding(_Message, frozen=True, tag="all-standing"):
+class AllStanding(_PushMessage, frozen=True, tag="all-standing"):
     """All robots ahead of the receiver stand still."""
 
     push: int
 
 
-class AllSettled(_Message, frozen=True, tag="all-settled"):
+class AllSettled(_PushMessage, frozen=True, tag="all-settled"):
     """All robots behind the receiver have reached their slots."""
 
     push: int
 
 
-class PushDone(_Message, frozen=True, tag="done"):
+class PushDone(_PushMessage, frozen=True, tag="done"):
     """The push has ended, and one more robot has left the base."""
 
     push: int
 
 
-class RedundantOffer(_Message, frozen=True, tag="offer"):
+class RedundantOffer(_PushMessage, frozen=True, tag="offer"):
     """To the base, hop by hop: a robot has left the first of `slots`, and can be called. `slots` lead back to it."""
 
     push: int
     slots: tuple[int, ...]
 
 
-class RedundantCall(_Message, frozen=True, tag="call"):
+class RedundantCall(_PushMessage, frozen=True, tag="call"):
     """From the base, hop by hop: the robot that has left the first of `slots` must be the rear of a push."""
 
     push: int
     slots: tuple[int, ...]
 
 
-class RedundantPushEnd(_Message, frozen=True, tag="end"):
+class RedundantPushEnd(_PushMessage, frozen=True, tag="end"):
     """To the base, hop by hop: the push of a called robot has ended. `tried`: its leader tried. `done`: it succeeded."""
 
     push: int
@@ -133,14 +133,14 @@ PushMessage = LeaderReady | TakeSlot | PushAborted | AllStanding | AllSettled | 
 Body = PushToken | PushMessage | RelayedMessage
 
 
-class Segment(_Message, frozen=True, tag="segment"):
+class Segment(_PushMessage, frozen=True, tag="segment"):
     """The `number`-th segment from its sender to its receiver."""
 
     number: int
     body: Body
 
 
-class SegmentAck(_Message, frozen=True, tag="segment-ack"):
+class SegmentAck(_PushMessage, frozen=True, tag="segment-ack"):
     """The segment of this number has arrived."""
 
     number: int

@@ -13,6 +13,7 @@ from zwerm.agents.sensor_coverage.messages.commands import Landmark, Sighting
 from zwerm.agents.sensor_coverage.motion.homing import Vector, slide, unit
 from zwerm.agents.sensor_coverage.motion.landmark_target import TargetPoint, target_point
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Locomotion
+from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
 from zwerm.wire.messages import BodyVelocity
 
 # A contact within this angle of the heading is ahead.
@@ -36,13 +37,17 @@ PERPENDICULAR_MIN: Final = 0.3
 
 
 class DriveResult(NamedTuple):
-    """The end of a drive; the fields have the meaning of `Arrived`."""
+    """The end of a drive; the fields have the meaning of `Arrived`.
+
+    `robots` are the robots in touch with a deployment that stopped early.
+    """
 
     ok: bool
     used_odometry: bool = False
     used_moving_landmarks: bool = False
     driven_m: float = 0.0
     touched: tuple[float, ...] = ()
+    robots: tuple[Touched, ...] = ()
 
 
 DriveToResult = Generator[BodyVelocity, None, DriveResult]
@@ -70,9 +75,10 @@ def deploy(
         ahead = [each for each in frame.touched if _apart(each, bearing_rad) < AHEAD_RAD]
         if ahead or stuck > STUCK_TICKS:
             touched = tuple(ahead)
+            robots = tuple(each for each in frame.contacts if each.node is not None)
             if done < clear_m:
                 yield from motion.drive_to(start)
-                return DriveResult(False, driven_m=done, touched=touched)
+                return DriveResult(False, driven_m=done, touched=touched, robots=robots)
             break
         if not cleared and done >= clear_m:
             cleared = True

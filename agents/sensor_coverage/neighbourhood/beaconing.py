@@ -67,11 +67,15 @@ class Beaconing(Component):
         """Return the broadcasts of this tick, by the state at its end."""
         if self._lossy_until is None:
             self._lossy_until = self._tick + NEW_TICKS
-        return [*self._state_beacon(), *self._route_alone()]
+        return self._state_beacon() + self._route_alone()
 
     def next_wake(self) -> int:
         """Return the tick of the next broadcast if nothing else happens."""
-        return min((self.heartbeat, *self._due[:1], *self._route_due[:1]))
+        earliest = self.heartbeat
+        for due in (self._due, self._route_due):
+            if due and due[0] < earliest:
+                earliest = due[0]
+        return earliest
 
     def _state_beacon(self) -> list[Outgoing]:
         tick, local_map, waiting = self._tick, self._local_map, self._waiting()
@@ -95,7 +99,8 @@ class Beaconing(Component):
     def _route_alone(self) -> list[Outgoing]:
         """Return the path vector, if nothing but the route has changed."""
         tick, local_map = self._tick, self._local_map
-        if not self._route_due and (self._sent.slot, self._sent.route) != (local_map.slot, local_map.route):
+        sent = self._sent
+        if not self._route_due and (sent.slot != local_map.slot or sent.route != local_map.route):
             self._route_due = self._times(max(tick, self._sent_at + ROUTE_TICKS))
         if not self._route_due or tick < self._route_due[0]:
             return []

@@ -59,7 +59,7 @@ class LocalMap(NeighbourTable):
         self.path_vectors = PathVectorProtocol()
         self.obstacle: dict[Edge, None] = {}
         self.obstructed = 0
-        self._obstructed: dict[tuple[int, ...], int] = {}  # key of an attempt: the dead robot whose body stopped it
+        self._obstructed: dict[tuple[int, ...], int] = {}  # key of an attempt: the robot whose body stopped it
         self._finished: dict[int, None] = {}  # dead robots that claimed no frontier when they died
         self.plan_count = 0
         self._make_planner = make_planner
@@ -116,12 +116,23 @@ class LocalMap(NeighbourTable):
 
     # --- robots that died or restarted --------------------------------------------------------------------------------
 
-    def bury(self, node: int) -> None:
-        """Forget a robot that is dead, and end the claims of its slot."""
+    def remove_dead(self, node: int) -> None:
+        """Forget a robot that is dead, and end the claims of its slot.
+
+        Without it the gaps around this slot have other directions, so attempts at gaps do not count any more. The
+        directions in which walls stopped drives remain.
+        """
         slot = self._slot_of(node)
         if slot != NOWHERE and not self.states[node].moving and not self.path_vectors.is_claimed(slot):
             self._finished[node] = None
         self.path_vectors.forget(node, slot)
+        log = self._planner.attempt_log
+        for known in (log.closed, log.attempts):
+            for key in [key for key in known if key[2] == 0]:
+                del known[key]
+        if node in self._obstructed.values():
+            self.reopen()  # a drive that pushes its body finds out what is behind it
+        self._plan_basis = None
         self.forget(node)
 
     def restarted(self, node: int) -> None:
@@ -232,7 +243,7 @@ class LocalMap(NeighbourTable):
         self.obstructed = self._count_obstructed(scan)
 
     def _count_obstructed(self, scan: ScanResult) -> int:
-        """Return the number of sides and gaps here that are open, or closed only by a body behind which no robot has looked.
+        """Return the number of sides and gaps here that are closed only by the body of a dead robot.
 
         No robot must look behind a dead robot that did not claim a frontier when it died. The same holds if a neighbour
         sees the body from the other side.
@@ -249,7 +260,7 @@ class LocalMap(NeighbourTable):
 
     def _is_seen_past(self, body: int) -> bool:
         seen = self.seen.get(body)
-        if body in self._finished or seen is None:
+        if body in self._finished or body in self.states or seen is None:
             return True
         here = seen.bearing_rad + (self.heading or 0.0)
         return any(
@@ -298,7 +309,7 @@ class LocalMap(NeighbourTable):
         self.change()
 
     def note_obstruction(self, plan: Plan, driven_m: float, body: int) -> None:
-        """Record that a dead robot's body stopped a plan after `driven_m`: this robot does not know what is behind it."""
+        """Record that a robot's body stopped a plan after `driven_m`: if it is dead, nobody may know what is behind it."""
         self._obstructed[plan.key] = body
         self.note_failure(plan, driven_m)
 

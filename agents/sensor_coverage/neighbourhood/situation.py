@@ -1,7 +1,7 @@
 """One decentralised robot's situation, which its components share: readings, activity, local map, and mailbox."""
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -86,9 +86,11 @@ class Situation:
         return self._activity is not None
 
     @property
-    def bearings(self) -> dict[int, float]:
+    def bearings(self) -> Mapping[int, float]:
         """Bearings [rad] of the visible robots that are not declared dead."""
         dead = self.failure_detector.dead
+        if not dead:
+            return self.motion.frame.seen
         return {node: bearing for node, bearing in self.motion.frame.seen.items() if node not in dead}
 
     @property
@@ -155,9 +157,10 @@ class Situation:
     def unsure(self) -> bool:
         """True if a visible robot is not averaged yet, or an averaged robot is no longer visible."""
         motion, frame = self.motion, self.motion.frame
+        if not self.local_map.samples or not self.local_map.seen.keys() <= frame.seen.keys():
+            return True
         wanted = 1 if motion.bearing_noise_rad is None else motion.samples
-        gone = any(node not in frame.seen for node in self.local_map.seen)
-        return gone or not self.local_map.samples or any(frame.count(node) < wanted for node in self._standing())
+        return any(frame.count(node) < wanted for node in self._standing())
 
     def _standing(self) -> list[int]:
         """Return the visible robots that are not known to move."""

@@ -81,8 +81,11 @@ class Surveillance(Component):
 
     def _next_timer(self) -> int:
         situation = self._situation
-        times = situation.failure_detector.due, situation.local_map.handovers_until, self._doubt_at
-        return min([self._beaconing.heartbeat, *(each for each in times if each is not None)])
+        earliest = self._beaconing.heartbeat
+        for each in (situation.failure_detector.due, situation.local_map.handovers_until, self._doubt_at):
+            if each is not None and each < earliest:
+                earliest = each
+        return earliest
 
     def _update(self, tick: int) -> None:
         """Update headings, references and plans, and ask for missing states.

@@ -1,6 +1,6 @@
 """The loop over a robot's components: deliver, poll, collect, and find the next wake-up."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from zwerm.agents.sensor_coverage.messages.incarnations import ANY, Incarnations
@@ -28,11 +28,17 @@ class Codec(NamedTuple):
 class ComponentLoop:
     """Runs components in the given order; `codecs` has a codec for each radio channel that they use.
 
-    `incarnation` is that of this node. Messages from or to former incarnations are dropped at the door.
+    `incarnation` is that of this node. Messages from or to former incarnations are dropped on arrival.
     """
 
     def __init__(self, components: Sequence[Component], codecs: Mapping[str, Codec], incarnation: int = 1) -> None:
         self._components = components
+        # A robot that hears its neighbours steps often, and most components do not take part in each stage.
+        self._polled = [each.poll for each in components if type(each).poll is not Component.poll]
+        self._senders = [
+            (each.channel, each.outgoing) for each in components if type(each).outgoing is not Component.outgoing
+        ]
+        self._wakers = [each.next_wake for each in components if type(each).next_wake is not Component.next_wake]
         self._codecs = codecs
         self.losses = LossEstimate()
         self._incarnations = Incarnations(incarnation)
@@ -42,8 +48,10 @@ class ComponentLoop:
             for kind in component.accepts:
                 self._receivers.setdefault(kind, []).append(component)
 
-    def deliver(self, inbox: Iterable[Packet], tick: int) -> None:
+    def deliver(self, inbox: Sequence[Packet], tick: int) -> None:
         """Read the packets of this tick, and dispatch their messages; corrupt packets and copies are ignored."""
+        if not inbox:
+            return
         arrived: dict[tuple[int, bytes], int] = {}
         for packet in inbox:
             codec = self._codecs.get(packet.channel)
@@ -79,15 +87,15 @@ class ComponentLoop:
 
     def poll(self, tick: int) -> None:
         """Poll every component."""
-        for component in self._components:
-            component.poll(tick)
+        for poll in self._polled:
+            poll(tick)
 
     def outbox(self) -> tuple[Transmission, ...]:
         """Return the packets to send in this tick."""
         sent: list[Transmission] = []
-        for component in self._components:
-            for each in component.outgoing():
-                sent += self._transmissions(component.channel, each)
+        for channel, outgoing in self._senders:
+            for each in outgoing():
+                sent += self._transmissions(channel, each)
         return tuple(sent)
 
     def _transmissions(self, channel: str, outgoing: Outgoing) -> list[Transmission]:
@@ -104,6 +112,10 @@ class ComponentLoop:
         return [Transmission(channel, payload, to)] * copies
 
     def next_wake(self) -> int | None:
-        """Return the earliest tick at which a component wants to be polled, or None."""
-        wakes = (component.next_wake() for component in self._components)
-        return min((each for each in wakes if each is not None), default=None)
+        """Return the earliest wake-up of a component, or None."""
+        earliest: int | None = None
+        for next_wake in self._wakers:
+            wake = next_wake()
+            if wake is not None and (earliest is None or wake < earliest):
+                earliest = wake
+        return earliest

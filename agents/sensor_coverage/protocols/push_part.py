@@ -34,7 +34,7 @@ VACANCY_PERIOD_TICKS: Final = 20
 BACK_RAD: Final = 0.3
 
 
-class Surroundings(Protocol):
+class PushSituation(Protocol):
     """The part of a robot's situation that its part in a push depends on."""
 
     @property
@@ -62,12 +62,12 @@ class PushPart:
     """The state of one robot's part in one push. `over` once it has ended; `end` is its last message, as far as known.
 
     `chain` are the robots of the push, rear to front, each with its slot before the push. `back` is the robot or base
-    that sent the token. `first`: no robot has left the base yet.
+    that sent the token, and `next` the robot that it went to. `first`: no robot has left the base yet.
     """
 
     def __init__(
         self,
-        situation: Surroundings,
+        situation: PushSituation,
         announce_vacated: Callable[[int], None],
         push: int,
         fresh: int,
@@ -79,7 +79,8 @@ class PushPart:
         self.phase = "link"
         self.over = False
         self.end: Body | None = None
-        self._situation: Surroundings = situation
+        self.next: int | None = None
+        self._situation: PushSituation = situation
         self._map: NeighbourTable = situation.local_map
         self._announce_vacated = announce_vacated
         self._since = situation.tick
@@ -160,6 +161,11 @@ class PushPart:
 
     def _settled_behind(self) -> bool:
         return self._behind_settled or self._waited > self._wait_ticks(self._chain.behind)
+
+    def _token_is_lost(self) -> bool:
+        """Return whether the robot that the token went to is dead or out of range, or takes too long."""
+        gone = self.next is not None and (self.next in self._lost or self.next not in self._situation.bearings)
+        return (gone and self._waited > LOST_TICKS) or self._waited > LINK_TICKS
 
     def _may_offer(self) -> bool:
         return self._situation.clear or self._waited > HOLD_TICKS

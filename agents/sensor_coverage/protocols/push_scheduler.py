@@ -147,7 +147,7 @@ class PushScheduler(Component):
     def _watch_push(self, tick: int, push: int) -> None:
         """End a push that takes too long, and release the next robot in time."""
         self._not_ready_since = tick
-        if tick - self._since > PUSH_TICKS_MAX:
+        if tick - self._since > PUSH_TICKS_MAX or self._rear in self._situation.failure_detector.dead:
             self._end(False)
         elif self._released_at is None and self._rear_has_left() and not self._offers:
             self._let_out(tick)
@@ -205,7 +205,7 @@ class PushScheduler(Component):
         self.pushes += done
         self._report_numbers()
         if self._is_first and tried and not done:
-            self.outcome = "source-blocked: no robot gets away from the base"
+            self.outcome = "source-blocked: no robot can leave the base"
 
     # --- conditions ---------------------------------------------------------------------------------------------------
 
@@ -237,8 +237,8 @@ class PushScheduler(Component):
         """Return whether the robot that the push took from the base has its slot: the next robot has time to average."""
         states = self._map.states
         rear = None if self._rear is None else states.get(self._rear)
-        nobody = not any(states[node].slot == NOWHERE for node in self._situation.bearings if node in states)
-        return not self._is_first and rear is not None and rear.slot != NOWHERE and not rear.moving and nobody
+        no_robot_waits = not any(states[node].slot == NOWHERE for node in self._situation.bearings if node in states)
+        return not self._is_first and rear is not None and rear.slot != NOWHERE and not rear.moving and no_robot_waits
 
     def _let_out(self, tick: int) -> None:
         """Release a robot, or conclude that the depot is empty if none has come out."""

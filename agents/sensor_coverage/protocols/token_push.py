@@ -23,7 +23,7 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.frontier.directions import wrapped
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrapped
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import (
@@ -37,17 +37,19 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     PushToken,
     TakeSlot,
 )
-from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
+from zwerm.agents.sensor_coverage.motion.push_drives import AHEAD_RAD, DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import direction_to
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
-from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, WAVE_TICKS, PushPart
+from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS, PushPart
 
-# A dead robot's body within BODY_AHEAD_RAD of a drive's direction is expected to stop the drive. If a drive was stopped
-# without a touch, a dead robot's body within BODY_BESIDE_RAD has stopped it.
+# A dead robot's body within BODY_AHEAD_RAD of a drive's direction may stop the drive. A robot in touch within
+# BODY_BESIDE_RAD has stopped it.
 BODY_AHEAD_RAD: Final = 0.3
 BODY_BESIDE_RAD: Final = math.pi / 2.0
+# A robot that pushes so many bodies still has a quarter of its speed, and does not count as stuck.
+PUSHED_MAX: Final = 3
 
 
 class TokenPush(PushPart):
@@ -175,8 +177,7 @@ class TokenPush(PushPart):
     def _blocked(self, result: DriveResult) -> None:
         """End the push after a test drive that met a wall; the first robot tries its other bearings before."""
         if self._plan is not None:
-            bearing_rad = wrapped(self._plan.direction - self._heading)
-            body = None if result.touched else self._situation.dead_ahead(bearing_rad, BODY_BESIDE_RAD)
+            body = self._body_in_the_way(result, wrapped(self._plan.direction - self._heading))
             if body is None:
                 self._map.note_failure(self._plan, result.driven_m)
             else:
@@ -187,6 +188,21 @@ class TokenPush(PushPart):
             return
         self._situation.stand()
         self.close(PushAborted(self.id, True))
+
+    def _body_in_the_way(self, result: DriveResult, bearing_rad: float) -> int | None:
+        """Return the robot that stopped a drive and may hide free space, or None.
+
+        Dead robots yield to a push, and bodies are smooth. So a body ahead that does not yield stands at a wall.
+        """
+        off = [(angle_between(each.bearing_rad, bearing_rad), each.node) for each in result.robots]
+        away_rad, body = min(((angle, node) for angle, node in off if node is not None), default=(math.pi, None))
+        if result.touched or away_rad > BODY_BESIDE_RAD:
+            return None
+        seen = self._situation.motion.frame.seen
+        dead = [node for node in self._situation.failure_detector.dead if node in seen]
+        row = [node for node in dead if angle_between(seen[node], bearing_rad) < BODY_BESIDE_RAD]
+        at_wall = body in dead and away_rad < AHEAD_RAD and len(row) <= PUSHED_MAX
+        return None if at_wall else body
 
     def _find_anchors(self) -> tuple[Sighting, ...]:
         """Return the robots that determine the leader's distance, with their approximate bearings."""
@@ -202,7 +218,7 @@ class TokenPush(PushPart):
     # --- the followers ------------------------------------------------------------------------------------------------
 
     def _call(self) -> None:
-        """Let the follower come, and drive once it knows."""
+        """Inform the follower, and drive once it has acknowledged."""
         self._enter("calling")
         behind = self._chain.behind
         if behind is None:
@@ -253,7 +269,7 @@ class TokenPush(PushPart):
         return 0.0 if there_rad is None else wrapped(there_rad - self._heading)
 
     def _home(self) -> None:
-        """Home again on landmarks that were moving and stand still now."""
+        """Repeat the visual homing on landmarks that were moving and stand still now."""
         states = self._map.states
         if not self._result.used_moving_landmarks or self._memory is None:
             self._settled()
@@ -298,12 +314,12 @@ class TokenPush(PushPart):
         self._enter("telling")
 
     def _write(self, body: Body) -> None:
-        """Write to the robot behind, or to the sender of the token."""
+        """Send to the robot behind, or to the sender of the token."""
         if self._back is not None:
             self._situation.mailbox.write(self._back, body)
 
     def _drop(self) -> None:
-        """End without telling: the robot behind is out of range, and finds out by itself."""
+        """End without a message: the robot behind is out of range, and its waiting time ends."""
         self._situation.mailbox.drop(self.id)
         self.over = True
 
@@ -323,8 +339,8 @@ class Phase(NamedTuple):
 # fmt: off
 PHASES: Final[Mapping[str, Phase]] = {
     # The token passes on along the path.
-    "link": Phase(((lambda push: push._waited > LINK_TICKS, TokenPush._finish),),
-                  wake=lambda push: push._since + LINK_TICKS + 1),
+    "link": Phase(((TokenPush._token_is_lost, lambda push: push.close(PushAborted(push.id, False))),),
+                  wake=lambda push: push._wake_after(LOST_TICKS if push._waited < LOST_TICKS else LINK_TICKS)),
     # Leader: wait until the local map is right, offer the slot, drive, and wait for the followers.
     "holding": Phase(((TokenPush._may_offer, TokenPush._offer),), wake=TokenPush._next_tick),
     "offering": Phase(),

@@ -186,7 +186,7 @@ def test_a_walk_alternates_segments_and_turns_of_the_lengths_that_it_draws() -> 
     assert kinds == {(speed, speed), (speed, -speed), (-speed, speed)}
 
 
-def test_a_walks_randomness_is_its_own_stream() -> None:
+def test_a_random_walk_draws_from_the_stream_of_its_node_only() -> None:
     assert walk(300) == walk(300)
     assert walk(300) != walk(300, key=Draws(1).stream_key("controller", 1))
     assert walk(300) != walk(300, key=Draws(2).stream_key("controller", 0))
@@ -208,7 +208,7 @@ def test_a_straighter_walk_turns_less() -> None:
         ({"beta": 0.2}, "Object contains unknown field `beta`"),
     ],
 )
-def test_a_walk_that_is_none_is_refused(parameters: dict[str, float], mistake: str) -> None:
+def test_invalid_parameters_of_a_walk_are_refused(parameters: dict[str, float], mistake: str) -> None:
     with pytest.raises(ControllerError) as raised:
         make("random-walk", setup(parameters))
     assert mistake in str(raised.value)

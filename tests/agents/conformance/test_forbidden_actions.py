@@ -143,7 +143,7 @@ def test_state_shared_between_controllers_is_a_violation() -> None:
             return Command(drive=WheelSpeeds(0.01 * len(self.board), 0.0))
 
     (found,) = violations(Blackboard)
-    assert found.startswith("its answers change when another controller lives beside it: shared state")
+    assert found.startswith("its answers change when another controller runs in the same process: shared state")
 
 
 @pytest.mark.parametrize("name", ["OrderOfASet", "HashOfAName"])

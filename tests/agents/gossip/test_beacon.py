@@ -16,19 +16,19 @@ def beacon(node: int) -> Beacon:
     return Beacon(Setup(node, "robot", 0.1, (), Draws(1).stream_key("controller", node), BODY, ("robots",), {}))
 
 
-def test_it_counts_what_it_hears_what_is_missing_and_what_is_damaged() -> None:
+def test_a_beacon_counts_received_missing_and_damaged_packets() -> None:
     sender, hearer = beacon(1), beacon(2)
     frames = [sender.step(Observation(tick, 0.1 * tick)).outbox[0].payload for tick in range(6)]
     for tick, number in enumerate((0, 1, 4, 5)):
         hearer.step(Observation(tick, 0.1 * tick, (Packet("robots", frames[number], 1),)))
     damaged = bytes([frames[5][0] ^ 1]) + frames[5][1:]
     hearer.step(Observation(4, 0.4, (Packet("robots", damaged, 1),)))
-    assert (hearer.heard, hearer.missed, hearer.refused) == ({1: 4}, {1: 2}, 1)
+    assert (hearer.received, hearer.missed, hearer.refused) == ({1: 4}, {1: 2}, 1)
 
 
 @pytest.mark.parametrize("kind", ["holonomic", "differential"])
 @pytest.mark.parametrize(("speed_m_s", "far_m"), [(0.0, 0.0), (0.1, 0.2)])
-def test_it_drives_straight_on_with_wheels_and_without(kind: str, speed_m_s: float, far_m: float) -> None:
+def test_a_beacon_drives_straight_on_with_and_without_wheels(kind: str, speed_m_s: float, far_m: float) -> None:
     robots = {
         "count": 1,
         "controller": "beacon",

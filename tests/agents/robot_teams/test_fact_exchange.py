@@ -6,7 +6,7 @@ import pytest
 from zwerm.agents.robot_teams.mapping.facts import SweptSegment
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.protocols.fact_exchange import FACTS_MAX, FactExchange
-from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, View, decode_beacon, encode_beacon
+from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, View, read_beacon, write_beacon
 
 DT_S = 0.25
 
@@ -15,7 +15,8 @@ def beacon(node: int, slice_map: SliceMap, exchange: FactExchange, tick: int) ->
     parcel = exchange.outgoing(tick)
     facts = slice_map.facts
     sent = TeamBeacon(node, (View(1, 0, (0, 1, 2)),), (), (), (), facts.digest, len(facts), *parcel)
-    received: TeamBeacon = decode_beacon(encode_beacon(sent))
+    received = read_beacon(write_beacon(sent))
+    assert received is not None
     return received
 
 

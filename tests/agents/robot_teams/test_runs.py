@@ -102,6 +102,13 @@ def test_two_robots_are_faster_than_one_and_repeat_more() -> None:
     assert two.coverage["repeat_coverage_fraction"] > one.coverage["repeat_coverage_fraction"]
 
 
+def test_the_lower_bound_is_the_area_over_what_all_footprints_sweep_in_a_second() -> None:
+    room = {"polygon": [[0.0, 0.0], [9.0, 0.0], [9.0, 6.0], [0.0, 6.0]], "obstacles": []}
+    poses = [[0.6, 5.0, 0.0], [1.55, 5.0, 0.0]]
+    metrics = run(team(2, room, poses, time={"duration_s": 0.5}), 1, "inline").metrics
+    assert metrics["lower_bound_s"] == pytest.approx(9.0 * 6.0 / (2 * 1.0 * 1.0))
+
+
 def test_a_run_that_is_stopped_early_has_not_covered_the_hall() -> None:
     found = cover(team(1, time={"duration_s": 30.0}))
     assert found.outcome == "time-limit"

@@ -23,13 +23,13 @@ WRECK = Wreck(3, 100)
 
 
 def watched(
-    ticks: int, silent: bool = True, gap_m: float = 0.01, moves_m: float = 0.0, told: tuple[Void, ...] = ()
+    ticks: int, silent: bool = True, gap_m: float = 0.01, moves_m: float = 0.0, reported: tuple[Void, ...] = ()
 ) -> WreckWatch:
     """Return a watch after it saw robot 3 for so many ticks."""
     watch = WreckWatch(DT_S, SILENCE_S, lambda node, tick: tick if silent else 0)
     for tick in range(ticks):
         beside = Beside(3, 1.0 + moves_m * (tick % 2), 2.0, 1.0, 0.0, gap_m, 0.0, 0.0)
-        watch.watch(Senses(tick, 0.5, 2.0, (), (beside,)), told)
+        watch.watch(Senses(tick, 0.5, 2.0, (), (beside,)), reported)
     return watch
 
 
@@ -45,20 +45,20 @@ def test_neither_silence_nor_rest_nor_touch_alone_makes_a_wreck() -> None:
 
 
 def test_a_wreck_that_a_teammate_reported_is_known_at_sight_and_only_there() -> None:
-    assert watched(1, told=(Void(1, 1_020, 0, 0, WRECK),)).wrecks == {3: WRECK}
-    assert not watched(1, told=(Void(1, 2_020, 0, 0, WRECK),)).wrecks
+    assert watched(1, reported=(Void(1, 1_020, 0, 0, WRECK),)).wrecks == {3: WRECK}
+    assert not watched(1, reported=(Void(1, 2_020, 0, 0, WRECK),)).wrecks
 
 
 def test_a_wreck_that_moves_or_sends_counts_as_alive() -> None:
-    watch = watched(1, told=(Void(1, 1_000, 0, 0, WRECK),))
+    watch = watched(1, reported=(Void(1, 1_000, 0, 0, WRECK),))
     watch.watch(Senses(120, 0.5, 2.0, (), (Beside(3, 1.2, 2.0, 1.0, 0.0, 0.2, 0.0, 0.0),)), ())
     assert watch.moved == [3]
     assert not watch.wrecks
     watch = watched(LONG_TICKS)
     tick = watch.wrecks[3].tick
-    watch.lives(3, tick)
+    watch.note_alive(3, tick)
     assert watch.wrecks, "a status from before proves nothing"
-    watch.lives(3, tick + 1)
+    watch.note_alive(3, tick + 1)
     assert not watch.wrecks
 
 

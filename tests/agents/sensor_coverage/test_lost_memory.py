@@ -1,5 +1,6 @@
 """Robots that die, restart, or have another clock: every robot is accounted for, and `completed` is true."""
 
+import math
 from collections.abc import Callable
 
 import msgspec
@@ -7,15 +8,20 @@ import numpy as np
 import pytest
 
 from zwerm.agents.runtime.node import Node
+from zwerm.agents.sensor_coverage.frontier.plan import Plan
 from zwerm.agents.sensor_coverage.local_node import CODECS
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, StateBeacon, StateRequest
 from zwerm.agents.sensor_coverage.messages.incarnations import ADOPTED, adopted_slot, first_count
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, read_envelope, write
+from zwerm.agents.sensor_coverage.messages.pushes import PushAborted
 from zwerm.agents.sensor_coverage.messages.robot_sets import from_bytes, members, robot_set, to_bytes
+from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
+from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.component_loop import ComponentLoop
 from zwerm.agents.sensor_coverage.protocols.ending.release_roster import ReleaseRoster
+from zwerm.agents.sensor_coverage.protocols.token_push import TokenPush
 from zwerm.deploy.node_specs import node_specs
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble_run
@@ -198,14 +204,75 @@ def test_robots_that_die_are_replaced_and_do_not_keep_the_run_from_ending() -> N
     assert is_covered(result)
 
 
-def test_a_body_in_a_passage_that_no_robot_can_look_behind_is_a_frontier() -> None:
+@pytest.mark.parametrize("at_s", [34.0, 46.0])
+def test_a_body_in_a_passage_is_pushed_to_its_end(at_s: float) -> None:
     """The first robot of a single file dies, and no other robot gets past its body."""
     passage = ("arena.size_m=[4.4,0.22]", "base.pose=[0.2,0.11,0.0]", "robots.count=10", "services.path=gradient")
-    result = with_faults(passage, '{kind="crash", nodes=[1], at_s=34.0}')
-    assert result.metrics["reachable_coverage_fraction"] < 0.98
-    assert result.outcome == "failed"
-    assert "cut-off" in result.reason
-    assert result.metrics["concluded_early"] == 0.0
+    assert is_covered(with_faults(passage, f'{{kind="crash", nodes=[1], at_s={at_s}}}'))
+
+
+def pushing(visible: dict[int, float], dead: tuple[int, ...]) -> tuple[LocalRobot, TokenPush]:
+    """Return robot 3 at slot 8, which sees others at these bearings [rad], and its part in push 7 from the base."""
+    robot = Node(*node_specs(load("sensor-coverage", TINY), 1)[3])._controller
+    assert isinstance(robot, LocalRobot)
+    robot.situation.motion.frame.seen = visible
+    robot.situation.failure_detector.dead = dict.fromkeys(dead)
+    robot.local_map.occupy(8)
+    robot.pushing._join(7, 7, ((8, 3),), 0)
+    assert robot.push is not None
+    return robot, robot.push
+
+
+@pytest.mark.parametrize(
+    ("bearing_deg", "dead", "walls", "hides"),
+    [
+        (0.0, (5,), (), None),
+        (50.0, (5,), (), None),
+        (-75.0, (5,), (), 5),
+        (120.0, (5,), (), None),
+        (0.0, (), (), 5),
+        (0.0, (5,), (0.3,), None),
+        (0.0, (4, 5, 6), (), None),
+        (0.0, (4, 5, 6, 9), (), 5),
+    ],
+    ids=["ahead", "obliquely ahead", "beside", "behind", "alive", "and a wall", "three in a row", "four in a row"],
+)
+def test_a_dead_body_ahead_that_does_not_yield_stands_at_a_wall(
+    bearing_deg: float, dead: tuple[int, ...], walls: tuple[float, ...], hides: int | None
+) -> None:
+    bearing = math.radians(bearing_deg)
+    _, push = pushing({4: 0.1, 5: bearing, 6: -0.1, 9: 0.2}, dead)
+    stopped = DriveResult(False, driven_m=0.1, touched=walls, robots=(Touched(bearing, 5),))
+    assert push._body_in_the_way(stopped, 0.0) == hides
+
+
+def test_a_push_ends_when_the_robot_that_has_the_token_dies() -> None:
+    for dead, waited, ended in (((), 500, False), ((5,), 50, False), ((5,), 101, True), ((), 1001, True)):
+        robot, push = pushing({0: 0.0, 5: 1.0}, dead)
+        push.next = 5
+        robot.situation.tick = waited
+        assert push.next_wake() > waited
+        push.poll()
+        assert (push.phase == "closing") is ended
+        assert push.end == (PushAborted(7, False) if ended else None)
+
+
+def test_what_the_body_of_a_robot_stopped_is_tried_again_when_it_is_dead() -> None:
+    robot, _ = pushing({5: 0.0}, ())
+    local_map = robot.local_map
+    gap, side = Plan((8, 5, 0, 1), 8, 1.0, 0.95, 0.9, (8,)), Plan((5, 8, 1), 8, 2.0, 0.95, 0.8, (8,))
+    wall = Plan((8, 9, 1), 8, 3.0, 0.95, 0.8, (8,))
+    log = local_map._planner.attempt_log
+    for plan in (gap, wall):
+        local_map.note_failure(plan, 0.5)
+    local_map.remove_dead(4)
+    assert list(log.closed) == [wall.key], "the gap has another shape"
+    local_map.note_obstruction(side, 0.5, 5)
+    local_map.remove_dead(4)
+    assert list(log.closed) == [wall.key, side.key]
+    local_map.remove_dead(5)
+    assert not log.closed
+    assert not local_map._obstructed
 
 
 def test_a_swarm_in_a_corridor_that_a_death_has_parted_is_joined_again() -> None:
@@ -214,7 +281,7 @@ def test_a_swarm_in_a_corridor_that_a_death_has_parted_is_joined_again() -> None
 
 
 def test_the_base_waits_for_robots_that_it_does_not_hear() -> None:
-    """It receives nothing for four minutes; then the others are there as before."""
+    """The base receives nothing for four minutes; the others have not changed then."""
     result = with_faults(SMALL, '{kind="partition", groups=[[0]], at_s=30.0, for_s=240.0}')
     assert is_covered(result)
     assert result.sim_s > 270.0

@@ -57,7 +57,7 @@ def velocity(command):
 # --- the algorithm as printed ---------------------------------------------------------------------------------------
 
 
-def test_a_robot_moves_towards_the_centroid_of_its_cell_at_k_times_the_way():
+def test_a_robot_moves_towards_the_centroid_of_its_cell_at_k_times_the_distance():
     # Half the square, left of x = 0.5, is its cell.
     found = velocity(controller("voronoi-coverage").step(observe((0.2, 0.5), [(0.8, 0.5)])))
     assert found == (pytest.approx(5.0 * (0.25 - 0.2)), pytest.approx(0.0))
@@ -141,7 +141,7 @@ def test_a_robot_at_the_same_place_is_no_neighbour():
     assert closed_cell([(0.0, 0.0), (-0.2, 0.1)], table) == closed_cell([(-0.2, 0.1)], table)
 
 
-def test_a_cell_that_is_bounded_by_neighbours_is_left_alone():
+def test_a_cell_that_neighbours_bound_is_not_changed():
     others = [(0.2, 0.0), (0.0, 0.2), (-0.2, 0.0), (0.0, -0.2)]
     assert shapely.Polygon(closed_cell(others, SwarmBotTable(line_m=0.01))).area == pytest.approx(0.04)
 
@@ -174,7 +174,7 @@ def heard(node, time_s, place, value=1.0):
     return Packet(CHANNEL, pack(node, NeighbourReport(time_s, place[0], place[1], value)))
 
 
-def test_what_is_heard_counts_as_what_is_sensed():
+def test_neighbours_known_by_radio_give_the_command_of_sensed_neighbours():
     others = [(0.8, 0.5), (0.1, 0.9), (0.4, 0.2)]
     sensed = controller("voronoi-coverage").step(observe((0.3, 0.5), others, 1.0, (0.5, 0.2), 0.7))
     inbox = tuple(heard(node, 0.0, place) for node, place in enumerate(others, 1))
@@ -182,7 +182,7 @@ def test_what_is_heard_counts_as_what_is_sensed():
     assert velocity(told) == pytest.approx(velocity(sensed), abs=1e-12)
 
 
-def test_a_late_packet_does_not_undo_a_newer_one_and_what_is_old_is_forgotten():
+def test_a_late_packet_does_not_replace_a_newer_one_and_old_packets_are_removed():
     robot = controller("voronoi-radio", memory_s=1.0)
     half = 5.0 * (0.25 - 0.2)
     newer, older = heard(1, 0.5, (0.8, 0.5)), heard(1, 0.4, (0.4, 0.5))
@@ -201,7 +201,7 @@ def test_a_robot_listens_for_a_period_before_it_first_moves():
 
 
 @given(st.integers(0, 39), st.integers(1, 255))
-def test_a_damaged_packet_is_passed_over(byte, flip):
+def test_a_damaged_packet_is_ignored(byte, flip):
     packet = pack(7, NeighbourReport(1.0, 0.5, 0.25, 3.0))
     assert unpack(packet) == (7, NeighbourReport(1.0, 0.5, 0.25, 3.0))
     damaged = bytearray(packet)

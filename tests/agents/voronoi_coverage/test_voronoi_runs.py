@@ -46,7 +46,7 @@ def test_ten_robots_converge_and_are_then_near_the_optimum():
     assert times[3] <= result.sim_s <= times[3] + 0.2
 
 
-def test_the_error_that_is_measured_is_the_one_the_robots_feel():
+def test_the_measured_error_equals_the_error_of_the_robots():
     result = inline(TABLE1, "time.duration_s=1.0")
     tracks = result.history.arrays()
     # u = k (C_hat - p), and the point goes where it wants to: a step is k dt times the error.
@@ -60,7 +60,7 @@ def test_a_run_that_does_not_converge_has_no_convergence_time():
     assert math.isnan(found["convergence_time_s"])
 
 
-def test_the_step_does_not_decide_when_and_where_the_robots_end():
+def test_the_control_period_does_not_change_the_time_and_place_of_convergence():
     # Some seeds lie between two optima, and there it does.
     coarse = inline(TABLE1, "time.dt_s=0.1", seed=4).metrics
     fine = inline(TABLE1, "time.dt_s=0.02", seed=4).metrics
@@ -82,7 +82,7 @@ def test_a_uniform_swarm_has_density_one_in_every_ring():
     assert [value for name, value in density.items() if "ring" in name] == pytest.approx([1.0] * 8, rel=0.05)
 
 
-def test_the_lower_the_offset_the_nearer_the_light():
+def test_robots_are_nearer_to_the_light_with_a_lower_offset():
     distance = [
         inline("voronoi-light", f"robots.parameters.offset={offset}", "time.duration_s=12.0").metrics[
             "mean_peak_distance_m"
@@ -103,7 +103,7 @@ def test_robots_spread_from_a_corner_and_beacons_stay_on_the_walls():
     assert held.metrics["mean_error_m"] > 2.0 * free.metrics["mean_error_m"]
 
 
-def test_who_can_hear_all_covers_as_who_can_see_all():
+def test_neighbours_known_by_radio_give_the_coverage_of_sensed_neighbours():
     few = ("robots.count=12", "time.duration_s=10.0")
     seen = inline("voronoi-radio", "robots.controller=voronoi-coverage", *_SENSED, *few, seed=2).metrics
     heard = inline("voronoi-radio", *few, seed=2).metrics
@@ -117,7 +117,7 @@ def test_integers_cover_as_well_as_floating_point():
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_a_seed_makes_a_run_and_another_seed_another(name):
+def test_equal_seeds_give_equal_traces_and_another_seed_another_trace(name):
     # The corner experiment's poses are given; what a seed changes there is the noise.
     short = "time.duration_s=0.5"
     first, again, other = (inline(name, short, seed=seed) for seed in (3, 3, 4))
@@ -137,7 +137,7 @@ def test_a_study_can_be_planned_and_its_trials_measure_what_it_reports(name):
         assert all(len(row[f"{series}_series"]) > 100 for series in study.table.series)
 
 
-def test_measuring_changes_nothing():
+def test_metrics_change_no_trace():
     without = inline(TABLE1, "time.duration_s=1.0", "metrics={}")
     assert without.trace == inline(TABLE1, "time.duration_s=1.0").trace
     assert "mean_error_m" not in without.metrics

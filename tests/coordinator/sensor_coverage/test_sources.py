@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.paths import Dijkstra, Reach
+from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
@@ -31,7 +31,7 @@ Point = tuple[float, float]
 # --- stations and depots --------------------------------------------------------------------------------------------
 
 
-def test_the_robots_are_dealt_out_to_the_depots_in_turn_and_an_empty_one_refuses() -> None:
+def test_robots_are_distributed_to_the_depots_one_by_one_and_an_empty_depot_refuses() -> None:
     world = assemble(load("sensor-coverage-multi-source", ("robots.count=9",)), 1)
     depots = world.bodies.depots
     assert depots is not None
@@ -53,7 +53,7 @@ def test_of_robots_released_at_once_one_enters_a_tick() -> None:
     assert [each and each[0] for each in entering] == [4, 3, None]
 
 
-def test_every_station_is_a_node_and_only_the_coordinator_knows_which() -> None:
+def test_every_station_is_a_node_and_only_the_coordinator_gets_their_ids() -> None:
     specs = node_specs(load("sensor-coverage-multi-source"), 1)
     assert [node for node, (_, setup) in specs.items() if setup.role == "base"] == [0, 1, 2]
     assert {node: setup.bases for node, (_, setup) in specs.items() if setup.bases} == {160: (0, 1, 2)}
@@ -111,7 +111,7 @@ class Truth:
         return math.atan2(by - ay, bx - ax)
 
     def off(self, robot: int) -> float:
-        """By how much directions told of a robot are turned against the truth."""
+        """Return the rotation between the stored directions of a robot and the true ones."""
         return math.remainder(self.slots.heading[robot] - self.turned[robot], math.tau)
 
 
@@ -123,7 +123,7 @@ def two_swarms() -> Truth:
     return truth
 
 
-def test_a_swarms_directions_are_in_the_frame_of_its_station() -> None:
+def test_the_directions_of_a_swarm_are_in_the_frame_of_its_station() -> None:
     truth = two_swarms()
     truth.update((0, 2), (0, 3), (2, 3), (1, 4), (1, 5), (4, 5))
     assert [truth.slots.frame[robot] for robot in range(6)] == [0, 1, 0, 0, 1, 1]
@@ -173,7 +173,7 @@ def plan(mover: int, *key: int) -> Plan:
 def assigned(
     complex_: FlagComplex, sources: dict[int, float], *tiers: list[Plan], pushes_max: int = 9
 ) -> list[tuple[int, ...]]:
-    def routes(part: FlagComplex, starts: dict[int, float]) -> Reach:
+    def routes(part: FlagComplex, starts: dict[int, float]) -> CheapestRoutes:
         return Dijkstra(3.0).routes(part, starts, ())
 
     add = CheapestFirst(Slots(), pushes_max).assign(tiers, ScanResult({}, complex_, ()), sources, routes)  # type: ignore[arg-type]

@@ -64,9 +64,7 @@ WAYS = ("comparing all with all", "blocks", "the index")
 @pytest.mark.parametrize("way", WAYS)
 @settings(deadline=None, max_examples=50)
 @given(walls=st.lists(lattice_line, min_size=1, max_size=6), lines=st.lists(lattice_line, min_size=1, max_size=6))
-def test_a_line_is_blocked_where_its_inside_meets_a_wall_be_it_in_a_point_or_along_it(
-    way: str, walls: Any, lines: Any
-) -> None:
+def test_a_line_is_blocked_if_its_inside_meets_a_wall_in_a_point_or_along_it(way: str, walls: Any, lines: Any) -> None:
     # On a lattice every touch, corner and overlap is exact, and comes up often.
     arena = Arena(box(-1, -1, 7, 7), [LineString(wall) for wall in walls])
     start, end = np.array(lines, dtype=float).transpose(1, 0, 2)
@@ -150,7 +148,7 @@ def test_in_a_large_arena_the_index_answers_bit_for_bit_as_comparing_all_with_al
     assert 0 < answers[0][0].sum() < 300
 
 
-def test_no_questions_get_no_answers() -> None:
+def test_a_query_without_points_has_no_result() -> None:
     arena = Arena(box(0, 0, 2, 2), [LineString([(1, 0), (1, 1)])])
     none = np.empty((0, 2))
     for way in WAYS:

@@ -17,7 +17,7 @@ def headings(seed: int, *overrides: str) -> list[float]:
     return [float(heading[0, 0]), float(heading[-1, 0])]
 
 
-def test_the_seed_draws_the_heading_of_a_station() -> None:
+def test_the_seed_draws_the_heading_of_a_base_station() -> None:
     drawn = [headings(seed, "base.pose=[0.2,1.0,0.0]", 'base.heading="drawn"') for seed in (1, 2, 3)]
     assert all(first == last for first, last in drawn), "a station never moves"
     assert len({first for first, _ in drawn}) == 3

@@ -77,12 +77,12 @@ def test_a_ros_map_lies_at_its_origin_and_unknown_cells_are_not_free(folder: Pat
     assert_is_the_room(read(folder, map="room.yaml"))
 
 
-def test_a_plain_pgm_says_the_same_as_a_binary_one(folder: Path) -> None:
+def test_a_plain_pgm_gives_the_same_cells_as_a_binary_one(folder: Path) -> None:
     write_pgm(folder / "room.pgm", room(), plain=True)
     assert_is_the_room(read(folder, map="room.yaml"))
 
 
-def test_a_negated_png_says_the_same(folder: Path) -> None:
+def test_a_negated_png_gives_the_same_cells(folder: Path) -> None:
     Image.fromarray((255 - room()).astype(np.uint8)).save(folder / "room.png")
     write_yaml(folder / "room.yaml", image="room.png", negate=1)
     assert_is_the_room(read(folder, map="room.yaml"))

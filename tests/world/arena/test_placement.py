@@ -1,4 +1,4 @@
-"""Robots start where there is room, and where the seed and their own id put them."""
+"""Robots start at free places, which depend on the seed and their own id."""
 
 from typing import Any
 
@@ -60,7 +60,7 @@ def test_robots_start_clear_of_walls_and_of_each_other(
     assert ((heading >= -np.pi) & (heading < np.pi)).all()
 
 
-def test_the_same_seed_places_alike_and_another_otherwise() -> None:
+def test_equal_seeds_give_equal_starts_and_another_seed_others() -> None:
     position, heading = placed(BUSY, 25, seed=7)
     again, other = placed(BUSY, 25, seed=7), placed(BUSY, 25, seed=8)
     assert position.tolist() == again[0].tolist()
@@ -70,13 +70,13 @@ def test_the_same_seed_places_alike_and_another_otherwise() -> None:
 
 
 @pytest.mark.parametrize("keys", [{}, {"kind": "disc", "radius_m": 0.8}])
-def test_a_robot_more_moves_none_of_the_others(keys: Any) -> None:
+def test_an_additional_robot_moves_no_other_start(keys: Any) -> None:
     fewer, more = placed(BUSY, 60, **keys), placed(BUSY, 61, **keys)
     assert more[0][:60].tolist() == fewer[0].tolist()
     assert more[1][:60].tolist() == fewer[1].tolist()
 
 
-def test_a_robot_out_of_everyones_way_is_where_it_would_be_alone() -> None:
+def test_a_robot_far_from_all_others_starts_where_it_would_start_alone() -> None:
     alone = [place(table(), SQUARE, 1, RADIUS_M, Draws(seed))[0] for seed in (1, 2)]
     assert placed(SQUARE, 25, seed=1)[0][0].tolist() == alone[0][0].tolist()
     thin, thick = (placed(SQUARE, 25, seed=1, body_m=body_m)[0] for body_m in (1e-6, 0.03))
@@ -195,7 +195,7 @@ def test_every_mistake_in_the_table_is_one_line(keys: Any, lines: list[str]) -> 
     assert mistakes(SQUARE, 3, **keys) == lines
 
 
-def test_robots_for_whom_there_is_no_room_are_named() -> None:
+def test_a_robot_without_room_is_named() -> None:
     lines = mistakes(Arena(box(0, 0, 1, 1)), 25, body_m=0.15)
     robot = int(lines[0].split()[5])
     assert 3 < robot < 12

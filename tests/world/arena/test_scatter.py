@@ -1,4 +1,4 @@
-"""Scattered landmarks: everywhere within the dispersion, none in a wall, and no more of them than that takes."""
+"""Scattered landmarks: one within the dispersion of every place, none in a wall, and no two close together."""
 
 import math
 from pathlib import Path
@@ -41,7 +41,7 @@ def test_landmarks_that_see_each_other_are_apart() -> None:
     assert 0.6 < len(landmarks) * 0.5**2 / arena.area_m2 < 0.9
 
 
-def test_landmarks_hang_on_the_seed_of_the_run_or_on_their_own() -> None:
+def test_landmarks_depend_on_the_seed_of_the_run_or_on_their_own() -> None:
     arena = hall()
     of_run = [scatter(ScatterTable(dispersion_m=0.8), arena, seed).tolist() for seed in (1, 1, 2)]
     assert of_run[0] == of_run[1] != of_run[2]

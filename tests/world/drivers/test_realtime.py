@@ -85,7 +85,7 @@ def test_a_hung_robot_gets_a_bounded_number_of_observations_and_is_observed_agai
         assert driver.deadman_stops >= 1
 
 
-def test_what_a_killed_world_leaves_the_next_run_removes_and_a_living_ones_it_does_not(private_tmp: Path) -> None:
+def test_a_run_removes_the_directories_of_killed_runs_and_not_those_of_living_ones(private_tmp: Path) -> None:
     command = [sys.executable, *ZWERM, "run", "beacon-twin", "--realtime", "1", "--json"]
     with subprocess.Popen(command, env=os.environ | {"PYTHONPATH": str(ROOT)}) as world:
         until(lambda: list(private_tmp.glob("zwerm-*/router")), "the world listens")

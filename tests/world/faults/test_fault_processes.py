@@ -1,4 +1,4 @@
-"""Faults done to real processes: SIGKILL, SIGSTOP and new incarnations, with the trace that the same run has inline."""
+"""Faults of real processes: SIGKILL, SIGSTOP and new incarnations, with the trace that the same run has inline."""
 
 import os
 import signal
@@ -13,7 +13,8 @@ from zwerm.deploy.swarm import LocalSwarm
 from zwerm.errors import LinkError, ScenarioError, StragglerError
 from zwerm.link.node_link import ZenohNodeLink
 from zwerm.run.assembly import assemble
-from zwerm.run.runner import NullProgress, drive, new_run_id, run, serve
+from zwerm.run.progress import NullProgress
+from zwerm.run.runner import drive, new_run_id, run, serve
 from zwerm.scenario.tables import Scenario
 
 EVERY_FAULT: list[dict[str, Any]] = [
@@ -136,7 +137,7 @@ def test_a_stale_incarnation_is_refused_and_counted(nothing_left: None) -> None:
                 ghost.join()
         finally:
             ghost.close()
-        assert swarm.link.refused["incarnation"] == 1
+        assert swarm.link.refusals.by_reason["incarnation"] == 1
 
 
 def test_late_commands_of_a_killed_robot_are_refused_in_real_time_and_its_next_incarnation_runs(

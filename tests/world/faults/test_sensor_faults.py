@@ -32,7 +32,7 @@ def faulty(*faults: dict[str, Any]) -> Scenario:
 
 
 def look(world: World) -> dict[int, Observation]:
-    """Return what every robot observes now, and go on by a tick without answers."""
+    """Return the observations of all robots, and advance by a tick without answers."""
     world.begin()
     nodes, payloads = world.observe()
     world.advance()
@@ -43,7 +43,7 @@ def seen(observation: Observation) -> list[int]:
     return [bearing.node for bearing in observation.bearings or ()]
 
 
-def test_a_dead_beacon_is_not_seen_but_sees_others_and_is_still_touched() -> None:
+def test_a_robot_with_a_dead_beacon_is_not_seen_and_sees_and_touches_others() -> None:
     world = assemble(faulty({"kind": "dead_beacon", "robots": [1, 3], "at_s": 0.1, "for_s": 0.1}), 1)
     before, during, after = look(world), look(world), look(world)
     assert seen(before[0]) == seen(after[0]) == [1, 2, 3]

@@ -57,7 +57,7 @@ def test_what_lies_behind_a_crack_that_no_body_passes_cannot_be_reached_and_corn
     assert reachable(cut, 0.07, np.array([[0.5, 1.0]])).area == pytest.approx(2.0, abs=0.005)
 
 
-def test_the_shadow_of_an_obstacle_is_that_of_a_lamp() -> None:
+def test_an_obstacle_hides_exactly_the_area_behind_it() -> None:
     """From (1, 2), a square that spans 1 m across at 1 m away hides a wedge: 2 at the near side, the rest by similarity."""
     hall = arena(size_m=[4.0, 4.0], obstacles=[[[2.0, 1.5], [3.0, 1.5], [3.0, 2.5], [2.0, 2.5]]])
     # The wedge between the rays through the near corners, x from 2 to 4, less the square itself.
@@ -138,7 +138,7 @@ def test_holes_are_what_another_library_finds_in_the_true_complex(deployed: RunR
     assert deployed.metrics["holes"] == tree.betti_numbers()[1] == deployed.metrics["obstacles"] == 1.0
 
 
-def test_cycles_are_those_told_of_and_ticks_and_messages_are_shared_out_among_them(deployed: RunResult) -> None:
+def test_cycles_are_those_reported_and_ticks_and_messages_are_means_per_cycle(deployed: RunResult) -> None:
     found = deployed.metrics
     assert found["deployment_cycles"] == snapshots(deployed.snapshots)[-1].cycle
     assert found["ticks_per_cycle_mean"] == deployed.ticks / found["deployment_cycles"]
@@ -147,7 +147,7 @@ def test_cycles_are_those_told_of_and_ticks_and_messages_are_shared_out_among_th
     assert 0.0 <= found["redundant_robots"] < found["robots_deployed"]
 
 
-def test_a_share_of_the_arena_is_in_sight_when_it_is_said_to_be(deployed: RunResult) -> None:
+def test_the_time_to_a_coverage_is_the_time_at_which_it_is_in_sight(deployed: RunResult) -> None:
     found, tracks = deployed.metrics, deployed.history.arrays()
     times = [found[f"time_to_{percent}_percent_coverage_s"] for percent in (50, 90, 99)]
     assert times == sorted(times)
@@ -161,7 +161,7 @@ def test_a_share_of_the_arena_is_in_sight_when_it_is_said_to_be(deployed: RunRes
     assert deployed.series["robots_deployed"][-1] == found["robots_deployed"]
 
 
-def test_a_share_that_is_never_reached_has_no_time() -> None:
+def test_a_coverage_that_is_never_reached_has_no_time() -> None:
     settings = ["arena.size_m=[2.2,1.6]", "base.pose=[0.2,0.8,0.0]", "robots.count=14", "time.duration_s=20.0"]
     found = run("sensor-coverage", runner="inline", overrides=settings).metrics
     assert found["time_to_50_percent_coverage_s"] < 20.0

@@ -7,52 +7,30 @@ from typing import Any
 
 import numpy as np
 import pytest
-from air import DT_S, Radio, ring
+from air import DT_S, EXAMPLES, Radio, ring
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 from support import scenario
 
-from zwerm.catalogue import RADIO_MODELS
 from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.run.runner import run
 from zwerm.wire.messages import Transmission
 from zwerm.world.radio.links import Links
 
-MODELS: dict[str, dict[str, Any]] = {
-    "range": {"range_m": 1.2},
-    "line_of_sight": {},
-    "path_loss": {"tx_power_dbm": -50.0},
-    "wall_attenuation": {"material": "glass", "margin_db": 1.0},
-    "loss": {"fraction": 0.3},
-    "gilbert_elliott": {"loss_fraction": 0.4, "burst_packets": 3.0},
-    "delay": {"delay_s": 0.05, "jitter_s": 0.2, "distribution": "exponential"},
-    "duplication": {"fraction": 0.5, "copies": 2},
-    "corruption": {"bit_error_rate": 0.02},
-    "rate_limit": {"rate_bytes_s": 60.0, "queue_bytes": 20.0},
-    "collision": {"airtime_s": 0.02},
-}
 WALL = [[50.0, 50.0], [50.0, 60.0]]
 
 
-def table(kind: str, **more: Any) -> dict[str, Any]:
-    return {"kind": kind, **MODELS[kind], **more}
-
-
-def test_these_tests_try_every_radio_model_of_the_catalogue() -> None:
-    assert sorted(MODELS) == sorted(RADIO_MODELS)
-
-
-@pytest.mark.parametrize(("first", "second"), list(product(MODELS, MODELS)))
+@pytest.mark.parametrize(("first", "second"), list(product(EXAMPLES, EXAMPLES)))
 def test_the_ledger_balances_under_every_pair_of_models(first: str, second: str) -> None:
-    radio = Radio(ring(4), [table(first), table(second, senders=[0, 1, 2])], walls=[WALL])
+    radio = Radio(ring(4), [EXAMPLES[first], EXAMPLES[second] | {"senders": [0, 1, 2]}], walls=[WALL])
     outbox = (Transmission("robots", b"broadcast"), Transmission("robots", b"one", to=3))
     for _ in range(12):  # the medium audits itself at every tick
         radio.step({0: outbox, 1: outbox[:1], 2: outbox})
     held_back = radio.medium.summary()
     summary = radio.all_broadcast(3)
-    for books in (held_back, summary):
-        assert books["sent"] == books["delivered"] + sum(books["dropped"].values()) + books["in_flight"]
+    for counts in (held_back, summary):
+        assert counts["sent"] == counts["delivered"] + sum(counts["dropped"].values()) + counts["in_flight"]
     assert summary["in_flight"] == 0
     assert summary["sent"] == 12 * (3 * 3 + 2) + 3 * 12 + summary["copies"]
     assert summary["delivered"] == sum(map(len, radio.received.values()))
@@ -60,7 +38,7 @@ def test_the_ledger_balances_under_every_pair_of_models(first: str, second: str)
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
-    kinds=st.lists(st.sampled_from(sorted(MODELS)), max_size=4),
+    kinds=st.lists(st.sampled_from(sorted(EXAMPLES)), max_size=4),
     traffic=st.lists(
         st.lists(
             st.tuples(st.integers(0, 4), st.one_of(st.none(), st.integers(0, 4)), st.binary(max_size=20)), max_size=5
@@ -74,7 +52,7 @@ def test_the_ledger_balances_under_every_pair_of_models(first: str, second: str)
 def test_the_ledger_balances_under_any_traffic_with_sleeping_and_crashing_nodes(
     kinds: list[str], traffic: list[Any], asleep: set[int], dies: tuple[int, int, int], seed: int
 ) -> None:
-    radio = Radio(ring(5), [table(kind) for kind in kinds], seed, walls=[WALL])
+    radio = Radio(ring(5), [EXAMPLES[kind] for kind in kinds], seed, walls=[WALL])
     node, down_at, up_at = dies
     sent = 0
     for number, tick in enumerate(traffic):
@@ -89,10 +67,10 @@ def test_the_ledger_balances_under_any_traffic_with_sleeping_and_crashing_nodes(
                 sent += 4 if to is None else 1
         radio.step(outboxes, [each for each in range(5) if each not in asleep])
     radio.medium.audit()
-    books = radio.medium.summary()
-    assert books["sent"] == sent + books["copies"]
-    assert books["sent"] == books["delivered"] + sum(books["dropped"].values()) + books["in_flight"]
-    assert books["delivered"] == sum(map(len, radio.received.values()))
+    counts = radio.medium.summary()
+    assert counts["sent"] == sent + counts["copies"]
+    assert counts["sent"] == counts["delivered"] + sum(counts["dropped"].values()) + counts["in_flight"]
+    assert counts["delivered"] == sum(map(len, radio.received.values()))
 
 
 def test_an_audit_finds_a_packet_that_vanishes() -> None:
@@ -106,18 +84,18 @@ def test_an_audit_finds_a_packet_that_vanishes() -> None:
 
 
 def test_the_counts_by_link_are_sorted_and_add_up_to_the_summary() -> None:
-    radio = Radio(ring(4), [table("loss"), table("duplication")])
+    radio = Radio(ring(4), [EXAMPLES["loss"], EXAMPLES["duplication"]])
     summary = radio.all_broadcast(50)
-    books = radio.medium.channels["robots"].ledger.by_link()
-    assert list(zip(books["sender"], books["receiver"], strict=True)) == [
+    counts = radio.medium.channels["robots"].ledger.by_link()
+    assert list(zip(counts["sender"], counts["receiver"], strict=True)) == [
         (a, b) for a in range(4) for b in range(4) if a != b
     ]
-    assert sum(books["sent"]) == summary["sent"]
-    assert sum(books["delivered"]) == summary["delivered"]
-    assert sum(books["dropped"]["loss"]) == summary["dropped"]["loss"]
+    assert sum(counts["sent"]) == summary["sent"]
+    assert sum(counts["delivered"]) == summary["delivered"]
+    assert sum(counts["dropped"]["loss"]) == summary["dropped"]["loss"]
     heard = Counter((packet.sender, node) for node, got in radio.received.items() for _, packet in got)
-    pairs = zip(books["sender"], books["receiver"], strict=True)
-    assert books["delivered"] == [heard[pair] for pair in pairs]
+    pairs = zip(counts["sender"], counts["receiver"], strict=True)
+    assert counts["delivered"] == [heard[pair] for pair in pairs]
 
 
 def test_the_radio_table_has_every_cause_and_the_links_that_lost_most() -> None:
@@ -127,14 +105,14 @@ def test_the_radio_table_has_every_cause_and_the_links_that_lost_most() -> None:
         radio={"models": [one_way]},
         faults=[{"kind": "cut", "senders": [2], "receivers": [0], "at_s": 1.0}],
     )
-    books = run(walled, 1, "inline").radio
-    links = books["channels"]["robots"]["links"]
+    counts = run(walled, 1, "inline").radio
+    links = counts["channels"]["robots"]["links"]
     ages = dict(zip(zip(links["sender"], links["receiver"], strict=True), links["age_mean_s"], strict=True))
     assert ages[0, 1] is None, "nothing was ever delivered"
     assert ages[1, 0] == pytest.approx(0.1)
     assert ages[2, 0] > 0.3
     console = Console(record=True, width=120, file=io.StringIO())
-    print_radio_ledger(console, books, 2)
+    print_radio_ledger(console, counts, 2)
     text = [" ".join(line.split()) for line in console.export_text().splitlines()]
     assert text[1] == "from to sent delivered loss cut in flight delivered % age mean s age max s"
     assert text[2].startswith(f"all all 120 {120 - 20 - 10 - 4} 20 10 4 ")
@@ -145,9 +123,9 @@ def test_the_radio_table_has_every_cause_and_the_links_that_lost_most() -> None:
 def test_messages_and_bytes_are_counted_once_for_each_sender() -> None:
     radio = Radio(ring(3))
     radio.step({0: (Transmission("robots", b"12345"), Transmission("robots", b"1", to=2)), 2: ()})
-    books = radio.medium.channels["robots"].ledger
-    assert books.node_messages.tolist() == [2, 0, 0]
-    assert books.node_bytes.tolist() == [6, 0, 0]
+    counts = radio.medium.channels["robots"].ledger
+    assert counts.node_messages.tolist() == [2, 0, 0]
+    assert counts.node_bytes.tolist() == [6, 0, 0]
     assert radio.medium.summary()["bytes"] == 6
 
 
@@ -171,23 +149,23 @@ def test_a_packet_to_a_receiver_out_of_reach_is_no_loss() -> None:
         faults=[down, cut],
     )
     result = run(chosen, 1, "inline")
-    books, ticks = result.radio, 400
+    counts, ticks = result.radio, 400
     sent = ticks * (count - 1) * (count - 1)  # 11 live robots, 11 receivers each
     # Neighbours among the 11 that live: 10 pairs, both ways. Of these the fault cuts one link, not the one to a stranger.
     in_reach = ticks * 20
-    assert books["sent"] == sent
-    assert books["out_of_reach"] == sent - in_reach
-    assert books["dropped"]["cut"] == ticks
-    assert books["dropped"]["receiver-down"] == ticks * (count - 1)
-    assert books["sent"] == books["delivered"] + sum(books["dropped"].values()) + books["in_flight"]
-    assert books["bytes"] == sum(books["channels"]["robots"]["message_bytes"]) == ticks * (count - 1) * 16
+    assert counts["sent"] == sent
+    assert counts["out_of_reach"] == sent - in_reach
+    assert counts["dropped"]["cut"] == ticks
+    assert counts["dropped"]["receiver-down"] == ticks * (count - 1)
+    assert counts["sent"] == counts["delivered"] + sum(counts["dropped"].values()) + counts["in_flight"]
+    assert counts["bytes"] == sum(counts["channels"]["robots"]["message_bytes"]) == ticks * (count - 1) * 16
     assert result.metrics["out_of_reach_fraction"] == pytest.approx(1.0 - in_reach / sent)
     expected = 0.7 * 19 / 20
     assert abs(result.metrics["delivered_fraction"] - expected) < 2.576 * (0.7 * 0.3 / in_reach) ** 0.5 + 20 / in_reach
-    links = books["channels"]["robots"]["links"]
-    assert sum(links["out_of_reach"]) == books["channels"]["robots"]["out_of_reach"] == books["out_of_reach"]
+    links = counts["channels"]["robots"]["links"]
+    assert sum(links["out_of_reach"]) == counts["channels"]["robots"]["out_of_reach"] == counts["out_of_reach"]
     console = Console(record=True, width=160, file=io.StringIO())
-    print_radio_ledger(console, books, 1)
+    print_radio_ledger(console, counts, 1)
     rows = [line.split() for line in console.export_text().splitlines()]
     assert rows[2][-3] == f"{100.0 * result.metrics['delivered_fraction']:.1f}"
     assert rows[3][:4] == ["1", "0", str(ticks), "0"], "the link that lost most, and not one out of reach"
@@ -210,7 +188,7 @@ def test_a_model_of_a_user_states_whether_its_receivers_are_out_of_reach() -> No
 
 
 def test_the_age_of_information_equals_a_count_at_every_tick() -> None:
-    radio = Radio(ring(3), [table("loss"), table("delay")], seed=5)
+    radio = Radio(ring(3), [EXAMPLES["loss"], EXAMPLES["delay"]], seed=5)
     broadcast = Transmission("robots", b"x")
     newest: dict[tuple[int, int], int] = {}
     ages: dict[tuple[int, int], list[int]] = {}

@@ -1,4 +1,4 @@
-"""Each model does what its docstring says: fractions within their 99 % confidence intervals, and every rule by an example."""
+"""Each model fulfils its docstring: fractions within their 99 % confidence intervals, and every rule by an example."""
 
 import math
 from typing import Any
@@ -280,8 +280,8 @@ def test_shadowing_is_log_normal_lasting_and_the_same_in_both_directions() -> No
     radio = Radio(ring(40, 5.0), [model])
     radio.position[:] = np.array([[50.0, 50.0 + 10.0 * (node % 2)] for node in range(40)])
     summary = radio.all_broadcast(5)
-    books = radio.medium.channels["robots"].ledger.by_link()
-    fate = dict(zip(zip(books["sender"], books["receiver"], strict=True), books["delivered"], strict=True))
+    counts = radio.medium.channels["robots"].ledger.by_link()
+    fate = dict(zip(zip(counts["sender"], counts["receiver"], strict=True), counts["delivered"], strict=True))
     assert set(fate.values()) == {0, 5}, "a link's shadowing lasts"
     assert all(fate[a, b] == fate[b, a] for a, b in fate)
     far = [fate[a, b] > 0 for a, b in fate if a < b and (a + b) % 2]
@@ -296,13 +296,13 @@ def test_a_one_way_link_stays_one_way() -> None:
     model = {"kind": "loss", "fraction": 1.0, "senders": [0], "receivers": [1]}
     radio = Radio(ring(3), [model])
     radio.all_broadcast(20)
-    books = radio.medium.channels["robots"].ledger.by_link()
-    fate = dict(zip(zip(books["sender"], books["receiver"], strict=True), books["delivered"], strict=True))
+    counts = radio.medium.channels["robots"].ledger.by_link()
+    fate = dict(zip(zip(counts["sender"], counts["receiver"], strict=True), counts["delivered"], strict=True))
     assert fate == {(0, 1): 0, (0, 2): 20, (1, 0): 20, (1, 2): 20, (2, 0): 20, (2, 1): 20}
 
 
 def heard(radio: Radio, ticks: int, nodes: int) -> list[list[tuple[int, int | None, bytes]]]:
-    """Return what nodes below `nodes` heard of each other while everyone sent numbered broadcasts."""
+    """Return the packets that nodes below `nodes` received while all nodes sent numbered broadcasts."""
     for tick in range(ticks):
         payload = tick.to_bytes(2, "big")
         radio.step({node: (Transmission("robots", payload),) for node in range(len(radio.position))})

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from air import Radio
+from air import EXAMPLES, Radio
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -18,22 +18,7 @@ from zwerm.world.radio.models.path_loss import PathLossTable, reach_m
 from zwerm.world.radio.reach import Reach
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 
-MODELS: dict[str, dict[str, Any]] = {
-    "range": {"range_m": 2.0},
-    "line_of_sight": {},
-    "path_loss": {"tx_power_dbm": -50.0},
-    "wall_attenuation": {"material": "glass", "margin_db": 1.0},
-    "loss": {"fraction": 0.3},
-    "gilbert_elliott": {"loss_fraction": 0.4, "burst_packets": 3.0},
-    "delay": {"delay_s": 0.05, "jitter_s": 0.2, "distribution": "exponential"},
-    "duplication": {"fraction": 0.5, "copies": 2},
-    "corruption": {"bit_error_rate": 0.02},
-    "rate_limit": {"rate_bytes_s": 60.0, "queue_bytes": 20.0},
-    "collision": {"airtime_s": 0.02},
-    "own_models:Lossy": {},
-}
-
-
+MODELS = {**EXAMPLES, "own_models:Lossy": {"kind": "own_models:Lossy"}}
 WALLS = [[[50.0, 45.0], [50.0, 50.0]]]
 ARENA = Arena(shapely.box(0.0, 0.0, 100.0, 100.0))
 
@@ -120,7 +105,7 @@ def test_the_same_packets_arrive_and_the_totals_are_equal_with_all_pairs_judged(
         }
         for _ in range(ticks)
     ]
-    models = [{"kind": kind, **MODELS[kind]} for kind in kinds]
+    models = [MODELS[kind] for kind in kinds]
     more = {"range_m": 3.0} if shorthand else {}
     results = []
     judges_first = False
@@ -179,8 +164,8 @@ def test_beyond_its_reach_path_loss_lets_no_more_pass_than_it_states() -> None:
         see_all_pairs(radio)
         for _ in range(20):
             radio.step({node: (Transmission("robots", b"x"),) for node in range(40)})
-        books = radio.medium.channels["robots"].ledger.by_link()
-        far = np.array(books["receiver"]) >= 40
-        sent, dropped = np.array(books["sent"])[far].sum(), np.array(books["dropped"]["weak-signal"])[far].sum()
+        counts = radio.medium.channels["robots"].ledger.by_link()
+        far = np.array(counts["receiver"]) >= 40
+        sent, dropped = np.array(counts["sent"])[far].sum(), np.array(counts["dropped"]["weak-signal"])[far].sum()
         assert sent == 20 * 40 * 40
         assert sent - dropped <= 0.01 * sent

@@ -22,7 +22,9 @@ point = st.tuples(coordinate, coordinate)
     through_walls=st.booleans(),
 )
 @settings(max_examples=60, deadline=None)
-def test_landmarks_in_sight_are_where_they_are(make_scene, sensor_for, arena, poses, landmarks, range_m, through_walls):
+def test_landmarks_in_sight_have_their_true_bearings(
+    make_scene, sensor_for, arena, poses, landmarks, range_m, through_walls
+):
     scene = make_scene(poses, arena)
     walls = MultiLineString([segment.reshape(2, 2) for segment in arena.segments])
     ends = [Point(end) for segment in arena.segments for end in segment.reshape(2, 2)]
@@ -58,7 +60,7 @@ def test_a_landmark_that_hangs_on_a_wall_is_seen_from_the_side_it_faces(make_sce
         assert [each.landmark for each in other] == [0, 1]
 
 
-def test_what_is_remembered_is_what_would_be_found_afresh(make_scene, sensor_for, walled):
+def test_kept_results_equal_new_results(make_scene, sensor_for, walled):
     random = np.random.default_rng(4)
     scene = make_scene(random.uniform(0.1, 2.9, (12, 3)), walled)
     landmarks = {"landmarks": random.uniform(0.1, 2.9, (15, 2))}
@@ -71,7 +73,7 @@ def test_what_is_remembered_is_what_would_be_found_afresh(make_scene, sensor_for
         assert remembering.read(scene, robots) == fresh.read(scene, robots)
 
 
-def test_a_swarm_that_stands_still_asks_the_arena_nothing(make_scene, sensor_for, walled):
+def test_no_line_of_sight_is_tested_for_a_swarm_that_stands_still(make_scene, sensor_for, walled):
     class Counting(Arena):
         lines = 0
 

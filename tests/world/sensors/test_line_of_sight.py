@@ -14,7 +14,7 @@ heading = st.floats(-7.0, 7.0)
 
 
 def judged(scene, robot, range_m):
-    """Return the reading by shapely: the first thing that the ray comes upon; a case too close to call is none."""
+    """Return the reading by shapely: the first object on the ray; cases within rounding are left out."""
     origin = Point(scene.position[robot])
     along = 10.0 * np.array([math.cos(scene.heading[robot]), math.sin(scene.heading[robot])])
     ray = LineString([origin, scene.position[robot] + along])
@@ -40,7 +40,7 @@ def judged(scene, robot, range_m):
     range_m=st.sampled_from([None, 0.8]),
 )
 @settings(max_examples=60, deadline=None)
-def test_a_robot_sees_what_its_ray_comes_upon_first(make_scene, sensor_for, arena, poses, absent, range_m):
+def test_a_robot_sees_the_first_object_on_its_ray(make_scene, sensor_for, arena, poses, absent, range_m):
     scene = make_scene(poses, arena, [index != absent for index in range(len(poses))], radius_m=RADIUS_M)
     assume(arena.contains(scene.position, 1e-3).all())
     robots = scene.present_ids()
@@ -57,13 +57,13 @@ def test_a_robot_behind_a_wall_is_not_seen_and_one_before_it_is(make_scene, sens
     assert sensor_for(scene, "line_of_sight").read(scene, scene.present_ids()) == [False, False, True]
 
 
-def test_it_sees_as_far_as_the_arena_goes_and_only_ahead(make_scene, sensor_for):
+def test_the_line_of_sight_sensor_sees_across_the_whole_arena_and_only_ahead(make_scene, sensor_for):
     scene = make_scene([(0.1, 1.5, 0.0), (2.9, 1.5, 0.0), (1.5, 0.2, math.pi / 2)])
     assert sensor_for(scene, "line_of_sight").read(scene, scene.present_ids()) == [True, False, False]
 
 
 @pytest.mark.parametrize("count", [180, 300])
-def test_a_large_swarm_is_read_as_robots_are_one_by_one(make_scene, sensor_for, arena, count):
+def test_a_large_swarm_has_the_readings_of_its_robots_one_by_one(make_scene, sensor_for, arena, count):
     """More pairs than are worked on at a time, and a number of rows that does not divide the robots."""
     random = np.random.default_rng(count)
     poses = np.column_stack([random.uniform(0.05, 2.95, (count, 2)), random.uniform(-4.0, 4.0, count)])

@@ -15,7 +15,7 @@ pose = st.tuples(coordinate, coordinate, st.floats(-20.0, 20.0))
 
 
 def read(sensor, scene):
-    """Return the readings of everyone present, as rows of numbers."""
+    """Return the readings of all present robots, as rows of numbers."""
     return np.array(
         [[getattr(each, name) for name in each.__struct_fields__] for each in sensor.read(scene, scene.present_ids())]
     )
@@ -23,7 +23,7 @@ def read(sensor, scene):
 
 @given(poses=st.lists(pose, min_size=1, max_size=6))
 @settings(max_examples=40, deadline=None)
-def test_pose_and_compass_tell_the_truth_within_one_turn(make_scene, sensor_for, poses):
+def test_pose_and_compass_read_the_true_values_within_one_turn(make_scene, sensor_for, poses):
     scene = make_scene(poses)
     told = sensor_for(scene, "pose").read(scene, scene.present_ids())
     compass = sensor_for(scene, "compass").read(scene, scene.present_ids())
@@ -90,7 +90,7 @@ def test_an_arena_in_two_pieces_has_no_one_boundary(make_scene, sensor_for):
 
 @given(walk=st.lists(pose, min_size=2, max_size=6))
 @settings(max_examples=40, deadline=None)
-def test_displacements_put_end_to_end_lead_where_the_robot_is(make_scene, sensor_for, walk):
+def test_the_sum_of_displacements_is_the_position_of_the_robot(make_scene, sensor_for, walk):
     sensor = sensor_for(make_scene([walk[0]]), "odometry")
     place, facing = complex(*walk[0][:2]), complex(math.cos(walk[0][2]), math.sin(walk[0][2]))
     for step, at in enumerate(walk):

@@ -1,4 +1,4 @@
-"""Sensors from a scenario's tables: the built-in ones, other people's, and every mistake in one line each."""
+"""Sensors from a scenario's tables: built-in ones, those of users, and one line for each mistake."""
 
 import sys
 from pathlib import Path
@@ -46,26 +46,33 @@ def mistakes(make, *tables, **surroundings):
     return caught.value.mistakes
 
 
-def test_every_built_in_sensor_fills_its_field_with_what_crosses_the_wire(make, scene):
+def test_the_sensors_of_the_catalogue_fill_every_field_of_an_observation():
+    assert {find(kind).field for kind in SENSORS} >= set(SENSOR_FIELDS) - {"extra"}
+
+
+@pytest.mark.parametrize("kind", sorted(SENSORS))
+def test_a_built_in_sensor_fills_its_field_with_values_that_cross_the_wire_unchanged(kind, make, scene):
     landmarks, field = np.array([[1.0, 1.0]]), Linear(0.0, (1.0, 0.0))
-    sensors = make(*({"kind": kind} for kind in SENSORS), landmarks=landmarks, field=field)
-    assert {sensor.field for sensor in sensors} == set(SENSOR_FIELDS) - {"extra"}
-    robots = scene.present_ids()
-    readings = {sensor.field: sensor.read(scene, robots) for sensor in sensors}
-    for index in range(2):
-        observation = Observation(tick=0, time_s=0.0, **{name: each[index] for name, each in readings.items()})
+    [sensor] = make({"kind": kind, **find(kind).example}, landmarks=landmarks, field=field)
+    assert sensor.field in SENSOR_FIELDS
+    readings = sensor.read(scene, scene.present_ids())
+    assert len(readings) == 2
+    for reading in readings:
+        observation = Observation(tick=0, time_s=0.0, **{sensor.field: reading})
         decoded = decode_observation(encode(observation))
         assert decoded == observation
-        for name in readings:  # equal, and of the same types: no numpy numbers, no lists
-            assert repr(getattr(decoded, name)) == repr(getattr(observation, name))
+        # Equal, and of the same types: no numpy numbers, no lists.
+        assert repr(getattr(decoded, sensor.field)) == repr(getattr(observation, sensor.field))
 
 
-def test_every_built_in_sensor_reads_no_robot_if_none_is_requested(make, scene):
+@pytest.mark.parametrize("kind", sorted(SENSORS))
+def test_a_built_in_sensor_reads_no_robot_if_none_is_requested(kind, make, scene):
     nobody = np.empty(0, dtype=np.int64)
-    sensors = make(*({"kind": kind} for kind in SENSORS), landmarks=np.array([[1.0, 1.0]]), field=Linear(0, (0, 0)))
-    assert [list(sensor.read(scene, nobody)) for sensor in sensors] == [[]] * len(SENSORS)
+    landmarks, field = np.array([[1.0, 1.0]]), Linear(0.0, (0.0, 0.0))
+    [sensor] = make({"kind": kind, **find(kind).example}, landmarks=landmarks, field=field)
+    assert list(sensor.read(scene, nobody)) == []
     scene.present[:] = False
-    assert [list(sensor.read(scene, nobody)) for sensor in sensors] == [[]] * len(SENSORS)
+    assert list(sensor.read(scene, nobody)) == []
 
 
 @pytest.mark.parametrize(
@@ -155,7 +162,7 @@ def test_two_sensors_cannot_fill_the_same_field(make):
     ]
 
 
-def test_other_peoples_sensors_are_gathered_under_their_names(make, scene):
+def test_sensors_of_users_are_collected_in_extra_by_their_names(make, scene):
     sensors = make(
         {"kind": "other_peoples:Thermometer", "unit_m": 0.5}, {"kind": "compass"}, {"kind": "other_peoples:Hygrometer"}
     )
@@ -181,7 +188,8 @@ def test_the_stimuli_of_a_sensor_cross_the_wire_and_its_traits_agree_with_them(k
     random = np.random.Generator(np.random.Philox(7))
     stimuli = [found.rest(), found.extremes(), *(found.stimulus(random, count) for count in (0, 1, 5))]
     for reading in stimuli:
-        observation = Observation(tick=0, time_s=0.0, **{found.field: reading})
+        filled = {found.field: reading} if found.field in SENSOR_FIELDS else {"extra": {found.field: reading}}
+        observation = Observation(tick=0, time_s=0.0, **filled)
         assert decode_observation(encode(observation)) == observation
     assert found.has_items == (isinstance(found.rest(), tuple) and len(found.rest()) == 0)
     if found.wake_event:

@@ -21,7 +21,7 @@ def turned(x, y, heading):
 
 @given(poses=st.lists(pose, min_size=1, max_size=8), absent=st.integers(0, 20))
 @settings(max_examples=60, deadline=None)
-def test_robots_in_sight_are_where_they_are(make_scene, sensor_for, walled, poses, absent):
+def test_robots_in_sight_have_their_true_bearings_and_positions(make_scene, sensor_for, walled, poses, absent):
     scene = make_scene(poses, walled, [index != absent for index in range(len(poses))])
     robots = scene.present_ids()
     bearings = sensor_for(scene, "bearings", range_m=RANGE_M).read(scene, robots)

@@ -15,7 +15,7 @@ RADIUS_M, REACH_M = 0.3, 0.05
 
 
 def judged(scene, robot, switches):
-    """Return the numbers of the closed switches, by shapely; a case too close to call is none."""
+    """Return the numbers of the closed switches, by shapely; cases within rounding are left out."""
     here = Point(scene.position[robot])
     pieces = [LineString(segment.reshape(2, 2)) for segment in scene.arena.segments]
     others = [Point(scene.position[other]) for other in scene.present_ids().tolist() if other != robot]
@@ -35,7 +35,7 @@ def judged(scene, robot, switches):
 
 @given(poses=st.lists(pose, min_size=1, max_size=6), absent=st.integers(0, 12), switches=st.sampled_from([1, 4, 7, 16]))
 @settings(max_examples=60, deadline=None)
-def test_the_switch_that_faces_what_touches_is_closed(make_scene, sensor_for, arena, poses, absent, switches):
+def test_the_switch_that_faces_the_contact_is_closed(make_scene, sensor_for, arena, poses, absent, switches):
     scene = make_scene(poses, arena, [index != absent for index in range(len(poses))], radius_m=RADIUS_M)
     robots = scene.present_ids()
     expected = [judged(scene, robot, switches) for robot in robots.tolist()]
@@ -48,7 +48,7 @@ def test_the_switch_that_faces_what_touches_is_closed(make_scene, sensor_for, ar
 
 
 @pytest.mark.parametrize(("gap_m", "touches"), [(0.0, True), (0.0019, True), (0.0021, False)])
-def test_a_switch_reaches_so_far_from_the_bodys_surface_and_no_farther(make_scene, sensor_for, gap_m, touches):
+def test_a_switch_closes_up_to_its_reach_from_the_bodys_surface_and_no_farther(make_scene, sensor_for, gap_m, touches):
     at_the_wall = make_scene([(0.037 + gap_m, 1.0, 0.0)])
     at_a_robot = make_scene([(1.0, 1.0, 0.0), (1.074 + gap_m, 1.0, math.pi)])
     for scene, bearing in ((at_the_wall, math.pi), (at_a_robot, 0.0)):

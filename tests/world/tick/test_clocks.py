@@ -15,7 +15,7 @@ from zwerm.world.tick.clocks import Clocks
 TABLE = ClockTable(offset_s_max=2.0, drift_ppm_max=1e4)
 
 
-def test_a_clock_is_drawn_by_the_seed_and_one_robot_more_changes_no_other() -> None:
+def test_a_clock_is_drawn_by_the_seed_and_an_additional_robot_changes_no_other() -> None:
     clocks, again, other = Clocks(TABLE, 5, 5, Draws(1)), Clocks(TABLE, 6, 7, Draws(1)), Clocks(TABLE, 5, 5, Draws(2))
     assert clocks.offset_s.tolist() == again.offset_s[:5].tolist() != other.offset_s.tolist()
     assert clocks.drift.tolist() == again.drift[:5].tolist() != other.drift.tolist()

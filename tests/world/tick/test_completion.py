@@ -41,7 +41,7 @@ def completion(done: Sequence[int], **tables: Any) -> Completion:
         ([1, 2, 3], [], [], BASE, False),
     ],
 )
-def test_the_task_is_done_when_the_deciding_node_or_every_living_robot_says_so(
+def test_the_task_is_done_when_the_deciding_node_or_every_living_robot_reports_it(
     done: list[int], exited: list[int], dead: list[int], tables: dict[str, Any], completed: bool
 ) -> None:
     assert completion(done, **tables).completed(exited, dead) is completed

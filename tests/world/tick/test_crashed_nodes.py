@@ -20,4 +20,4 @@ def test_the_commands_of_a_crashed_node_are_refused_and_counted_also_where_late_
         world.advance()
         world.observe()
     assert (world.scene.position[0] == before).all()
-    assert world.intake.refused == {"crashed": 10}
+    assert world.intake.refusals.by_reason == {"crashed": 10}

@@ -1,4 +1,4 @@
-"""Faults of programs, for robots, a base station and the coordinator alike: one file a kind.
+"""Faults of programs, of robots, base stations and the coordinator: one file per kind.
 
 The effect of a fault on a program is the same at the same tick inline and in processes.
 """

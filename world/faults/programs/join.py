@@ -1,4 +1,4 @@
-"""Join: programs are not started before the fault begins. The bodies of robots stand in the arena without power until then."""
+"""Join: programs are not started before the fault begins. Until then the bodies of the robots stand in the arena."""
 
 from typing import ClassVar
 

@@ -1,4 +1,5 @@
-"""Dead beacon: sensors of other robots do not see these robots. Their bodies are still there, and touch feels them."""
+"""Dead beacon: sensors of other robots do not see these robots. Their bodies stay in the arena, and touch sensors
+detect them."""
 
 from typing import Any
 

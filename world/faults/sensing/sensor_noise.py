@@ -1,4 +1,4 @@
-"""Sensor noise: one sensor of some robots, or of all, reads wrong numbers, misses items, and sees items that are not there.
+"""Sensor noise: one sensor of some robots, or of all, has wrong numbers, missing items, and phantom items.
 
 Every number of a reading gets `bias` and Gaussian noise of standard deviation `sd`, in the unit of the sensor. Items of
 a reading are robots or landmarks seen, closed switches, or a bit that is true. A fraction `missed_fraction` of them is
@@ -101,7 +101,7 @@ class SensorNoise(OwnReadingFault):
 def _with_phantom(
     sensor: Sensor, seen: tuple[Any, ...], robot: int, uniform: Callable[[str], float]
 ) -> tuple[Any, ...]:
-    """Return `seen` and an item that is not there, in the order of the sensor."""
+    """Return `seen` and a phantom item, in the order of the sensor."""
     phantom = sensor.phantom(robot, {sensor.item_id(item) for item in seen}, uniform)
     return seen if phantom is None else tuple(sorted([*seen, phantom], key=sensor.item_id))
 

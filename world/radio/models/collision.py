@@ -8,7 +8,8 @@ transmission of the tick interferes, also where another model drops its packets.
 """
 
 import math
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -31,6 +32,7 @@ class Collision(RadioModel):
     cause: ClassVar[str] = "collision"
     memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = CollisionTable
+    example: ClassVar[Mapping[str, Any]] = {"airtime_s": 0.02}
 
     def __init__(self, parameters: CollisionTable, context: ModelContext) -> None:
         if (parameters.airtime_s is None) == (parameters.rate_bytes_s is None):

@@ -5,7 +5,8 @@ and so is every gap to the next.
 """
 
 import math
-from typing import Annotated, ClassVar
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ class Corruption(RadioModel):
 
     memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = CorruptionTable
+    example: ClassVar[Mapping[str, Any]] = {"bit_error_rate": 0.02}
 
     def __init__(self, parameters: CorruptionTable, context: ModelContext) -> None:
         self._rate = parameters.bit_error_rate
@@ -63,5 +65,5 @@ class Corruption(RadioModel):
 
     @classmethod
     def network_rule(cls, parameters: CorruptionTable) -> None:
-        """Raise ValueError: no damaged packet passes a kernel."""
+        """Raise ValueError: a kernel drops damaged packets."""
         raise ValueError("the kernel drops packets with a wrong checksum")

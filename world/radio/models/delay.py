@@ -9,7 +9,8 @@ Distributions of the jitter, each with the mean jitter_s:
     pareto        with shape 2.5: a heavier tail. netem has a similar one, tc-netem(8)
 """
 
-from typing import ClassVar, Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -34,6 +35,7 @@ class Delay(RadioModel):
 
     memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = DelayTable
+    example: ClassVar[Mapping[str, Any]] = {"delay_s": 0.05, "jitter_s": 0.2, "distribution": "exponential"}
 
     def __init__(self, parameters: DelayTable, context: ModelContext) -> None:
         self._table = parameters

@@ -1,9 +1,10 @@
-"""Duplication: some packets arrive more than once, as behind a link layer whose acknowledgements get lost.
+"""Duplication: some packets arrive more than once, as on a link layer that loses acknowledgements.
 
 The models that follow judge a copy with random numbers of its own. It counts as sent, and as a copy.
 """
 
-from typing import Annotated, ClassVar
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -23,6 +24,7 @@ class Duplication(RadioModel):
     """Copies each packet with probability `fraction`; drops nothing."""
 
     Parameters: ClassVar[type[RadioModelTable]] = DuplicationTable
+    example: ClassVar[Mapping[str, Any]] = {"fraction": 0.5, "copies": 2}
 
     def __init__(self, parameters: DuplicationTable, context: ModelContext) -> None:
         self._fraction = parameters.fraction

@@ -10,7 +10,8 @@ ones, loss rate and length of bursts. The transition probabilities follow from t
 With `bad_loss_fraction` = 1 (Gilbert) a burst is a run of lost packets, `burst_packets` long in the mean.
 """
 
-from typing import Annotated, ClassVar
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -35,6 +36,7 @@ class GilbertElliott(RadioModel):
     cause: ClassVar[str] = "burst"
     draw_key: ClassVar[str] = "bursts"
     Parameters: ClassVar[type[RadioModelTable]] = GilbertElliottTable
+    example: ClassVar[Mapping[str, Any]] = {"loss_fraction": 0.4, "burst_packets": 3.0}
 
     def __init__(self, parameters: GilbertElliottTable, context: ModelContext) -> None:
         self._equilibrium, self._enter, self._leave = chances(parameters)

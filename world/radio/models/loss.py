@@ -1,6 +1,7 @@
 """Independent loss: each packet is lost with the same probability, independently of all others (Bernoulli)."""
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from zwerm.scenario.types import Fraction
 from zwerm.world.radio import ModelContext, Packets, RadioModel, RadioModelTable, Transmissions, Verdict
@@ -19,6 +20,7 @@ class Loss(RadioModel):
     cause: ClassVar[str] = "loss"
     memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = LossTable
+    example: ClassVar[Mapping[str, Any]] = {"fraction": 0.3}
 
     def __init__(self, parameters: LossTable, context: ModelContext) -> None:
         self._fraction = parameters.fraction

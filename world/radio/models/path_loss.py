@@ -14,8 +14,9 @@ The defaults are those of an IEEE 802.15.4 radio (0 dBm, -94 dBm) indoors.
 """
 
 import math
+from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -46,6 +47,7 @@ class PathLoss(RadioModel):
     needs_positions: ClassVar[bool] = True
     memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = PathLossTable
+    example: ClassVar[Mapping[str, Any]] = {"tx_power_dbm": -50.0}
 
     def __init__(self, parameters: PathLossTable, context: ModelContext) -> None:
         self._table = parameters

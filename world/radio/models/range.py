@@ -3,7 +3,8 @@
 Clark, Colbourn, Johnson: Unit disk graphs. Discrete Mathematics 86 (1990).
 """
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +27,7 @@ class DiscRange(RadioModel):
     out_of_reach: ClassVar[bool] = True
     memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = RangeTable
+    example: ClassVar[Mapping[str, Any]] = {"range_m": 1.5}
 
     def __init__(self, parameters: RangeTable, context: ModelContext) -> None:
         self.range_max_m = parameters.range_m

@@ -5,7 +5,8 @@ transmission with q bytes before it leaves the radio after (q + its size) / rate
 radio sends or drops all its packets together. A transmission takes no time if earlier models dropped all its packets.
 """
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,6 +28,7 @@ class RateLimit(RadioModel):
 
     cause: ClassVar[str] = "queue-full"
     Parameters: ClassVar[type[RadioModelTable]] = RateTable
+    example: ClassVar[Mapping[str, Any]] = {"rate_bytes_s": 60.0, "queue_bytes": 20.0}
 
     def __init__(self, parameters: RateTable, context: ModelContext) -> None:
         self._rate_bytes_s = parameters.rate_bytes_s

@@ -8,7 +8,8 @@ Without `margin_db` the model drops nothing, and a `path_loss` that follows uses
 packet passes if the walls attenuate it by at most that.
 """
 
-from typing import ClassVar, Final, Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -60,6 +61,7 @@ class WallAttenuation(RadioModel):
     out_of_reach: ClassVar[bool] = True
     memoryless: ClassVar[bool] = True
     Parameters: ClassVar[type[RadioModelTable]] = WallAttenuationTable
+    example: ClassVar[Mapping[str, Any]] = {"material": "glass", "margin_db": 1.0}
 
     def __init__(self, parameters: WallAttenuationTable, context: ModelContext) -> None:
         self._margin_db = parameters.margin_db

@@ -66,7 +66,9 @@ def compare(
     figure: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
-            "--figure", metavar="FILE", help="Where to draw it: .png, .pdf or .svg; beside the rows by default."
+            "--figure",
+            metavar="FILE",
+            help="The file of the figure: .png, .pdf or .svg; by default beside the file of rows.",
         ),
     ] = None,
     retry: Retry = False,
@@ -75,8 +77,8 @@ def compare(
 ) -> None:
     """Compare variants of a scenario, seed by seed: same seeds, same random draws, same faults.
 
-    The first variant is the reference. Prints for each metric the paired difference and its 95 % interval; writes a Parquet
-    file with one row a trial, and a figure. After Ctrl-C the same command continues where it stopped.
+    The first variant is the reference. Prints for each metric the paired difference and its 95 % interval; writes a
+    Parquet file with one row a trial, and a figure. After Ctrl-C the same command continues where it stopped.
 
     Examples:
 

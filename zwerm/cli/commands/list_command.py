@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 
 def list_catalogue(
-    text: Annotated[str, typer.Argument(help="Show what has this text in its name or summary, in full.")] = "",
+    text: Annotated[
+        str, typer.Argument(help="Show only entries with this text in their name or summary, in full.")
+    ] = "",
     whole: Annotated[bool, typer.Option("--all", help="Show every scenario and study with its summary.")] = False,
     kinds: Annotated[bool, typer.Option("--plugins", help="List the plug-ins of each kind instead.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
@@ -91,7 +93,8 @@ def _algorithms(text: str) -> "list[dict[str, Any]]":
 
 
 def _print_algorithms(rows: "Sequence[dict[str, Any]]", whole: bool) -> None:
-    """Print the rows: the `whole` of each entry, or one line an entry, so that the catalogue fits on a screen or two."""
+    """Print the rows: the `whole` of each entry, or one line an entry, so that the catalogue fits on a screen or
+    two."""
     from rich.table import Table
 
     for row in rows:

@@ -1,4 +1,4 @@
-"""`zwerm new`: write a small project of one's own that runs."""
+"""`zwerm new`: write a small project that runs, as the start of a user's own."""
 
 from pathlib import Path
 from typing import Annotated

@@ -11,12 +11,14 @@ from zwerm.cli.terminal import err, errors_as_lines, out
 
 def shrink(
     scenario: ScenarioName,
-    failing: Annotated[str, typer.Option("--failing", metavar="CONDITION", help="Such as 'METRIC < 0.5'.")],
+    failing: Annotated[
+        str, typer.Option("--failing", metavar="CONDITION", help="The condition of a failure, such as 'METRIC < 0.5'.")
+    ],
     seed: Seed = 1,
     sets: Sets = None,
     output: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--out", metavar="FILE.toml", help="Where to write it; runs/SCENARIO-shrunk.toml by default."),
+        typer.Option("--out", metavar="FILE.toml", help="The file to write; runs/SCENARIO-shrunk.toml by default."),
     ] = None,
 ) -> None:
     """Reduce a failing schedule of faults to a smallest one that still fails, and write it as a scenario.

@@ -14,15 +14,15 @@ def twin(
     sets: Sets = None,
     transport: Annotated[
         Literal["udp", "tcp", "both"],
-        typer.Option("--transport", help="What Zenoh runs over; both are two runs, one after the other."),
+        typer.Option("--transport", help="The transport of Zenoh; with `both`, two runs one after the other."),
     ] = "both",
     as_json: Json = False,
 ) -> None:
     """Run a scenario on a real network, in real time: every robot in a network namespace of its own.
 
-    Every packet goes over Zenoh through nftables and tc, which lose and delay packets as the scenario's models say. The
-    models judge the same packets, and the results of both are printed side by side. Needs Linux and root; leaves nothing
-    behind.
+    Every packet goes over Zenoh through nftables and tc, which lose and delay packets by the rules of the scenario's
+    models. The models judge the same packets, and the results of both are printed side by side. Needs Linux and root;
+    leaves nothing behind.
 
     Examples:
 

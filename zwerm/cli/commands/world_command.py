@@ -28,17 +28,21 @@ def world(
     outage_s: Outage = OUTAGE_S,
     plain: Annotated[
         bool,
-        typer.Option("--plain", help="Allow tcp/ beyond this machine: anybody on the way can read and change all."),
+        typer.Option(
+            "--plain", help="Allow tcp/ beyond this machine: hosts on the route can read and change messages."
+        ),
     ] = False,
 ) -> None:
     """Run the world of a scenario and wait for robots on other machines to connect.
 
-    Writes the robots' credentials to a file that only you can read; carry it to where the robots run. Where several hosts run
-    robots, make the credentials of each with [bold]zwerm keys[/bold]. By tls/ and quic/ both ends prove who they are.
+    Writes the robots' credentials to a file that only you can read; copy it to the machines on which the robots run. If
+    several hosts run robots, make the credentials of each host with [bold]zwerm keys[/bold]. With tls/ and quic/ both
+    ends are authenticated.
 
     Examples:
 
-    [bold]zwerm world computation-free --listen tls/0.0.0.0:7447 --name world.example.org --credentials robots.key[/bold]
+    [bold]zwerm world computation-free --listen tls/0.0.0.0:7447 --name world.example.org --credentials
+    robots.key[/bold]
 
     [bold]zwerm world computation-free --listen tls/0.0.0.0:7447 --keys keys/world.key[/bold]
     """
@@ -58,6 +62,7 @@ def world(
                 realtime=options.realtime,
                 watcher=progress,
                 record=options.record,
+                security_log=options.security_log,
                 keys_file=keys,
                 names=names or (),
                 lease_s=outage_s,

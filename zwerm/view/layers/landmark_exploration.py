@@ -1,7 +1,8 @@
-"""The picture layer of landmark-based exploration: the landmark complex over the arena, open frontiers, and assignments.
+"""The picture layer of landmark-based exploration: the landmark complex over the arena, open frontiers, and
+assignments.
 
-As Figs. 10 to 13 of Ramaithitima and Bhattacharya 2018: the complex is drawn where its landmarks truly are, which no robot
-knows. Each simplex is the convex hull of its landmarks. Importing this module needs matplotlib.
+As Figs. 10 to 13 of Ramaithitima and Bhattacharya 2018: the complex is drawn at the true places of its landmarks, to
+which no robot has access. Each simplex is the convex hull of its landmarks. Importing this module needs matplotlib.
 """
 
 from collections.abc import Sequence
@@ -69,7 +70,7 @@ class LandmarkComplexLayer(Layer):
         return [self._simplices, self._edges, self._frontier, self._assigned]
 
     def show(self, tracks: Tracks, index: int, at_s: float | None) -> None:
-        """Show what was known at `at_s`, or at the end."""
+        """Show the state at `at_s`, or at the end."""
         until = float("inf") if at_s is None else at_s + 1e-9
         self._simplices.set_verts([hull for time_s, hull in self._hulls if time_s <= until])
         self._edges.set_segments([line for time_s, line in self._lines if time_s <= until])
@@ -86,7 +87,7 @@ class LandmarkComplexLayer(Layer):
         self._assigned.set_segments(assigned)
 
     def legend(self) -> Sequence[Line2D | Patch]:
-        """Return the entries for all that may be shown."""
+        """Return the entries of the legend."""
         star: dict[str, Any] = {"marker": "*", "markersize": 5, "linestyle": "none"}
         return [
             Line2D([], [], color=LANDMARK, **star, label="landmark"),

@@ -19,7 +19,8 @@ POINTS: Final = 0.9
 
 
 class RadioLinks(Layer):
-    """Straight lines below the robots. A link counts from the first packet to the last one of the run, wherever it was."""
+    """Straight lines below the robots. A link counts from the first packet to the last one of the run, wherever it
+    was."""
 
     colours: ClassVar[Sequence[str]] = (VERMILLION,)
     more_entries: ClassVar[int] = 1
@@ -31,7 +32,7 @@ class RadioLinks(Layer):
 
     @classmethod
     def applies(cls, view: RunView) -> bool:
-        """Return whether links are asked for, and there are some."""
+        """Return whether the run's picture has links, and there are some."""
         return len(view.links) > 0
 
     @property

@@ -37,10 +37,14 @@ Slice = tuple[float, float, float]
 
 
 class Cells(NamedTuple):
-    """The cells of a decomposition: the middle (n, 2) [m] of each, and pairs of adjacent ones, ascending."""
+    """The cells of a decomposition: the middle (n, 2) [m] of each, and pairs of adjacent ones, ascending.
+
+    `gates` (m, 2) [m] are places, one for each pair, at which the free space of the one cell goes on into the other.
+    """
 
     middles: Floats
     edges: list[tuple[int, int]]
+    gates: Floats
 
 
 def cells_of(slices: Sequence[Slice]) -> Cells:
@@ -71,14 +75,25 @@ def cells_of(slices: Sequence[Slice]) -> Cells:
     for segment, name in cell.items():
         members[names[name]].append(segment)
     middles = [_middle(each) for each in members]
-    edges = sorted({(names[cell[a]], names[cell[b]]) for a, b in joined})
-    return Cells(np.array(middles) if middles else NOWHERE, edges)
+    gates = {(names[cell[a]], names[cell[b]]): _gate(a, b) for a, b in joined}
+    edges = sorted(gates)
+    return Cells(
+        np.array(middles) if middles else NOWHERE,
+        edges,
+        np.array([gates[edge] for edge in edges]) if edges else NOWHERE,
+    )
 
 
 def _middle(segments: Sequence[Slice]) -> tuple[float, float]:
     """Return the middle of a cell's middle segment, which lies in the cell."""
     x, low, high = sorted(segments)[len(segments) // 2]
     return x, (low + high) / 2.0
+
+
+def _gate(one: Slice, other: Slice) -> tuple[float, float]:
+    """Return the middle of the passage between two segments on neighbouring slices."""
+    low, high = max(one[1], other[1]), min(one[2], other[2])
+    return (one[0] + other[0]) / 2.0, (low + high) / 2.0
 
 
 class CellsLayer(Layer):
@@ -113,12 +128,18 @@ class CellsLayer(Layer):
         return [self._lines, self._edges, self._nodes, self._dots]
 
     def show(self, tracks: Tracks, index: int, at_s: float | None) -> None:
-        """Show what was reported by `at_s`."""
+        """Show the reports up to `at_s`."""
         shown = [(line, team) for time_s, line, team in self._slices if at_s is None or time_s <= at_s + 1e-9]
         self._lines.set_segments([np.array([[x, low], [x, high]]) for (x, low, high), _ in shown])
         self._lines.set_color([TEAMS[team % len(TEAMS)] for _, team in shown])
         cells = cells_of([line for line, _ in shown])
-        self._edges.set_segments([cells.middles[[one, other]] for one, other in cells.edges])
+        # An edge leads through the passage between its cells, so that it does not cross the obstacle beside it.
+        self._edges.set_segments(
+            [
+                np.array([cells.middles[one], gate, cells.middles[other]])
+                for (one, other), gate in zip(cells.edges, cells.gates, strict=True)
+            ]
+        )
         self._nodes.set_offsets(cells.middles)
         points = [point for time_s, point in self._points if at_s is None or time_s <= at_s + 1e-9]
         self._dots.set_offsets(np.array(points) if points else NOWHERE)

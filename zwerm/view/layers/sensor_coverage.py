@@ -1,7 +1,7 @@
 """The picture layer of sensor coverage: the simplicial complex, its frontier and obstacle edges, and the push paths.
 
-Frontier is cyan and obstacle brown, as in Ramaithitima et al. 2015. Between two reports of the coordinator the robots move
-over the complex, which stays as last reported. Importing this module needs matplotlib.
+Frontier is cyan and obstacle brown, as in Ramaithitima et al. 2015. Between two reports of the coordinator the robots
+move over the complex, which stays as last reported. Importing this module needs matplotlib.
 """
 
 from collections.abc import Sequence
@@ -89,7 +89,7 @@ def _snapshot(moment: TelemetryRecord, reported: ComplexSnapshot) -> Snapshot:
 
 
 class ComplexLayer(Layer):
-    """The complex on a sheet: as last reported, or where nothing was reported, as it truly is."""
+    """The complex on a sheet: as last reported, or the true complex if none was reported."""
 
     colours: ClassVar[Sequence[str]] = (EDGE, FRONTIER, OBSTACLE, PUSH, TRIANGLE["facecolor"])
     legend_entries: ClassVar[int] = 9
@@ -134,7 +134,7 @@ class ComplexLayer(Layer):
         return [self._triangles, self._edges, self._obstacle, self._frontier, self._pushes, self._heads]
 
     def show(self, tracks: Tracks, index: int, at_s: float | None) -> None:
-        """Show the last snapshot reported by `at_s`, or the true complex at the sample where none ever was."""
+        """Show the last snapshot reported by `at_s`, or the true complex at the sample if no node ever reported one."""
         if self._snapshots:
             until = [each for each in self._snapshots if at_s is None or each.time_s <= at_s + 1e-9]
             self.show_snapshot(until[-1] if until else None)
@@ -164,7 +164,7 @@ class ComplexLayer(Layer):
         return [self._write(robot, position[robot]) for robot in np.flatnonzero(snapshot.present).tolist()]
 
     def legend(self) -> list[Line2D | Patch]:
-        """Return the entries for all that may be shown: frontier and pushes only where a complex was reported."""
+        """Return the entries of the legend: frontier and pushes only where a complex was reported."""
         entries: list[Line2D | Patch] = [
             Patch(**TRIANGLE, label="three robots that see each other"),
             Line2D([], [], color=EDGE, linewidth=0.8, label="two that see each other"),

@@ -60,7 +60,7 @@ class TelemetryColours(Layer):
 
     @classmethod
     def applies(cls, view: RunView) -> bool:
-        """Return whether a value is asked for."""
+        """Return whether the run's picture has a value to colour by."""
         return bool(view.colour_by)
 
     @property

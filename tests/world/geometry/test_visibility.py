@@ -20,7 +20,7 @@ MARGIN_M = 1e-6
 
 
 def judged(scene, range_m, through_walls, robots_occlude):
-    """Return the visible pairs, by shapely; a case too close to call is none."""
+    """Return the visible pairs, by shapely; cases within rounding are left out."""
     walls = MultiLineString([segment.reshape(2, 2) for segment in scene.arena.segments])
     centre = {i: Point(scene.position[i]) for i in scene.present_ids().tolist()}
     visible = []
@@ -54,7 +54,7 @@ def test_the_visible_pairs_are_those_that_shapely_finds(make_scene, arena, poses
 
 @given(st.data())
 @settings(max_examples=60, deadline=None)
-def test_what_is_remembered_is_what_would_be_found_afresh(make_scene, walled, data):
+def test_kept_results_equal_new_results(make_scene, walled, data):
     start = data.draw(st.lists(st.tuples(coordinate, coordinate, st.just(0.0)), min_size=6, max_size=6))
     scene = make_scene(start, walled, radius_m=0.1)
     remembering = Visibility()
@@ -74,7 +74,7 @@ def test_what_is_remembered_is_what_would_be_found_afresh(make_scene, walled, da
 
 
 class Counting(Arena):
-    """An arena that remembers how many lines it was asked about."""
+    """An arena that counts the lines that were tested."""
 
     lines = 0
 
@@ -90,7 +90,7 @@ def counted(walled, make_scene):
     return make_scene(np.column_stack([places, np.zeros(12)]), Counting(walled.free, walled.walls))
 
 
-def test_a_swarm_that_stands_still_asks_the_arena_nothing(counted):
+def test_no_line_of_sight_is_tested_for_a_swarm_that_stands_still(counted):
     visibility = Visibility()
     visibility.pairs(counted, 1.5)
     assert counted.arena.lines > 0
@@ -103,7 +103,7 @@ def test_a_swarm_that_stands_still_asks_the_arena_nothing(counted):
     assert counted.arena.lines == 0
 
 
-def test_one_robot_that_moves_has_only_its_own_lines_looked_at(counted):
+def test_only_the_lines_of_a_robot_that_moved_are_tested_again(counted):
     visibility = Visibility()
     visibility.pairs(counted)
     counted.arena.lines = 0
@@ -112,7 +112,7 @@ def test_one_robot_that_moves_has_only_its_own_lines_looked_at(counted):
     assert counted.arena.lines == 11
 
 
-def test_two_sensors_with_different_ranges_share_what_the_arena_said(counted):
+def test_two_sensors_with_different_ranges_share_wall_tests(counted):
     visibility = Visibility()
     visibility.pairs(counted, 2.0)
     counted.arena.lines = 0
@@ -126,7 +126,7 @@ def test_the_range_includes_its_edge(make_scene):
     assert Visibility().pairs(scene, 1.25).tolist() == [[0, 1], [1, 2]]
 
 
-def test_many_robots_hide_each_other_as_few_do(make_scene):
+def test_many_robots_occlude_each_other_as_few_do(make_scene):
     """More robots than are tried at once: against every third robot of every pair, one by one."""
     places = np.random.default_rng(2).uniform(0.1, 2.9, (48, 2))
     scene = make_scene(np.column_stack([places, np.zeros(48)]))

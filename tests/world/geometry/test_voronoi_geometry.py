@@ -1,4 +1,4 @@
-"""Cells, closed forms and quadrature: each judged by something written differently."""
+"""Cells, closed forms and quadrature, each compared with another method."""
 
 import math
 from itertools import combinations
@@ -89,7 +89,7 @@ def test_cells_are_those_of_scipy(seed, count):
 
 @settings(max_examples=100, deadline=None)
 @given(swarms)
-def test_voronoi_neighbours_alone_give_the_same_cell_as_everyone(position):
+def test_voronoi_neighbours_alone_give_the_same_cell_as_all_robots(position):
     arena = Arena(shapely.Polygon(SQUARE))
     for robot, cell in enumerate(VoronoiCells(arena, Constant(1.0)).cells(position)):
         everyone = relative(cell_of(position, robot, SQUARE), position[robot])

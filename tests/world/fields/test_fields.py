@@ -51,7 +51,7 @@ def test_each_kind_has_the_value_its_formula_gives():
 @given(at=points)
 @settings(max_examples=60, deadline=None)
 @pytest.mark.parametrize("kind", ["constant", "linear", "gaussians", "bitmap"])
-def test_the_gradient_is_how_the_value_changes(picture, kind, at):
+def test_the_gradient_equals_finite_differences_of_the_value(picture, kind, at):
     parameters: Any = {
         "constant": {"value": 2.0},
         "linear": {"gradient_per_m": [2.0, -1.0]},
@@ -71,7 +71,7 @@ def test_the_gradient_is_how_the_value_changes(picture, kind, at):
 
 @given(at=points)
 @settings(max_examples=40, deadline=None)
-def test_a_picture_lies_over_the_arena_as_it_looks(picture, at):
+def test_a_bitmap_covers_the_arena_in_the_orientation_of_its_picture(picture, at):
     folder, shades = picture
     field = field_of("bitmap", folder, file="shades.png", low=-1.0, high=3.0)
     x, y = np.arange(6) * 0.5 + 0.25, np.arange(4) * 0.5 + 0.25
@@ -79,7 +79,7 @@ def test_a_picture_lies_over_the_arena_as_it_looks(picture, at):
     assert field.value(at) == pytest.approx(judge(np.clip(at, [x[0], y[0]], [x[-1], y[-1]])))
 
 
-def test_a_picture_lies_where_it_is_put(picture):
+def test_a_bitmap_is_at_its_origin_with_its_size(picture):
     folder, shades = picture
     field = field_of("bitmap", folder, file="shades.png", origin_m=[1.0, 2.0], size_m=[12.0, 16.0])
     lower_left_pixel, upper_right_pixel = [2.0, 4.0], [12.0, 16.0]

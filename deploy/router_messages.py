@@ -1,0 +1,164 @@
+"""The router's own messages about what it refused: denied operations, wrong passwords, messages that are too long.
+
+Zenoh reports these only in its log, which it writes to descriptor 1. `capture` moves the standard output of this process to
+another descriptor, and reads Zenoh's log in a thread. This holds until the process ends, because Zenoh's log cannot be
+switched off again. So it is for the command line. The log has a line for each message that the router carries: the world
+needs about half as much processor time again (measured with 30 robots in lock-step).
+"""
+
+import os
+import re
+import sys
+import threading
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import zenoh
+
+# What Zenoh's log holds: every decision of the access control, failed handshakes, and discarded messages.
+_FILTER: Final = ",".join(
+    (
+        "zenoh::net::routing::interceptor::access_control=trace",
+        "zenoh_transport::unicast::establishment::accept=debug",
+        "zenoh_transport::unicast::manager=trace",
+        "zenoh_transport::unicast::universal::rx=trace",
+    )
+)
+
+DENIED: Final = "denied"
+FOREIGN: Final = "foreign-session"
+PASSWORD: Final = "password"
+OVERSIZED: Final = "oversized"
+SILENT: Final = "silent"
+FULL: Final = "full"
+
+# A text in a line of the log, and the reason of the refusal that it reports.
+_TEXTS: Final = (
+    (b"Invalid password", PASSWORD),
+    (b"Invalid user", PASSWORD),
+    (b"Expected extension", PASSWORD),
+    (b"did not match any configured ACL subject", FOREIGN),
+    (b"Defragmentation buffer full", OVERSIZED),
+    (b"Failed to accept link before deadline", SILENT),
+    (b"Max transports reached", FULL),
+    (b"Closing link for preventing potential DoS", FULL),
+)
+
+_CACHING: Final = re.compile(rb"ACL \(ingress\): caching permissions for `([^`]*)`")
+_DENIAL: Final = re.compile(rb"(Using cached result: )?(\S+)(?: on (.*?))? is unauthorized to (.+) \(ingress\) on (.*)")
+_USER: Final = re.compile(rb"Username\(node-(\d+)\)")
+
+# Bytes of the log that one read takes, and the longest time that reading all of it may take [s].
+_READ_BYTES: Final = 1 << 18
+SETTLE_S_MAX: Final = 30.0
+
+
+class RouterEvent(NamedTuple):
+    """One refusal by the router: its reason, the node if the router knows it (else -1), and what was tried."""
+
+    reason: str
+    node: int
+    detail: str
+
+
+class RefusalParser:
+    """Finds refusals in the lines of Zenoh's log.
+
+    When the router first meets a key, it evaluates all operations on it in advance, and logs each result as if it had been
+    tried. The parser skips one such line for each operation that follows the announcement of a key. Keys and session ids are
+    what a session chose to send: a hostile one can add false lines, but cannot take back true ones.
+    """
+
+    def __init__(self) -> None:
+        self._key = b""
+        self._evaluated: set[bytes] = set()
+        self._node_of: dict[bytes, int] = {}  # by session
+
+    def parse(self, line: bytes) -> RouterEvent | None:
+        """Return the refusal that a line reports, or None."""
+        if b"unauthorized" in line:
+            return self._denial(line)
+        if announced := _CACHING.search(line):
+            self._key, self._evaluated = announced[1], set()
+            return None
+        if b" is authorized" in line or b"Received: " in line:  # most lines; a payload may hold any text
+            return None
+        for text, reason in _TEXTS:
+            if text in line:
+                return RouterEvent(reason, -1, text.decode())
+        return None
+
+    def _denial(self, line: bytes) -> RouterEvent | None:
+        found = _DENIAL.search(line)
+        if found is None:  # towards a node: the router withholds what the node must not see
+            return None
+        cached, session, subject, operation, key = found.groups()
+        if user := _USER.search(subject or b""):
+            self._node_of[session] = int(user[1])
+        if not cached and key == self._key and operation not in self._evaluated:
+            self._evaluated.add(operation)
+            return None
+        tried = f"session {_text(session)}: {_text(operation)} on {_text(key)}"
+        return RouterEvent(DENIED, self._node_of.get(session, -1), tried)
+
+
+def _text(part: bytes) -> str:
+    return part[:200].decode("utf-8", "replace")
+
+
+class RouterMessages:
+    """Zenoh's log of this process, read in a thread of its own. `on_event` is called there with each refusal."""
+
+    def __init__(self) -> None:
+        self.on_event: Callable[[RouterEvent], object] | None = None
+        self._parser = RefusalParser()
+        self._settled = threading.Event()
+        reader, writer = os.pipe()
+        sys.stdout.flush()
+        if _is_descriptor_1(sys.stdout):
+            sys.stdout = os.fdopen(os.dup(1), "w", encoding=sys.stdout.encoding)
+        os.dup2(writer, 1)
+        os.close(writer)
+        before = {name: os.environ.get(name) for name in ("RUST_LOG", "NO_COLOR")}
+        os.environ |= {"RUST_LOG": _FILTER, "NO_COLOR": "1"}
+        zenoh.init_log_from_env_or(_FILTER)
+        for name, value in before.items():
+            os.environ.pop(name)
+            if value is not None:
+                os.environ[name] = value
+        threading.Thread(target=self._read, args=(reader,), name="zwerm-router-messages", daemon=True).start()
+
+    def settle(self) -> None:
+        """Return when everything that Zenoh has logged so far was read."""
+        self._settled.clear()
+        os.write(1, b"\n" + _SETTLE + b"\n")
+        self._settled.wait(SETTLE_S_MAX)
+
+    def _read(self, reader: int) -> None:
+        rest = b""
+        while block := os.read(reader, _READ_BYTES):
+            *lines, rest = (rest + block).split(b"\n")
+            for line in lines:
+                if line == _SETTLE:
+                    self._settled.set()
+                elif (event := self._parser.parse(line)) is not None and self.on_event is not None:
+                    self.on_event(event)
+
+
+_SETTLE: Final = b"zwerm: everything before this line was read"
+_capturing: RouterMessages | None = None
+
+
+def capture() -> RouterMessages:
+    """Begin to read Zenoh's log in this process, before its first session opens. The same object every time."""
+    global _capturing
+    if _capturing is None:
+        _capturing = RouterMessages()
+    return _capturing
+
+
+def _is_descriptor_1(stream: object) -> bool:
+    try:
+        return stream.fileno() == 1  # type: ignore[attr-defined, no-any-return]
+    except (AttributeError, OSError, ValueError):
+        return False
