@@ -79,7 +79,8 @@ class Landmarks(Sensor):
             return row, landmark
         if len(robots) * len(landmarks) <= _FEW_PAIRS:
             dx, dy = landmarks[:, 0] - position[:, :1], landmarks[:, 1] - position[:, 1:]
-            return (dx**2 + dy**2 <= self._range_m**2).nonzero()
+            row, landmark = (dx**2 + dy**2 <= self._range_m**2).nonzero()
+            return row, landmark
         # Slightly too far, so that only the exact comparison below decides at the edge of the range.
         reach_m = self._range_m * (1.0 + 1e-9)
         found = cKDTree(position).sparse_distance_matrix(self._tree, reach_m, output_type="ndarray")
