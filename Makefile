@@ -74,7 +74,7 @@ package:  ## build the package, and try it in a fresh environment
 
 lock:  ## resolve the dependencies anew (needs uv)
 	$(COMPILE) --upgrade --output-file requirements.txt
-	$(COMPILE) --extra frames --group dev --constraint requirements.txt --upgrade --output-file requirements-dev.txt
+	$(COMPILE) --extra cluster --extra evolve --extra frames --group dev --constraint requirements.txt --upgrade --output-file requirements-dev.txt
 
 clean:  ## remove .venv and everything that was built
 	rm -rf $(VENV) build dist site *.egg-info zwerm/maths/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis

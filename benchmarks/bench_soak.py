@@ -193,9 +193,11 @@ def rows_of(result: RunResult, samples: Sequence[dict[str, float]]) -> list[dict
         count("ticks", result.ticks),
         count("observations", result.robot_ticks),
         count("radio packets delivered", result.radio["delivered"]),
-        count("robots that crashed or restarted", len(set(result.crashed) | set(result.restarted))),
+        count(
+            f"robots that crashed or restarted, of {result.robots}", len(set(result.crashed) | set(result.restarted))
+        ),
         count("lost by the middleware", result.middleware_lost, "0"),
-        count("refused messages", result.metrics["refused_messages"], "0"),
+        count("refused messages", result.metrics["refused_messages"]),
         count("late commands", result.metrics["late_commands"]),
         count("late ticks", result.metrics["tick_overruns"]),
     ]

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.deploy.endpoints import is_encrypted, is_loopback
 from zwerm.deploy.identity import load, slice_of
 from zwerm.deploy.supervisor import JOIN_DEADLINE_S, LocalSupervisor, prepare
@@ -36,6 +37,7 @@ def run_robots(
     ids: str = "",
     progress: Callable[[int, int], object] | None = None,
     deadline_s: float = JOIN_DEADLINE_S,
+    confinement: Confinement = UNCONFINED,
 ) -> dict[int, int]:
     """Start the robots `ids` (all in the file, if empty), wait until they end, and return their exit codes by id.
 
@@ -48,7 +50,7 @@ def run_robots(
         credentials = slice_of(credentials, parse_ids(ids))
     prepare(len(credentials.nodes))
     start_s = time.monotonic()
-    with LocalSupervisor(endpoint, credentials) as supervisor:
+    with LocalSupervisor(endpoint, credentials, confinement=confinement) as supervisor:
         supervisor.start(progress, deadline_s - (time.monotonic() - start_s))
         supervisor.wait()
         return supervisor.exit_codes

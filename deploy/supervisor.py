@@ -22,6 +22,7 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 from typing import Any, Final
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.process import main
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.errors import LinkError
@@ -39,6 +40,10 @@ TERMINATE_WAIT_S: Final = 2.0
 # Open files of this process for each robot: two pipes and the router's end of the connection.
 _FILES_PER_ROBOT: Final = 3
 _FILES_MIN: Final = 16_384
+
+# Bytes of the reports of robots that one read takes, and a bound of the length of a password: a report may be cut in two.
+READ_BYTES: Final = 65_536
+PASSWORD_BYTES_MAX: Final = 128
 
 # The place of the session id in /proc/PID/stat, after the name.
 _SESSION: Final = 3
@@ -99,7 +104,11 @@ class LocalSupervisor:
         *,
         order: Sequence[int] | None = None,
         stations: Mapping[int, Station] | None = None,
+        confinement: Confinement = UNCONFINED,
     ) -> None:
+        """Raises LinkError where this machine cannot confine robots so."""
+        confinement.check()
+        self._confinement = confinement
         self._endpoint = endpoint
         self._run = credentials.run
         self._terms = credentials.terms
@@ -200,9 +209,13 @@ class LocalSupervisor:
         return [process for process in self._processes.values() if process.exitcode is None]
 
     def _launch(self, credentials: Sequence[Credential], deadline_s: float) -> Iterator[int]:
-        """Start a process for each of `credentials`, and yield each node's id once it has joined."""
+        """Start a process for each of `credentials`, and yield each node's id once it has joined.
+
+        A robot reports with its password, because its controller could write to the same pipe: it cannot report for others.
+        """
         waiting = deque(credentials)
         missing: dict[int, tuple[ForkServerProcess, float]] = {}
+        heard = b""
         reader, writer = self._context.Pipe(duplex=False)
         with reader, writer:
             while waiting or missing:
@@ -215,9 +228,11 @@ class LocalSupervisor:
                 sentinels = [process.sentinel for process, _ in missing.values()]
                 ready = wait([reader, *sentinels], max(0.0, end_s - time.monotonic()))
                 if reader in ready:  # before the sentinels: a joined robot may have ended since
-                    node = int(reader.recv_bytes())
-                    del missing[node]
-                    yield node
+                    heard += os.read(reader.fileno(), READ_BYTES)
+                    for node in [node for node in missing if self._credentials[node].password.encode() in heard]:
+                        del missing[node]
+                        yield node
+                    heard = heard[-PASSWORD_BYTES_MAX:]
                     continue
                 for process, _ in missing.values():
                     if process.sentinel in ready:
@@ -231,6 +246,7 @@ class LocalSupervisor:
             args=(
                 *(self._run, credential, self._endpoint, self._terms, deadline_s, joined),
                 self._stations.get(credential.node),
+                self._confinement,
             ),
             name=f"node {credential.node}",
             daemon=True,

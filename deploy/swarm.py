@@ -18,6 +18,7 @@ from typing import NamedTuple, Self
 
 import msgspec
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import code_of
 from zwerm.deploy.authority import certify
@@ -147,6 +148,7 @@ class LocalSwarm(_Swarm):
         restart: RestartSpec | None = None,
         stations: Mapping[int, Station] | None = None,
         on_refusal: RefusalListener | None = None,
+        confinement: Confinement = UNCONFINED,
     ) -> None:
         """`order` is the order of starting, `deadline_s` the time each process has to join, `paced` means real time.
 
@@ -156,6 +158,7 @@ class LocalSwarm(_Swarm):
         super().__init__(run, members, progress, deadline_s, paced, on_refusal)
         self._order = [node for node in (members if order is None else order) if node not in late_joiners]
         self._restart = restart
+        self._confinement = confinement
         self._stations = stations
         self._ran = set(self._order)
         self._stopped: set[int] = set()
@@ -167,7 +170,9 @@ class LocalSwarm(_Swarm):
         self.credentials = issue(self._run, self._members)
         self._listen(directory, [endpoint])
         self._current = {credential.node: credential for credential in self.credentials.nodes}
-        self.supervisor = LocalSupervisor(endpoint, self.credentials, order=self._order, stations=self._stations)
+        self.supervisor = LocalSupervisor(
+            endpoint, self.credentials, order=self._order, stations=self._stations, confinement=self._confinement
+        )
         self._stack.callback(self._end)
 
     def _gather(self) -> None:

@@ -1,8 +1,9 @@
 """Draw the figures of stored measurements: `python docs/figures.py`.
 
-Each figure shows rows of a CSV file in `measurements/`, so it is drawn again from the same file that a table shows.
+Each figure shows rows of a CSV file in `measurements/` or beside the figure, so it is drawn again from the same file.
 """
 
+import csv
 import sys
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +18,12 @@ FOLDER: Final = Path(__file__).parent
 LOSS: Final = "compare-small-hall"
 AXIS: Final = "radio.loss+uplink.loss"
 STYLES: Final = {"central": ("#0072B2", "o"), "decentralised": ("#D55E00", "s")}
+SOAK: Final = FOLDER / "images" / "soak.csv"  # as `benchmarks/bench_soak.py --series` writes it
+SOAK_PANELS: Final = {
+    "memory of the world [MB]": {"world_mb": "world"},
+    "memory of a robot [MB]": {"old_robot_mb_mean": "mean of those that live on", "robot_mb_max": "largest"},
+    "open descriptors": {"world_descriptors": "world", "robot_descriptors_max": "a robot, most"},
+}
 METRICS: Final = {
     "coverage_fraction": "coverage",
     "robots_deployed": "robots deployed",
@@ -54,6 +61,24 @@ def loss_figure() -> Figure:
     return figure
 
 
+def soak_figure() -> Figure:
+    """Return memory and descriptors of the world and of its robots over a long run."""
+    with SOAK.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    minutes = [float(row["time_s"]) / 60.0 for row in rows]
+    figure = Figure(figsize=(10.5, 3.2), layout="constrained")
+    for axes, (title, columns) in zip(figure.subplots(1, 3), SOAK_PANELS.items(), strict=True):
+        for (column, label), (colour, _) in zip(columns.items(), STYLES.values(), strict=False):
+            axes.plot(minutes, [float(row[column]) for row in rows], color=colour, label=label)
+        axes.set_title(title, loc="left", fontsize=10)
+        axes.set_xlabel("minutes")
+        axes.grid(alpha=0.3)
+        axes.set_ylim(bottom=0.0)
+        if len(columns) > 1:
+            axes.legend(frameon=False, loc="lower right")
+    return figure
+
+
 def _draw(axes: Any, rows: list[dict[str, str]], variant: str, colour: str, marker: str) -> None:
     x = [float(row[AXIS]) for row in rows]
     mean = [float(row["mean"]) for row in rows]
@@ -62,9 +87,9 @@ def _draw(axes: Any, rows: list[dict[str, str]], variant: str, colour: str, mark
 
 
 def main() -> None:
-    path = FOLDER / "compare-loss.png"
-    loss_figure().savefig(path, dpi=110)
-    print(path.relative_to(FOLDER.parent))
+    for path, figure in ((FOLDER / "compare-loss.png", loss_figure), (FOLDER / "images" / "soak.png", soak_figure)):
+        figure().savefig(path, dpi=110)
+        print(path.relative_to(FOLDER.parent))
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 @pytest.fixture(autouse=True)
 def _robots_importable(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Let tests import robots, and forget what a test has imported from its temporary folder.
+    """Let tests import robots, and drop the modules that a test has imported from its temporary folder.
 
     Another test may write a module of the same name, which would be refused as mixed up with the first.
     """

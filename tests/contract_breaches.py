@@ -17,7 +17,7 @@ def violations(controller: Any, *arguments: Any, **options: Any) -> list[str]:
 
 
 def stepping(step: Callable[[Any, Observation], Any], **attributes: Any) -> type[Controller]:
-    """Return a controller of which everything is good but `step`."""
+    """Return a controller that is correct except for `step`."""
     return type("Bad", (Controller,), {"step": step, **attributes})
 
 

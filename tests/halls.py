@@ -1,4 +1,4 @@
-"""Small halls for sensor coverage, and how to run one under a test's eyes."""
+"""Small halls for sensor coverage, and a function that runs one step by step for a test."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ def drive(
     on_tick: Callable[[World], None] | None = None,
     around: Callable[[int, Link], Link] | None = None,
 ) -> tuple[str, World]:
-    """Run inline; `on_tick` may meddle with the world, `around` with what a node hears and says."""
+    """Run inline; `on_tick` may change the world, `around` the messages from and to a node."""
     world = assemble(scenario, 1)
     answers: dict[int, Link] = {n: Node(*each).answer for n, each in node_specs(scenario, 1).items()}
     if around is not None:

@@ -1,13 +1,13 @@
 """Every interleaving of the redundancy protocol on a small graph, by explicit exploration of its states.
 
 The network is the set of all messages ever sent. Any of them can be delivered at any time, any number of times, or
-never. This is loss, delay, reordering and duplication at once. Robots ask, give up, leave, look around, lose their
-memory, come and are moved by others whenever they can. Time is a few ticks. A robot's state is interned, and the effect
-of an event on it is computed once.
+never. This is loss, delay, reordering and duplication at once. Robots request, give up, leave, observe, lose their
+memory, arrive and are moved at any time. Time is a few ticks. A robot's state is interned, and the effect of an event
+on it is computed once.
 
-Events without influence are left out. A denial has the effect of giving up, which robots do anyway. A grant only allows
-more, so it arrives at once; a robot need not use it. The leave requests in a list are also in messages that were sent.
-A message that its receiver will always ignore is deleted.
+Events without influence are left out. A denial has the effect of giving up, which can happen at any time. A grant only
+allows more, so it arrives at once; a robot may ignore it. The leave requests in a list are also in messages that were
+sent. A message that its receiver will always ignore is deleted.
 """
 
 from collections.abc import Iterator, Mapping
@@ -42,7 +42,8 @@ class Budget(NamedTuple):
 
 
 class State(NamedTuple):
-    """A swarm: ids of the robots' states, a bit for every message ever sent, and a bit for everyone who stands or is seen."""
+    """A swarm: ids of the robots' states, a bit for every message ever sent, and a bit for every robot that stands or
+    is visible."""
 
     now: int
     robots: tuple[int, ...]
@@ -58,7 +59,7 @@ BEFORE, UNDER_WAY, AFTER = 2, 1, 0
 
 
 class Violation(Exception):
-    """A state in which what is promised does not hold."""
+    """A state that violates the guarantees."""
 
 
 class Explorer:
@@ -159,7 +160,7 @@ class Explorer:
         return self.graph if state.moving else self.later
 
     def _only_forbids(self, state: State, sender: int, receiver: int, message: LockProtocolMessage) -> bool:
-        """Return whether all that a message would do is to make its receiver refuse others, which might as well be lost."""
+        """Return whether a message only makes its receiver refuse others, which has the effect of their loss."""
         lock = self._objects[state.robots[receiver]]._lock
         return isinstance(message, LockRelease) and (
             lock is None or lock.holder != sender or lock.number > message.number
@@ -171,7 +172,7 @@ class Explorer:
     # --- robots, interned -------------------------------------------------------------------------------------------
 
     def _first(self) -> State:
-        """Everyone stands, and knows all lists."""
+        """All robots stand, and have all lists."""
         standing = sum(1 << node for node in self.graph if not (self.budget.comes and node == self.mover))
         robots = {node: self.kind(node, LEASE_TICKS, -LEASE_TICKS) for node in self.graph}
         for node, robot in robots.items():
@@ -226,7 +227,7 @@ class Explorer:
         return state._replace(robots=robots, sent=left)
 
     def _still_matters(self, state: State, sender: int, receiver: int, message: LockProtocolMessage) -> bool:
-        """Return whether a message can allow anything to those who have asked or will."""
+        """Return whether a message can allow anything to a present or future requester."""
         match message:
             case NeighbourList():
                 return receiver in state.asks
@@ -235,7 +236,7 @@ class Explorer:
         return True
 
     def _without_lists(self, number: int) -> int:
-        """Return the robot's state less what only matters to who will ask."""
+        """Return the robot's state without the parts that only a future requester uses."""
         if number not in self._bare:
             robot = _copy(self._objects[number])
             robot._lists = {}
@@ -269,7 +270,7 @@ class Explorer:
     def _step(
         self, number: int, now: int, seen: tuple[int, ...] | None, event: str, *what: Any
     ) -> tuple[int, tuple[Any, ...]]:
-        """Let a robot see whom it sees now, and then something happen; return its new state and what it sends."""
+        """Let a robot observe its neighbours, and then apply an event; return its new state and its messages."""
         key = (number, now, seen, event, *what)
         if key not in self._done:
             robot = _copy(self._objects[number])

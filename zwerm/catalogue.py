@@ -43,6 +43,7 @@ class Algorithm:
 
     `variants` are tried in order: the first that agrees with the services a scenario names is taken. `metrics` are
     measured and `layers` drawn in every run of these controllers. `scenarios` and `studies` are patterns of file names.
+    `reactive` names, by controller, the function that returns the wheel speeds of a robot in a batch (`zwerm.evolve.batch`).
     """
 
     name: str
@@ -54,6 +55,7 @@ class Algorithm:
     metrics: Sequence[str] = ()
     layers: Sequence[str] = ()
     scenarios: Sequence[str] = ()
+    reactive: Mapping[str, str] = field(default_factory=dict)
 
 
 _SENSOR_COVERAGE: Final = "zwerm.agents.sensor_coverage"
@@ -158,6 +160,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             }
         },
         scenarios=("computation-free*",),
+        reactive={"computation-free": "zwerm.agents.computation_free.reactive:wheel_fractions"},
     ),
     Algorithm(
         name="robot_teams",
@@ -211,6 +214,8 @@ COMMANDS: Final = {
     "shrink": "zwerm.cli.commands.shrink_command:shrink",
     "study": "zwerm.cli.commands.study_command:study",
     "compare": "zwerm.cli.commands.compare_command:compare",
+    "merge": "zwerm.cli.commands.merge_command:merge",
+    "evolve": "zwerm.cli.commands.evolve_command:evolve",
 }
 
 SENSORS: Final = {

@@ -24,6 +24,11 @@ class WheelTable(Struct, frozen=True, forbid_unknown_fields=True):
     right_1: Speed = -0.911843
 
 
+def wheel_fractions(wheels: WheelTable) -> tuple[float, float, float, float]:
+    """Return left and right wheel speed as fractions of the greatest: without a robot in sight, and with one."""
+    return wheels.left_0, wheels.right_0, wheels.left_1, wheels.right_1
+
+
 class ComputationFree(Controller):
     """(v_l, v_r) = (v_l,0, v_r,0) if s = 0, (v_l,1, v_r,1) otherwise. Ozdemir 2019, eq. 1."""
 

@@ -26,6 +26,7 @@ from typing import Any, Final, TextIO
 import msgspec
 import uvloop
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import code_of
 from zwerm.agents.runtime.node import Node
@@ -55,6 +56,7 @@ def main(
     deadline_s: float,
     joined: Connection,
     station: Station | None = None,
+    confinement: Confinement = UNCONFINED,
 ) -> None:
     """Run one robot and exit: 0 end of the run, 1 the controller failed, 2 could not join, 3 lost the world.
 
@@ -79,8 +81,10 @@ def main(
     try:
         if station is not None:
             enter_namespace(station.namespace)
+        elif is_local(endpoint):
+            confinement.leave_network()
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            code = runner.run(run_node(run, credential, endpoint, terms, deadline_s, joined, station))
+            code = runner.run(run_node(run, credential, endpoint, terms, deadline_s, joined, station, confinement))
     except ZwermError as error:
         sys.stderr.write(f"zwerm: {error}\n")
         code = EXIT_REFUSED
@@ -121,10 +125,11 @@ async def run_node(
     deadline_s: float = 30.0,
     joined: Connection | None = None,
     station: Station | None = None,
+    confinement: Confinement = UNCONFINED,
 ) -> int:
     """Join the run, answer observations until its end, and return the exit code.
 
-    Writes the node's id to `joined` once the node has joined. Raises ZwermError if it cannot join.
+    Writes the node's password to `joined` once the node has joined. Raises ZwermError if it cannot join.
     """
     loop = asyncio.get_running_loop()
     end: asyncio.Future[int] = loop.create_future()
@@ -186,6 +191,9 @@ async def run_node(
         welcome = link.join()
         loop.add_signal_handler(signal.SIGTERM, finish, 0)
         try:
+            confinement.apply(credential.node)  # after the connection, whose socket only the world's user may open
+            if confinement.first_user is not None:  # the kernel forgets the request when the user changes
+                die_with_parent(_server)
             answer = _node(welcome, radio, fail).answer
         except ControllerError as error:
             link.send(encode(Failure(0, str(error), "")))
@@ -198,7 +206,7 @@ async def run_node(
             loop.add_reader(parent.sentinel, os._exit, EXIT_LOST)
         if joined is not None:
             with contextlib.suppress(OSError), joined:  # the supervisor does not wait any more
-                joined.send_bytes(str(credential.node).encode())
+                os.write(joined.fileno(), credential.password.encode())
         link.listen(receive_in_loop if welcome.paced else receive)
         code = await end
         if code == EXIT_FAILED:

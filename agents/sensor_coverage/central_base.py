@@ -31,7 +31,7 @@ class CentralBase(CentralRobot):
             self._heard_s = observation.time_s
         elif observation.time_s > self._heard_s + SILENCE_S_MAX - 1e-9:
             self._heard_s = observation.time_s
-            command.gave_up = f"coordinator-lost: not a word from the coordinator for {SILENCE_S_MAX:g} s"
+            command.gave_up = f"coordinator-lost: no message from the coordinator for {SILENCE_S_MAX:g} s"
         if command.wake is not None:
             command.wake = self._before_silence(command.wake)
         return command

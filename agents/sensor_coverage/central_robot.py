@@ -41,7 +41,7 @@ from zwerm.agents.sensor_coverage.protocols.component_loop import Codec, Compone
 from zwerm.agents.sensor_coverage.protocols.transport.deduplication import RequestDeduplicator
 from zwerm.wire.messages import BodyVelocity, Command, Observation, Wake
 
-# A robot within this distance [m] of the point where it came out has not left the depot's door.
+# A robot within this distance [m] of the point where it came out still stands at the exit of the depot.
 HOME_M: Final = 0.05
 
 UPLINK_CODEC: Final = Codec(read_request, write)

@@ -13,10 +13,9 @@ class CheapestFirst:
     """Assigns the deployments with the cheapest paths, `pushes_max` at most, that do not cross.
 
     Each path has slots, and the slots that it uses as landmarks. Two pushes do not cross if no slot of one path is
-    among those of the other. Then
-    no robot takes a moving robot for a static landmark, and the new slots are far apart. A plan of lower priority is
-    assigned only where no plan of higher priority is reachable in the same component of the complex. A walk along a wall
-    is assigned alone.
+    among those of the other. Then no robot takes a moving robot for a static landmark, and the new slots are far apart.
+    A plan of lower priority is assigned only where no plan of higher priority is reachable in the same component of the
+    complex. A walk along a wall is assigned alone.
     """
 
     def __init__(self, slots: Slots, pushes_max: int) -> None:

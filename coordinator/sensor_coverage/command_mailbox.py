@@ -111,7 +111,7 @@ class CommandMailbox:
             if before != response.incarnation:
                 self.incarnations[node] = response.incarnation
                 self._unread.append((node, response.answer))
-                if before is not None:  # it has forgotten its request
+                if before is not None:  # it has lost its request
                     self._pending.pop(node, None)
             return
         if response.to_incarnation != self._incarnation:

@@ -45,7 +45,7 @@ WATCH_TICKS: Final = 50
 # Explanations of the outcomes other than `covered`.
 GIVEN_UP: Final = {
     "depot-dry": "the depot is empty",
-    "source-blocked": "no robot gets away from the base",
+    "source-blocked": "no robot can leave the base",
     "source-lost": "no base station answers",
     "cut-off": "no path leads to the frontier",
     "no-end": "too many cycles",
@@ -181,7 +181,7 @@ class SensorCoverageCoordinator:
         return moved
 
     def _run(self) -> Routine[None]:
-        """Call the roll, carry out the algorithm, and report the numbers."""
+        """Send the roll call, carry out the algorithm, and report the numbers."""
         self.mailbox.roll_call(RollCall(1), ROLL_CALL_COPIES if self._restarted else 1)
         yield from self._algorithm_1()
         self.outcome = self.outcome or "no-end"
@@ -364,7 +364,7 @@ class SensorCoverageCoordinator:
         return "source-blocked" if alone else "cut-off"
 
     def _reconsider_outcome(self) -> Routine[None]:
-        """Go on after all if silent stations may be a first loss, or if the covered space is to be watched."""
+        """Continue if silent stations may be a first loss, or if `watch_until_s` has not passed."""
         if self.outcome == "source-lost" and self.mailbox.suspect_loss():
             self.outcome = ""
             for slot, base in self.sources.stations.items():

@@ -2,8 +2,8 @@
 
 The coordinator asks robots that the frontier does not need: they are not on the fence, and their slot would not be
 expanded to again. The robots decide, by the link criterion and with a lock from every neighbour. No neighbour of a
-robot that has left or is silent can leave. Each scan reports which robots have left, so a coordinator without memory
-knows.
+robot that has left or is silent can leave. Each scan reports which robots have left, so a coordinator needs no
+memory of them.
 """
 
 from collections.abc import Collection, Iterator, Mapping

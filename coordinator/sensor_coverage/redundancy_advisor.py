@@ -2,8 +2,8 @@
 
 Robots report their parts of the complex (`messages.advice`). After a pause without new reports the advisor composes the
 complex. It finds the robots that a relative 2-cycle through the fence does not use (`relative_homology`), and advises
-some of them. No two of these see each other, and each leaves b0 and b1 as they are. The advisor knows no slot, no
-direction and no push. It moves no robot, and decides nothing without the neighbours' agreement.
+some of them. No two of these see each other, and each leaves b0 and b1 as they are. The advisor has no slots, directions
+and pushes. It moves no robot, and decides nothing without the neighbours' agreement.
 
 All its knowledge is reported again and again: its messages are repeated, and it asks robots that another robot sees and
 that have not reported. So an advisor that starts again needs no memory.

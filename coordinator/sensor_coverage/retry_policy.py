@@ -1,6 +1,6 @@
-"""When to repeat a request, and how long to wait for its answer, by the measured fraction of lost messages.
+"""The times of repeated requests and the waiting times for answers, by the measured fraction of lost messages.
 
-Before the first loss a request is repeated only when its answer is overdue: a perfect radio costs nothing. After the
+Before the first loss a request is repeated only when its answer is overdue: a perfect radio has no repetitions. After the
 first loss it is repeated after one round trip. A silent robot is dead once its silence has a probability below CHANCE,
 and not before a burst of losses has ended.
 """

@@ -48,7 +48,7 @@ def intruder(net: Network) -> Iterator[zenoh.Session]:
 
 
 def after_all_before(net: Network, session: zenoh.Session) -> None:
-    """Return when the world has taken in everything that `session` sent, which its own next command proves."""
+    """Wait until the world has received everything that `session` sent: its next command arrives after that."""
     session.put(command_key(RUN, INTRUDER), b"control")
     assert net.link.receive(20.0) == Arrival(INTRUDER, b"control")
 

@@ -1,5 +1,7 @@
 """The pages of the documentation: their generated parts are up to date, and every measured table has its provenance."""
 
+import argparse
+import dataclasses
 import re
 import sys
 import tomllib
@@ -9,7 +11,11 @@ from types import ModuleType
 import pytest
 from support import ROOT, script
 
-from zwerm import RunResult, Setup
+from zwerm import RunResult, ScenarioError, Setup
+from zwerm.compare.comparison import make_comparison
+from zwerm.compare.variants import parse_sweep, parse_variant, split
+from zwerm.study.study_tables import Study, load_study
+from zwerm.study.trial_plan import make_points
 
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
@@ -106,6 +112,41 @@ def test_every_table_is_measured_by_a_command_or_says_what_made_it(measured: Mod
         assert len({"command", "recorded_command", "of"} & plan.keys()) == 1, name
         known = set(measured.plans()["metrics"])
         assert {metric.partition(":")[0] for metric in plan.get("metrics", [])} <= known, name
+
+
+def planned(words: list[str]) -> Study:
+    """Return the study that a plan's command runs. Raises ScenarioError for a command with a mistake."""
+    if words[0] == "study":
+        return load_study(words[1])
+    parser = argparse.ArgumentParser()
+    parser.add_argument("scenario")
+    for option in ("--variant", "--sweep", "--set"):
+        parser.add_argument(option, action="append", default=[])
+    parser.add_argument("--variants")
+    parser.add_argument("--metrics", default="")
+    given = parser.parse_args(words[1:])
+    base = load_study(given.variants) if given.variants else None
+    variants, sweeps = [parse_variant(each) for each in given.variant], [parse_sweep(each) for each in given.sweep]
+    study = make_comparison(given.scenario, variants, sweeps, split(given.metrics), base)
+    table = study.table.model_copy(update={"set": [*study.table.set, *given.set]})
+    return dataclasses.replace(study, table=table)
+
+
+def test_every_command_of_the_plan_can_be_run(measured: ModuleType) -> None:
+    for name, plan in measured.plans()["tables"].items():
+        command = plan.get("command", ["of"])
+        if command[0] in ("study", "compare"):
+            assert make_points(planned(command)), name
+        elif command[0] not in ("of", "twin"):
+            assert (ROOT / command[0]).is_file(), name
+
+
+def test_a_command_of_a_plan_with_a_mistake_is_found() -> None:
+    for words in (["compare", "beacon", "--variant", "a", "--variant", "b, c"], ["study", "no-such-study"]):
+        with pytest.raises(ScenarioError):
+            planned(words)
+    with pytest.raises(ScenarioError, match=r"radio\.los"):
+        make_points(planned(["compare", "beacon", "--variant", "a", "--variant", "b:radio.los=0.1"]))
 
 
 def hand_typed(text: str, mark: re.Pattern[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""A cached cell equals the cell that is clipped from nothing."""
+"""A cached cell equals a newly clipped cell."""
 
 import importlib.util
 import math
@@ -23,7 +23,7 @@ REGIONS = pytest.mark.parametrize("region", [SQUARE, HEPTAGON, L_SHAPE], ids=["s
 
 
 def clipped(region, others, value, gx, gy):
-    """Return the target as the definition has it: clip by everyone, truncate, integrate."""
+    """Return the target by the definition: clip by all robots, truncate, integrate."""
     cell = voronoi_cell(region, [(other.x_m, other.y_m) for other in others])
     return estimated_centroid(cell, value, gx, gy) or nearest_point(region)
 

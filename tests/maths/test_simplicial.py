@@ -65,7 +65,7 @@ def gudhi_relative_b2(complex_: FlagComplex, fence: list[tuple[int, int]]) -> in
 
 
 def gudhi_b1_coned(complex_: FlagComplex, cycles: list[tuple[int, ...]]) -> int:
-    """The holes that are left when those that the cycles go around are filled."""
+    """The holes that remain after the holes of the cycles are filled."""
     tree = gudhi.SimplexTree()
     for simplex in (*((v,) for v in complex_.vertices), *complex_.edges, *complex_.triangles):
         tree.insert(list(simplex))

@@ -1,14 +1,20 @@
-"""A recorded run can be read back by other people's tools, message by message, and changes nothing."""
+"""Other tools can read a recording message by message, and recording changes no run."""
 
+import contextlib
 import json
 from pathlib import Path
 
 import msgpack
 import pytest
+from mcap.exceptions import EndOfFile, McapError
 from mcap.reader import make_reader
+from mcap.records import McapRecord, Message
+from mcap.stream_reader import StreamReader
 from support import scenario
 
 from zwerm.errors import ScenarioError
+from zwerm.record.recording import Recording
+from zwerm.run.assembly import assemble
 from zwerm.run.runner import run
 
 
@@ -42,3 +48,31 @@ def test_a_recording_that_cannot_be_written_is_one_clear_line(tmp_path: Path) ->
     (tmp_path / "file").write_text("")
     with pytest.raises(ScenarioError, match=r"cannot write a recording: (File exists|Not a directory)$"):
         run(scenario(), 1, "inline", record=tmp_path / "file" / "run.mcap")
+
+
+def test_a_recording_that_is_never_closed_holds_all_but_the_last_second(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = [100.0]
+    monkeypatch.setattr("zwerm.record.recording.time.monotonic", lambda: clock[0])
+    path, world = tmp_path / "run.mcap", assemble(scenario(), 1)
+    recording = Recording(path, 0.1, {})
+    written_s: list[float] = []
+    for tick in range(100):
+        clock[0] += 0.07 if tick != 50 else 3.0  # a pause: nothing is written meanwhile
+        recording.exchange(tick, [0], [b"observation"], [b"command"], world.scene)
+        written_s.append(clock[0])
+        on_disk = [each.sequence for each in readable(path) if isinstance(each, Message)]
+        missing = set(range(tick + 1)) - set(on_disk)
+        assert all(clock[0] - written_s[each] < 1.0 for each in missing), (tick, missing)
+    recording.close()
+    assert len({each.sequence for each in readable(path) if isinstance(each, Message)}) == 100
+
+
+def readable(path: Path) -> list[McapRecord]:
+    """Return the records of a file that may end anywhere."""
+    found: list[McapRecord] = []
+    with path.open("rb") as file, contextlib.suppress(EndOfFile, McapError):
+        for record in StreamReader(file).records:
+            found.append(record)  # noqa: PERF402 - keep what was read before the end
+    return found

@@ -20,7 +20,7 @@ class HashOfAName(Controller):
 
 
 class OrderOfASortedSet(Controller):
-    """The same as the first, and no fault of it."""
+    """Sorts the set first, and so keeps the contract."""
 
     def step(self, observation: Observation) -> Command:
         order = "".join(sorted({"1", "2", "3", "4", "5", "6", "7", "8"}))

@@ -1,4 +1,4 @@
-"""Controllers that print, hang, leave or crash together, for tests of what a run reports."""
+"""Controllers that print, hang, exit or crash together, for tests of the report of a run."""
 
 import os
 import signal

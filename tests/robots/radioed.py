@@ -1,4 +1,4 @@
-"""Controllers for tests of faults: what they say shows what happened to them."""
+"""Controllers for tests of faults: their messages show the effects of faults on them."""
 
 from zlib import crc32
 
@@ -7,7 +7,7 @@ from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 
 
 class Counts(Controller):
-    """Drives on, and tells everyone how many observations it has had, and a random number of its own."""
+    """Drives on, and broadcasts the number of its observations, and a random number of its own."""
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
@@ -23,7 +23,7 @@ class Counts(Controller):
 
 
 class Raises(Controller):
-    """Divides by zero at tick 3 of its life."""
+    """Divides by zero at its third observation."""
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
@@ -37,7 +37,7 @@ class Raises(Controller):
 
 
 class Babbles(Controller):
-    """Lets all that it hears, sees and draws into what it says and does; sleeps now and then."""
+    """Sends and drives as a function of all that it receives, senses and draws; sleeps at some ticks."""
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)

@@ -1,4 +1,4 @@
-"""Controllers that report telemetry, honest and forged, for tests of what the emulator makes of it."""
+"""Controllers that report telemetry, correct and forged."""
 
 from typing import ClassVar
 

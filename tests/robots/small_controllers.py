@@ -8,7 +8,7 @@ from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
 
 
 class Echo:
-    """Sends back what it hears."""
+    """Sends back each payload that it receives."""
 
     def __init__(self, setup: Setup) -> None:
         pass
@@ -32,7 +32,7 @@ class Spins:
 
 
 class Exits(Echo):
-    """Leaves its process in a way that no controller should."""
+    """Ends its process, which no controller may."""
 
     def step(self, observation: Observation) -> Command:
         raise SystemExit(0)
@@ -60,14 +60,14 @@ class Recurses(Echo):
 
 
 class Garrulous(Echo):
-    """Has more to say than a message can hold."""
+    """Sends more than a message can hold."""
 
     def step(self, observation: Observation) -> Command:
         return Command(outbox=(Transmission("a", bytes(100_000)),))
 
 
 class Unspeakable(Echo):
-    """Fails with words that are no text."""
+    """Fails with an error text that is no valid Unicode."""
 
     def step(self, observation: Observation) -> Command:
         raise ValueError("\udcff")

@@ -1,4 +1,4 @@
-"""Controllers that go wrong on purpose, for tests of what the emulator makes of them."""
+"""Controllers with defects, for tests of the emulator's reaction."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ class Raises(Controller):
 
 
 class Dies(Controller):
-    """Robot 2 is killed by signal 9 at tick 5, without a word."""
+    """Robot 2 is killed by signal 9 at tick 5."""
 
     def step(self, observation: Observation) -> Command:
         if self.setup.node == 2 and observation.tick == 5:
@@ -45,7 +45,8 @@ class Slow(Controller):
 
 
 class Chatter(Controller):
-    """Every robot sends its random number to all, sums what it hears into its speed, and sleeps a little every tenth tick."""
+    """Every robot sends its random number to all, adds the received numbers to its speed, and sleeps a little every
+    tenth tick."""
 
     def __init__(self, setup):
         super().__init__(setup)
@@ -68,7 +69,7 @@ class Chatter(Controller):
 
 
 class Finishes(Controller):
-    """Says that it is done once it is as many ticks old as its id."""
+    """Reports that it is done after as many ticks as its id."""
 
     def step(self, observation: Observation) -> Command:
         return Command(done=observation.tick >= self.setup.node)

@@ -33,7 +33,7 @@ def interrupt(running: subprocess.Popen[str]) -> None:
 
 
 def kill_robots(running: subprocess.Popen[str]) -> None:
-    """End the run as it ends when its robots fail."""
+    """End the run as failing robots end it."""
     running.send_signal(signal.SIGTERM)
 
 

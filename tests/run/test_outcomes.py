@@ -24,7 +24,7 @@ STATIONS = ("arena.size_m=[4.2,2.6]", "robots.count=40", "base.poses=[[0.2,1.3,0
         (("robots.count=6",), "depot-dry: the depot is empty; frontier edges left: 6"),
         (
             ("arena.size_m=[0.5,0.5]", "base.pose=[0.2,0.2,0.0]", 'coordinator.parameters.walls="paper"'),
-            "source-blocked: no robot gets away from the base; frontier edges left: 0",
+            "source-blocked: no robot can leave the base; frontier edges left: 0",
         ),
         (
             ('faults=[{kind="crash",at_s=30,nodes=["base"]}]',),

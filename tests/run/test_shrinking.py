@@ -40,7 +40,7 @@ def relay(faults: list[dict[str, Any]], **tables: Any) -> Scenario:
 
 
 def harmless(count: int) -> list[dict[str, Any]]:
-    """Return faults of every kind under which the largest id still gets around."""
+    """Return faults of every kind under which the largest id still reaches all robots."""
     kinds: list[dict[str, Any]] = [
         {"kind": "pause", "nodes": [0], "for_s": 0.3},
         {"kind": "slow", "nodes": [2], "every_ticks": 2, "for_s": 0.4},

@@ -190,7 +190,7 @@ MOMENT = SimpleNamespace(
 
 
 def deployment(cycles: int = 3) -> RunView:
-    """A run of `cycles` s; the complex is told of once a second, and turns from frontier to obstacle at the last."""
+    """A run of `cycles` s; the complex is reported once a second, and turns from frontier to obstacle at the last."""
     history = history_of(*[(TRIANGLE.tolist(), [True] * 3) for _ in range(cycles + 1)])
     reported = [
         TelemetryRecord(

@@ -140,7 +140,7 @@ class Stranger(threading.Thread):
 
 
 def run_with_a_stranger(tmp_path: Path, say: Callable[[Node, bytes], list[bytes]], **tables: object):
-    """Run the small scenario over Zenoh; node 0 says what `say` makes of each observation, the others behave."""
+    """Run the small scenario over Zenoh; node 0 answers each observation with `say` of it, the others correctly."""
     keys, endpoint = tmp_path / "keys", f"unixsock-stream/{tmp_path}/router"
     strangers = [
         Stranger(keys, endpoint, number, say if number == 0 else lambda node, seen: [node.answer(seen)])

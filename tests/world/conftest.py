@@ -28,7 +28,7 @@ MakeSensor = Callable[..., Sensor]
 
 @pytest.fixture(scope="session", params=ARENAS)
 def arena(request: pytest.FixtureRequest) -> Arena:
-    """An arena in which nothing hides anything, then one with an obstacle and walls; both 3 m x 3 m."""
+    """An arena without obstacles, then one with an obstacle and walls; both 3 m x 3 m."""
     return ARENAS[request.param]
 
 

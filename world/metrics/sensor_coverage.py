@@ -1,4 +1,5 @@
-"""The metrics of sensor coverage: what its coordinator and base stations report, and what truth says of robots' decisions.
+"""The metrics of sensor coverage: the reports of its coordinator and base stations, and the robots' decisions judged by
+the truth.
 
 A report counts only from a node that may give it. The coordinator and the base stations report cycles, pushes and
 numbers of robots. Each robot reports its own frontier claim and its own membership. Others are ignored.

@@ -1,4 +1,4 @@
-"""The part of the arena that a swarm sees, and the least number of robots that could: the measures of sensor coverage.
+"""Coverage by sight: the part of the arena that a swarm sees, and the number of robots of an ideal packing.
 
 A robot covers what is within its range and not behind a wall, as exact polygons but for the disc, which has 256 sides.
 The reference is that of Ramaithitima et al. 2015, section V: a hexagonal packing over the free space, whose points are
@@ -39,7 +39,7 @@ class SeenArea:
         self._from: dict[tuple[float, ...], shapely.Geometry] = {}
 
     def area(self, position: Floats) -> shapely.Geometry:
-        """Return what is seen from any of position (n, 2)."""
+        """Return the area that is seen from any of position (n, 2)."""
         self._from = {
             tuple(each.tolist()): self._from.get(tuple(each.tolist())) or seen_from(each, self.range_m, self.arena)
             for each in position
@@ -66,7 +66,7 @@ def reachable(arena: Arena, radius_m: float, position: Floats) -> shapely.Geomet
 
 
 def seen_from(place: Floats, range_m: float, arena: Arena) -> shapely.Geometry:
-    """Return what is seen from a place (2,) within `range_m`: the disc, less the shadows of the walls."""
+    """Return the area that is seen from a place (2,) within `range_m`: the disc without the shadows of the walls."""
     disc = shapely.buffer(shapely.Point(place), range_m, quad_segs=_QUARTER_SIDES)
     walls = arena.segments[arena.walls_within(place[None, :], range_m).segment]
     shadows = [piece for x0, y0, x1, y1 in walls.tolist() for piece in _shadow(place, (x0, y0), (x1, y1), range_m)]
@@ -85,7 +85,7 @@ def robust(operation: Callable[..., shapely.Geometry], *geometries: Any) -> shap
 def _shadow(
     place: Floats, start: tuple[float, float], end: tuple[float, float], range_m: float
 ) -> Sequence[shapely.Polygon]:
-    """Return polygons that cover what a wall hides from a place, as far as `range_m`, or nothing if it is too far."""
+    """Return polygons that cover the area that a wall hides from a place, up to `range_m`; none if the wall is too far."""
     ax, ay = start[0] - place[0], start[1] - place[1]
     bx, by = end[0] - place[0], end[1] - place[1]
     dx, dy = bx - ax, by - ay
@@ -128,5 +128,5 @@ def obstacles(arena: Arena) -> int:
 
 
 def living(present: Ints, dead: Sequence[int]) -> Ints:
-    """Return the robots that are there and alive."""
+    """Return the living robots in the arena."""
     return np.setdiff1d(present, np.array(dead, dtype=np.int64))

@@ -1,4 +1,4 @@
-"""`metrics.sight_range_m`: how much of the arena is in sight of the robots, and how many robots that takes."""
+"""`metrics.sight_range_m`: the fraction of the arena in sight of the robots, and the number of robots."""
 
 import math
 from collections.abc import Sequence

@@ -1,6 +1,6 @@
 """Coverage of a field by a swarm: errors, cost, convergence and density, by the robots' true Voronoi cells.
 
-All is computed from the truth: where every robot is, the whole field. The error to the *estimated* centroid is that of
+All values are computed from the true positions and the exact field. The error to the *estimated* centroid is that of
 an undisturbed robot at that place (eqs. 10 to 18). The error to the exact centroid (eq. 5) and the cost (eq. 1) are
 integrals of the true field. Source: Schwager, McLurkin, Rus 2006.
 """
@@ -29,7 +29,8 @@ STATISTICS: Final[dict[str, Callable[[Floats], float]]] = {
 
 
 class VoronoiMetricsTable(Table):
-    """Coverage of the field by Voronoi cells: errors, cost, when statistics of the error fall below `converged_m`.
+    """Coverage of the field by Voronoi cells: errors, cost, and the times at which statistics of the error fall below
+    `converged_m`.
 
     With `peak_m` also the density in `rings` about it. The first `stationary` robots have cells, and no errors.
     """

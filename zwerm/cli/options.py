@@ -94,6 +94,22 @@ SecurityLogFile = Annotated[
         help="Write each refusal by world and router to FILE: denials, wrong passwords, refused messages. Takes time.",
     ),
 ]
+RobotUsers = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option(
+        "--robot-users", metavar="FIRST", help="Run robot N as the user id FIRST + N, without a network. Needs root."
+    ),
+]
+RobotMemory = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option("--robot-memory", min=1, metavar="MIB", help="Memory that each robot may allocate after it joins."),
+]
+RobotProcesses = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option(
+        "--robot-processes", min=0, metavar="N", help="Processes that each robot may start. Needs --robot-users."
+    ),
+]
 RealTime = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option("--realtime", metavar="FACTOR", help="Pace the run at FACTOR times the wall clock."),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal, Protocol, get_args
 
 import numpy as np
 
+from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import make
 from zwerm.agents.runtime.node import Node
@@ -60,13 +61,15 @@ def run(
     watcher: ProgressListener | None = None,
     record: Path | None = None,
     security_log: Path | None = None,
+    confinement: Confinement = UNCONFINED,
 ) -> RunResult:
     """Run `scenario` (a built-in name, a path, or a loaded scenario) and return its result.
 
     `overrides` are `path=value` strings; `realtime` paces the run at that factor of the wall clock; `record` is a file
     to write an MCAP recording to. `security_log` is a file for all that world and router refuse; with processes it takes over
-    descriptor 1 of this process (see `zwerm.deploy.router_messages`). Raises ScenarioError for a mistake in the scenario, and
-    LinkError where robots cannot be started. A failed or interrupted run is a result like any other: look at its `outcome`.
+    descriptor 1 of this process (see `zwerm.deploy.router_messages`). `confinement` limits the robots' processes.
+    Raises ScenarioError for a mistake in the scenario, and LinkError where robots cannot be started. A failed or
+    interrupted run is a result like any other: look at its `outcome`.
     """
     if runner not in get_args(Runner):
         expected = " or ".join(map(repr, get_args(Runner)))
@@ -84,6 +87,8 @@ def run(
     members = node_specs(scenario, seed)
     watcher = watcher or NullProgress()
     if runner == "inline":
+        if confinement != UNCONFINED:
+            raise ScenarioError(["runner: only robots that are processes can be confined, got 'inline'"])
         nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
         watcher.joined(len(nodes), len(nodes))
         link = MemoryLink(
@@ -107,6 +112,7 @@ def run(
             late_joiners=world.schedule.late_joiners,
             restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
             on_refusal=None if security is None else security.note,
+            confinement=confinement,
         ) as swarm,
     ):
         return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)

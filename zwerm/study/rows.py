@@ -76,6 +76,7 @@ class Rows:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._journal = self._journal_path.open("a+b", buffering=0)
+            _sync(path.parent)  # the name of the journal: rows alone would be lost with it
         except OSError as error:
             raise ScenarioError([f"{path}: cannot be written: {error.strerror}"]) from None
         try:

@@ -15,12 +15,15 @@ from joblib import cpu_count
 
 from zwerm.errors import ScenarioError
 from zwerm.run.runner import Runner
+from zwerm.study.distribute.cluster import run_on_cluster
+from zwerm.study.distribute.shard import Shard
 from zwerm.study.pool import run_trials
 from zwerm.study.rows import Key, Rows
 from zwerm.study.study_tables import Setting, Study
 from zwerm.study.summary import Results
 from zwerm.study.trial import Row
 from zwerm.study.trial_identity import still_same
+from zwerm.study.trial_order import in_order
 from zwerm.study.trial_plan import Trial, make_points, make_trials
 from zwerm.world.tick.completion import FAILED
 
@@ -68,20 +71,29 @@ def run_study(
     timeout_s: float | None = None,
     runner: Runner = "inline",
     listener: StudyListener | None = None,
+    shard: Shard | None = None,
+    cluster: str = "",
 ) -> StudyResult:
     """Run the trials of `study` that the file `out` does not have, `jobs` at a time, and return the results.
 
     `seeds` replaces the study's seeds, `sets` overrides its scenarios, `retry` repeats failed trials. A trial without a
     result after `timeout_s` fails. After Ctrl-C all rows so far are kept, and the result says that it was interrupted.
     With one job trials run in this process, and nothing ends them early. With the runner `processes` one trial runs at
-    a time, in the same way. Raises ScenarioError for errors in the input, before any trial runs.
+    a time, in the same way. With `shard` only its trials run. With `cluster`, the address of a Dask scheduler, its workers
+    run the trials. Raises ScenarioError for errors in the input, before any trial runs.
     """
     if jobs is not None and jobs < 1:
         raise ScenarioError([f"jobs: expected >= 1, got {jobs}"])
+    if cluster and (jobs is not None or timeout_s is not None or runner != "inline"):
+        raise ScenarioError(
+            ["cluster: expected neither jobs nor a timeout nor robot processes: its workers run the trials"]
+        )
     points = make_points(study, sets, runner)
     trials = make_trials(study, points, study.table.seeds if seeds is None else seeds, runner)
     with Rows(out) as rows:
         distinct = _distinct(trials)
+        if shard is not None:
+            distinct = shard.of(distinct)
         for trial in distinct:
             if trial.key in rows.held and not _trusted(trial, rows.held[trial.key]):
                 del rows.held[trial.key]
@@ -93,7 +105,8 @@ def run_study(
             here = runner == "processes" or jobs == 1
             # At least two workers: one job means this process, and a trial that ends its process must not end the study.
             workers = 1 if here else max(2, min(jobs or cpu_count(), len(todo)))
-            with closing(run_trials(todo, workers, timeout_s)) as ending:
+            todo = in_order(todo, rows.held.values(), workers)
+            with closing(run_on_cluster(todo, cluster) if cluster else run_trials(todo, workers, timeout_s)) as ending:
                 for row in ending:
                     rows.add(row)
                     ran += 1

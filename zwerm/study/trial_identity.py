@@ -32,7 +32,7 @@ LIBRARIES: Final = ("numpy", "scipy", "shapely", "pymunk", "pillow", "pyyaml")
 _DESCRIPTIVE: Final = {"name", "summary", "source"}
 _PATH_CHARS_MAX: Final = 255
 # Folders of Zwerm whose code decides no result.
-_SHOWING: Final = ("cli", "compare", "network", "record", "study", "twin", "view")
+_SHOWING: Final = ("cli", "compare", "evolve", "network", "record", "study", "twin", "view")
 
 # The digest of each user module's file when this process was first known to have imported it, by path.
 _imported: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""Holes of a swarm's complex, by bearings: their corners, and whether a robot ever met an obstacle in them.
+"""Holes of a swarm's complex, by bearings: their corners, and whether a robot found an obstacle in them.
 
 Homology finds a hole but does not distinguish a pillar from an accidental gap. Robots can: a robot that touched a wall,
 or was stopped by one, knows its direction. A hole into which no such direction leads does not surround an obstacle.

@@ -1,4 +1,4 @@
-"""The local proof of coverage: in which directions from a robot robots in view, or walls that were followed, close the space.
+"""The local proof of coverage: the directions from a robot in which visible robots or followed walls close the space.
 
 Every triangle of the proof has a standing robot i as a corner. Robot i sees the two other corners. One of these may be
 a point of a walk along a wall. Its sides are free lines of sight, or a step of the walk. So i sees the whole triangle.

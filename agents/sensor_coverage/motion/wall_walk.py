@@ -29,7 +29,7 @@ STUCK_TICKS: Final = 5
 STUCK_FRACTION: Final = 0.2
 # Distance [m] between waypoints while nothing else changes.
 SPACING_M: Final = 0.1
-# Way [m] in which a robot must get clear of its start.
+# Distance [m] within which a robot must get clear of its start.
 CLEARING_M_MAX: Final = 3.0
 
 

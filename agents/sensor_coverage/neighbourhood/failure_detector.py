@@ -60,7 +60,7 @@ class FailureDetector(Component):
         for node, requests in self._requests.items():
             silent = node not in table.heard or tick - table.heard[node] > SILENT_TICKS
             if requests > REQUESTS_MAX and silent:
-                table.bury(node)
+                table.remove_dead(node)
                 self.dead[node] = None
         self._outbox.append(Outgoing(None, StateRequest(tuple(wanted))))
 

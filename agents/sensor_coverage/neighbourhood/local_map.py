@@ -116,7 +116,7 @@ class LocalMap(NeighbourTable):
 
     # --- robots that died or restarted --------------------------------------------------------------------------------
 
-    def bury(self, node: int) -> None:
+    def remove_dead(self, node: int) -> None:
         """Forget a robot that is dead, and end the claims of its slot.
 
         Without it the gaps around this slot have other directions, so attempts at gaps do not count any more. The

@@ -1,4 +1,4 @@
-"""A robot's table of its neighbours: their states, where it sees them, and its own heading.
+"""A robot's table of its neighbours: their states, their directions, and its own heading.
 
 Robots announce what they see in one frame, that of the base. Each robot knows its heading from reciprocal bearings. A
 robot that comes out of the depot sees what the base sees. Every sighting names the drive after which it was made, so a
@@ -109,7 +109,7 @@ class NeighbourTable:
         self.heard.pop(node, None)
         self.change()
 
-    def bury(self, node: int) -> None:
+    def remove_dead(self, node: int) -> None:
         """Forget a robot that is dead."""
         self.forget(node)
 

@@ -28,7 +28,7 @@ class Codec(NamedTuple):
 class ComponentLoop:
     """Runs components in the given order; `codecs` has a codec for each radio channel that they use.
 
-    `incarnation` is that of this node. Messages from or to former incarnations are dropped at the door.
+    `incarnation` is that of this node. Messages from or to former incarnations are dropped on arrival.
     """
 
     def __init__(self, components: Sequence[Component], codecs: Mapping[str, Codec], incarnation: int = 1) -> None:
@@ -112,7 +112,7 @@ class ComponentLoop:
         return [Transmission(channel, payload, to)] * copies
 
     def next_wake(self) -> int | None:
-        """Return the earliest tick at which a component wants to be polled, or None."""
+        """Return the earliest wake-up of a component, or None."""
         earliest: int | None = None
         for next_wake in self._wakers:
             wake = next_wake()

@@ -124,7 +124,7 @@ class LeaveLock:
         holds. Without them the robot checks the criterion on the lists that it knows. Neighbours answer the same in
         both cases.
 
-        After giving up, wait before the next request, and longer each time: robots that want to leave disturb each
+        After giving up, wait before the next request, and longer each time: simultaneous requests disturb each
         other.
         """
         request = self._request

@@ -72,7 +72,7 @@ class Membership(Component):
         return self._negotiation.next_wake()
 
     def _redundant(self, advised: bool) -> bool:
-        """Return whether coverage does not need this robot, and a robot is wanted at the frontier.
+        """Return whether coverage does not need this robot, and there is a frontier for it.
 
         With a coordinator only `advised` robots leave, and they need not check the criterion that makes it safe.
         """

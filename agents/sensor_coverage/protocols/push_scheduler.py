@@ -205,7 +205,7 @@ class PushScheduler(Component):
         self.pushes += done
         self._report_numbers()
         if self._is_first and tried and not done:
-            self.outcome = "source-blocked: no robot gets away from the base"
+            self.outcome = "source-blocked: no robot can leave the base"
 
     # --- conditions ---------------------------------------------------------------------------------------------------
 
@@ -237,8 +237,8 @@ class PushScheduler(Component):
         """Return whether the robot that the push took from the base has its slot: the next robot has time to average."""
         states = self._map.states
         rear = None if self._rear is None else states.get(self._rear)
-        nobody = not any(states[node].slot == NOWHERE for node in self._situation.bearings if node in states)
-        return not self._is_first and rear is not None and rear.slot != NOWHERE and not rear.moving and nobody
+        no_robot_waits = not any(states[node].slot == NOWHERE for node in self._situation.bearings if node in states)
+        return not self._is_first and rear is not None and rear.slot != NOWHERE and not rear.moving and no_robot_waits
 
     def _let_out(self, tick: int) -> None:
         """Release a robot, or conclude that the depot is empty if none has come out."""

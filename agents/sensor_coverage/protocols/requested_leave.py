@@ -57,7 +57,7 @@ class RequestedLeave(Component):
         self.negotiation.receive(sender, message, tick)
 
     def poll(self, tick: int) -> None:
-        """Negotiate if the coordinator wants it, and leave once all neighbours have agreed."""
+        """Negotiate on the coordinator's request, and leave once all neighbours have agreed."""
         negotiation = self.negotiation
         negotiation.update(self._stands(tick))
         negotiation.wanted = self.wanted

@@ -218,7 +218,7 @@ class TokenPush(PushPart):
     # --- the followers ------------------------------------------------------------------------------------------------
 
     def _call(self) -> None:
-        """Let the follower come, and drive once it knows."""
+        """Inform the follower, and drive once it has acknowledged."""
         self._enter("calling")
         behind = self._chain.behind
         if behind is None:
@@ -269,7 +269,7 @@ class TokenPush(PushPart):
         return 0.0 if there_rad is None else wrapped(there_rad - self._heading)
 
     def _home(self) -> None:
-        """Home again on landmarks that were moving and stand still now."""
+        """Repeat the visual homing on landmarks that were moving and stand still now."""
         states = self._map.states
         if not self._result.used_moving_landmarks or self._memory is None:
             self._settled()
@@ -314,12 +314,12 @@ class TokenPush(PushPart):
         self._enter("telling")
 
     def _write(self, body: Body) -> None:
-        """Write to the robot behind, or to the sender of the token."""
+        """Send to the robot behind, or to the sender of the token."""
         if self._back is not None:
             self._situation.mailbox.write(self._back, body)
 
     def _drop(self) -> None:
-        """End without telling: the robot behind is out of range, and finds out by itself."""
+        """End without a message: the robot behind is out of range, and its waiting time ends."""
         self._situation.mailbox.drop(self.id)
         self.over = True
 

@@ -265,12 +265,12 @@ def test_what_the_body_of_a_robot_stopped_is_tried_again_when_it_is_dead() -> No
     log = local_map._planner.attempt_log
     for plan in (gap, wall):
         local_map.note_failure(plan, 0.5)
-    local_map.bury(4)
+    local_map.remove_dead(4)
     assert list(log.closed) == [wall.key], "the gap has another shape"
     local_map.note_obstruction(side, 0.5, 5)
-    local_map.bury(4)
+    local_map.remove_dead(4)
     assert list(log.closed) == [wall.key, side.key]
-    local_map.bury(5)
+    local_map.remove_dead(5)
     assert not log.closed
     assert not local_map._obstructed
 
@@ -281,7 +281,7 @@ def test_a_swarm_in_a_corridor_that_a_death_has_parted_is_joined_again() -> None
 
 
 def test_the_base_waits_for_robots_that_it_does_not_hear() -> None:
-    """It receives nothing for four minutes; then the others are there as before."""
+    """The base receives nothing for four minutes; the others have not changed then."""
     result = with_faults(SMALL, '{kind="partition", groups=[[0]], at_s=30.0, for_s=240.0}')
     assert is_covered(result)
     assert result.sim_s > 270.0

@@ -1,4 +1,4 @@
-"""Sensor coverage, run for real in small halls: coverage, noise, failures, frames, outcomes, processes."""
+"""Complete runs of sensor coverage in small halls: coverage, noise, failures, frames, outcomes, processes."""
 
 import math
 from collections.abc import Callable
@@ -67,7 +67,7 @@ def test_a_robot_slides_along_a_wall_and_away_from_it() -> None:
 
 
 class OneRobot:
-    """A robot alone with a made-up world: one neighbour in sight within 1 m, one wall across its way."""
+    """One robot in a simulated plane: a neighbour that it sees within 1 m, and a wall across its path."""
 
     def __init__(self, neighbour: tuple[float, float], wall_x_m: float) -> None:
         body = Body("holonomic", 0.07, 0.5, 6.0)
@@ -175,7 +175,7 @@ def test_a_small_hall_is_covered_with_no_hole_but_the_obstacle(settings: tuple[s
 
 
 def test_the_end_of_a_single_file_looks_around_a_corner() -> None:
-    """It stands just before a corridor branches off: no drive into it gets as far as a new place should be."""
+    """The last robot stands just before a branch of the corridor: no drive into it reaches the distance of a new slot."""
     branch = "arena.polygon=[[0.0,0.0],[2.15,0.0],[2.15,-1.5],[2.65,-1.5],[2.65,0.5],[0.0,0.5]]"
     result = run("sensor-coverage-narrow", 1, "inline", [branch, "robots.count=12"])
     assert result.outcome == "completed"

@@ -59,7 +59,7 @@ LOSS = ("radio.loss=0.3", "uplink.loss=0.3")
 
 
 class Pair:
-    """A robot, 1, that sees one neighbour, 7, whose words are made up."""
+    """Robot 1, which sees one neighbour, 7, whose messages the test writes."""
 
     def __init__(self, incarnation: int = 1) -> None:
         body = Body("holonomic", 0.07, 0.5, 6.0)
@@ -72,7 +72,7 @@ class Pair:
         self.drives = False
 
     def turn(self, *said: PeerMessage, order: RobotCommand | None = None, again: bool = False) -> None:
-        """Let a tick pass in which the neighbour says this, and the coordinator orders that."""
+        """Step a tick with messages of the neighbour and commands of the coordinator."""
         inbox = [Packet(CHANNEL, write_word(each), 7) for each in said]
         self.number += order is not None and not again
         if order is not None:
@@ -112,7 +112,7 @@ class Pair:
         return next(each.version for each in reversed(self.words) if isinstance(each, NeighbourList))
 
     def leaves(self) -> None:
-        """Have the coordinator ask the robot to find out, and agree to all that it asks for."""
+        """Let the coordinator request a negotiation, and grant all requests of the robot."""
         self.turn(order=NegotiateLeave(2))
         for _ in range(30):
             asked, self.words = self.words, []
@@ -232,7 +232,7 @@ def complexes(result: RunResult) -> list[tuple[float, ComplexSnapshot]]:
 
 
 def outs(result: RunResult, until_s: float = math.inf) -> tuple[dict[int, None], int]:
-    """Return who had left by then and not come back, and how many had come back."""
+    """Return the robots that had left and not returned by then, and the number that had returned."""
     out: dict[int, None] = {}
     back = 0
     for each in result.snapshots:

@@ -182,7 +182,7 @@ def test_without_losses_a_command_is_repeated_only_when_overdue_and_after_the_fi
 
 
 def after_roll_call() -> Desk:
-    """Return the desk of a restarted coordinator, one tick after its roll call, with one station."""
+    """Return the mailbox of a restarted coordinator, one tick after its roll call, with one station."""
     desk = Desk()
     desk.mailbox.roll_call(RollCall(1), ROLL_CALL_COPIES)
     desk.mailbox.expect(0)
@@ -265,7 +265,7 @@ def test_a_silent_robot_counts_as_dead_only_when_losses_cannot_explain_its_silen
 
 
 def drive(scenario: Scenario) -> tuple[str, World, SensorCoverageCoordinator, dict[str, float]]:
-    """Run inline, and return how it ended, the world, and the coordinator in its last life."""
+    """Run inline, and return how it ended, the world, and the last incarnation of the coordinator."""
     world, observers = assemble_run(scenario, 1)
     observers.subscribe(world.telemetry)
     nodes = {node: Node(*each) for node, each in node_specs(scenario, 1).items()}
@@ -314,7 +314,7 @@ def crash(at_s: float, more: str = "") -> str:
 def test_the_base_ends_the_run_when_the_coordinator_is_gone_for_good(at_s: float) -> None:
     result = run("sensor-coverage", runner="inline", overrides=[*HALL, crash(at_s)])
     assert result.outcome == "failed"
-    assert result.reason == "node 0 gave up: coordinator-lost: not a word from the coordinator for 120 s"
+    assert result.reason == "node 0 gave up: coordinator-lost: no message from the coordinator for 120 s"
     assert at_s + 90.0 < result.sim_s < at_s + 123.0
 
 
@@ -333,7 +333,7 @@ def test_the_robots_wait_for_a_coordinator_that_is_away_for_300_s() -> None:
 
 
 def resumed(result: RunResult, from_s: float) -> None:
-    """Check that the coordinator, begun anew, has everybody again within two seconds, and goes on to the end."""
+    """Check that the restarted coordinator knows all robots within two seconds, and completes the run."""
     anew = next(each for each in result.snapshots if each.time_s >= from_s)
     complex_ = decode_snapshot(anew.snapshot)
     assert isinstance(complex_, ComplexSnapshot)

@@ -50,14 +50,14 @@ def wheel(steps: tuple[int, ...] = (1, 2, 4, 5)) -> dict[int, StandingReport]:
 
 
 class Centre:
-    """A coordinator, and what it says."""
+    """A coordinator and its messages."""
 
     def __init__(self) -> None:
         self.advisor = RedundancyAdvisor(Setup(CENTRE, "coordinator", DT_S, (), b"0" * 32, bases=(BASE,)))
         self.tick = -1
 
     def hear(self, words: Iterable[tuple[int, AdviceMessage]] = (), ticks: int = 1) -> Said:
-        """Return what it says on hearing this, and in so many ticks from then on."""
+        """Return its messages after it received these, over a number of ticks."""
         inbox = tuple(Packet(CHANNEL, write(word), sender) for sender, word in words)
         said: Said = []
         for number in range(ticks):
@@ -210,8 +210,8 @@ def test_neighbours_grant_a_lock_by_advice_only_if_it_names_their_present_lists(
 class Swarm:
     """Robots about a grid, and a ring of others around them; who has left the complex is carried away after a while.
 
-    Packets of the uplink are lost, late by up to `late` ticks, and repeated. With `locks` robots leave as they should,
-    else as soon as they are told to.
+    Packets of the uplink are lost, late by up to `late` ticks, and repeated. With `locks` robots leave by the protocol,
+    else as soon as they get advice.
     """
 
     def __init__(self, seed: int, late: int, locks: bool) -> None:

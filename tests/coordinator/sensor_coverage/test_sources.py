@@ -111,7 +111,7 @@ class Truth:
         return math.atan2(by - ay, bx - ax)
 
     def off(self, robot: int) -> float:
-        """By how much directions told of a robot are turned against the truth."""
+        """Return the rotation between the stored directions of a robot and the true ones."""
         return math.remainder(self.slots.heading[robot] - self.turned[robot], math.tau)
 
 

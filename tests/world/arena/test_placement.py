@@ -1,4 +1,4 @@
-"""Robots start where there is room, and where the seed and their own id put them."""
+"""Robots start at free places, which depend on the seed and their own id."""
 
 from typing import Any
 

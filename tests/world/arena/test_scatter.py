@@ -1,4 +1,4 @@
-"""Scattered landmarks: everywhere within the dispersion, none in a wall, and no more of them than that takes."""
+"""Scattered landmarks: one within the dispersion of every place, none in a wall, and no two close together."""
 
 import math
 from pathlib import Path

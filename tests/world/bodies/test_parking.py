@@ -1,4 +1,4 @@
-"""Parked bodies: the physics engine steps only what moves, and what it may meet, without any effect on where robots get."""
+"""Parked bodies: the physics engine steps only moving bodies and those near them, without any effect on positions."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Faults done to real processes: SIGKILL, SIGSTOP and new incarnations, with the trace that the same run has inline."""
+"""Faults of real processes: SIGKILL, SIGSTOP and new incarnations, with the trace that the same run has inline."""
 
 import os
 import signal

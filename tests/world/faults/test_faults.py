@@ -42,7 +42,7 @@ def faulty(*faults: dict[str, Any], **tables: Any) -> Scenario:
 
 
 class Life:
-    """A run in memory, looked at tick by tick: `observed[tick][node]`, `orders[tick]`."""
+    """A run in memory, recorded tick by tick: `observed[tick][node]`, `orders[tick]`."""
 
     def __init__(self, chosen: Scenario, seed: int = 1) -> None:
         self.world = assemble(chosen, seed)
@@ -76,7 +76,7 @@ class Life:
         return [tick for tick, observed in enumerate(self.observed) if node in observed]
 
     def heard(self, receiver: int, sender: int) -> list[int]:
-        """Return the ticks of sending of what one node heard of another."""
+        """Return the ticks at which the packets were sent that one node received from another."""
         return [
             tick - 1
             for tick, observed in enumerate(self.observed)
@@ -86,7 +86,7 @@ class Life:
         ]
 
     def steps(self, receiver: int, sender: int) -> list[int]:
-        """Return the counts that one node heard of another: how many observations that one had had."""
+        """Return the counts that one node received from another: the sender's number of observations."""
         return [
             int(packet.payload.split()[1])
             for observed in self.observed

@@ -32,7 +32,7 @@ def faulty(*faults: dict[str, Any]) -> Scenario:
 
 
 def look(world: World) -> dict[int, Observation]:
-    """Return what every robot observes now, and go on by a tick without answers."""
+    """Return the observations of all robots, and advance by a tick without answers."""
     world.begin()
     nodes, payloads = world.observe()
     world.advance()

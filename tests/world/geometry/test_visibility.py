@@ -20,7 +20,7 @@ MARGIN_M = 1e-6
 
 
 def judged(scene, range_m, through_walls, robots_occlude):
-    """Return the visible pairs, by shapely; a case too close to call is none."""
+    """Return the visible pairs, by shapely; cases within rounding are left out."""
     walls = MultiLineString([segment.reshape(2, 2) for segment in scene.arena.segments])
     centre = {i: Point(scene.position[i]) for i in scene.present_ids().tolist()}
     visible = []
@@ -74,7 +74,7 @@ def test_kept_results_equal_new_results(make_scene, walled, data):
 
 
 class Counting(Arena):
-    """An arena that remembers how many lines it was asked about."""
+    """An arena that counts the lines that were tested."""
 
     lines = 0
 

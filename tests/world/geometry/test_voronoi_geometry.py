@@ -1,4 +1,4 @@
-"""Cells, closed forms and quadrature: each judged by something written differently."""
+"""Cells, closed forms and quadrature, each compared with another method."""
 
 import math
 from itertools import combinations

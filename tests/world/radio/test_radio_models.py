@@ -1,4 +1,4 @@
-"""Each model does what its docstring says: fractions within their 99 % confidence intervals, and every rule by an example."""
+"""Each model fulfils its docstring: fractions within their 99 % confidence intervals, and every rule by an example."""
 
 import math
 from typing import Any
@@ -302,7 +302,7 @@ def test_a_one_way_link_stays_one_way() -> None:
 
 
 def heard(radio: Radio, ticks: int, nodes: int) -> list[list[tuple[int, int | None, bytes]]]:
-    """Return what nodes below `nodes` heard of each other while everyone sent numbered broadcasts."""
+    """Return the packets that nodes below `nodes` received while all nodes sent numbered broadcasts."""
     for tick in range(ticks):
         payload = tick.to_bytes(2, "big")
         radio.step({node: (Transmission("robots", payload),) for node in range(len(radio.position))})

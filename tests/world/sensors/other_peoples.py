@@ -1,4 +1,4 @@
-"""Sensors as someone outside the project might write them: good ones and broken ones."""
+"""Sensors of users: correct and defective ones."""
 
 from typing import ClassVar
 
@@ -21,7 +21,7 @@ class Thermometer:
 
 
 class Hygrometer:
-    """Two numbers about nothing."""
+    """Two numbers without meaning."""
 
     field = "humidity"
     Parameters: ClassVar[type[Table]] = Table
@@ -34,7 +34,7 @@ class Hygrometer:
 
 
 class OwnLineOfSight(Hygrometer):
-    """Somebody's replacement of a built-in sensor."""
+    """A user's replacement of a built-in sensor."""
 
     field = "line_of_sight"
 

@@ -14,7 +14,7 @@ heading = st.floats(-7.0, 7.0)
 
 
 def judged(scene, robot, range_m):
-    """Return the reading by shapely: the first thing that the ray comes upon; a case too close to call is none."""
+    """Return the reading by shapely: the first object on the ray; cases within rounding are left out."""
     origin = Point(scene.position[robot])
     along = 10.0 * np.array([math.cos(scene.heading[robot]), math.sin(scene.heading[robot])])
     ray = LineString([origin, scene.position[robot] + along])

@@ -15,7 +15,7 @@ pose = st.tuples(coordinate, coordinate, st.floats(-20.0, 20.0))
 
 
 def read(sensor, scene):
-    """Return the readings of everyone present, as rows of numbers."""
+    """Return the readings of all present robots, as rows of numbers."""
     return np.array(
         [[getattr(each, name) for name in each.__struct_fields__] for each in sensor.read(scene, scene.present_ids())]
     )

@@ -1,4 +1,4 @@
-"""Sensors from a scenario's tables: the built-in ones, other people's, and every mistake in one line each."""
+"""Sensors from a scenario's tables: built-in ones, those of users, and one line for each mistake."""
 
 import sys
 from pathlib import Path

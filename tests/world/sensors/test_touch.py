@@ -15,7 +15,7 @@ RADIUS_M, REACH_M = 0.3, 0.05
 
 
 def judged(scene, robot, switches):
-    """Return the numbers of the closed switches, by shapely; a case too close to call is none."""
+    """Return the numbers of the closed switches, by shapely; cases within rounding are left out."""
     here = Point(scene.position[robot])
     pieces = [LineString(segment.reshape(2, 2)) for segment in scene.arena.segments]
     others = [Point(scene.position[other]) for other in scene.present_ids().tolist() if other != robot]

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from zwerm.cli.options import RobotMemory, RobotProcesses, RobotUsers
 from zwerm.cli.run_options import RunOptions, with_run_options
 from zwerm.cli.terminal import err, errors_as_lines
 
@@ -14,6 +15,9 @@ def run(
     inline: Annotated[
         bool, typer.Option("--inline/--processes", help="Run the robots in this process: faster, same trace.")
     ] = False,
+    robot_users: RobotUsers = None,
+    robot_memory: RobotMemory = None,
+    robot_processes: RobotProcesses = None,
 ) -> None:
     """Run a scenario: the world in this process, and every robot in a process of its own.
 
@@ -29,6 +33,7 @@ def run(
 
     [bold]zwerm run computation-free --set robots.controller=my_file:MyController[/bold]
     """
+    from zwerm.agents.runtime.confinement import Confinement
     from zwerm.cli.console import RunProgress
     from zwerm.cli.debugger import breakpoints
     from zwerm.run.runner import run as run_scenario
@@ -44,5 +49,6 @@ def run(
                 watcher=progress,
                 record=options.record,
                 security_log=options.security_log,
+                confinement=Confinement(robot_users, robot_memory, robot_processes),
             )
         output.report(result)

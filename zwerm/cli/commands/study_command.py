@@ -1,6 +1,7 @@
 """`zwerm study`: run a study, print its table and draw it."""
 
-from typing import Annotated
+import os
+from typing import Annotated, Optional
 
 import typer
 
@@ -35,6 +36,21 @@ def study(
     sets: Sets = None,
     retry: Retry = False,
     timeout: Timeout = None,
+    shard: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--shard",
+            metavar="I/N",
+            help="Run part I of N of the trials, into a file of its own. `auto` for I or N is taken from the environment of "
+            "a Slurm array, and for I from that of a Kubernetes indexed job.",
+        ),
+    ] = None,
+    cluster: Annotated[
+        str,
+        typer.Option(
+            "--cluster", metavar="tcp://HOST:PORT", help="Run the trials on the Dask cluster of this scheduler."
+        ),
+    ] = "",
     as_json: Json = False,
 ) -> None:
     """Run a study: scenarios over a grid of settings and many seeds, compared with a paper's numbers.
@@ -47,9 +63,14 @@ def study(
     [bold]zwerm study computation-free-comparison --seeds 20[/bold]
 
     [bold]zwerm study my-study.toml --seeds 501-1000 --out second-half.parquet[/bold]
+
+    [bold]zwerm study my-study.toml --shard 3/8[/bold], and then [bold]zwerm merge runs/my-study-shard-*.parquet[/bold]
+
+    [bold]zwerm study my-study.toml --cluster tcp://10.0.0.5:8786[/bold]
     """
     with errors_as_lines():
         with study_extra():
+            from zwerm.study.distribute.shard import parse_shard
             from zwerm.study.export import study_json
             from zwerm.study.study_figure import draw_study
             from zwerm.study.study_report import StudyProgress, print_results
@@ -57,7 +78,10 @@ def study(
             from zwerm.study.study_tables import load_study, parse_seeds
         loaded = load_study(study)
         chosen = None if seeds is None else parse_seeds(seeds)
+        part = None if shard is None else parse_shard(shard, os.environ)
         path = rows_file(output, loaded.name)
+        if part is not None and output is None:
+            path = part.file(path)
         with StudyProgress(err, loaded.name, quiet=as_json) as progress:
             result = run_study(
                 loaded,
@@ -68,6 +92,8 @@ def study(
                 retry=retry,
                 timeout_s=timeout,
                 listener=progress,
+                shard=part,
+                cluster=cluster,
             )
         drawn = [draw_study(path.with_suffix(".png"), result.results)] if result.done else []
         drawn += write_csv(output, result)

@@ -62,7 +62,7 @@ class Termination:
         if tick - self._missing_since <= MISSING_TICKS:
             return ""
         if self._completion.search >= SEARCHES_MAX:
-            return self._somebody_missing()
+            return self._missing_robots_outcome()
         self._completion.begin_search()
         self._missing_since = None
         self._progress_at = tick
@@ -76,12 +76,12 @@ class Termination:
             return ""
         last = self._completion.last
         if last is not None and self._completion.missing:
-            return self._somebody_missing()
+            return self._missing_robots_outcome()
         if last is not None and last.claims > 0:
             return "cut-off: no way leads to the frontier"
         return "no-end: some robot does not know whether it stands at the frontier"
 
-    def _somebody_missing(self) -> str:
+    def _missing_robots_outcome(self) -> str:
         missing = self._completion.missing
         named = ", ".join(str(each) for each in missing[:NAMED_MAX]) + (", ..." if len(missing) > NAMED_MAX else "")
         return f"somebody-missing: {len(missing)} robots neither answer nor are seen dead: {named}"

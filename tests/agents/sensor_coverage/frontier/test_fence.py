@@ -84,7 +84,7 @@ def test_an_edge_inside_other_triangles_of_a_common_neighbour_is_an_exception() 
 
 
 def test_a_chain_on_this_side_of_the_edge_is_no_exception() -> None:
-    """The trap: with a robot within triangle kij the printed rule would fire, though nothing covers what is beyond."""
+    """A robot within triangle kij: the printed rule would apply, although nothing covers the space beyond."""
     slots = {0: (0.0, 0.0), 1: (0.7, -0.4), 2: (0.7, 0.4), 3: (0.3, 0.0)}
     views, complex_ = swarm(slots)
     assert not is_exception(views, complex_, 1, 2)
@@ -142,7 +142,7 @@ def test_turning_any_robots_frame_does_not_change_the_fence() -> None:
 
 
 def test_wedges_close_the_fence_where_the_sign_rule_leaves_it_open() -> None:
-    """The trap: a sees i, b and j, edge ab crosses ij, and b and j are blind to each other."""
+    """Robot a sees i, b and j, edge ab crosses ij, and b and j do not see each other."""
     views, complex_ = swarm({1: (0.0, 0.0), 2: (0.95, 0.0)})
     assert [(i, a, b) for i, a, b, _ in wedges(views, complex_)] == [(1, 2, 2), (2, 1, 1)]
     views, complex_ = swarm(hexagon())
@@ -151,7 +151,7 @@ def test_wedges_close_the_fence_where_the_sign_rule_leaves_it_open() -> None:
 
 
 def test_a_path_avoids_obstacle_edges_where_the_way_round_is_cheaper() -> None:
-    """Figure 9(a): 12, 10, 6, 2; with the first edge at a wall it is dearer than the way round."""
+    """Figure 9(a): 12, 10, 6, 2; with the first edge at a wall it costs more than the path around it."""
     lists = {12: [10, 11], 10: [12, 6], 6: [10, 2], 2: [6, 11], 11: [12, 2]}
     complex_ = FlagComplex(lists)
     assert cheapest_routes(complex_, {12: 0.0}, (), 3.0).path(2) == (12, 11, 2)

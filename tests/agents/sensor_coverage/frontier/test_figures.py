@@ -169,7 +169,7 @@ def test_figure_6b_if_one_end_touches_a_wall_ahead_the_other_end_is_the_mover(
 
 
 def test_figure_6c_a_convex_corner_makes_both_of_its_edges_obstacle_edges() -> None:
-    """They are 0.9 apart as they stand, and a pillar keeps them from seeing each other."""
+    """The two robots are 0.9 apart, and a pillar blocks their line of sight."""
     swarm = Swarm({_I: (0.0, 0.0), _J: (0.95, 0.0), _K: at(56.0)})
     views = {slot: dict(view) for slot, view in swarm.scan.views.items()}
     del views[swarm.slot[_J]][swarm.slot[_K]], views[swarm.slot[_K]][swarm.slot[_J]]
@@ -195,7 +195,7 @@ def test_figure_7_an_edge_is_fence_where_all_its_triangles_are_on_one_side(k2: P
 def test_figure_8a_both_ends_send_the_new_robot_to_the_same_point_at_60_degrees_on_the_free_side(
     turned_seed: int,
 ) -> None:
-    """The sign conventions, end to end: left of the way from i to j is right of the way from j to i."""
+    """The sign conventions from end to end: left of the direction from i to j is right of the direction from j to i."""
     position = {_I: (0.2, 0.1), _J: at(20.0, of=(0.2, 0.1)), _K: at(-40.0, of=(0.2, 0.1))}
     swarm = Swarm(position, turned_seed=turned_seed).update()
     plans = swarm.plans(_I, _J)
@@ -236,7 +236,7 @@ def assigned(swarm: Swarm) -> Plan:
 
 
 def test_figure_9a_the_path_from_the_source_to_a_frontier_robot_is_12_10_6_2() -> None:
-    """Walls at the flanks leave one way on: upwards, from robot 2."""
+    """Walls at both sides leave one direction of expansion: upwards, from robot 2."""
     swarm = figure_9()
     for robot in (12, 11, 8, 9, 10, 7, 5, 4, 6, 3, 1):
         swarm.touch(robot, *range(0, 360, 30))
@@ -249,7 +249,7 @@ def test_figure_9a_the_path_from_the_source_to_a_frontier_robot_is_12_10_6_2() -
 
 
 def pushed(swarm: Swarm, plan: Plan, used_odometry: bool = False) -> list[tuple[int, RobotCommand]]:
-    """Run a push to its end with obedient robots, robot 13 waiting in the depot; return all commands."""
+    """Run a push to its end with robots that execute every command, robot 13 waiting in the depot; return all commands."""
     mailbox = CommandMailbox(0.1)
     base = swarm.scan.bases[0]
     station = swarm.slots.occupant[base]
@@ -336,7 +336,7 @@ def test_figure_9b_the_new_robot_corrects_its_distance_to_the_future_occupant_of
 
 
 def test_a_robot_that_used_odometry_corrects_its_distance_to_the_robot_behind_by_a_given_bearing() -> None:
-    """It may have gone so far that it sees nobody behind it."""
+    """The robot may have driven so far that it sees no robot behind it."""
     swarm, said = push_of_figure_9(used_odometry=True)
     commands = [(robot, command) for robot, command in said if isinstance(command, Correct)]
     assert [(robot, command.anchors[0].node) for robot, command in commands] == [(13, 12), (10, 13), (6, 10), (2, 6)]
@@ -352,7 +352,7 @@ def test_a_robot_that_used_odometry_corrects_its_distance_to_the_robot_behind_by
 
 
 def test_the_fence_opens_where_two_robots_do_not_both_see_each_other() -> None:
-    """Four around a hub, 90 degrees apart and near enough to see each other: where one is blind to the next, a side is open."""
+    """Four around a hub, 90 degrees apart and near enough to see each other: if one does not see the next, a side is open."""
     swarm = Swarm({n: at(90.0 * n, 0.65) for n in range(1, 5)} | {9: (0.0, 0.0)})
     boundary_edges = [(1, 2), (1, 4), (2, 3), (3, 4)]
     assert swarm.update().robots(side.edge for side in swarm.planner.fence.sides) == boundary_edges

@@ -1,4 +1,4 @@
-"""Holes by bearings: the way around, the way in, and whether anything was met there."""
+"""Holes by bearings: their cycles, the drives into them, and obstacles that robots met in them."""
 
 import math
 

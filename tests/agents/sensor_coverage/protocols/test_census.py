@@ -18,7 +18,7 @@ Graph = dict[int, list[int]]
 
 
 class Swarm:
-    """Robots that take the census, and the messages under way; robot 0 is the base. A tick is half a second."""
+    """Robots that take the census, and the messages in flight; robot 0 is the base. A tick is half a second."""
 
     def __init__(self, graph: Graph, seed: int, loss: float = 0.0, delay_ticks: int = 0, copies: float = 0.0) -> None:
         self.graph = graph
@@ -59,7 +59,7 @@ class Swarm:
                         self.under_way.append((at, sender, receiver, message))
 
     def until_concluded(self, ticks_max: int) -> bool:
-        """Go on until the base concludes, or for so long, and tell which."""
+        """Run until the base concludes or the time ends; return whether it concluded."""
         for _ in range(ticks_max):
             self.step()
             if self.robots[0].concluded:
@@ -165,7 +165,7 @@ def test_the_base_concludes_from_the_census_once_all_robots_are_quiet(
 
 
 class Hurried(Census):
-    """Does not ask who was stirred between two waves: a control."""
+    """A negative control: ignores robots that were disturbed between two waves."""
 
     def update(self, neighbours: list[int], claims: int, busy: bool) -> None:  # type: ignore[override]
         super().update(neighbours, 0, False)
@@ -197,7 +197,7 @@ def test_a_census_that_ignores_disturbed_robots_misses_a_moving_claim() -> None:
 
 
 def broken_links(seed: int, faults: dict[str, float], amnesia: float) -> bool:
-    """Let a robot that claims be in reach now by one neighbour and now by another; return whether the base concludes."""
+    """Let a robot with a claim see one neighbour and then another; return whether the base concludes."""
     swarm = Swarm({0: [1, 2], 1: [0, 2, 3], 2: [0, 1, 3], 3: [1, 2]}, seed, **faults)  # type: ignore[arg-type]
     swarm.claims[3] = 1
     for _ in range(400):
@@ -220,7 +220,7 @@ def test_the_census_misses_no_claim_when_links_break(faults: dict[str, float], s
 
 
 def test_robots_that_lose_their_memory_repeatedly_rarely_cause_a_wrong_conclusion() -> None:
-    """About 1 in 1,500 such lives did when it was measured: late messages of former lives were believed."""
+    """About 1 in 1,500 such restarts did when it was measured: late messages of former incarnations were accepted."""
     assert not any(broken_links(seed, {"loss": 0.2, "delay_ticks": 20}, amnesia=0.02) for seed in range(30))
 
 
@@ -242,7 +242,7 @@ def test_the_census_needs_another_wave_after_a_robot_lost_its_memory() -> None:
 
 
 def test_a_robot_joins_a_wave_only_by_a_neighbour_that_waits_for_it() -> None:
-    """It may hear robots that do not see it: they would not count it."""
+    """The robot may receive from robots that do not see it: they would not count it."""
     robot = Census(1, POLL_S, EVERY_S, 0)
     robot.update([2], 0, False)
     assert robot.receive(0, CensusWave(5, None, (7,), False), 0.0) == []

@@ -1,6 +1,6 @@
-"""Robots that want to leave, under every interleaving: no two neighbours leave together, and no hole or piece comes or goes.
+"""Requests to leave under every interleaving: no two neighbours leave together, and neither b0 nor b1 changes.
 
-All connected graphs of up to five robots, and every two robots that ask (or one that asks twice), up to symmetry.
+All connected graphs of up to five robots, and every two requesting robots (or one with two requests), up to symmetry.
 """
 
 from collections.abc import Iterator
@@ -66,7 +66,7 @@ def test_no_departure_is_unsafe_when_robots_lose_their_memory() -> None:
 
 
 def slots(robots: int) -> list[tuple[int, tuple[int, ...]]]:
-    """Return where one of the robots may be moved to: all that it can see there."""
+    """Return the sets of robots that one robot may see after it was moved."""
     others = range(robots - 1)
     return [(robots - 1, each) for size in range(robots) for each in combinations(others, size)]
 
@@ -113,7 +113,7 @@ def test_no_departure_is_unsafe_when_robots_rely_on_advice_from_old_lists() -> N
 
 
 class Credulous(Advised):
-    """Grants a lock whatever list it is asked upon."""
+    """Grants a lock for any version of its list."""
 
     def _answer(self, requester: int, request: LockRequest, now_s: float) -> list[Outgoing]:
         return super()._answer(requester, LockRequest(request.number, ((self._me, self._version),)), now_s)
@@ -128,7 +128,7 @@ def test_advice_from_old_lists_is_unsafe_if_neighbours_do_not_check_list_version
 
 
 class Unlocked(LeaveLock):
-    """Leaves as soon as it is redundant by the lists it knows."""
+    """Leaves as soon as it is redundant by its lists, without locks."""
 
     def may_leave(self, now_s: float) -> bool:
         return self.wants
@@ -143,21 +143,21 @@ class Impatient(LeaveLock):
 
 
 class AnyVersion(LeaveLock):
-    """Grants a lock whatever list it is asked upon."""
+    """Grants a lock for any version of its list."""
 
     def _answer(self, requester: int, request: LockRequest, now_s: float) -> list[Outgoing]:
         return super()._answer(requester, LockRequest(request.number, ((self._me, self._version),)), now_s)
 
 
 class Late(LeaveLock):
-    """Leaves as long as it likes after it asked."""
+    """Leaves at any time after its request."""
 
     def _may_still_act(self, request: Any, now_s: float) -> bool:
         return request.version == self._version
 
 
 class Generous(LeaveLock):
-    """Grants locks while it wants to leave itself, and leaves nevertheless."""
+    """Grants locks during its own request, and leaves nevertheless."""
 
     def _answer(self, requester: int, request: LockRequest, now_s: float) -> list[Outgoing]:
         own, self._request = self._request, None
@@ -170,7 +170,7 @@ class Generous(LeaveLock):
 
 
 class Fickle(LeaveLock):
-    """Takes a grant for any number it ever asked under."""
+    """Accepts a grant for any of its request numbers."""
 
     def receive(self, sender: int, message: LockProtocolMessage, now_s: float) -> list[Outgoing]:
         if self._request is not None and isinstance(message, LockGrant):
@@ -179,7 +179,7 @@ class Fickle(LeaveLock):
 
 
 class Rash(LeaveLock):
-    """Grants locks as soon as it has been restarted."""
+    """Grants locks immediately after a restart."""
 
     def __init__(self, me: int, lease_s: float, now_s: float) -> None:
         super().__init__(me, lease_s, now_s)
@@ -187,7 +187,7 @@ class Rash(LeaveLock):
 
 
 class Ghost(LeaveLock):
-    """Grants locks when it has left."""
+    """Grants locks after it has left."""
 
     def _answer(self, requester: int, request: LockRequest, now_s: float) -> list[Outgoing]:
         stands, self._stands = self._stands, True
@@ -197,7 +197,7 @@ class Ghost(LeaveLock):
 
 
 class Blind(LeaveLock):
-    """Leaves although it sees others than when it asked."""
+    """Leaves although it sees other robots than at its request."""
 
     def may_leave(self, now_s: float) -> bool:
         request = self._request

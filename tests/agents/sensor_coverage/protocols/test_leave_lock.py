@@ -1,4 +1,4 @@
-"""Permission to leave: the criterion against gudhi, and the locks one by one. All interleavings are in
+"""Departures: the criterion compared with gudhi, and the rules of the locks one by one. All interleavings are in
 test_interleavings.py."""
 
 import importlib

@@ -1,4 +1,4 @@
-"""Leaving as a robot does it: agreements over a radio that loses half of all words, and the checker that watches a run."""
+"""Departures of robots: agreements over a radio that loses half of all messages, and the checker of a run."""
 
 import random
 
@@ -106,7 +106,7 @@ def test_a_robot_that_granted_a_lock_stands_still_until_the_lock_is_released() -
 
 
 def drive(scenario: Scenario, seed: int) -> tuple[World, list[LocalRobot]]:
-    """Run inline, watch that no place has two robots that stand, and return the world and the robots that are out."""
+    """Run inline, check that no slot has two standing robots, and return the world and the released robots."""
     world = assemble(scenario, seed)
     nodes = {node: Node(*each) for node, each in node_specs(scenario, seed).items()}
 

@@ -1,4 +1,4 @@
-"""The way to the frontier, on networks that lose, delay, copy and reorder messages."""
+"""The route to the frontier, on networks that lose, delay, copy and reorder messages."""
 
 from collections.abc import Iterable
 from itertools import combinations
@@ -19,7 +19,7 @@ OBSTACLE_COST = 3.0
 
 
 class Network:
-    """Robots at places of the same numbers (1 and up), edges with their weights, and every word that is under way."""
+    """Robots at places of the same numbers (1 and up), edges with their weights, and all messages in flight."""
 
     def __init__(
         self, count: int, weights: dict[Edge, float], kind: type[PathVectorProtocol] = PathVectorProtocol
@@ -47,7 +47,7 @@ class Network:
             self.robots[receiver].receive(sender, way)
 
     def round(self, slots: Iterable[int]) -> None:
-        """Let everyone tell its way, and all hear it: nothing is lost."""
+        """Let all robots send their routes, without loss."""
         for slot in slots:
             self.tell(slot)
         arrived, self.under_way = self.under_way, []
@@ -85,7 +85,7 @@ def settled(network: Network, rounds: int) -> Network:
 
 
 class Lossy(RuleBasedStateMachine):
-    """Words are lost, kept, copied, delivered in any order; edges and roots come and go; robots lose their memory."""
+    """Messages are lost, delayed, copied and delivered in any order; edges and roots change; robots lose their memory."""
 
     @initialize(data=st.data(), count=st.integers(2, 6))
     def build(self, data: st.DataObject, count: int) -> None:
@@ -139,7 +139,7 @@ class Lossy(RuleBasedStateMachine):
                 assert robot.route.cost <= OBSTACLE_COST * (len(robot.route.slots) - 1)
 
     def teardown(self) -> None:
-        """Once nothing is lost any more, ways become the shortest of the graph, and stay so."""
+        """After the last loss, routes become the shortest of the graph, and stay so."""
         if not hasattr(self, "network"):
             return
         network = settled(self.network, rounds=2 * len(self.network.robots) + 1)
@@ -163,7 +163,7 @@ TestAnyFiniteSequenceOfFaults = Lossy.TestCase
 
 
 class Gullible(PathVectorProtocol):
-    """Believes in ways through its own place, up to a length: plain distance vector, as a control."""
+    """A negative control, plain distance vector: accepts routes through its own slot, up to a length."""
 
     def choose(self, slot: int, cost: float | None, weights: dict[int, float], tick: int) -> None:  # type: ignore[override]
         best = None if cost is None else Route(cost, (slot,))

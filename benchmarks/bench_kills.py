@@ -1,0 +1,188 @@
+"""Signals to every role of a run in every phase: the exit status, and whether a process, a socket or a file is left.
+
+Roles: the world, the server that robots are forked from, and a robot. Phases: while robots join, while the run goes on,
+and while the picture is drawn. Signals: interrupt, terminate, hang-up, kill, and stop; after a stop the world is continued,
+the others are not. Each run is a command of its own, with a folder of its own for temporary files.
+"""
+
+import argparse
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+from csv_rows import add_csv_option, write_csv
+
+from zwerm.deploy.runtime_directory import sweep
+
+ROOT: Final = Path(__file__).parents[1]
+ROBOTS: Final = 6
+SIGNALS: Final = ("INT", "TERM", "HUP", "KILL", "STOP")
+PHASES: Final = ("joining", "running", "drawing")
+ROLES: Final = ("world", "server", "robot")
+DEADLINE_S: Final = 120.0
+ENDLESS_S: Final = 1e6
+INTERRUPTED: Final = 130
+
+# The exit statuses that the documentation allows. A robot or its server that ends while robots join is an error of the
+# start (2); in the run it is a crash (1). While the picture is drawn, only the world's own end changes the status.
+ALLOWED: Final = {
+    ("world", "INT"): {INTERRUPTED},
+    ("world", "TERM"): {INTERRUPTED},
+    ("world", "HUP"): {INTERRUPTED},
+    ("world", "KILL"): {-signal.SIGKILL},
+    ("world", "STOP"): {0},
+}
+
+
+def processes(session: int) -> dict[int, int]:
+    """Return the parents of the living processes that descend from a process, itself included."""
+    parents = {}
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, parent = entry.read_text().rpartition(")")[2].split()[:2]
+        except OSError:
+            continue
+        if state != "Z":
+            parents[int(entry.parent.name)] = int(parent)
+    found = {session: parents.get(session, 0)} if session in parents else {}
+    while fresh := {pid: parent for pid, parent in parents.items() if parent in found and pid not in found}:
+        found |= fresh
+    return found
+
+
+def until(holds: Callable[[], object], what: str) -> None:
+    """Return when `holds()` is true. Raises TimeoutError after DEADLINE_S."""
+    end_s = time.monotonic() + DEADLINE_S
+    while not holds():
+        if time.monotonic() > end_s:
+            raise TimeoutError(f"not within {DEADLINE_S:g} s: {what}")
+        time.sleep(0.01)
+
+
+def robots_of(world: int) -> tuple[int, list[int]]:
+    """Return the server of the robots and the robots; 0 and [] while there are none."""
+    tree = processes(world)
+    for pid, parent in tree.items():
+        children = [each for each, of in tree.items() if of == pid]
+        if parent == world and children:
+            return pid, children
+    return 0, []
+
+
+def one(role: str, name: str, phase: str) -> str:
+    """Carry out one trial, and return what went wrong, or ""."""
+    with TemporaryDirectory(prefix="k-") as folder:
+        duration_s = 0.5 if phase == "drawing" else ENDLESS_S
+        command = [
+            *(sys.executable, "-c", "from zwerm.cli.app import main; main()", "run", "computation-free", "--quiet"),
+            *("--set", f"robots.count={ROBOTS}", "--set", f"time.duration_s={duration_s}"),
+            *("--set", "time.straggler_s=3.0", "--record", "run.mcap"),
+        ]
+        environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": folder, "COLUMNS": "120"}
+        with Path(folder, "said").open("w+b") as said:
+            world = subprocess.Popen(
+                command, cwd=folder, env=environment, stdout=said, stderr=said, start_new_session=True
+            )
+            try:
+                return _judge(role, name, phase, world, Path(folder))
+            except TimeoutError as error:
+                return str(error)
+            finally:
+                for pid in [*processes(world.pid), world.pid]:
+                    with contextlib.suppress(OSError):
+                        os.kill(pid, signal.SIGKILL)
+                world.wait()
+
+
+def _judge(role: str, name: str, phase: str, world: subprocess.Popen[bytes], folder: Path) -> str:
+    record, said = folder / "run.mcap", folder / "said"
+    if phase == "joining":
+        until(lambda: world.poll() is not None or len(robots_of(world.pid)[1]) > 1, "robots start")
+    elif phase == "running":
+        until(
+            lambda: world.poll() is not None or (record.exists() and record.stat().st_size > 100_000), "the run goes on"
+        )
+    else:
+        until(lambda: world.poll() is not None or b"trace" in said.read_bytes(), "the result is printed")
+    server, robots = robots_of(world.pid)
+    target = {"world": world.pid, "server": server, "robot": robots[0] if robots else 0}[role]
+    everybody = set(processes(world.pid))
+    if target:  # robots are gone while the picture is drawn
+        os.kill(target, getattr(signal, f"SIG{name}"))
+    if name == "STOP" and role == "world":
+        time.sleep(0.5)
+        os.kill(world.pid, signal.SIGCONT)
+        if phase != "drawing":  # it goes on for ever: end it
+            until(lambda: phase == "joining" or record.stat().st_size > 200_000, "the run goes on after the stop")
+            os.kill(world.pid, signal.SIGINT)
+    elif name == "INT" and role == "robot" and phase != "drawing":
+        os.kill(world.pid, signal.SIGINT)  # robots ignore it
+    elif name == "INT" and role == "server" and phase != "drawing":
+        os.kill(world.pid, signal.SIGINT)
+    until(lambda: world.poll() is not None, "the run ends")
+    until(lambda: not any(_alive(pid) for pid in everybody), "all processes end")
+    text = said.read_text(errors="replace")
+    if name == "KILL" and role == "world":
+        sweep(folder)  # as the next run does
+    left = [each.name for each in folder.iterdir() if each.name.startswith(("zwerm-", "pymp-"))]
+    allowed = _allowed(role, name, phase)
+    if world.returncode not in allowed:
+        return f"exit status {world.returncode}, expected {sorted(allowed)}: {text[-300:]}"
+    if "Traceback" in text:
+        return f"a traceback: {text[-300:]}"
+    return f"left: {left}" if left else ""
+
+
+def _allowed(role: str, name: str, phase: str) -> set[int]:
+    if role == "world":
+        ended = ALLOWED[role, name]
+        return {INTERRUPTED} if name == "STOP" and phase != "drawing" else ended
+    if phase == "drawing":
+        return {0}
+    if name == "INT":  # the robot and its server ignore it, and the trial ends the world
+        return {INTERRUPTED}
+    return {1, 2} if phase == "joining" else {1}
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=1)
+    parser.add_argument("--role", choices=ROLES, nargs="+", default=list(ROLES))
+    parser.add_argument("--phase", choices=PHASES, nargs="+", default=list(PHASES))
+    parser.add_argument("--signal", choices=SIGNALS, nargs="+", default=list(SIGNALS))
+    add_csv_option(parser)
+    options = parser.parse_args()
+    rows, failures = [], 0
+    for role in options.role:
+        for name in options.signal:
+            found: Counter[str] = Counter()
+            for phase in options.phase:
+                for _ in range(options.repeats):
+                    wrong = one(role, name, phase)
+                    found["wrong" if wrong else "right"] += 1
+                    print(role, name, phase, wrong or "right", sep="\t", flush=True)
+            failures += found["wrong"]
+            rows.append({"role": role, "signal": f"SIG{name}"})
+            rows[-1] |= {"trials": str(found.total()), "as documented, nothing left": str(found["right"])}
+    write_csv(options.csv, rows)
+    if failures:
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()
