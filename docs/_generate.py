@@ -8,7 +8,6 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -34,6 +33,7 @@ from zwerm.catalogue import (
 )
 from zwerm.cli.app import app
 from zwerm.scenario.load import built_in, load
+from zwerm.scenario.plugin_names import class_named
 from zwerm.scenario.tables import Scenario, metrics_table
 from zwerm.scenario.types import OpenTable
 from zwerm.study.study_tables import StudyTable
@@ -41,6 +41,7 @@ from zwerm.wire import messages as protocol
 from zwerm.world.faults import FaultTable
 from zwerm.world.faults import registry as faults
 from zwerm.world.fields import registry as fields
+from zwerm.world.metrics import Metric
 from zwerm.world.radio import RadioModel, RadioModelTable
 from zwerm.world.radio import registry as radio
 from zwerm.world.sensors import registry as sensors
@@ -340,16 +341,28 @@ def gallery() -> str:
     return "\n\n".join(parts)
 
 
-def metric_list() -> str:
-    """Return every group of metrics: the key or the algorithm that switches it on, its parameters, and its names."""
+def metric_groups() -> list[tuple[str, type[Metric]]]:
+    """Return every metric class of the catalogue, with the key or the title of the algorithm that switches it on."""
     groups = [(f"`[metrics] {key}`", where) for key, where in METRICS.items()]
-    groups += [(f"{row.title}", where) for row in ALGORITHMS for where in row.metrics]
+    groups += [(row.title, where) for row in ALGORITHMS for where in row.metrics]
+    return [(switch, class_named(where, "metric", METRICS)) for switch, where in groups]
+
+
+def metric_list() -> str:
+    """Return every group of metrics: the key or the algorithm that switches it on, its names, and its summary."""
     lines = ["| measured with | metrics | what they measure |", "| --- | --- | --- |"]
-    for switch, where in groups:
-        module, _, name = where.partition(":")
-        found = getattr(import_module(module), name)
+    for switch, found in metric_groups():
         shown = ", ".join(f"`{each}`" for each in found.names)
         lines.append(f"| {switch} | {shown} | {escaped(first_paragraph(found.__doc__))} |")
+    return "\n".join(lines)
+
+
+def metric_meanings() -> str:
+    """Return every metric of the catalogue: its name, what it means, and the key or the algorithm that switches it on."""
+    lines = ["| metric | what it is | measured with |", "| --- | --- | --- |"]
+    for switch, found in metric_groups():
+        assert isinstance(found.names, Mapping), f"{found.__qualname__}: the names of a metric need meanings"
+        lines += [f"| `{name}` | {escaped(text)} | {switch} |" for name, text in found.names.items()]
     return "\n".join(lines)
 
 
@@ -364,6 +377,7 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
     "object-fields": object_fields,
     "public-names": public_names,
     "metrics": metric_list,
+    "metric-meanings": metric_meanings,
     "parts": part_list,
     "radio-models": radio_models,
     "scenario-tables": scenario_tables,

@@ -37,7 +37,7 @@ from zwerm.agents.robot_teams.protocols.team_messages import (
     write_beacon,
 )
 from zwerm.agents.robot_teams.team_lead import TeamLead, findings
-from zwerm.agents.robot_teams.work import Lost, NoWay, Work
+from zwerm.agents.robot_teams.work import Lost, NoRoute, Work
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError
 from zwerm.wire.messages import BodyVelocity, Command, Observation, Transmission
@@ -159,7 +159,7 @@ class TeamRobot(Controller):
     # --- moving -------------------------------------------------------------------------------------------------------
 
     def _stand(self, senses: Senses) -> tuple[float, float]:
-        """Stop work, and make way for others."""
+        """Stop work, and move aside for others."""
         self._left_off = True
         return self.pilot.stand(senses)
 
@@ -207,7 +207,7 @@ class TeamRobot(Controller):
                     self.work.phase, self.work.sweeping = READY, None
                     self._urgent = True
                 yield None
-            except (Lost, NoWay):
+            except (Lost, NoRoute):
                 self.work.failures += 1
                 self.work.at = self.work.sweeping = None
 

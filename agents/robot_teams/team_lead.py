@@ -25,7 +25,7 @@ from zwerm.agents.robot_teams.protocols.team_messages import CorridorPlan
 from zwerm.agents.robot_teams.virtual_frontier import TeamFrontier
 
 # Time that a team waits until the team whose lead has the smaller id unites the two [s].
-MERGE_PATIENCE_S: Final = 30.0
+MERGE_WAIT_S: Final = 30.0
 # Time in which a robot does not take a task again at which it found nothing new [s].
 SKIP_S: Final = 30.0
 # Times without a new corridor after which free robots take tasks at any distance, and then in cells where others work [s].
@@ -99,7 +99,7 @@ class TeamLead:
         if self._merge and membership.met():
             if len(free) == len(view.members) and membership.merge(tick):
                 return True
-            if membership.merges_soon(tick, round(MERGE_PATIENCE_S / dt_s)):
+            if membership.merges_soon(tick, round(MERGE_WAIT_S / dt_s)):
                 return False
         if self._map.certificate.complete:
             return False

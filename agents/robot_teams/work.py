@@ -37,8 +37,8 @@ AT_END_M: Final = 0.06
 CUT_MM: Final = 300
 
 
-class NoWay(Exception):
-    """No known way leads there."""
+class NoRoute(Exception):
+    """No known way leads to the end."""
 
 
 class Lost(Exception):
@@ -189,12 +189,12 @@ class Work:
                 yield from self.trace(step.direction)
             if self.here != self.map.end(step.stop):
                 astray[start, step.direction] = None
-        raise NoWay
+        raise NoRoute
 
     def _go_straight(self, start: End, goal: End) -> Activity:
         if start.slice != goal.slice or abs(start.y_mm - goal.y_mm) > STRAIGHT_MM:
-            raise NoWay
-        yield Approach(goal, self._grid, self._parked)
+            raise NoRoute
+        yield from self._go_to(goal)
         self.at = goal
 
     def _is_new(self, start: End, direction: int, stop: End, beside_wreck: bool) -> bool:
@@ -213,14 +213,20 @@ class Work:
 
     @property
     def here(self) -> End | None:
-        """The known end at which the robot stands, or from which it set out; None where it does not know."""
+        """The known end at which the robot stands, or from which it set out; None if its position in the map is lost."""
         return None if self.at is None else self.map.end(self.at)
 
     def _approach(self, end: End) -> Activity:
         senses = self._sense()
         dx, dy = senses.x_m - self._grid.x_m(end.slice), senses.y_m - end.y_mm / 1000.0
         if dx * dx + dy * dy > AT_END_M**2:
-            yield Approach(end, self._grid, self._parked)
+            yield from self._go_to(end)
+
+    def _go_to(self, end: End) -> Activity:
+        approach = Approach(end, self._grid, self._parked)
+        yield approach
+        if approach.hidden:
+            raise Lost
 
     # --- a corridor ---------------------------------------------------------------------------------------------------
 
@@ -231,7 +237,7 @@ class Work:
         self.phase = TRAVELS
         try:
             yield from self.travel(plan.anchor)
-        except NoWay:
+        except NoRoute:
             self.spare = True
             return
         if not (yield from self._take_slot(plan, mates)):
@@ -265,7 +271,7 @@ class Work:
                 if self.at != ends[wanted]:
                     try:
                         yield from self.travel(ends[wanted])
-                    except NoWay:
+                    except NoRoute:
                         return False
                 return True
             passes = yield from self.trace(plan.direction)

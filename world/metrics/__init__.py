@@ -6,7 +6,7 @@ every run of the algorithm's controllers. A scenario adds a class or a function 
 ["module:name"]`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -60,13 +60,14 @@ class Truth:
 class Metric:
     """A group of metrics over one run. Derive from this class and override what the metric needs.
 
-    `names` are the names of its metrics, units last; `*` in a name stands for any characters. `every_s` is the sampling
-    period [s] where the scenario does not give `metrics.every_s`; None samples at the end only. `Parameters` is the pydantic
-    type of its key's value in `[metrics]`; with None the key is a switch, true or false. A method `report(record)`, if there
-    is one, gets every TelemetryRecord as it comes.
+    `names` are the names of its metrics, units last; `*` in a name stands for any characters. In the catalogue it is a mapping
+    from each name to what it means, for the reference. `every_s` is the sampling period [s] where the scenario does not give
+    `metrics.every_s`; None samples at the end only. `Parameters` is the pydantic type of its key's value in `[metrics]`; with
+    None the key is a switch, true or false. A method `report(record)`, if there is one, gets every TelemetryRecord as it
+    comes.
     """
 
-    names: ClassVar[Sequence[str]] = ()
+    names: ClassVar[Collection[str]] = ()
     every_s: ClassVar[float | None] = None
     Parameters: ClassVar[Any] = None
 

@@ -1,7 +1,7 @@
 """Metrics of agreement, from the robots' telemetry: the spread of their values, and the number of leaders."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from zwerm.world.metrics import Metric, MetricContext, Truth
@@ -10,7 +10,9 @@ from zwerm.world.metrics import Metric, MetricContext, Truth
 class Spread(Metric):
     """The greatest difference between the newest values of two robots that are not down for good."""
 
-    names: ClassVar[Sequence[str]] = ("value_spread",)
+    names: ClassVar[Mapping[str, str]] = {
+        "value_spread": "greatest difference between two robots' newest values, where robots report `value`",
+    }
     every_s: ClassVar[float | None] = 0.1
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
@@ -34,7 +36,11 @@ class Leaders(Metric):
     """The time in which no robot led, and the time in which more than one did. The second violates the guarantee of a
     lease."""
 
-    names: ClassVar[Sequence[str]] = ("leaders_max", "leaderless_s", "two_leaders_s")
+    names: ClassVar[Mapping[str, str]] = {
+        "leaders_max": "greatest number of robots that led at the same time, where robots report `leader`",
+        "leaderless_s": "time without a leader",
+        "two_leaders_s": "time with more than one",
+    }
     every_s: ClassVar[float | None] = 0.1
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:

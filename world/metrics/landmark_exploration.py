@@ -6,7 +6,7 @@ do not reach the walls. These metrics use true positions, to which no robot has 
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -112,11 +112,25 @@ def maximal(simplices: Iterable[Sequence[int]]) -> list[tuple[int, ...]]:
 class Exploration(Metric):
     """Completeness of the coordinator's map, or of the robots' maps together, over time."""
 
-    names: ClassVar[Sequence[str]] = (
-        "completion_fraction", "iterations", "landmarks", "free_simplices", "landmark_complex_pieces",
-        "landmark_complex_holes", "obstacles", "open_frontiers", "concluded_early",
-        *map(milestone, MILESTONES),
-    )  # fmt: skip
+    names: ClassVar[Mapping[str, str]] = {
+        "completion_fraction": (
+            "points at which all visible landmarks were seen together by some robot, of a grid of points in free space"
+        ),
+        "iterations": "ticks of the run",
+        "landmarks": "number of landmarks",
+        "free_simplices": "observations that are no face of another one",
+        "landmark_complex_pieces": "b0 of the landmark complex",
+        "landmark_complex_holes": "b1 of the landmark complex",
+        "obstacles": "obstacles that stand free in the arena",
+        "open_frontiers": "frontiers left open, at the robot that knows the most, or at the coordinator",
+        "concluded_early": (
+            "1 if a robot concluded while a living one knew an open frontier, else 0; absent with a coordinator"
+        ),
+        **{
+            milestone(percent): f"ticks until completion was {percent:g} %; absent if it never was"
+            for percent in MILESTONES
+        },
+    }
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         self._context = context
@@ -184,7 +198,11 @@ class Navigation(Metric):
     A goal counts as reached if the robot reported it and all landmarks of the goal were visible.
     """
 
-    names: ClassVar[Sequence[str]] = ("navigation_goals", "navigation_success_fraction", "navigation_iterations_mean")
+    names: ClassVar[Mapping[str, str]] = {
+        "navigation_goals": "goals that robots set out for; only in `landmark-navigate`",
+        "navigation_success_fraction": "goals at which all landmarks of the goal were visible, of those",
+        "navigation_iterations_mean": "ticks to a goal that was reached",
+    }
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         self._context = context

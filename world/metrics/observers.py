@@ -1,6 +1,6 @@
 """The metrics of one run: their classes, the times of their samples, and their values."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fnmatch import fnmatchcase
 from typing import Any, Final
 
@@ -138,7 +138,7 @@ def _catalogue_names() -> list[str]:
     return [name for path in paths for name in class_named(path, "metric", METRICS).names]
 
 
-def _refuse_taken(names: Sequence[str], known: Sequence[str]) -> None:
+def _refuse_taken(names: Iterable[str], known: Sequence[str]) -> None:
     for name in names:
         if is_measured(name, known):
             raise ValueError(f"expected a name that no other metric has, got {name!r}")

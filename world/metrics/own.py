@@ -2,7 +2,7 @@
 
 import inspect
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection
 from typing import Any, ClassVar
 
 from zwerm.errors import ScenarioError
@@ -14,7 +14,7 @@ from zwerm.world.metrics import Metric, MetricContext, Truth
 class FunctionMetric(Metric):
     """A function `f(truth) -> number`; its name is the metric's name. The metric is its value at the end."""
 
-    names: ClassVar[Sequence[str]] = ()
+    names: ClassVar[Collection[str]] = ()
     every_s: ClassVar[float | None] = 1.0
 
     def __init__(self, parameters: Callable[[Truth], Any], context: MetricContext) -> None:
@@ -50,7 +50,7 @@ def own_metric(name: str, context: MetricContext) -> Metric:
     """
     found = object_named(name, "metric")
     if isinstance(found, type):
-        if not issubclass(found, Metric) or not isinstance(found.names, list | tuple) or not found.names:
+        if not issubclass(found, Metric) or not isinstance(found.names, list | tuple | dict) or not found.names:
             raise ValueError(f"expected a subclass of zwerm.Metric that declares its `names`, got {name!r}")
         metric: Metric = found(None, context)
     elif callable(found) and hasattr(found, "__name__"):

@@ -1,6 +1,6 @@
 """Coverage by position: the fraction of grid cells with a robot, and the fraction of the area near a robot. Ozdemir 2019."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -41,7 +41,9 @@ def area_coverage_fraction(position: Floats, radius_m: float, arena: Arena) -> f
 class CellCoverage(Metric):
     """`metrics.cells`: the fraction of the cells of a grid, [columns, rows], that hold a robot."""
 
-    names: ClassVar[Sequence[str]] = ("cell_coverage_fraction",)
+    names: ClassVar[Mapping[str, str]] = {
+        "cell_coverage_fraction": "cells of the grid with a robot in them, of all cells. Ozdemir 2019, eq. 2",
+    }
     Parameters: ClassVar[Any] = Grid
 
     def __init__(self, parameters: tuple[int, int], context: MetricContext) -> None:
@@ -56,17 +58,19 @@ class CellCoverage(Metric):
 
     def metrics(self) -> dict[str, float]:
         """Return the fraction at the end."""
-        return {self.names[0]: self._fractions[-1]}
+        return {"cell_coverage_fraction": self._fractions[-1]}
 
     def series(self) -> dict[str, list[float]]:
         """Return the fraction at every sample."""
-        return {self.names[0]: self._fractions}
+        return {"cell_coverage_fraction": self._fractions}
 
 
 class AreaCoverage(Metric):
     """`metrics.coverage_radius_m`: the fraction of the arena within that distance [m] of a robot."""
 
-    names: ClassVar[Sequence[str]] = ("area_coverage_fraction",)
+    names: ClassVar[Mapping[str, str]] = {
+        "area_coverage_fraction": "free area within the radius of a robot, of all free area. Ozdemir 2019, eq. 3",
+    }
     Parameters: ClassVar[Any] = Positive
 
     def __init__(self, parameters: float, context: MetricContext) -> None:
@@ -81,8 +85,8 @@ class AreaCoverage(Metric):
 
     def metrics(self) -> dict[str, float]:
         """Return the fraction at the end."""
-        return {self.names[0]: self._fractions[-1]}
+        return {"area_coverage_fraction": self._fractions[-1]}
 
     def series(self) -> dict[str, list[float]]:
         """Return the fraction at every sample."""
-        return {self.names[0]: self._fractions}
+        return {"area_coverage_fraction": self._fractions}

@@ -6,7 +6,7 @@ circle is a polygon of 4 * 32 sides inside it; the same in both areas.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -80,11 +80,26 @@ def coverage(
 class TeamCoverage(Metric):
     """Coverage by the footprints of all robots, from their paths, and what the robots report of their map."""
 
-    names: ClassVar[Sequence[str]] = (
-        *("coverage_fraction", "repeat_coverage_fraction", "path_length_m", "sweepable_area_m2", "completion_time_s"),
-        *("lower_bound_s", "time_over_lower_bound"),
-        *("certificate_satisfied", "critical_points", "divisions", "merges"),
-    )
+    names: ClassVar[Mapping[str, str]] = {
+        "coverage_fraction": "the swept part of the area that footprints can sweep",
+        "repeat_coverage_fraction": (
+            "length of all paths times the diameter of the footprint, over the area that footprints can sweep, less one"
+        ),
+        "path_length_m": "length of the paths of all robots",
+        "sweepable_area_m2": "area that the footprints of the robots can sweep",
+        "completion_time_s": (
+            "time at which the certificate of the last living robot was satisfied; null if it never was"
+        ),
+        "lower_bound_s": (
+            "area that footprints can sweep, over robots times speed times the footprint's diameter: a bound on "
+            "the time of any planner"
+        ),
+        "time_over_lower_bound": "`completion_time_s` over `lower_bound_s`",
+        "certificate_satisfied": "1 if the certificates of all living robots are satisfied, else 0",
+        "critical_points": "critical points that the robots report",
+        "divisions": "divisions of teams that the robots report",
+        "merges": "merges of teams that the robots report",
+    }
     every_s: ClassVar[float | None] = 0.05
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:

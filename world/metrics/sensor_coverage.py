@@ -5,7 +5,7 @@ A report counts only from a node that may give it. The coordinator and the base 
 numbers of robots. Each robot reports its own frontier claim and its own membership. Others are ignored.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar, Final
 
@@ -31,9 +31,24 @@ ENOUGH: Final = 0.98
 class Deployment(Metric):
     """Cycles, pushes and robots of a deployment, by the reports of the coordinator and the base stations."""
 
-    names: ClassVar[Sequence[str]] = (
-        CYCLES, *NUMBERS, "ticks_per_cycle_mean", "messages_per_cycle_mean", "undecodable_snapshots",
-    )  # fmt: skip
+    names: ClassVar[Mapping[str, str]] = {
+        CYCLES: (
+            "cycles of a deployment, each of which asks what robots see and moves some; the last ones only find "
+            "that all is done; over all lives of a coordinator that began anew"
+        ),
+        "pushes": (
+            "pushes that placed a robot; of a coordinator that began anew, those of its last life, since none "
+            "is reported before it ends"
+        ),
+        "robots_released": "robots that the base station let out",
+        "redundant_robots": (
+            "robots at the end that coverage would not miss, by relative H2; with `services.redundancy=link` "
+            "those that have left the complex; only with a coordinator that finds the path"
+        ),
+        "ticks_per_cycle_mean": "ticks of the run by deployment cycles",
+        "messages_per_cycle_mean": "transmissions of all nodes, the coordinator too, by deployment cycles",
+        "undecodable_snapshots": "snapshots of nodes that could not be decoded; absent where there are none",
+    }
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         centre = [] if context.coordinator is None else [context.coordinator]
@@ -93,7 +108,13 @@ class Conclusion(Metric):
     or a claim of a running robot that it stands at a frontier. A robot that has restarted reports its claim again.
     """
 
-    names: ClassVar[Sequence[str]] = ("concluded_early",)
+    names: ClassVar[Mapping[str, str]] = {
+        "concluded_early": (
+            "with `services.path=gradient`: 1 if the base station concluded while less than 0.98 of the "
+            "reachable space was in sight, or a living robot knew where to expand, else 0; its mean over runs "
+            "is the rate of wrong conclusions"
+        ),
+    }
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         variant, range_m = context.scenario.variant, context.scenario.metrics.sight_range_m
@@ -140,7 +161,15 @@ class Removals(Metric):
     given and robots leave by agreement.
     """
 
-    names: ClassVar[Sequence[str]] = ("removals", "unsafe_removals")
+    names: ClassVar[Mapping[str, str]] = {
+        "removals": (
+            "robots that left the complex; with `services.redundancy=link`, or with a coordinator and "
+            "`services.path=gradient`"
+        ),
+        "unsafe_removals": (
+            "how many of these departures changed b0 or b1 of the complex of all that see each other, in truth"
+        ),
+    }
 
     def __init__(self, parameters: Any, context: MetricContext) -> None:
         self._range_m: float | None = context.scenario.metrics.sight_range_m

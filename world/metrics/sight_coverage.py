@@ -1,7 +1,7 @@
 """`metrics.sight_range_m`: the fraction of the arena in sight of the robots, and the number of robots."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar, Final
 
 import shapely
@@ -14,16 +14,32 @@ from zwerm.world.scene import Floats
 
 # Percentages of the arena whose first time in sight is measured.
 PERCENTS: Final = (50, 90, 99)
+TIMES: Final = {
+    f"time_to_{percent}_percent_coverage_s": (
+        f"when {percent} % of the arena was first in sight, on a straight line between samples; null if it never was"
+    )
+    for percent in PERCENTS
+}
 
 
 class SightCoverage(Metric):
     """Coverage by sight of the living robots, its curve over the run, and the number of robots beside the ideal packing."""
 
-    names: ClassVar[Sequence[str]] = (
-        *("coverage_fraction", "reachable_coverage_fraction", "robots_deployed", "hexagonal_packing_robots"),
-        *("robots_over_hexagonal", "holes", "obstacles"),
-        *(f"time_to_{percent}_percent_coverage_s" for percent in PERCENTS),
-    )
+    names: ClassVar[Mapping[str, str]] = {
+        "coverage_fraction": "free area in sight of a living robot, within the range, of all free area; exact polygons",
+        "reachable_coverage_fraction": (
+            "the same, of the free area that a robot's body can get into from where robots are: not what lies "
+            "behind a crack in a wall"
+        ),
+        "robots_deployed": "living robots that are in the arena at the end",
+        "hexagonal_packing_robots": (
+            "how many an ideal hexagonal packing has, points the range apart: the mean over all ways to lay it"
+        ),
+        "robots_over_hexagonal": "the first of these two over the second",
+        "holes": "holes (H1) of the complex of the living robots that see each other within the range",
+        "obstacles": "obstacles that stand free in the arena; a deployment that is done has as many holes",
+        **TIMES,
+    }
     every_s: ClassVar[float | None] = 5.0
     Parameters: ClassVar[Any] = Positive
 

@@ -6,7 +6,7 @@ integrals of the true field. Source: Schwager, McLurkin, Rus 2006.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
@@ -44,10 +44,20 @@ class VoronoiMetricsTable(Table):
 class VoronoiMetrics(Metric):
     """`metrics.voronoi`: coverage of the field by the robots that are present and not `stationary`."""
 
-    names: ClassVar[Sequence[str]] = (
-        *("mean_error_m", "max_error_m", "true_mean_error_m", "coverage_cost", *STATISTICS),
-        *("mean_peak_distance_m", "density_ring_*"),
-    )
+    names: ClassVar[Mapping[str, str]] = {
+        "mean_error_m": "from robots to the estimated centroids of their Voronoi cells. Schwager 2006, eq. 10",
+        "max_error_m": "the largest of those",
+        "true_mean_error_m": "the same to the exact centroids of the true field. Schwager 2006, eq. 5",
+        "coverage_cost": "cost of the swarm's places, lower is better. Schwager 2006, eq. 1",
+        "convergence_time_s": "when the mean error first was below `converged_m`; null if it never was",
+        "convergence_time_max_s": "when the largest error was",
+        "convergence_time_mean_squared_s": "when the mean of the squared errors [m²] was below the same number",
+        "convergence_time_max_squared_s": "when the largest squared error was",
+        "mean_peak_distance_m": "from robots to the peak, where `peak_m` is given",
+        "density_ring_*": (
+            "robots in each ring about the peak, 01 the first, over what a uniform swarm would have there"
+        ),
+    }
     every_s: ClassVar[float | None] = 0.1
     Parameters: ClassVar[Any] = VoronoiMetricsTable
 

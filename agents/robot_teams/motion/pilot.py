@@ -119,7 +119,7 @@ class Pilot:
         self._mark = (math.inf, 0.0)
 
     def rest(self) -> None:
-        """End the manoeuvre: stand, and make way for others."""
+        """End the manoeuvre: stand, and move aside for others."""
         self._manoeuvre, self.state = None, IDLE
 
     def give_up(self) -> None:
@@ -127,7 +127,7 @@ class Pilot:
         self._manoeuvre, self._retreat, self.state = None, None, FAILED
 
     def stand(self, senses: Senses) -> Vector:
-        """Return the velocity of a robot that has nothing left to do: it makes way for others."""
+        """Return the velocity of a robot that has nothing left to do: it moves aside for others."""
         if self.state != IDLE:
             self.rest()
         return self.step(senses)

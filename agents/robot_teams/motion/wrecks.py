@@ -1,6 +1,6 @@
 """Detection of wrecks: robots that do not move although they are touched, and are silent.
 
-Silence alone proves nothing: a packet may be lost, or the radio divided. A living robot that is touched makes way, or goes on.
+Silence alone proves nothing: a packet may be lost, or the radio divided. A living robot moves aside when touched, or goes on.
 So a robot counts as a wreck only if three conditions hold. It was touched for `TOUCHED_S` in total. It did not move for
 `STILL_S`. It was silent for twice the time after which a member is dropped. Any motion, and any later status, shows
 that it lives.

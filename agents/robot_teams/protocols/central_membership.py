@@ -1,7 +1,7 @@
 """One team of all robots, which the coordinator leads: the robots' messages to it, and its messages to them.
 
-The coordinator makes a view of all robots that it hears. A robot takes every later view that includes it, and founds
-none. It waits while it receives nothing.
+The coordinator makes a view of all robots whose beacons it receives. A robot takes every later view that includes it, and
+founds none. It waits while it receives nothing.
 """
 
 from zwerm.agents.robot_teams.protocols.team_membership import TeamMembership, later
@@ -9,7 +9,7 @@ from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, View
 
 
 class CoordinatedMembership(TeamMembership):
-    """A robot's view of the coordinator's team. All that it hears comes from the coordinator."""
+    """A robot's view of the coordinator's team. All that it receives comes from the coordinator."""
 
     @property
     def leads(self) -> bool:
@@ -21,8 +21,8 @@ class CoordinatedMembership(TeamMembership):
         return True
 
     def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
-        """Take in the coordinator's beacon."""
-        self._note_statuses(beacon, tick)
+        """Receive the coordinator's beacon."""
+        self._receive_statuses(beacon, tick)
         for view in beacon.views:
             self._latest_epoch = max(self._latest_epoch, view.epoch)
             if self.node in view.members and later(view, self.view):
@@ -36,7 +36,7 @@ class CoordinatedMembership(TeamMembership):
 
 
 class CoordinatorMembership(TeamMembership):
-    """The coordinator's view: all robots that it hears. It is no member itself."""
+    """The coordinator's view: all robots whose beacons it receives. It is no member itself."""
 
     def __init__(self, node: int, dt_s: float, silence_s: float) -> None:
         super().__init__(node, dt_s, silence_s)
@@ -47,15 +47,15 @@ class CoordinatorMembership(TeamMembership):
         return True
 
     def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
-        """Take in a robot's beacon."""
-        self._note_statuses(beacon, tick)
+        """Receive a robot's beacon."""
+        self._receive_statuses(beacon, tick)
         for view in beacon.views:
             self._latest_epoch = max(self._latest_epoch, view.epoch)
 
     def poll(self, tick: int) -> None:
-        """Take in robots that are heard, and drop silent ones. Plans hold within a view: robots finish theirs first."""
-        heard = [
+        """Add robots whose beacons it receives, and drop silent ones. Plans hold within a view: robots finish theirs first."""
+        received = [
             node for node in sorted(self.roster.statuses) if self.roster.silent_ticks(node, tick) <= self._silence_ticks
         ]
-        if tuple(heard) != self.view.members:
-            self._adopt(View(self._latest_epoch + 1, self.node, tuple(heard)), tick)
+        if tuple(received) != self.view.members:
+            self._adopt(View(self._latest_epoch + 1, self.node, tuple(received)), tick)

@@ -76,8 +76,8 @@ class TeamMembership:
         return self.view.lead == self.node
 
     def receive(self, beacon: TeamBeacon, tick: int, near: bool) -> None:
-        """Take in a beacon; `near` is true if its sender is close enough to be met."""
-        self._note_statuses(beacon, tick)
+        """Receive a beacon; `near` is true if its sender is close enough to be met."""
+        self._receive_statuses(beacon, tick)
         theirs = beacon.views[0]
         for view in beacon.views:
             self._latest_epoch = max(self._latest_epoch, view.epoch)
@@ -100,9 +100,9 @@ class TeamMembership:
 
     def meet_first(self, tick: int) -> None:
         """Found the first team: the robot with the smallest id of all that receive each other at the start leads it."""
-        heard = sorted(self.roster.statuses.keys() | {self.node})
-        if heard[0] == self.node and len(heard) > 1 and self.view.epoch == 1:
-            self._adopt(View(2, self.node, tuple(heard)), tick)
+        received = sorted(self.roster.statuses.keys() | {self.node})
+        if received[0] == self.node and len(received) > 1 and self.view.epoch == 1:
+            self._adopt(View(2, self.node, tuple(received)), tick)
 
     def poll(self, tick: int) -> None:
         """Drop silent members, or take the place of a silent lead."""
@@ -156,11 +156,11 @@ class TeamMembership:
         self._adopt(View(self._latest_epoch + 1, self.node, tuple(sorted(members))), tick)
         return True
 
-    def merges_soon(self, tick: int, patience_ticks: int) -> bool:
+    def merges_soon(self, tick: int, wait_ticks: int) -> bool:
         """Return whether a team was met a short time ago: the lead with the smaller id unites the two when all are free."""
-        return any(tick - since < patience_ticks for _, since in self._met.values())
+        return any(tick - since < wait_ticks for _, since in self._met.values())
 
-    def _note_statuses(self, beacon: TeamBeacon, tick: int) -> None:
+    def _receive_statuses(self, beacon: TeamBeacon, tick: int) -> None:
         for status in beacon.statuses:
             if status.node != self.node:
                 self.roster.receive(status, tick)

@@ -135,12 +135,12 @@ def happen(corridor: Corridor, event: tuple[str, int, int]) -> Corridor:
 
 
 def signature(corridor: Corridor) -> object:
-    heard = [
+    received = [
         [(node, status.phase, status.claim, status.room) for node, status in sorted(member.roster.statuses.items())]
         for member in corridor.members
     ]
     old = [beacon and (beacon.statuses[0].phase, beacon.statuses[0].room) for beacon in corridor.old]
-    return repr((corridor.phase, corridor.claims, corridor.found_room, heard, old, corridor.dead))
+    return repr((corridor.phase, corridor.claims, corridor.found_room, received, old, corridor.dead))
 
 
 def explore(corridor: Corridor, depth: int, dies: int | None = None) -> int:
