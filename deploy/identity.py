@@ -26,6 +26,7 @@ T = TypeVar("T")
 
 PRIVATE_FILE_MODE: Final = 0o600
 SECRET_BYTES: Final = 24
+PROBE: Final = "probe"
 PENDING_MAX: Final = 4_000
 ACCEPT_TIMEOUT_MS: Final = 5_000
 
@@ -80,13 +81,21 @@ def _issue(node: int) -> Credential:
 
 
 def router_settings(
-    credentials: Credentials, endpoints: list[str], dictionary: Path, identity: WorldIdentity | None = None
+    credentials: Credentials,
+    endpoints: list[str],
+    dictionary: Path,
+    identity: WorldIdentity | None = None,
+    probe_password: str = "",
 ) -> dict[str, Any]:
     """Return the Zenoh settings of a router that listens on `endpoints` and admits these credentials only.
 
-    Writes the passwords to the file `dictionary`. The router reads it when its session opens; the caller then removes it.
+    With `probe_password` it also admits the user PROBE, who may do nothing: to see whether it takes sessions. Writes the
+    passwords to the file `dictionary`. The router reads it when its session opens; the caller then removes it.
     """
-    write_private(dictionary, "".join(f"{node.user}:{node.password}\n" for node in credentials.nodes).encode())
+    users = {node.user: node.password for node in credentials.nodes} | (
+        {PROBE: probe_password} if probe_password else {}
+    )
+    write_private(dictionary, "".join(f"{user}:{password}\n" for user, password in users.items()).encode())
     capacity = len(credentials.nodes)
     return {
         "listen/endpoints": endpoints,

@@ -7,14 +7,15 @@ Entering returns when every node has joined. Leaving, also by an exception, leav
 """
 
 import contextlib
+import secrets
 import signal
 import socket
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Final, NamedTuple, Self
 
 import msgspec
 
@@ -23,7 +24,17 @@ from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import code_of
 from zwerm.deploy.authority import certify
 from zwerm.deploy.endpoints import host_of, is_encrypted
-from zwerm.deploy.identity import WorldIdentity, WorldKeys, issue, renew, router_settings, save, slice_of
+from zwerm.deploy.identity import (
+    PROBE,
+    SECRET_BYTES,
+    WorldIdentity,
+    WorldKeys,
+    issue,
+    renew,
+    router_settings,
+    save,
+    slice_of,
+)
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.deploy.supervisor import (
     JOIN_DEADLINE_S,
@@ -36,9 +47,19 @@ from zwerm.deploy.supervisor import (
 from zwerm.errors import ControllerError, LinkError
 from zwerm.link.admission import ExpectedNode
 from zwerm.link.peer_radio import Station
-from zwerm.link.session import LEASE_REMOTE_S, UNIX_PROTOCOL, Credential, Credentials, close_without_waiting
+from zwerm.link.session import (
+    LEASE_REMOTE_S,
+    UNIX_PROTOCOL,
+    Credential,
+    Credentials,
+    close_without_waiting,
+    open_session,
+)
 from zwerm.link.world_link import ZenohWorldLink
 from zwerm.wire.messages import encode
+
+# Time in which the router must admit a probe.
+PROBE_S_MAX: Final = 5.0
 
 Members = Mapping[int, tuple[str, Setup]]
 
@@ -84,6 +105,7 @@ class _Swarm(ABC):
         self._progress = progress or (lambda joined, total: None)
         self._deadline_s = deadline_s
         self._stack = contextlib.ExitStack()
+        self._probe_password = secrets.token_urlsafe(SECRET_BYTES)
 
     def __enter__(self) -> Self:
         """Start all nodes, and return when all have joined. Raises LinkError if one does not join."""
@@ -108,7 +130,7 @@ class _Swarm(ABC):
         """Open the world's end of the link on `endpoints`, for the nodes in `self.credentials`."""
         members = {credential.node: self._member(credential) for credential in self.credentials.nodes}
         passwords = directory / "passwords"
-        settings = router_settings(self.credentials, endpoints, passwords, identity)
+        settings = router_settings(self.credentials, endpoints, passwords, identity, self._probe_password)
         try:
             self.link = ZenohWorldLink(self._run, members, settings)
         finally:
@@ -166,7 +188,7 @@ class LocalSwarm(_Swarm):
 
     def _open(self, directory: Path) -> None:
         prepare(len(self._members))
-        endpoint = f"{UNIX_PROTOCOL}/{directory}/router"
+        endpoint = self._endpoint = f"{UNIX_PROTOCOL}/{directory}/router"
         self.credentials = issue(self._run, self._members)
         self._listen(directory, [endpoint])
         self._current = {credential.node: credential for credential in self.credentials.nodes}
@@ -176,7 +198,8 @@ class LocalSwarm(_Swarm):
         self._stack.callback(self._end)
 
     def _gather(self) -> None:
-        self.supervisor.start(self._progress, self._deadline_s)
+        with self._joining():
+            self.supervisor.start(self._progress, self._deadline_s)
         self._exit_wait_s = LEAVE_WAIT_S
 
     def kill(self, node: int) -> None:
@@ -193,7 +216,8 @@ class LocalSwarm(_Swarm):
             self._start_next_incarnation(node)
             return
         self._ran.add(node)
-        self.supervisor.restart(self._current[node], self._deadline_s)
+        with self._joining():
+            self.supervisor.restart(self._current[node], self._deadline_s)
 
     def pause(self, node: int) -> None:
         """Stop a node's process with SIGSTOP."""
@@ -224,7 +248,33 @@ class LocalSwarm(_Swarm):
             self._members = {**self._members, node: self._restart(node, credential.incarnation)}
         self.link.expect(node, self._member(credential))
         self._current[node] = credential
-        self.supervisor.restart(credential, self._deadline_s)
+        with self._joining():
+            self.supervisor.restart(credential, self._deadline_s)
+
+    @contextlib.contextmanager
+    def _joining(self) -> Iterator[None]:
+        """Add to the error of a robot that does not join whether the router still takes sessions: it may have stopped to."""
+        try:
+            yield
+        except LinkError as error:
+            if self.takes_sessions():
+                raise
+            raise LinkError(f"{error}; the router takes no more sessions") from None
+
+    def takes_sessions(self) -> bool:
+        """Return whether the router admits one more session, within PROBE_S_MAX."""
+        settings = {
+            "mode": "client",
+            "connect/endpoints": [self._endpoint],
+            "connect/timeout_ms": round(1000 * PROBE_S_MAX),
+            "connect/exit_on_failure": True,
+            "transport/auth/usrpwd": {"user": PROBE, "password": self._probe_password},
+        }
+        try:
+            open_session(settings, "probe").close()  # type: ignore[no-untyped-call]
+        except LinkError:
+            return False
+        return True
 
     def _end(self) -> None:
         for node in sorted(self._stopped):

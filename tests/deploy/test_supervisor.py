@@ -11,12 +11,14 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from network import free_port, tick
 from support import ROBOTS, ROOT, children_of, gone, until
 
 from zwerm.agents.runtime.contract import Setup
+from zwerm.deploy.identity import router_settings
 from zwerm.deploy.remote import run_robots
 from zwerm.deploy.supervisor import interrupts_held
 from zwerm.deploy.swarm import Certificate, LocalSwarm, RemoteSwarm
@@ -83,6 +85,19 @@ def test_an_exception_inside_a_swarm_ends_all_its_processes(nothing_left: None) 
 def test_the_error_names_the_node_that_does_not_join_in_time(nothing_left: None) -> None:
     with pytest.raises(LinkError, match=r"^node 0 did not join within 0.5 s$"):
         LocalSwarm("run", members(1, "small_controllers:NeverMade"), deadline_s=0.5).__enter__()
+
+
+def test_a_router_that_takes_no_more_sessions_is_named(nothing_left: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*arguments: Any) -> dict[str, Any]:
+        return router_settings(*arguments) | {"transport/unicast/max_sessions": 1}
+
+    with monkeypatch.context() as patched:
+        patched.setattr("zwerm.deploy.swarm.router_settings", full)
+        with pytest.raises(LinkError, match=r"^node [01] .*; the router takes no more sessions$"):
+            LocalSwarm("run", members(2), deadline_s=2.0).__enter__()
+    with LocalSwarm("run", members(2)) as swarm:
+        assert swarm.takes_sessions()
+        assert set(tick(swarm.link, range(2), 0)) == {0, 1}
 
 
 def test_the_failure_of_a_controller_arrives_and_its_process_exits_with_1(nothing_left: None) -> None:
