@@ -194,7 +194,7 @@ class Work:
     def _go_straight(self, start: End, goal: End) -> Activity:
         if start.slice != goal.slice or abs(start.y_mm - goal.y_mm) > STRAIGHT_MM:
             raise NoRoute
-        yield Approach(goal, self._grid, self._parked)
+        yield from self._go_to(goal)
         self.at = goal
 
     def _is_new(self, start: End, direction: int, stop: End, beside_wreck: bool) -> bool:
@@ -220,7 +220,13 @@ class Work:
         senses = self._sense()
         dx, dy = senses.x_m - self._grid.x_m(end.slice), senses.y_m - end.y_mm / 1000.0
         if dx * dx + dy * dy > AT_END_M**2:
-            yield Approach(end, self._grid, self._parked)
+            yield from self._go_to(end)
+
+    def _go_to(self, end: End) -> Activity:
+        approach = Approach(end, self._grid, self._parked)
+        yield approach
+        if approach.hidden:
+            raise Lost
 
     # --- a corridor ---------------------------------------------------------------------------------------------------
 

@@ -23,6 +23,9 @@ CROSSED_M: Final = 0.002
 AROUND_TICKS_MAX: Final = 100
 # Distance that it may leave its slice for that [m].
 AROUND_M: Final = 1.2
+# Ticks beside a wreck without coming nearer after which an approach gives up, and what counts as nearer [m].
+HIDDEN_TICKS: Final = 20
+NEARER_M: Final = 0.02
 # Distance on the wrong side of its slice at which a trace may begin [m].
 SLACK_M: Final = 0.75
 
@@ -76,27 +79,33 @@ class Around:
 
 
 class Approach:
-    """Go straight to an end near by, sliding along walls, and press against the boundary there."""
+    """Go straight to an end near by, sliding along walls, and press against the boundary there.
+
+    A wreck may stand at the end, or in the way: then the approach is over, and `hidden` is true.
+    """
 
     def __init__(self, end: End, grid: SliceGrid, parked: Parked) -> None:
         self.end = end
         self._parked = parked
         self._x_m, self._y_m = grid.x_m(end.slice), end.y_mm / 1000.0
-        self._ticks = 0
+        self._nearest_m = math.inf
+        self._beside_wreck_ticks = 0
+        self.hidden = False
 
     def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
         """Return where to go, or None at the end."""
         dx, dy = self._x_m - senses.x_m, self._y_m - senses.y_m
         distance = math.hypot(dx, dy)
-        self._ticks += 1
         if distance < 0.03 or (blocks and distance < 0.7 and self.end in self._parked(senses)):
             return None
+        if distance < self._nearest_m - NEARER_M:
+            self._nearest_m, self._beside_wreck_ticks = distance, 0
+        elif senses.wrecks:
+            self._beside_wreck_ticks += 1
+            if self._beside_wreck_ticks > HIDDEN_TICKS:
+                self.hidden = True
+                return None
         return dx / distance, dy / distance
-
-    @property
-    def ticks(self) -> int:
-        """The time that it has lasted [ticks]."""
-        return self._ticks
 
 
 class SliceSweep:

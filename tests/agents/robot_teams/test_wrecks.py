@@ -1,5 +1,7 @@
 """A robot is taken for a wreck by touch, rest and silence together; facts that name it are void once it is alive."""
 
+import pytest
+
 from zwerm.agents.robot_teams.mapping.facts import (
     BOTTOM,
     LEFT,
@@ -14,6 +16,7 @@ from zwerm.agents.robot_teams.mapping.facts import (
     Wreck,
 )
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
+from zwerm.agents.robot_teams.motion.manoeuvres import Approach, SliceGrid
 from zwerm.agents.robot_teams.motion.senses import Beside, Senses
 from zwerm.agents.robot_teams.motion.wrecks import STILL_S, TOUCHED_S, WreckWatch
 
@@ -137,3 +140,12 @@ def test_an_end_that_a_robot_swept_past_counts_for_nothing() -> None:
     assert known(grazed).certificate.complete
     beside = [*room(2), arc(End(0, TOP, 5_000), RIGHT, End(1, TOP, 6_500))]
     assert not known(beside).certificate.complete
+
+
+@pytest.mark.parametrize(("dead", "ends"), [(True, True), (False, False)])
+def test_an_approach_to_an_end_at_which_a_wreck_stands_ends_soon(dead: bool, ends: bool) -> None:
+    """The control: a robot that lives may go away, so the approach goes on."""
+    beside = Beside(3, 0.0, 1.45, 0.0, -1.0, 0.01, 0.0, 0.0, Wreck(3, 0) if dead else None)
+    approach = Approach(End(0, BOTTOM, 1_000), SliceGrid(0.0, 0.95), lambda senses: [])
+    steps = [approach.step(Senses(tick, 0.0, 2.0, (), (beside,)), []) for tick in range(30)]
+    assert (None in steps) == ends == approach.hidden
