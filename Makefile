@@ -2,6 +2,7 @@
 
 PYTHON ?= python3
 SCENARIO ?= sensor-coverage
+BASE ?= HEAD~1
 VENV := .venv
 BIN := $(VENV)/bin
 UV ?= uv
@@ -16,7 +17,7 @@ COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generat
 .DEFAULT_GOAL := help
 APT_TOOLS := iproute2 nftables ffmpeg chromium
 
-.PHONY: help setup dev compile tools run test lint format pages docs bench fidelity package lock clean
+.PHONY: help setup dev compile tools run test lint format pages docs bench regressions fidelity package lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -65,6 +66,9 @@ bench: dev  ## run the benchmarks, Voronoi coverage compiled where there is a C 
 	then $(MAKE) --no-print-directory compile; else echo "bench: Voronoi coverage is interpreted, there is no C compiler"; fi
 	@for each in benchmarks/bench_*.py; do \
 	  test -e "$$each" || continue; echo "== $$each"; $(BIN)/python "$$each" || exit 1; done
+
+regressions: dev  ## compare the speed with that of the commit before (BASE=revision), and name what is 10 % slower
+	$(BIN)/python benchmarks/regressions.py --base $(BASE)
 
 fidelity: dev  ## hold every model of the radio against its 99 % confidence interval, a million packets each
 	$(BIN)/python benchmarks/bench_fidelity.py

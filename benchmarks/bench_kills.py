@@ -87,9 +87,9 @@ def one(role: str, name: str, phase: str) -> str:
             *("--set", "time.straggler_s=3.0", "--record", "run.mcap"),
         ]
         environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": folder, "COLUMNS": "120"}
-        with Path(folder, "said").open("w+b") as said:
+        with Path(folder, "printed").open("w+b") as printed:
             world = subprocess.Popen(
-                command, cwd=folder, env=environment, stdout=said, stderr=said, start_new_session=True
+                command, cwd=folder, env=environment, stdout=printed, stderr=printed, start_new_session=True
             )
             try:
                 return _judge(role, name, phase, world, Path(folder))
@@ -103,7 +103,7 @@ def one(role: str, name: str, phase: str) -> str:
 
 
 def _judge(role: str, name: str, phase: str, world: subprocess.Popen[bytes], folder: Path) -> str:
-    record, said = folder / "run.mcap", folder / "said"
+    record, printed = folder / "run.mcap", folder / "printed"
     if phase == "joining":
         until(lambda: world.poll() is not None or len(robots_of(world.pid)[1]) > 1, "robots start")
     elif phase == "running":
@@ -111,7 +111,7 @@ def _judge(role: str, name: str, phase: str, world: subprocess.Popen[bytes], fol
             lambda: world.poll() is not None or (record.exists() and record.stat().st_size > 100_000), "the run goes on"
         )
     else:
-        until(lambda: world.poll() is not None or b"trace" in said.read_bytes(), "the result is printed")
+        until(lambda: world.poll() is not None or b"trace" in printed.read_bytes(), "the result is printed")
     server, robots = robots_of(world.pid)
     target = {"world": world.pid, "server": server, "robot": robots[0] if robots else 0}[role]
     everybody = set(processes(world.pid))
@@ -129,7 +129,7 @@ def _judge(role: str, name: str, phase: str, world: subprocess.Popen[bytes], fol
         os.kill(world.pid, signal.SIGINT)
     until(lambda: world.poll() is not None, "the run ends")
     until(lambda: not any(_alive(pid) for pid in everybody), "all processes end")
-    text = said.read_text(errors="replace")
+    text = printed.read_text(errors="replace")
     if name == "KILL" and role == "world":
         sweep(folder)  # as the next run does
     left = [each.name for each in folder.iterdir() if each.name.startswith(("zwerm-", "pymp-"))]

@@ -22,16 +22,17 @@ from zwerm.agents.landmark_exploration.mapping.frontier_status import (
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, columns, write_report
 from zwerm.agents.landmark_exploration.motion import Drive, Outcome, explore, roam, travel, wander
-from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, ExplorerParameters
+from zwerm.agents.landmark_exploration.parameters import ExplorerParameters
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Message, Register, TaskPart, TaskReport, Vector
-from zwerm.agents.landmark_exploration.sharing.log_entries import observation_entries, status_entries
+from zwerm.agents.landmark_exploration.sharing.log_entries import failure_entry, observation_entries, status_entries
 from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
 from zwerm.agents.landmark_exploration.sharing.orders import ExplorationTask, OrderIntake, landmark_bytes
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 from zwerm.agents.landmark_exploration.sharing.upload import Upload
 from zwerm.agents.landmark_exploration.view import ExplorerView, Slide
+from zwerm.agents.landmark_exploration.wayfinding import MEETING_TICKS, VISIT_TICKS, meet, visit
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError
 from zwerm.wire.messages import Command, Observation, Packet, Transmission
@@ -48,6 +49,11 @@ LOOK_TICKS: Final = 5
 CUT_OFF_TICKS: Final = 200
 # Ticks for which a robot leaves a frontier alone that it did not get to.
 AVOID_TICKS: Final = 300
+# An idle robot goes to the meeting place for news, if it has not heard of some robot for this many ticks. Its map may be old.
+FRESH_TICKS: Final = 100
+# A robot goes there before its next frontier, too, if it has not heard of any robot for this many ticks, and twice as many
+# after each visit in vain: it might explore what others have explored.
+LONELY_TICKS: Final = 400
 # Ticks between two snapshots that a robot reports to observers of the run.
 TELEMETRY_TICKS: Final = 25
 
@@ -99,7 +105,7 @@ class Explorer(Controller):
         self._news_at = 0
         self._no_way_since: int | None = None
         self._cut_off = False
-        self._failures: dict[int, int] = {}
+        self._lonely_ticks = LONELY_TICKS
         self._avoid_until: dict[int, int] = {}
         self._outbox: list[Transmission] = []
         self._seen: list[BearingSnapshot] = []
@@ -167,20 +173,42 @@ class Explorer(Controller):
         idle = wander(self.view, self.random, self.parameters.turn_sd_rad)
         if self.parameters.presence_only:
             idle = roam(self.view, self.random, lambda: self._news_at == self.view.tick)
+        meeting = meet(self.view, self.map, self.random, lambda: next(idle), self._meeting_ticks)
+        meets = self._carries and not self.parameters.presence_only
         while True:
+            if meets and self._task is None and self._is_lonely():
+                self._lonely_ticks *= 2
+                yield from visit(self.view, self.map, self.random, lambda: VISIT_TICKS)
             if self._task is None:
                 self._choose()
             if self._task is None or self._task.key is None:
                 # If robots carry the map to each other, the idle robots do this. If a coordinator has the map, idle
                 # robots wait for it.
-                waits = not (self._carries or self._cut_off)
-                yield None if self._halted or waits else next(idle)
+                if self._halted or not (self._carries or self._cut_off):
+                    yield None
+                else:
+                    yield next(meeting if meets and self._waits_for_news() else idle)
                 continue
             task = self._task
             outcome = yield from self._carry_out(task)
             if task is self._task:
                 self._conclude(task, outcome)
                 self._task = None
+
+    def _meeting_ticks(self) -> int:
+        """Return how long to stay at the meeting place: not long if a walk may find the way to an open frontier."""
+        return MEETING_TICKS if self._no_way_since is None else VISIT_TICKS
+
+    def _is_lonely(self) -> bool:
+        """Return whether no known robot has been heard of for so long that it is worth the way to the meeting place."""
+        heard, tick = self.registers.last_heard(self.setup.node), self.view.tick
+        if heard is not None and tick - heard < LONELY_TICKS:
+            self._lonely_ticks = LONELY_TICKS
+        return heard is not None and tick - heard >= self._lonely_ticks
+
+    def _waits_for_news(self) -> bool:
+        """Return whether others may know what this robot, which has nothing to do, does not."""
+        return self._frozen or not self.registers.is_fresh(self.setup.node, self.view.tick, FRESH_TICKS)
 
     def _carry_out(self, task: ExplorationTask) -> Drive:
         """Navigate to the frontier, then explore it; end early where there is another task."""
@@ -214,11 +242,9 @@ class Explorer(Controller):
         elif outcome == "timed-out":
             self._raise([task.key], task.status)
         elif outcome == "unreached" and self._claims:
-            failures = self._failures[task.key] = self._failures.get(task.key, 0) + 1
-            if failures >= FAILURES_MAX:
-                self._raise([task.key], task.status)
-            else:
-                self._avoid_until[task.key] = self.view.tick + AVOID_TICKS
+            self.map.fail(task.key)
+            self._write([failure_entry(task.key)])
+            self._avoid_until[task.key] = self.view.tick + AVOID_TICKS
 
     def _choose(self) -> None:
         """Choose a frontier and claim it, where robots do that by themselves."""
@@ -238,7 +264,8 @@ class Explorer(Controller):
                 self._no_way_since = None
             elif self._no_way_since is None:
                 self._no_way_since = tick
-            self._cut_off = self._no_way_since is not None and tick - self._no_way_since >= CUT_OFF_TICKS
+            has_no_way = self._no_way_since is not None and tick - self._no_way_since >= CUT_OFF_TICKS
+            self._cut_off = has_no_way or not (frontiers.open or frontiers.has_area)
             self._choose_at = tick + self._patience_ticks
             self._patience_ticks = min(2 * self._patience_ticks, RETRY_TICKS_MAX)
             return
@@ -256,7 +283,12 @@ class Explorer(Controller):
         if not self._claims or self._gossip is None:
             return
         rules = self.parameters
-        if self._task is not None or self.map.frontiers.open or (rules.presence_only and self._news_at == tick):
+        if rules.presence_only:
+            has_news = self._news_at == tick
+        else:
+            # A map without an area is not explored: landmarks are too few, or in one line.
+            has_news = bool(self.map.frontiers.open) or not self.map.frontiers.has_area
+        if self._task is not None or has_news:
             self._quiet_since = tick
         quiet_ticks = rules.stagnation_ticks if rules.presence_only else rules.freeze_ticks
         if not self._frozen and tick - self._quiet_since >= quiet_ticks:

@@ -4,75 +4,36 @@ It has a map, bearings, contact and its compass, and needs no radio. A goal is a
 sees all of them. The map comes from a file (see `map_file`), whose text is a parameter.
 """
 
-from collections.abc import Sequence
-from typing import Annotated, ClassVar, Final
+from collections.abc import Callable, Sequence
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta, Struct
 
-from zwerm.agents.landmark_exploration.mapping.cost_utility import path_to, reach
-from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.map_file import read_map
 from zwerm.agents.landmark_exploration.mapping.map_reports import GoalReport, write_report
-from zwerm.agents.landmark_exploration.motion import Drive, travel, wander
+from zwerm.agents.landmark_exploration.motion import Drive, travel
+from zwerm.agents.landmark_exploration.presence import PresenceTracker, seek
 from zwerm.agents.landmark_exploration.view import ExplorerView, Slide
+from zwerm.agents.landmark_exploration.wayfinding import Follow, navigate
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError
 from zwerm.wire.messages import Command, Observation
-
-# Ways tried before a goal is given up.
-TRIES_MAX: Final = 30
-# Ticks of walking about between two tries, and where no way is known.
-ASTRAY_TICKS: Final = 15
-
-
-def navigate(view: ExplorerView, map_: LandmarkMap, goal: Sequence[int], random: np.random.Generator) -> Drive:
-    """Go to where all landmarks of `goal` are seen, or as many as the map has ever seen together."""
-
-    def arrived() -> bool:
-        return all(landmark in view.bearing for landmark in goal)
-
-    for _ in range(TRIES_MAX):
-        if arrived():
-            return "arrived"
-        path = way_to(map_, view.snapshot.landmarks, goal)
-        outcome = "unreached"
-        if path:
-            outcome = yield from travel(view, [map_.complex.snapshot_of(each) for each in path], random, arrived)
-        if outcome == "arrived":
-            return "arrived"
-        astray = wander(view, random)
-        for _ in range(ASTRAY_TICKS):
-            yield next(astray)
-            if arrived():
-                return "arrived"
-    return "unreached"
-
-
-def way_to(map_: LandmarkMap, landmarks: Sequence[int], goal: Sequence[int]) -> tuple[int, ...]:
-    """Return the vertices on the cheapest way to one with most landmarks of the goal, or nothing where there is no way."""
-    before: dict[int, int] = {}
-    best: tuple[int, int] | None = None
-    wanted = set(goal)
-    for _, vertex, previous in reach(map_.complex, landmarks):
-        before[vertex] = previous
-        shared = len(wanted.intersection(map_.complex.simplices[vertex]))
-        if shared and (best is None or shared > best[0]):
-            best = shared, vertex
-            if shared == len(wanted):
-                break
-    return () if best is None else path_to(best[1], before)
 
 
 class NavigatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
     """The text of the map's file, and the goals: sets of landmarks, one after the other.
 
-    Without goals each robot draws `random_goals` of them, free simplices of the map.
+    Without goals each robot draws `random_goals` of them, free simplices of the map. With `presence_only` no bearing is used,
+    neither of the map nor of the sensor. The robot then has to know the sensor's range, `range_m`.
     """
 
     map_file: str
     goals: tuple[tuple[int, ...], ...] = ()
     random_goals: Annotated[int, Meta(ge=1, le=10_000)] = 10
+    presence_only: bool = False
+    range_m: Annotated[float, Meta(gt=0.0)] = 1.0
 
 
 class Navigator(Controller):
@@ -93,6 +54,12 @@ class Navigator(Controller):
         self._goals = rules.goals or self._draw(rules.random_goals)
         self.view = ExplorerView()
         self._slide = Slide(self.random)
+        self._tracker: PresenceTracker | None = None
+        self._follow: Follow = travel
+        if rules.presence_only:
+            self._tracker = PresenceTracker(rules.range_m / (self._speed_m_s * setup.dt_s))
+            self._follow = self._seek
+        self._moved: float | None = None
         self._report = b""
         self._drive = self._live()
         self._done = False
@@ -106,14 +73,26 @@ class Navigator(Controller):
     def step(self, observation: Observation) -> Command:
         """Perceive and go on."""
         self.view.take(observation)
-        direction = self._slide.along(next(self._drive), self.view)
+        if self._tracker is not None:
+            self._tracker.update(self.view, self._moved)
+        direction = self._moved = self._slide.along(next(self._drive), self.view)
         report, self._report = self._report, b""
         return Command(drive=self.view.drive(direction, self._speed_m_s), done=self._done, snapshot=report)
+
+    def _seek(
+        self,
+        view: ExplorerView,
+        path: Sequence[BearingSnapshot],
+        random: np.random.Generator,
+        arrived: Callable[[], bool],
+    ) -> Drive:
+        assert self._tracker is not None
+        return seek(view, self._tracker, path, random, arrived)
 
     def _live(self) -> Drive:
         for goal in self._goals:
             began = self.view.tick
-            outcome = yield from navigate(self.view, self.map, goal, self.random)
+            outcome = yield from navigate(self.view, self.map, goal, self.random, self._follow)
             self._report = write_report(GoalReport(tuple(goal), outcome == "arrived", self.view.tick - began))
             yield None
         self._done = True

@@ -1,6 +1,6 @@
 """Parameters of landmark-based exploration."""
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
@@ -12,9 +12,6 @@ NonNegative = Annotated[float, Meta(ge=0.0)]
 # Of robots that choose by themselves, and of a coordinator that assigns.
 Strategy = Literal["cost-utility", "nearest-frontier", "random-walk"]
 CentralStrategy = Literal["cost-utility", "nearest-frontier", "min-pos"]
-
-# Failures to get to a frontier before it is given up: it is then taken for a potential obstacle boundary.
-FAILURES_MAX: Final = 2
 
 
 class ExplorerParameters(Struct, frozen=True, forbid_unknown_fields=True):

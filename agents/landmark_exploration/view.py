@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot, to_steps
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot, all_to_steps
 from zwerm.agents.landmark_exploration.mapping.frontier_status import LANDMARKS_MAX
 from zwerm.wire.messages import BodyVelocity, Observation
 
@@ -27,11 +27,8 @@ class ExplorerView:
         self.tick += 1
         heading = self.heading_rad = observation.compass_rad or 0.0
         seen = observation.landmarks or ()
-        known = [each for each in seen if each.landmark < LANDMARKS_MAX]
-        self.bearing = {each.landmark: each.bearing_rad + heading for each in known}
-        self.snapshot = BearingSnapshot(
-            tuple(self.bearing), tuple([to_steps(bearing_rad) for bearing_rad in self.bearing.values()])
-        )
+        self.bearing = {each.landmark: each.bearing_rad + heading for each in seen if each.landmark < LANDMARKS_MAX}
+        self.snapshot = BearingSnapshot(tuple(self.bearing), all_to_steps(self.bearing.values()))
         self.contacts = tuple([each.bearing_rad + heading for each in observation.touch or ()])
 
     def drive(self, direction_rad: float | None, speed_m_s: float) -> BodyVelocity:
@@ -53,6 +50,8 @@ class Slide:
 
     # Ticks for which a hand is kept after the last contact.
     KEEP_TICKS: Final = 15
+    # Ticks for which it is kept at most: in a corner one hand leads from wall to wall for ever.
+    HAND_TICKS_MAX: Final = 60
     # The wanted direction is turned in steps of this size until it leads away from every contact.
     _TURN_RAD: Final = math.radians(12.0)
 
@@ -60,17 +59,19 @@ class Slide:
         self._random = random
         self._hand = 0
         self._until = 0
+        self._hand_until = 0
 
     def along(self, direction_rad: float | None, view: ExplorerView) -> float | None:
         """Return the direction to drive in; None where every direction is blocked."""
         if direction_rad is None or not view.contacts:
             return direction_rad
-        if view.tick >= self._until:
+        if view.tick >= min(self._until, self._hand_until):
             self._hand = 0
         self._until = view.tick + self.KEEP_TICKS
         if self._is_free(direction_rad, view):
             return direction_rad
         if self._hand == 0:
+            self._hand_until = view.tick + self.HAND_TICKS_MAX
             left, right = self._turned(direction_rad, view, 1), self._turned(direction_rad, view, -1)
             if left is None or right is None:
                 return None

@@ -131,7 +131,9 @@ class CentralRobot(Controller):
         result = yield from walk
         self.motion.settle()
         x_m, y_m = self.wall_walk.way
-        self.commands.answer(Walked(cycle, result.end, x_m, y_m, result.driven_m, result.touched, result.waypoints))
+        self.commands.answer(
+            Walked(cycle, result.end, x_m, y_m, result.driven_m, result.touched, result.waypoints, result.near)
+        )
 
     def _clear(self, cycle: int) -> None:
         self.commands.answer(Cleared(cycle))

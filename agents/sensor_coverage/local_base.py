@@ -9,6 +9,7 @@ from zwerm.agents.sensor_coverage.protocols.ending.termination import COVERED
 from zwerm.agents.sensor_coverage.protocols.membership import Membership
 from zwerm.agents.sensor_coverage.protocols.push_scheduler import PushScheduler
 from zwerm.agents.sensor_coverage.protocols.transport.delivery import Delivery
+from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
 from zwerm.wire.messages import Command, Observation, Wake
 
 
@@ -22,8 +23,8 @@ class LocalBase(LocalNode):
         situation.local_map.heading = 0.0
         self.schedule = PushScheduler(situation, self.beaconing, self.completion)
         membership: list[Component] = []
+        situation.local_map.home = 0
         if situation.negotiation is not None:
-            situation.local_map.home = 0
             membership = [Membership(situation, situation.negotiation, self.advice_client)]
         self.components = ComponentLoop(
             (
@@ -32,6 +33,7 @@ class LocalBase(LocalNode):
                 Surveillance(situation, self.beaconing),
                 situation.failure_detector,
                 self.beaconing,
+                WallProtocol(situation),
                 *membership,
                 self.completion,
                 situation.mailbox,

@@ -57,7 +57,8 @@ class LocalNode(Controller):
         situation.observe(observation)
         silent, seen = situation.failure_detector.dead, situation.motion.frame.seen
         dead = [node for node in silent if node in seen] if silent else ()
-        self.completion.update(situation.tick, situation.bearings, situation.claims, self._occupied, dead)
+        unproven = situation.local_map.unproven
+        self.completion.update(situation.tick, situation.bearings, situation.claims, self._occupied, dead, unproven)
         self.components.deliver(observation.inbox, situation.tick)
         velocity = situation.advance()
         if self.completion.search != self._search:

@@ -22,6 +22,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     TakeSlot,
 )
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
+from zwerm.agents.sensor_coverage.motion.wall_walk import WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.neighbourhood.surveillance import Surveillance
@@ -32,6 +33,7 @@ from zwerm.agents.sensor_coverage.protocols.redundant_pool import RedundantPool
 from zwerm.agents.sensor_coverage.protocols.token_push import TokenPush
 from zwerm.agents.sensor_coverage.protocols.transport.delivery import Delivery
 from zwerm.agents.sensor_coverage.protocols.transport.vacancy import VacancyAnnouncer
+from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
 
 
 class PushParticipant(Component):
@@ -52,6 +54,7 @@ class PushParticipant(Component):
         self.push: TokenPush | None = None
         self.pool: RedundantPool | None = None
         self.announcer = VacancyAnnouncer(self._is_out)
+        self.walls = WallProtocol(situation, self._walk_over)
         self._situation = situation
         self._map = situation.local_map
         self._beaconing = beaconing
@@ -93,8 +96,11 @@ class PushParticipant(Component):
             self._beaconing.repeat(tick)
             return
         chain = (*token.chain, (here, self._situation.node))
-        first = not token.chain and token.via == NOWHERE
+        first = not token.chain and token.via == NOWHERE and token.wall_rad is None
         push = self._join(token.push, token.fresh, chain, sender, first)
+        if token.wall_rad is not None:
+            push.lead_from_base(token.wall_rad, token.hand)
+            return
         if first or (route is not None and local_map.has_route and len(route.slots) == 1):
             push.lead()
             return
@@ -114,6 +120,7 @@ class PushParticipant(Component):
     def _join(self, push: int, fresh: int, chain: Chain, back: int | None, first: bool = False) -> TokenPush:
         """Take part in a push."""
         self.push = TokenPush(self._situation, self._announce_vacated, push, fresh, chain, back, first)
+        self.push.walls = self.walls
         self._situation.in_push = True
         return self.push
 
@@ -158,7 +165,11 @@ class PushParticipant(Component):
         if self.push is not None:
             self.push.cleared()
 
-    def _arrived(self, result: DriveResult) -> None:
+    def _walk_over(self, push: int) -> None:
+        if self.push is not None and self.push.id == push:
+            self.push.walk_ended()
+
+    def _arrived(self, result: DriveResult | WalkResult) -> None:
         if self.push is not None:
             self.push.arrived(result)
         else:
@@ -181,8 +192,10 @@ class LocalRobot(LocalNode):
         self.pushing = PushParticipant(situation, self.beaconing)
         membership: list[Component] = []
         if situation.negotiation is not None:
+            membership = [Membership(situation, situation.negotiation, self.advice_client)]
+        if situation.negotiation is not None or self.parameters.walls == "followed":
             self.pushing.pool = RedundantPool(situation, self.pushing.begin_push)
-            membership = [Membership(situation, situation.negotiation, self.advice_client), self.pushing.pool]
+            membership = [*membership, self.pushing.pool]
         self.components = ComponentLoop(
             (
                 Delivery(situation.mailbox, lambda *body: self.components.dispatch(*body)),
@@ -191,6 +204,7 @@ class LocalRobot(LocalNode):
                 situation.failure_detector,
                 self.beaconing,
                 self.pushing.announcer,
+                self.pushing.walls,
                 *membership,
                 self.completion,
                 situation.mailbox,

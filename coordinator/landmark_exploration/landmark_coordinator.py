@@ -27,9 +27,9 @@ from zwerm.agents.landmark_exploration.mapping.cost_utility import (
     nearest_frontier,
 )
 from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, REOPENED, TIMED_OUT, pair_of
-from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.mapping.landmark_map import FAILURES_MAX, LandmarkMap
 from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, columns, write_report
-from zwerm.agents.landmark_exploration.parameters import FAILURES_MAX, CentralStrategy, NonNegative, Ticks
+from zwerm.agents.landmark_exploration.parameters import CentralStrategy, NonNegative, Ticks
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BYTES, Entries, TaskReport, Vector
 from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
@@ -300,11 +300,19 @@ class LandmarkCoordinator:
 
     def _finish(self, living: Sequence[int]) -> bool:
         """Halt all robots, and return whether all is explored: nothing is open, and no entry of a robot's log will open
-        anything."""
+        anything.
+
+        A map without an area is not explored: landmarks are too few, or in one line. Robots then walk about and look.
+        """
         if any(robot.incarnation < 0 and self._tick < self._rules.dead_ticks for robot in self._robots.values()):
             return False
         robots = {node: self._robots[node] for node in living if self._robots[node].incarnation >= 0}
-        if not robots or not self.map.complex.simplices:
+        if not robots:
+            return False
+        if not self.map.frontiers.has_area:
+            for node, robot in robots.items():
+                if robot.consider_at <= self._tick and (robot.task is None or robot.task.key is None):
+                    self._give(node, None, cut_off=True)
             return False
         if any(robot.task is not None and robot.task.key is not None for robot in robots.values()):
             return False

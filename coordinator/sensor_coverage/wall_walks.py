@@ -29,18 +29,11 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Waypoint,
 )
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
+from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, FEEL_M, IDLE_LEGS_MAX, LEG_M
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
 from zwerm.coordinator.sensor_coverage.sources import Sources
 
-# A wall within this way [m] is only felt: the space between it and the robot's slot is narrower than a body.
-FEEL_M: Final = 0.12
-# The walking robot leaves its slot by this distance [m] before the next robot takes it: two bodies and some space.
-CLEAR_M: Final = 0.3
-# Length [m] of one leg of a walk: the coordinator decides after each leg whether it goes on.
-LEG_M: Final = 3.0
-# Number of consecutive legs that closed nothing after which a walk ends.
-IDLE_LEGS_MAX: Final = 2
 # A leg closes something if the open arcs become smaller by this [rad].
 PROGRESS_RAD: Final = 0.1
 # A station's first robot follows a wall within the first length [m] for the second length [m], to learn its direction.
@@ -96,6 +89,7 @@ class WallWalks:
         if walked is None:  # dead
             self._sources.waiting.pop(plan.mover, None)
             return (leader,)
+        self._walls.note_near(plan.mover, [(start + heading, width) for start, width in walked.near])
         if walked.end == SHUT:
             for each in walked.touched:
                 self._walls.note_wall(plan.mover, each + heading)

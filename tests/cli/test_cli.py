@@ -51,13 +51,15 @@ def test_check_reports_every_error_of_every_stage_with_its_place_rule_and_value(
     ran = zwerm("check", "tables.toml", "parts.toml", cwd=tmp_path)
     assert ran.returncode == 2
     assert ran.stdout == ""
-    said = ran.stderr.splitlines()
-    assert "zwerm: tables.toml: arena.size_m.1: expected > 0, got -1.0" in said
-    assert "zwerm: tables.toml: robots.count: expected >= 1, got 0" in said
-    assert any(line.startswith("zwerm: tables.toml: robots.colour: unknown key") for line in said)
-    assert any(line.startswith("zwerm: parts.toml: arena: expected exactly one of") for line in said)
-    assert "zwerm: parts.toml: robots.sensors: the controller computation-free needs the sensor 'line_of_sight'" in said
-    assert "zwerm: parts.toml: robots.parameters.left_0: expected <= 1.0, got 3.0" in said
+    printed = ran.stderr.splitlines()
+    assert "zwerm: tables.toml: arena.size_m.1: expected > 0, got -1.0" in printed
+    assert "zwerm: tables.toml: robots.count: expected >= 1, got 0" in printed
+    assert any(line.startswith("zwerm: tables.toml: robots.colour: unknown key") for line in printed)
+    assert any(line.startswith("zwerm: parts.toml: arena: expected exactly one of") for line in printed)
+    assert (
+        "zwerm: parts.toml: robots.sensors: the controller computation-free needs the sensor 'line_of_sight'" in printed
+    )
+    assert "zwerm: parts.toml: robots.parameters.left_0: expected <= 1.0, got 3.0" in printed
 
 
 def test_check_reports_an_unknown_controller_and_an_unknown_sensor_beside_errors_in_the_tables(tmp_path: Path) -> None:
@@ -65,8 +67,8 @@ def test_check_reports_an_unknown_controller_and_an_unknown_sensor_beside_errors
         'arena = { size_m = [3.0, 3.0] }\ntime = { dt_s = 0.0 }\n[robots]\ncount = 2\ncontroller = "nobody"\ncuont = 3\n'
         'sensors = [{ kind = "sonar" }]\nplacement = { kind = "uniform", colour = 1 }\n'
     )
-    said = zwerm("check", "all.toml", cwd=tmp_path).stderr.splitlines()
-    assert [line.split(": ")[2] for line in said] == [
+    printed = zwerm("check", "all.toml", cwd=tmp_path).stderr.splitlines()
+    assert [line.split(": ")[2] for line in printed] == [
         "time.dt_s", "robots.placement.colour", "robots.cuont", "robots.controller", "robots.sensors.0.kind",
     ]  # fmt: skip
 

@@ -68,13 +68,13 @@ def trace_of(output: str) -> str:
 def test_an_error_of_many_robots_is_printed_once_with_the_line_of_the_user(tmp_path: Path) -> None:
     ran = run(tmp_path, "Raises", "--inline", "--quiet")
     assert ran.returncode == 1
-    said = ran.stderr.splitlines()
-    assert said[0] == "node 0 raised, and 11 more from the same line: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, ..."
-    assert [line for line in said if line.startswith("  File ")] == [
+    printed = ran.stderr.splitlines()
+    assert printed[0] == "node 0 raised, and 11 more from the same line: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, ..."
+    assert [line for line in printed if line.startswith("  File ")] == [
         f'  File "{tmp_path / "debugged.py"}", line 12, in step'
     ]
-    assert said.count("ValueError: no luck for 0") == 1
-    assert said[-1] == "zwerm: node 0 crashed at tick 3: ValueError: no luck for 0 (debugged.py:12, in step)"
+    assert printed.count("ValueError: no luck for 0") == 1
+    assert printed[-1] == "zwerm: node 0 crashed at tick 3: ValueError: no luck for 0 (debugged.py:12, in step)"
 
 
 def test_errors_from_different_lines_or_of_different_kinds_are_printed_separately() -> None:
@@ -112,7 +112,7 @@ def test_a_breakpoint_in_a_process_names_the_option_that_it_needs(tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("controller", "said"),
+    ("controller", "printed"),
     [
         (
             "NoSetup",
@@ -122,8 +122,8 @@ def test_a_breakpoint_in_a_process_names_the_option_that_it_needs(tmp_path: Path
         ("WithDataclass", "debugged:WithDataclass: its Parameters must be a subclass of msgspec.Struct, got <class"),
     ],
 )
-def test_a_class_that_cannot_be_a_controller_is_one_line(tmp_path: Path, controller: str, said: str) -> None:
+def test_a_class_that_cannot_be_a_controller_is_one_line(tmp_path: Path, controller: str, printed: str) -> None:
     ran = run(tmp_path, controller)
     assert ran.returncode == 2
     assert len(ran.stderr.splitlines()) == 1
-    assert said in ran.stderr
+    assert printed in ran.stderr

@@ -17,7 +17,7 @@ from zwerm.errors import ScenarioError
 SHORT = ("run", "computation-free", "--inline", "--quiet", "--set", "time.duration_s=0.3")
 
 
-def said(*files: OutputFile) -> list[str]:
+def mistakes_of(*files: OutputFile) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
         check_outputs(files)
     return caught.value.mistakes
@@ -27,7 +27,7 @@ def test_every_file_that_cannot_be_written_is_one_line(tmp_path: Path, monkeypat
     (tmp_path / "file").write_text("")
     (tmp_path / "folder.png").mkdir()
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    assert said(
+    assert mistakes_of(
         OutputFile("--picture", tmp_path / "a.jpg", PICTURES),
         OutputFile("--picture", tmp_path / "folder.png", PICTURES),
         OutputFile("--animate", tmp_path / "file" / "a.gif", ANIMATIONS),

@@ -201,7 +201,7 @@ def test_the_error_lines_in_the_documentation_are_the_real_ones(tmp_path: Path) 
     text = "arena.size_m = [1, 1]\n[robots]\ncount = 0\ncontroller = 'random-walk'\nbody.radius_mm = 3\n"
     (tmp_path / "trial.toml").write_text(text, encoding="utf-8")
     check = [sys.executable, "-c", "from zwerm.cli.app import main; main()", "check", "trial.toml"]
-    said = subprocess.run(check, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert said.returncode == 2
-    assert said.stderr in (ROOT / "docs" / "running.md").read_text(encoding="utf-8")
-    assert said.stderr.count("\n") == 2
+    printed = subprocess.run(check, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert printed.returncode == 2
+    assert printed.stderr in (ROOT / "docs" / "running.md").read_text(encoding="utf-8")
+    assert printed.stderr.count("\n") == 2

@@ -50,11 +50,11 @@ class Chatter(Controller):
 
     def __init__(self, setup):
         super().__init__(setup)
-        self.heard = 0.0
+        self.received = 0.0
 
     def step(self, observation: Observation) -> Command:
         for packet in observation.inbox:
-            self.heard = (self.heard + float(packet.payload.decode())) % 1.0
+            self.received = (self.received + float(packet.payload.decode())) % 1.0
         number = self.random.random()
         wake = (
             Wake(at_s=observation.time_s + 0.5, on_packet=self.setup.node % 2 == 0)
@@ -62,7 +62,7 @@ class Chatter(Controller):
             else None
         )
         return Command(
-            drive=WheelSpeeds(0.1 * self.heard, 0.1 * number),
+            drive=WheelSpeeds(0.1 * self.received, 0.1 * number),
             outbox=(Transmission("robots", repr(number).encode()),) if observation.tick % 3 == 0 else (),
             wake=wake,
         )

@@ -145,9 +145,9 @@ def test_an_interrupt_while_the_program_is_still_loading_exits_130_without_a_tra
             break
     running.send_signal(signal.SIGINT)
     _, err = running.communicate(timeout=60)
-    said = [each for each in err.splitlines() if not each.startswith("import time:")]
-    assert running.returncode == 130, said
-    assert not any("Traceback" in each for each in said)
+    printed = [each for each in err.splitlines() if not each.startswith("import time:")]
+    assert running.returncode == 130, printed
+    assert not any("Traceback" in each for each in printed)
 
 
 def test_a_failed_run_exits_1_and_prints_its_traceback_and_reason() -> None:
@@ -181,8 +181,8 @@ def test_robots_started_elsewhere_join_over_tcp_and_give_the_same_trace(tmp_path
     assert found["runner"] == "remote"
     assert found["trace"] == run("computation-free", 4, "inline", ["time.duration_s=3", "robots.count=6"]).trace
     for each in robots:
-        _, said = each.communicate(timeout=30)
-        assert each.returncode == 0, said
+        _, printed = each.communicate(timeout=30)
+        assert each.returncode == 0, printed
     assert not keys.exists(), "credentials are of no use after the run"
 
 

@@ -60,7 +60,7 @@ def test_every_wrong_parameter_of_every_node_is_reported_at_once_and_a_missing_s
     wrong = ("robots.parameters.samples=0", "base.parameters.creep_m=0", "coordinator.parameters.nix=1")
     with pytest.raises(ScenarioError) as caught:
         prepare(load("sensor-coverage", (*wrong, "robots.sensors.2={kind='compass'}")))
-    said = "\n".join(caught.value.mistakes)
+    mistakes_text = "\n".join(caught.value.mistakes)
     assert len(caught.value.mistakes) == 4
-    assert all(each.partition("=")[0] in said for each in wrong)
-    assert said.count("needs the sensor 'odometry'") == 1
+    assert all(each.partition("=")[0] in mistakes_text for each in wrong)
+    assert mistakes_text.count("needs the sensor 'odometry'") == 1

@@ -99,17 +99,17 @@ def test_a_folder_in_the_place_of_a_module_is_named(folders: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "rule"),
     [
         ("def f(:\n    pass\n", "cannot import 'bad_robot': SyntaxError: invalid syntax ({file}:1)"),
         ("\nx = 1 / 0\n", "cannot import 'bad_robot': division by zero (ZeroDivisionError, {file}:2)"),
         ("import nowhere_at_all\n", "cannot import 'bad_robot': No module named 'nowhere_at_all' ({file}:1)"),
     ],
 )
-def test_a_module_that_cannot_be_imported_is_one_line_with_the_place(folders: Path, text: str, said: str) -> None:
+def test_a_module_that_cannot_be_imported_is_one_line_with_the_place(folders: Path, text: str, rule: str) -> None:
     scenario = write(folders, "bad_robot")
     (folders / "bad_robot.py").write_text(text)
-    assert mistakes_of(scenario) == [f"robots.controller: {said.format(file=folders / 'bad_robot.py')}"]
+    assert mistakes_of(scenario) == [f"robots.controller: {rule.format(file=folders / 'bad_robot.py')}"]
 
 
 def test_a_misspelt_built_in_name_is_answered_with_the_nearest() -> None:

@@ -140,8 +140,8 @@ def test_a_computed_import_in_robot_processes_cannot_be_known(folder: Path) -> N
     (folder / "far_robot.py").write_text("name = 'far_helper'\n__import__(name)\n")
     tables = scenario(robots={"count": 1, "controller": "far_robot:C"})
     assert Identities().modules(tables, "inline").unknown == ()
-    said = Identities().modules(tables, "processes").unknown
-    assert said == ("module 'far_robot' imports by a name that it computes",)
+    unknown = Identities().modules(tables, "processes").unknown
+    assert unknown == ("module 'far_robot' imports by a name that it computes",)
 
 
 def test_a_module_that_changes_under_a_running_study_is_noticed(folder: Path) -> None:

@@ -247,10 +247,12 @@ def trace_of(*, precomputing: bool, latency_ticks: int) -> str:
         if precomputing:
             world.precompute()
         for node in nodes:
-            said: Command | Failure = answer.get(world.tick + node, Command(drive=BodyVelocity(1.9, 0.0, 0.05 * node)))
+            message: Command | Failure = answer.get(
+                world.tick + node, Command(drive=BodyVelocity(1.9, 0.0, 0.05 * node))
+            )
             failed = world.tick == 30 and node == nodes[0]
-            said = Failure(world.tick, "Oops", "") if failed else msgspec.structs.replace(said, tick=world.tick)
-            world.accept(node, encode(said))
+            message = Failure(world.tick, "Oops", "") if failed else msgspec.structs.replace(message, tick=world.tick)
+            world.accept(node, encode(message))
         world.advance()
     assert world.bodies.exited
     assert world.status.crashed

@@ -41,27 +41,32 @@ class MapCompletion:
     def __init__(self, arena: Arena, landmarks: Floats, range_m: float) -> None:
         places = _places(arena, range_m / PLACES_PER_RANGE)
         self.places = len(places)
-        counts: dict[int, int] = {}
-        for seen in visible(arena, landmarks, range_m, places):
-            bits = sum(1 << landmark for landmark in seen)
-            counts[bits] = counts.get(bits, 0) + 1
-        counts.pop(0, None)  # where nothing is visible nothing can be covered
         self._covered = 0
-        self._left: dict[int, dict[int, int]] = {}  # by smallest landmark: set of landmarks as bits, number of places
-        for bits, count in counts.items():
-            first = (bits & -bits).bit_length() - 1
-            self._left.setdefault(first, {})[bits] = count
+        # By the smallest landmark of a set: a bit for each landmark seen together with it, and the number of places of each set
+        # as bits. So no number has more bits than landmarks are seen near one place.
+        self._bits: dict[int, dict[int, int]] = {}
+        self._left: dict[int, dict[int, int]] = {}
+        for seen in visible(arena, landmarks, range_m, places):
+            if not seen:
+                continue  # where nothing is visible nothing can be covered
+            bits, left = self._bits.setdefault(seen[0], {}), self._left.setdefault(seen[0], {})
+            together = 0
+            for landmark in seen:
+                together |= bits.setdefault(landmark, 1 << len(bits))
+            left[together] = left.get(together, 0) + 1
 
     def add(self, simplices: Iterable[Iterable[int]]) -> None:
         """Cover the places of which all visible landmarks are in one of `simplices`."""
         for simplex in simplices:
             members = list(simplex)
-            outside = ~sum(1 << landmark for landmark in members)
             for landmark in members:
                 left = self._left.get(landmark)
                 if left:
-                    covered = [bits for bits in left if not bits & outside]
-                    self._covered += sum(left.pop(bits) for bits in covered)
+                    bits, inside = self._bits[landmark], 0
+                    for member in members:
+                        inside |= bits.get(member, 0)
+                    covered = [each for each in left if not each & ~inside]
+                    self._covered += sum([left.pop(each) for each in covered])
 
     @property
     def fraction(self) -> float:

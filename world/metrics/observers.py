@@ -25,6 +25,9 @@ RADIO_NAMES: Final = (
 )
 TELEMETRY_NAMES: Final = "telemetry.*"
 
+# A longer period, in ticks, samples the beginning and the end only.
+STRIDE_MAX: Final = 1e15
+
 
 class Observers:
     """Metrics of one run. They take samples every `every_s` of virtual time, and at the end.
@@ -36,7 +39,7 @@ class Observers:
         self._metrics = tuple(metrics)
         self._periodic = tuple(each for each in metrics if every_s is not None or each.every_s is not None)
         period_s = every_s or min((each.every_s for each in self._periodic if each.every_s is not None), default=1.0)
-        self._stride = max(1, round(period_s / dt_s))
+        self._stride = max(1, round(min(period_s / dt_s, STRIDE_MAX)))
         self._last_tick = -1
         self._time_s: list[float] = []
 

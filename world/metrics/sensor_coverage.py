@@ -102,7 +102,11 @@ class Deployment(Metric):
 
 
 class Conclusion(Metric):
-    """`concluded_early`: 1 where the base station has concluded too early, by the truth at that time, else 0.
+    """`falsely_completed`: 1 where a completed run has unseen space, by the truth at that time, else 0; and
+    `concluded_early`.
+
+    Unseen space is a coverage of the space that robots can reach below `ENOUGH`, measured where `metrics.sight_range_m` is
+    given. `concluded_early` is 1 where the base station has concluded too early.
 
     Too early is a coverage of the space that robots can reach below `ENOUGH`, measured where `metrics.sight_range_m` is given;
     or a claim of a running robot that it stands at a frontier. A robot that has restarted reports its claim again.
@@ -113,6 +117,10 @@ class Conclusion(Metric):
             "with `services.path=gradient`: 1 if the base station concluded while less than 0.98 of the "
             "reachable space was in sight, or a living robot knew where to expand, else 0; its mean over runs "
             "is the rate of wrong conclusions"
+        ),
+        "falsely_completed": (
+            "1 if a completed run has less than 0.98 of the reachable space in sight, else 0, where "
+            "`metrics.sight_range_m` is given; its mean over runs is the rate of false completions"
         ),
     }
 
@@ -134,12 +142,18 @@ class Conclusion(Metric):
         self._truth = truth
 
     def metrics(self) -> dict[str, float]:
-        """Return whether the conclusion was wrong; nothing where no base station concludes."""
+        """Return whether the conclusion was wrong: by the base station where it concludes, and by coverage if measured."""
         truth = self._truth
-        if not self._applies or truth is None:
+        if truth is None:
             return {}
-        claimed = any(claims and node not in truth.dead for node, claims in self._claims.items())
-        return {"concluded_early": float(truth.completed and (claimed or not self._is_covered(truth)))}
+        found = {}
+        unseen = truth.completed and not self._is_covered(truth)
+        if self._applies:
+            claimed = any(claims and node not in truth.dead for node, claims in self._claims.items())
+            found["concluded_early"] = float(truth.completed and (claimed or unseen))
+        if self._sight is not None:
+            found["falsely_completed"] = float(unseen)
+        return found
 
     def _is_covered(self, truth: Truth) -> bool:
         """Return whether the living robots see the space that they can reach, as far as that is measured."""

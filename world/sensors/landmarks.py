@@ -22,6 +22,9 @@ from zwerm.world.sensors import Sensor, Surroundings, chosen, portions, random_a
 # A line of sight ends this fraction of its length short, so that a wall does not hide a landmark on its surface.
 _SHORT = 1e-9
 
+# Up to this many pairs of a robot and a landmark all distances are computed: a search tree costs more.
+_FEW_PAIRS = 50_000
+
 
 class LandmarksTable(Table):
     """The landmarks that are seen, and the quality of the bearings. With `presence_only` every bearing reads 0: only
@@ -73,6 +76,10 @@ class Landmarks(Sensor):
         position, landmarks = scene.position[robots], self._landmarks
         if self._range_m is None:
             row, landmark = np.divmod(np.arange(len(robots) * len(landmarks)), len(landmarks))
+            return row, landmark
+        if len(robots) * len(landmarks) <= _FEW_PAIRS:
+            dx, dy = landmarks[:, 0] - position[:, :1], landmarks[:, 1] - position[:, 1:]
+            row, landmark = (dx**2 + dy**2 <= self._range_m**2).nonzero()
             return row, landmark
         # Slightly too far, so that only the exact comparison below decides at the edge of the range.
         reach_m = self._range_m * (1.0 + 1e-9)

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-CONTROLLER: Final = '''"""A controller: every robot moves its value towards the values that it hears."""
+CONTROLLER: Final = '''"""A controller: every robot moves its value towards the values that it receives."""
 
 import struct
 from typing import Annotated
@@ -19,7 +19,7 @@ class Parameters(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MyRobot(Controller):
-    """Broadcast the own value, and move it towards the mean of all values that are heard."""
+    """Broadcast the own value, and move it towards the mean of all values that are received."""
 
     Parameters = Parameters
 
@@ -29,13 +29,13 @@ class MyRobot(Controller):
 
     def step(self, observation: Observation) -> Command:
         # The radio may damage a packet: take only what can be a value.
-        heard = [
+        received = [
             value
             for packet in observation.inbox
             if len(packet.payload) == 8 and abs(value := struct.unpack("<d", packet.payload)[0]) < 1e6
         ]
-        if heard:
-            self.value += self.parameters.gain * (sum(heard) / len(heard) - self.value)
+        if received:
+            self.value += self.parameters.gain * (sum(received) / len(received) - self.value)
         packet = Transmission("robots", struct.pack("<d", self.value))
         return Command(outbox=(packet,), telemetry={"value": self.value})
 '''

@@ -46,14 +46,14 @@ MET, SENT, ARRIVED, HEARD = range(4)
 
 
 class Station(Struct, frozen=True):
-    """A node's network namespace and addresses. `hears` are (channel, sender); sender "*" means all of a channel."""
+    """A node's network namespace and addresses. `receives_from` are (channel, sender); sender "*" means all of a channel."""
 
     node: int
     namespace: str
     transport: Transport
     addresses: dict[int, str]
     channels: tuple[str, ...]
-    hears: tuple[tuple[str, str], ...]
+    receives_from: tuple[tuple[str, str], ...]
     anonymous: tuple[str, ...]
     log: str
 
@@ -117,7 +117,7 @@ class PeerRadio:
         )
         self._put: dict[str, Callable[[bytes], None]] = {}
         self._run = run
-        for channel, sender in station.hears:
+        for channel, sender in station.receives_from:
             for key in (air_key(run, channel, sender), air_key(run, channel, sender, node)):
                 self._subscribe(key, self._on_packet)
         self._subscribe(hail_key(run, "*"), self._on_hail)
@@ -185,8 +185,8 @@ class PeerRadio:
         self._arrived.append((channel, sender, tick, frame))
 
     def _on_hail(self, sample: zenoh.Sample) -> None:
-        sender, *heard = sample.payload.to_bytes()
-        self._met[sender] = self._station.node in heard
+        sender, *met = sample.payload.to_bytes()
+        self._met[sender] = self._station.node in met
 
     def _hail(self) -> None:
         """Send the ids received from, repeatedly. Log MET when this node has received from all and all from it."""

@@ -142,7 +142,7 @@ def _stations(
     if coordinator is not None:
         channels["uplink"] = scenario.uplink is not None and scenario.uplink.anonymous
 
-    def heard(node: int) -> list[tuple[str, str]]:
+    def senders_of(node: int) -> list[tuple[str, str]]:
         found = []
         if scenario.radio is not None and node != coordinator:
             found.append((ROBOTS, "*"))
@@ -157,7 +157,7 @@ def _stations(
             transport=transport,
             addresses=addresses,
             channels=tuple(channels),
-            hears=tuple(heard(node)),
+            receives_from=tuple(senders_of(node)),
             anonymous=tuple(name for name, anonymous in channels.items() if anonymous),
             log=str(directory / f"radio-{node}"),
         )

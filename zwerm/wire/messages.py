@@ -147,7 +147,7 @@ class WheelSpeeds(Struct, frozen=True, gc=False, forbid_unknown_fields=True, tag
 
 
 class Transmission(_WirePart, frozen=True):
-    """A radio packet to send: to every node that hears it, or to the one node `to`."""
+    """A radio packet to send: to every node that receives it, or to the one node `to`."""
 
     channel: str
     payload: bytes

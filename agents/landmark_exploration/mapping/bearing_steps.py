@@ -5,7 +5,7 @@ derive the same from an observation because all derive it from these steps.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 STEPS: Final = 256
@@ -25,6 +25,11 @@ def to_steps(bearing_rad: float) -> int:
     return round(bearing_rad * _PER_RAD) % STEPS
 
 
+def all_to_steps(bearings_rad: Iterable[float]) -> tuple[int, ...]:
+    """Return bearings in steps, each in [0, STEPS)."""
+    return tuple([round(each * _PER_RAD) % STEPS for each in bearings_rad])
+
+
 def to_rad(steps: int) -> float:
     """Return a bearing [rad] in [0, 2 pi)."""
     return steps / _PER_RAD
@@ -38,17 +43,21 @@ def is_left(bearing_a: int, bearing_b: int) -> bool:
     return 0 < (bearing_b - bearing_a) % STEPS < HALF
 
 
+def widest_gap(bearings: Sequence[int]) -> int:
+    """Return the widest angle between adjacent bearings in steps; STEPS for fewer than two."""
+    if len(bearings) < 2:
+        return STEPS
+    ordered = sorted(bearings)
+    before, widest = ordered[-1] - STEPS, 0
+    for each in ordered:
+        widest = max(widest, each - before)
+        before = each
+    return widest
+
+
 def is_inside(bearings: Sequence[int]) -> bool:
     """Return whether the observer stands inside the convex hull of the landmarks it sees.
 
     It does iff there are three or more and no two adjacent bearings are pi or more apart (section IV-A, Fig. 4).
     """
-    if len(bearings) < 3:
-        return False
-    ordered = sorted(bearings)
-    before = ordered[-1] - STEPS
-    for each in ordered:
-        if each - before >= HALF:
-            return False
-        before = each
-    return True
+    return widest_gap(bearings) < HALF

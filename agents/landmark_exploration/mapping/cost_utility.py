@@ -9,13 +9,16 @@ search ends as soon as no frontier farther away can be better.
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
 from zwerm.agents.landmark_exploration.mapping.frontier_status import Frontiers, pair_of
 from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
 
 # The vertex before the first of a path: the robot itself.
 HERE = -1
+
+# A cost limit is raised by this, so that rounding leaves out no vertex that is as good.
+_ROUNDING: Final = 1e-6
 
 
 class Reached(NamedTuple):
@@ -34,22 +37,31 @@ class Choice(NamedTuple):
     gain: float
 
 
-def reach(complex_: LandmarkComplex, landmarks: Sequence[int]) -> Iterator[Reached]:
-    """Yield the vertices that can be navigated to from where `landmarks` are seen, the cheapest first (Dijkstra 1959)."""
+class CostLimit:
+    """The cost beyond which no vertex is wanted. A caller may lower it during a search."""
+
+    def __init__(self) -> None:
+        self.cost = math.inf
+
+
+def reach(complex_: LandmarkComplex, landmarks: Sequence[int], limit: CostLimit | None = None) -> Iterator[Reached]:
+    """Yield the vertices that can be navigated to from where `landmarks` are seen, the cheapest first (Dijkstra 1959).
+
+    Vertices that cost more than `limit` may be left out.
+    """
     queue = [(1.0 / (shared - 1), vertex, HERE) for vertex, shared in complex_.adjacent(landmarks).items()]
     queue.sort()
     best = {vertex: cost for cost, vertex, _ in queue}
-    done: set[int] = set()
-    neighbours = complex_.neighbours
+    neighbours, limit = complex_.neighbours, limit or CostLimit()
     while queue:
         cost, vertex, before = heappop(queue)
-        if vertex in done:
-            continue
-        done.add(vertex)
+        if cost > best[vertex]:
+            continue  # a cheaper way to it was found since
         yield Reached(cost, vertex, before)
+        cost_max = limit.cost
         for other, shared in neighbours[vertex].items():
             farther = cost + 1.0 / (shared - 1)
-            if farther < best.get(other, 1e300):
+            if farther <= cost_max and farther < best.get(other, math.inf):
                 best[other] = farther
                 heappush(queue, (farther, other, vertex))
 
@@ -88,8 +100,7 @@ class Offer:
     def most(self) -> float:
         """Return a bound that no utility exceeds, now or later."""
         if self._most is None:
-            at = self._frontiers.open_at
-            self._most = float(max([at[key >> 16] + at[key & 0xFFFF] for key in self._frontiers.open], default=0))
+            self._most = float(self._frontiers.most_at_a_pair())
         return self._most
 
     def is_empty(self) -> bool:
@@ -217,10 +228,12 @@ def _best(
     best: tuple[float, int, int] | None = None  # gain, -key, vertex
     best = offer.best_in(sorted(landmarks), HERE, 0.0, most is not None, best)
     before: dict[int, int] = {}
-    simplices, bound = complex_.simplices, most or 0.0
-    for cost, vertex, previous in reach(complex_, landmarks):
+    simplices, bound, limit = complex_.simplices, most or 0.0, CostLimit()
+    for cost, vertex, previous in reach(complex_, landmarks, limit):
         if best is not None and bound - slope * cost < best[0]:
             break
+        if best is not None and slope > 0.0:
+            limit.cost = (bound - best[0]) / slope + _ROUNDING
         before[vertex] = previous
         best = offer.best_in(simplices[vertex], vertex, slope * cost, most is not None, best)
     if best is None:

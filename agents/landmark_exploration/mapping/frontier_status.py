@@ -5,9 +5,10 @@ IV-A). A status only ever rises, so that statuses from several robots merge by m
 """
 
 from collections.abc import Iterator
+from operator import itemgetter
 from typing import Final
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import HALF, STEPS, BearingSnapshot, is_inside
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import HALF, STEPS, BearingSnapshot, widest_gap
 
 UNKNOWN: Final = 0
 UNEXPLORED: Final = 1
@@ -21,6 +22,10 @@ _IS_OPEN: Final = (False, True, False, True, False, False, False)
 
 # Landmark ids are below this.
 LANDMARKS_MAX: Final = 1 << 16
+
+# The widest angle between adjacent bearings of an observer that is inside beyond doubt: 14 degrees less than a half turn,
+# which is 5 standard deviations of the sensor.
+AREA_GAP_MAX: Final = HALF - 10
 
 Pair = tuple[int, int]
 
@@ -36,12 +41,21 @@ def pair_of(key: int) -> Pair:
 
 
 class Frontiers:
-    """The status of every frontier. `open` holds the keys of those to be explored."""
+    """The status of every frontier. `open` holds the keys of those to be explored.
+
+    `has_area` is true once an observation was inside the hull of its landmarks beyond doubt. An observer on the line between
+    landmarks may seem to be inside because bearings are noisy.
+    """
 
     def __init__(self) -> None:
+        self.has_area = False
         self.statuses: dict[int, int] = {}
         self.open: dict[int, None] = {}
         self.open_at: dict[int, int] = {}  # landmark: open frontiers that it is part of
+        self._open_of: dict[int, dict[int, None]] = {}  # landmark: the keys of these
+        # By observed set of landmarks: its frontiers that were not clear at the last observation, as (i, j, key) with the
+        # numbers of both landmarks in the set.
+        self._undecided: dict[tuple[int, ...], list[tuple[int, int, int]]] = {}
 
     def status(self, a: int, b: int) -> int:
         """Return the status of <a, b>."""
@@ -61,11 +75,28 @@ class Frontiers:
             change = 1 if _IS_OPEN[status] else -1
             for landmark in pair_of(key):
                 self.open_at[landmark] = self.open_at.get(landmark, 0) + change
+                if change > 0:
+                    self._open_of.setdefault(landmark, {})[key] = None
+                else:
+                    del self._open_of[landmark][key]
             if change > 0:
                 self.open[key] = None
             else:
                 del self.open[key]
         return True
+
+    def most_at_a_pair(self) -> int:
+        """Return the largest sum of `open_at` over the two landmarks of an open frontier, or 0 without any.
+
+        Landmarks come by descending count. No pair whose larger count is half of the best sum or less can exceed it.
+        """
+        at, best = self.open_at, 0
+        for landmark, count in sorted(at.items(), key=itemgetter(1), reverse=True):
+            if 2 * count <= best:
+                break
+            for key in self._open_of.get(landmark, ()):
+                best = max(best, at[key >> 16] + at[key & 0xFFFF])
+        return best
 
     def note(self, snapshot: BearingSnapshot) -> bool:
         """Take in an observation; return whether any status rose.
@@ -73,23 +104,34 @@ class Frontiers:
         Seen from inside the hull of the landmarks, every frontier that the observer is in is clear. All others become
         unexplored if they were unknown. A pair in line with the observer is neither left nor right.
         """
-        statuses, news = self.statuses, False
         landmarks, bearings = snapshot
-        count, inside = len(landmarks), is_inside(bearings)
-        for i in range(1, count):
-            b, of_b = landmarks[i], bearings[i]
-            for j in range(i):
-                a, relative = landmarks[j], (of_b - bearings[j]) % STEPS
-                forth, back = a << 16 | b, b << 16 | a
-                if inside and relative not in (0, HALF):
-                    if relative > HALF:
-                        forth, back = back, forth
-                    if statuses.get(forth) != CLEAR:
-                        news = self.raise_to(forth, CLEAR) or news
-                elif forth not in statuses:
-                    news = self.raise_to(forth, UNEXPLORED) or news
-                if back not in statuses:
-                    news = self.raise_to(back, UNEXPLORED) or news
+        undecided = self._undecided.get(landmarks)
+        if undecided is None:
+            count = len(landmarks)
+            undecided = [(i, j, landmarks[i] << 16 | landmarks[j]) for j in range(1, count) for i in range(j)]
+            undecided += [(j, i, landmarks[j] << 16 | landmarks[i]) for i, j, _ in undecided]
+            fresh = [key for _, _, key in undecided if key not in self.statuses]
+            for key in fresh:
+                self.raise_to(key, UNEXPLORED)
+            news = bool(fresh)
+        elif not undecided:
+            return False
+        else:
+            news = False
+        gap = widest_gap(bearings)
+        self.has_area |= gap <= AREA_GAP_MAX
+        if gap < HALF:
+            statuses, left = self.statuses, []
+            for each in undecided:
+                i, j, key = each
+                if statuses[key] == CLEAR:
+                    continue
+                if 0 < (bearings[j] - bearings[i]) % STEPS < HALF:
+                    news = self.raise_to(key, CLEAR) or news
+                else:
+                    left.append(each)
+            undecided = left
+        self._undecided[landmarks] = undecided
         return news
 
     def sharing(self, key: int) -> int:

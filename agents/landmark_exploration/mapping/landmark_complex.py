@@ -57,6 +57,10 @@ class LandmarkComplex:
         """The bearing look-up table, by landmarks ascending."""
         return {simplex: self._bearings[simplex][1] for simplex in sorted(self._bearings)}
 
+    def smallest_landmark(self) -> int | None:
+        """Return the smallest id of all landmarks, or None without any."""
+        return min(self._holders, default=None)
+
     def contains(self, landmarks: Iterable[int]) -> bool:
         """Return whether these landmarks are a face of the complex. No landmarks are one."""
         common: set[int] | None = None

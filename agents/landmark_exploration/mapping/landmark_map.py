@@ -8,13 +8,16 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
-from zwerm.agents.landmark_exploration.mapping.frontier_status import CLEAR, Frontiers
+from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, CLEAR, TIMED_OUT, Frontiers
 from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
 from zwerm.agents.landmark_exploration.sharing import log_entries as entries
 from zwerm.agents.landmark_exploration.sharing.replica import Stretch
 
 # Parts of one observation beyond this number are invalid, and are dropped.
 _PARTS_MAX: Final = 4096
+
+# Failures to get to a frontier before it is given up: it is then taken for a potential obstacle boundary.
+FAILURES_MAX: Final = 2
 
 
 class LandmarkMap:
@@ -25,6 +28,7 @@ class LandmarkMap:
         self.complex = LandmarkComplex()
         self.frontiers = Frontiers()
         self.version = 0
+        self._failures: dict[int, int] = {}  # frontier: how often a robot did not get there
         self._parts: dict[int, list[tuple[int, int]]] = {}  # by origin, of an observation that is not complete
 
     def observe(self, snapshot: BearingSnapshot, rank: tuple[int, int] = (0, 0)) -> bool:
@@ -45,12 +49,24 @@ class LandmarkMap:
         self.version += any(news)
         return any(news)
 
+    def fail(self, key: int) -> None:
+        """Note that a robot did not get to a frontier.
+
+        The frontier is timed out after FAILURES_MAX failures of any robots, and abandoned after twice as many.
+        """
+        failures = self._failures[key] = self._failures.get(key, 0) + 1
+        if failures >= FAILURES_MAX:
+            self.raise_all([key], ABANDONED if failures >= 2 * FAILURES_MAX else TIMED_OUT)
+
     def _read(self, origin: int, number: int, entry: bytes) -> None:
         try:
             if entry[:1] == bytes([entries.STATUSES]):
                 status, keys = entries.read_statuses(entry)
                 if status <= CLEAR:
                     self.raise_all(keys, status)
+                return
+            if entry[:1] == bytes([entries.FAILURE]):
+                self.fail(entries.read_failure(entry))
                 return
             bearings = entries.read_bearings(entry)
         except ValueError:

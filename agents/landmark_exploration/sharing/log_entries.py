@@ -3,12 +3,13 @@
     observation  kind, then landmark (2 bytes) and bearing (1 byte) for each; one of more than `LANDMARKS_AT_ONCE` landmarks
                  comes in parts, and only the last part is of the kind OBSERVATION
     statuses     kind, status, then the two landmarks (2 bytes each) of every frontier
+    failure      kind, then the two landmarks of a frontier that the robot did not get to
 
 Numbers are little-endian. The entries of a log, read in order, are complete without other data.
 """
 
 from collections.abc import Iterable, Sequence
-from struct import iter_unpack, pack
+from struct import iter_unpack, pack, unpack
 from typing import Final
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import STEPS, BearingSnapshot
@@ -16,6 +17,7 @@ from zwerm.agents.landmark_exploration.mapping.bearing_steps import STEPS, Beari
 PART: Final = 0
 OBSERVATION: Final = 1
 STATUSES: Final = 2
+FAILURE: Final = 3
 
 LANDMARKS_AT_ONCE: Final = 13
 FRONTIERS_AT_ONCE: Final = 9
@@ -56,6 +58,19 @@ def read_statuses(entry: bytes) -> tuple[int, list[int]]:
     if len(entry) < 2 or entry[0] != STATUSES or len(entry) % 4 != 2:
         raise ValueError("statuses are their kind, a status and 4 bytes for each frontier")
     return entry[1], [a << 16 | b for a, b in iter_unpack("<HH", entry[2:])]
+
+
+def failure_entry(key: int) -> bytes:
+    """Return the entry that says that the robot did not get to a frontier."""
+    return pack("<BHH", FAILURE, key >> 16, key & 0xFFFF)
+
+
+def read_failure(entry: bytes) -> int:
+    """Return the key of the frontier that a robot did not get to. Raises ValueError where it is no such entry."""
+    if len(entry) != 5 or entry[0] != FAILURE:
+        raise ValueError("a failure is its kind and 4 bytes")
+    a, b = unpack("<HH", entry[1:])
+    return int(a) << 16 | int(b)
 
 
 def snapshot_of(bearings: Iterable[tuple[int, int]]) -> BearingSnapshot:

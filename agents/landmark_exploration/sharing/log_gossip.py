@@ -17,7 +17,7 @@ from zwerm.agents.landmark_exploration.sharing.landmark_messages import (
     RegisterBeacon,
     Vector,
 )
-from zwerm.agents.landmark_exploration.sharing.packing import counts_of, pack_entries, pack_vector
+from zwerm.agents.landmark_exploration.sharing.packing import counts_of, pack_entries, pack_vector, register_bytes
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch
 
@@ -29,8 +29,8 @@ DIFFERS_TICKS: Final = 12
 # Entries in answer to one vector, at most.
 ANSWER_ENTRIES_MAX: Final = 150
 SMALL_ANSWER_ENTRIES_MAX: Final = 40
-# Bytes of a beacon beside its registers, and the most that a register takes.
-_BEACON_BYTES: Final = 4 + 3 + 9
+# Bytes of a beacon beside its registers, and those that a register takes; where identifiers are large it takes more.
+_BEACON_BYTES: Final = 4 + 1 + 2 + 9 + 1
 _REGISTER_BYTES: Final = 22
 _REGISTERS_MAX: Final = 16
 
@@ -119,11 +119,17 @@ class Gossip:
             if own is not None:
                 self._registers.merge(own(), tick)
                 leading = [self._me]
-            most = min(_REGISTERS_MAX, max(1, (self._bytes_max - _BEACON_BYTES) // _REGISTER_BYTES))
+            most = min(_REGISTERS_MAX, max(1, (self._bytes_max - _BEACON_BYTES) // self._register_bytes()))
             said.append(Said(None, RegisterBeacon(self._replica.digest, self._registers.to_tell(leading, most, tick))))
         if tick >= self._sync_at:
             said += self._ask(tick)
         return said
+
+    def _register_bytes(self) -> int:
+        """Return the size of the largest register if few fit into a beacon, and else the usual size [bytes]."""
+        if self._bytes_max >= LARGE_BYTES:
+            return _REGISTER_BYTES
+        return max([_REGISTER_BYTES, *map(register_bytes, self._registers.newest.values())])
 
     def _ask(self, tick: int) -> list[Said]:
         """Send the version vector to the node, of those whose digests differ, that was sent it longest ago."""

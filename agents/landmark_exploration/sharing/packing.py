@@ -3,7 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, Vector
+from msgspec.structs import astuple
+
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, Register, Vector
 from zwerm.agents.landmark_exploration.sharing.replica import Stretch
 
 # Bytes of a packet of entries beside them: checksum, tag, origin, number; and of every entry beside it.
@@ -28,6 +30,17 @@ def pack_entries(stretch: Stretch, bytes_max: int) -> Iterator[Entries]:
         size += needed
     if first < len(stretch.entries):
         yield Entries(stretch.origin, stretch.first + first, stretch.entries[first:])
+
+
+def register_bytes(register: Register) -> int:
+    """Return the encoded size of a register in a message [bytes]."""
+    node, incarnation, stamp, claim, frozen = astuple(register)
+    return 1 + sum(_integer_bytes(each) for each in (node, incarnation, stamp, claim, frozen))
+
+
+def _integer_bytes(value: int) -> int:
+    """Return the size of a non-negative integer in MessagePack [bytes]."""
+    return 1 if value < 1 << 7 else 2 if value < 1 << 8 else 3 if value < 1 << 16 else 5 if value < 1 << 32 else 9
 
 
 def pack_vector(vector: Mapping[int, int], bytes_max: int, ask: bool) -> list[Vector]:

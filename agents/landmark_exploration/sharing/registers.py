@@ -50,6 +50,14 @@ class Registers:
         """Return whether a robot is presumed dead, because no new register of it has come for `dead_ticks`."""
         return tick - self._heard.get(node, 0) >= self._dead_ticks
 
+    def is_fresh(self, me: int, tick: int, ticks: int) -> bool:
+        """Return whether a new register of every known robot but `me` came in the last `ticks`."""
+        return all(tick - heard < ticks for node, heard in self._heard.items() if node != me)
+
+    def last_heard(self, me: int) -> int | None:
+        """Return the tick at which a new register of any robot but `me` came last, or None where none is known."""
+        return max((heard for node, heard in self._heard.items() if node != me), default=None)
+
     def claims(self, me: int, tick: int) -> Iterator[int]:
         """Yield the keys of the frontiers that other robots claim, by a lease that has not run out."""
         for node, register in self.newest.items():

@@ -11,10 +11,23 @@ from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
 from zwerm.agents.sensor_coverage.frontier.fence import Fence
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.walks import Arc
 from zwerm.maths.simplicial import Edge, FlagComplex
 
 # Returns the cheapest routes from sources (slot: cost to start there) through a complex.
 FindRoutes = Callable[[FlagComplex, Mapping[int, float]], CheapestRoutes]
+
+
+class WallService(Protocol):
+    """Finds where a robot must follow a wall. `tried` has the directions [rad] of the attempts, by slot."""
+
+    tried: dict[int, list[float]]
+
+    def plans_at(self, slot: int, beside: int, arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
+        """Return a plan for each open arc of a slot that has attempts left, and the number of arcs that have none."""
+
+    def note_wall(self, slot: int, direction: float) -> None:
+        """Record a wall closer than a body [rad] beside a slot."""
 
 
 class FrontierService(Protocol):
@@ -22,6 +35,10 @@ class FrontierService(Protocol):
 
     attempt_log: AttemptLog
     fence: Fence
+
+    @property
+    def walls(self) -> WallService:
+        """Where a robot must follow a wall."""
 
     @property
     def frontier(self) -> tuple[Edge, ...]:

@@ -1,9 +1,12 @@
 """One scan of the swarm, and one planned deployment."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from zwerm.maths.simplicial import FlagComplex
+
+# Fourth element of the keys of plans to follow a wall, plus the direction in degrees.
+WALLS: Final = 1000
 
 
 class ScanResult(NamedTuple):

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from operator import itemgetter
 
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_heading, refined_reference
-from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.walks import Arc, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
 
@@ -23,7 +23,8 @@ class Slots:
 
     `occupant` has the robot at each slot. `heading` [rad] and `frame` are each robot's heading and the robot in whose
     frame it is. `view` has the bearings that each robot sees in its own frame. `walls` and `blocked` have, by slot, the
-    directions of walls, and of drives that a wall stopped. `felt` has the directions of walls closer than a body.
+    directions of walls, and of drives that a wall stopped. `felt` has the directions of walls closer than a body, and `near`
+    the arcs in which a wall close to a slot was followed.
     `walks` are the walls that robots followed. `length_m` has the distances [m] between slots that are not a hop apart.
     """
 
@@ -34,6 +35,7 @@ class Slots:
         self.walls: dict[int, list[float]] = {}
         self.blocked: dict[int, list[float]] = {}
         self.felt: dict[int, list[float]] = {}
+        self.near: dict[int, list[Arc]] = {}
         self.walks: list[Walk] = []
         self.length_m: dict[tuple[int, int], float] = {}
         self.frame: dict[int, int] = {}
@@ -68,6 +70,7 @@ class Slots:
             self.view.pop(robot, None)
         self.walls.pop(slot, None)
         self.felt.pop(slot, None)
+        self.near.pop(slot, None)
 
     def take(self, robot: int, sightings: Iterable[Sighting]) -> None:
         """Store the bearings that a robot reports, in its own frame."""
@@ -136,6 +139,7 @@ class Slots:
             for known in (self.walls, self.blocked, self.felt):
                 if slot in known:
                     known[slot] = [each + by for each in known[slot]]
+            self.near[slot] = [Arc(each.start_rad + by, each.width_rad) for each in self.near.get(slot, ())]
         self.walks = [each.turned(new, by) if each.frame == old else each for each in self.walks]
         spin = cmath.exp(1j * by)
         for slot in turned:

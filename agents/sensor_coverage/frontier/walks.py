@@ -4,6 +4,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 
+class Arc(NamedTuple):
+    """Directions from `start_rad` to the left, over `width_rad`."""
+
+    start_rad: float
+    width_rad: float
+
+
 class WalkPoint(NamedTuple):
     """A point of a walk: the direction [rad] to it from each slot that it sees, the directions of walls that it touches.
 

@@ -4,17 +4,17 @@ The proof of coverage (`zwerm.agents.sensor_coverage.frontier.wall_proof`) finds
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.directions import add_wall
-from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
+from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, open_arcs
+from zwerm.agents.sensor_coverage.frontier.walks import Arc
+from zwerm.agents.sensor_coverage.frontier.wall_proof import open_arcs
 
-# Third and fourth element of the keys of these plans.
-WALLS: Final = 1000
+# Fourth element of the keys of plans to join two parts of the swarm.
 JOIN: Final = 2000
 # Directions to try into an open arc, as fractions of its width, one after the other.
 FRACTIONS: Final = (0.5, 0.5, 0.5, 0.5, 0.25, 0.75, 0.1, 0.9)
@@ -25,20 +25,23 @@ JOINS_MAX: Final = 4
 
 
 class WallPlans:
-    """Finds the places at which a robot must follow a wall. `unproven` are the slots that stay open after all attempts."""
+    """Finds the places at which a robot must follow a wall.
+
+    `unproven` are the slots that stay open after all attempts. `tried` has the directions [rad] of the attempts, by slot.
+    """
 
     def __init__(self, parameters: PlannerParameters, slots: Slots) -> None:
         self.unproven: tuple[int, ...] = ()
         self._parameters = parameters
         self._slots = slots
-        self._tried: dict[int, list[float]] = {}
+        self.tried: dict[int, list[float]] = {}
         self._joined: dict[tuple[int, tuple[int, ...]], int] = {}
 
     def open_arcs(self, scan: ScanResult) -> dict[int, list[Arc]]:
         """Return the arcs in which each slot is open."""
         slots = self._slots
         touched = {slot: [*slots.walls.get(slot, ()), *slots.felt.get(slot, ())] for slot in scan.complex_.vertices}
-        return open_arcs(scan.views, scan.complex_, slots.walks, touched)
+        return open_arcs(scan.views, scan.complex_, slots.walks, touched, slots.near)
 
     def plans(self, scan: ScanResult) -> Iterator[Plan]:
         """Yield a plan for each open arc that has attempts left."""
@@ -47,15 +50,27 @@ class WallPlans:
         for slot, arcs in self.open_arcs(scan).items():
             if not scan.complex_.neighbours[slot]:
                 continue
-            for arc in arcs:
-                tried = sum((each - arc.start_rad) % math.tau < arc.width_rad for each in self._tried.get(slot, ()))
-                if tried >= len(FRACTIONS):
-                    unproven[slot] = None
-                    continue
-                direction = math.remainder(arc.start_rad + FRACTIONS[tried] * arc.width_rad, math.tau)
-                number = round(math.degrees(direction))
-                yield Plan(
-                    (slot, scan.complex_.neighbours[slot][0], 0, WALLS + number),
+            found, exhausted = self.plans_at(slot, scan.complex_.neighbours[slot][0], arcs)
+            yield from found
+            if exhausted:
+                unproven[slot] = None
+        self.unproven = tuple(unproven)
+
+    def plans_at(self, slot: int, beside: int, arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
+        """Return a plan for each arc of a slot that has attempts left, and the number of arcs that have none.
+
+        `beside` is a neighbour of the slot, to name the frontier.
+        """
+        found, exhausted = list[Plan](), 0
+        for arc in arcs:
+            tried = sum((each - arc.start_rad) % math.tau < arc.width_rad for each in self.tried.get(slot, ()))
+            if tried >= len(FRACTIONS):
+                exhausted += 1
+                continue
+            direction = math.remainder(arc.start_rad + FRACTIONS[tried] * arc.width_rad, math.tau)
+            found.append(
+                Plan(
+                    (slot, beside, 0, WALLS + round(math.degrees(direction))),
                     slot,
                     direction,
                     self._parameters.hop_m,
@@ -65,7 +80,8 @@ class WallPlans:
                     hand=-1 if tried % 2 == 0 else 1,
                     beside=tried >= ANYWHERE_MAX,
                 )
-        self.unproven = tuple(unproven)
+            )
+        return found, exhausted
 
     def _joins(self, scan: ScanResult) -> Iterator[Plan]:
         """Yield plans to stand where a walk saw robots of two parts of the swarm that do not see each other."""
@@ -101,7 +117,11 @@ class WallPlans:
         if plan.meet:
             self._joined[plan.mover, plan.meet] = self._joined.get((plan.mover, plan.meet), 0) + 1
         else:
-            self._tried.setdefault(plan.mover, []).append(plan.direction)
+            self.tried.setdefault(plan.mover, []).append(plan.direction)
+
+    def note_near(self, slot: int, arcs: Iterable[tuple[float, float]]) -> None:
+        """Record arcs (start, width) [rad] around a slot in which a wall close to it was followed."""
+        self._slots.near[slot] = [*self._slots.near.get(slot, ()), *(Arc(*each) for each in arcs)]
 
     def note_wall(self, slot: int, direction: float) -> None:
         """Record a wall closer than a body [rad] beside a slot."""

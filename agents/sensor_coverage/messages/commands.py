@@ -203,7 +203,8 @@ class Walked(_UplinkMessage, frozen=True, tag="walked"):
     """The end of a drive to a wall or along it, after `driven_m`; `end` is one of OPEN, SHUT, STRETCH, LOST and MET.
 
     (x, y) [m] is the way from the place where the robot stood before it drove to the wall, by odometry. `touched` are
-    bearings [rad] of the wall that stopped a drive to it.
+    bearings [rad] of the wall that stopped a drive to it. `near` has arcs (start, width) [rad] around that place in which
+    the robot followed a wall close to it.
     """
 
     cycle: int
@@ -213,6 +214,7 @@ class Walked(_UplinkMessage, frozen=True, tag="walked"):
     driven_m: float
     touched: tuple[float, ...]
     waypoints: tuple[Waypoint, ...]
+    near: tuple[tuple[float, float], ...] = ()
 
 
 class Ack(_UplinkMessage, frozen=True, tag="ack"):

@@ -9,6 +9,7 @@ from zwerm.agents.sensor_coverage.messages.beacons import PathVector, StateBeaco
 from zwerm.agents.sensor_coverage.messages.incarnations import ANY, Incarnation
 from zwerm.agents.sensor_coverage.messages.locks import ListRequest, LockProtocolMessage
 from zwerm.agents.sensor_coverage.messages.pushes import Segment, SegmentAck, SlotVacated
+from zwerm.agents.sensor_coverage.messages.walls import WalkMessage
 from zwerm.agents.sensor_coverage.messages.waves import CensusMessage
 from zwerm.wire.checksum import Sealed
 
@@ -24,6 +25,7 @@ PeerMessage = (
     | Segment
     | SegmentAck
     | LockProtocolMessage
+    | WalkMessage
 )
 
 

@@ -38,6 +38,8 @@ class SlotMemory(_PushMessagePart, frozen=True):
     """The memory of a slot, which the next occupant inherits.
 
     `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
+    `felt` are directions [rad] of walls closer than a body. `explored` are directions of attempts to follow a wall.
+    `proved` has the arcs that walks closed: (slot at another corner or NOWHERE, start [rad], width [rad]).
     """
 
     slot: int
@@ -49,6 +51,9 @@ class SlotMemory(_PushMessagePart, frozen=True):
     blocked: tuple[float, ...]
     claims: int = 0
     obstructed: tuple[tuple[tuple[int, ...], int], ...] = ()
+    felt: tuple[float, ...] = ()
+    explored: tuple[float, ...] = ()
+    proved: tuple[tuple[int, float, float], ...] = ()
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).
@@ -56,42 +61,62 @@ Chain = tuple[tuple[int, int], ...]
 
 
 class PushToken(_PushMessage, frozen=True, tag="token"):
-    """A push searches its leader: forward along the path vectors, first to `via`. `fresh` is the new slot."""
+    """A push searches its leader: forward along the path vectors, first to `via`. `fresh` is the new slot.
+
+    With `wall_rad` the receiver leads from the base's point, into an open arc of the base in this direction, and follows
+    the wall there with its `hand`.
+    """
 
     push: int
     fresh: int
     chain: Chain
     via: int
+    wall_rad: float | None = None
+    hand: int = 1
 
 
 class LeaderReady(_PushMessage, frozen=True, tag="ready"):
-    """The leader to its follower: this will be your slot once I am gone. The leader stands there since drive `epoch`."""
+    """The leader to its follower: this will be your slot once I am gone. The leader stands there since drive `epoch`.
+
+    `walk`: the leader follows a wall once the others stand.
+    """
 
     push: int
     chain: Chain
     memory: SlotMemory
     epoch: int
+    walk: bool = False
 
 
 class TakeSlot(_PushMessage, frozen=True, tag="take-slot"):
-    """To the follower: take my slot, because I leave it now."""
+    """To the follower: take my slot, because I leave it now. `walk`: the leader follows a wall once the others stand."""
 
     push: int
     chain: Chain
     memory: SlotMemory
+    walk: bool = False
 
 
 class PushAborted(_PushMessage, frozen=True, tag="aborted"):
-    """The push has ended and no robot has moved. `tried`: its leader tried to drive."""
+    """The push has ended and no robot has moved. `tried`: its leader tried to drive.
+
+    `felt` are directions [rad] of walls that a leader felt close to the base's point.
+    """
 
     push: int
     tried: bool
+    felt: tuple[float, ...] = ()
 
 
 class AllStanding(_PushMessage, frozen=True, tag="all-standing"):
-    """All robots ahead of the receiver stand still."""
+    """All robots ahead of the receiver stand still.
+
+    From the leader to its follower, `near` has arcs (start, width) [rad] around the slot that the leader has left, in which
+    it followed a wall close to that slot.
+    """
 
     push: int
+    near: tuple[tuple[float, float], ...] = ()
 
 
 class AllSettled(_PushMessage, frozen=True, tag="all-settled"):

@@ -27,6 +27,7 @@ class CensusTally(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
 
     `incarnations` is the sum of the robots' random incarnation numbers. `present` are the counted robots, and `dead` those
     that one of them sees and that do not answer it. `roster` has robots that were let out, if the wave lacked any.
+    `unproven` counts the open arcs around the robots that are left after all attempts to follow a wall there.
     """
 
     number: Count
@@ -37,6 +38,7 @@ class CensusTally(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     present: bytes = b""
     dead: bytes = b""
     roster: bytes = b""
+    unproven: Count = 0
 
 
 CensusMessage = CensusWave | CensusTally

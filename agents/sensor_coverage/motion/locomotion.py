@@ -35,6 +35,7 @@ class Locomotion:
         self.parameters = parameters
         self.hop_m = parameters.link_m - parameters.margin_m
         self.step_m = setup.body.max_speed_m_s * setup.dt_s if setup.body is not None else 0.0
+        self.radius_m = setup.body.radius_m if setup.body is not None else 0.0
         self.frame = OdometryFrame()
         self.rest: Vector | None = None
         self.bearing_noise_rad: float | None = None

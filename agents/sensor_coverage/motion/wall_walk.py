@@ -6,7 +6,8 @@ its way are passed in the same manner, but the robot does not press against them
 """
 
 import math
-from collections.abc import Collection, Generator, Iterable, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Sequence
+from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
@@ -31,6 +32,20 @@ STUCK_FRACTION: Final = 0.2
 SPACING_M: Final = 0.1
 # Distance [m] within which a robot must get clear of its start.
 CLEARING_M_MAX: Final = 3.0
+# A wall within this way [m] is only felt: the space between it and the robot's slot is narrower than a body.
+FEEL_M: Final = 0.12
+# The walking robot leaves its slot by this distance [m] before the next robot takes it: two bodies and some space.
+CLEAR_M: Final = 0.3
+# Points closer [m] to the start have no direction from there.
+NEAR_M_MIN: Final = 0.02
+# Two contacts whose bearings differ by less than this [rad] are with the same wall; a switch is 30 degrees wide.
+SAME_WALL_RAD: Final = math.radians(35.0)
+# Two contacts at the same point that differ by less than this [rad] are the walls of a corner.
+CORNER_RAD: Final = math.radians(125.0)
+# Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
+LEG_M: Final = 3.0
+# Number of consecutive legs that closed nothing after which a walk ends.
+IDLE_LEGS_MAX: Final = 2
 
 
 class WalkResult(NamedTuple):
@@ -40,15 +55,28 @@ class WalkResult(NamedTuple):
     driven_m: float = 0.0
     touched: tuple[float, ...] = ()
     waypoints: tuple[Waypoint, ...] = ()
+    near: tuple[tuple[float, float], ...] = ()
 
 
 DriveToWalk = Generator[BodyVelocity, None, WalkResult]
 
 
+class NearPoint(NamedTuple):
+    """A point [m] of the way along a wall close to the start, whether the robot touched anything, and walls [rad]."""
+
+    at: Vector
+    in_touch: bool
+    walls: tuple[float, ...]
+
+
 class WallWalk:
-    """The walk of one robot along walls, over several commands: its trail, and the direction of the wall it has in touch."""
+    """The walk of one robot along walls, over several commands: its trail, and the direction of the wall it has in touch.
+
+    `on_step` is called with each point of a walk along a wall, one a tick.
+    """
 
     def __init__(self, motion: Locomotion) -> None:
+        self.on_step: Callable[[Waypoint], None] = lambda _: None
         self._motion = motion
         self._wall_rad = 0.0
         self._trail: list[Vector] = []
@@ -94,15 +122,17 @@ class WallWalk:
             return WalkResult(SHUT, done, touched)
         self._wall_rad, self._blind_rad = bearing_rad, 0.0
         way = 0.0
+        near = [self._near_point()]
         while math.hypot(frame.x_m - start[0], frame.y_m - start[1]) < clear_m:
             if way > CLEARING_M_MAX or self._blind_rad > TURNS_RAD_MAX:
                 yield from motion.drive_to(start)
-                return WalkResult(SHUT, done, touched)
+                return WalkResult(SHUT, done, touched, near=arcs_around(start, near, hand, motion.radius_m))
             before = motion.position
             yield self._step(hand)
             way += math.dist(before, motion.position)
             self._trail.append(motion.position)
-        return WalkResult(STRETCH, done, touched)
+            near.append(self._near_point())
+        return WalkResult(STRETCH, done, touched, near=arcs_around(start, near, hand, motion.radius_m))
 
     def along(
         self, hand: int, length_m: float, keep: Collection[int], meet: Collection[int], margin_m: float
@@ -121,6 +151,7 @@ class WallWalk:
         self._trail = [motion.position]
         self._blind_rad = 0.0
         points = [self._waypoint()]
+        self.on_step(points[0])
         seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
         last, way = motion.position, 0.0
         while way < length_m:
@@ -135,6 +166,7 @@ class WallWalk:
                 yield from self._back(margin_m, keep)
                 return WalkResult(LOST, way, (), tuple(points))
             self._trail.append(motion.position)
+            self.on_step(self._waypoint())
             now, touch = tuple(sorted(frame.seen)), _hands(frame.contacts)
             if now != seen or touch != hands:
                 if before != last:
@@ -161,6 +193,9 @@ class WallWalk:
             self._wall_rad = heading + hand * (math.pi / 2.0 - PRESS_RAD)
         ux, uy = unit(heading)
         return motion.velocity(ux * motion.step_m, uy * motion.step_m)
+
+    def _near_point(self) -> NearPoint:
+        return NearPoint(self._motion.position, bool(self._motion.frame.contacts), self._motion.frame.touched)
 
     def _waypoint(self) -> Waypoint:
         frame = self._motion.frame
@@ -204,6 +239,42 @@ class WallWalk:
             if math.hypot(dx, dy) < motion.parameters.tolerance_m:
                 return
             yield motion.velocity(dx, dy)
+
+
+def arcs_around(
+    start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float
+) -> tuple[tuple[float, float], ...]:
+    """Return the arcs (start, width) [rad] around a start in which a wall was followed in touch, by odometry.
+
+    Two successive points close the arc between them, if the wall is beyond. Two successive contacts with the same wall
+    close the arc between the touched points of the wall. So do two contacts at the same point, because a body does not pass
+    between them.
+    """
+    found = []
+    for before, point in pairwise(points):
+        near_m = min(math.dist(start, each.at) for each in (before, point))
+        if (before.in_touch or point.in_touch) and near_m > NEAR_M_MIN:
+            step = _between(start, before.at, point.at)
+            if step[1] * hand < 0.0:  # the start and the wall are on different sides of the step
+                found.append(step)
+        for a, b in combinations(point.walls, 2):
+            if _apart(a, b) < CORNER_RAD:
+                ends = (_touched_point(point.at, each, radius_m) for each in (a, b))
+                found.append(_between(start, *ends))
+        for a, b in ((a, b) for a in before.walls for b in point.walls if _apart(a, b) < SAME_WALL_RAD):
+            found.append(_between(start, _touched_point(before.at, a, radius_m), _touched_point(point.at, b, radius_m)))
+    return tuple((a, width) if width >= 0.0 else (a + width, -width) for a, width in found)
+
+
+def _touched_point(at: Vector, bearing_rad: float, radius_m: float) -> Vector:
+    ux, uy = unit(bearing_rad)
+    return at[0] + radius_m * ux, at[1] + radius_m * uy
+
+
+def _between(start: Vector, a: Vector, b: Vector) -> tuple[float, float]:
+    """Return the direction [rad] of a point from the start, and the angle from there to another point."""
+    first, second = (math.atan2(y - start[1], x - start[0]) for x, y in (a, b))
+    return first, math.remainder(second - first, math.tau)
 
 
 def swept(wall_rad: float, contacts: Sequence[Touched], hand: int) -> float:

@@ -5,26 +5,21 @@ A robot plans only for the edges at its own slot, and only as their mover.
 
 import cmath
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import islice
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
-from zwerm.agents.sensor_coverage.frontier.directions import (
-    Reference,
-    add_wall,
-    angle_between,
-    refined_reference,
-    wrapped,
-)
-from zwerm.agents.sensor_coverage.frontier.fence import VERTEX_BESIDE_RAD, wedges
+from zwerm.agents.sensor_coverage.frontier.directions import Reference, add_wall, refined_reference, wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SlotProof
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
+from zwerm.agents.sensor_coverage.neighbourhood.obstructions import Obstructions
 from zwerm.agents.sensor_coverage.protocols.path_vector import PathVectorProtocol
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
@@ -33,9 +28,8 @@ from zwerm.maths.simplicial import Edge, FlagComplex, edge
 DOUBT_COST: Final = 1_000.0
 # Added cost of a route to a robot at a gap. Gaps are expanded when no edge can be expanded and no robot is in doubt.
 GAP_COST: Final = 10_000.0
-
-# A body is seen from the other side if the directions to it differ by more than this [rad].
-BEHIND_RAD: Final = math.pi / 2.0
+# The same for a robot with an open arc, from which a robot must follow a wall. That comes after all edges and gaps.
+WALL_COST: Final = 20_000.0
 
 MakePlanner = Callable[[PlannerParameters, Slots], FrontierService]
 
@@ -43,7 +37,8 @@ MakePlanner = Callable[[PlannerParameters, Slots], FrontierService]
 class LocalMap(NeighbourTable):
     """One robot's neighbourhood.
 
-    `plans` expand edges and `gaps` expand gaps around this robot. `obstacle` has the obstacle edges here, and
+    `plans` expand edges and `gaps` expand gaps around this robot, and `wall_plans` lead into open arcs of the `proof` of
+    coverage. `unproven` counts the open arcs without an attempt left. `obstacle` has the obstacle edges here, and
     `obstructed` counts the sides and gaps that the body of a dead robot closes. `path_vectors` has the routes to the
     frontier. `plan_count` counts the times that plans were made. A base station sets `guests`.
     """
@@ -56,11 +51,13 @@ class LocalMap(NeighbourTable):
         self.parameters = parameters
         self.plans: list[Plan] = []
         self.gaps: list[Plan] = []
+        self.wall_plans: list[Plan] = []
+        self.unproven = 0
+        self.proof = SlotProof()
         self.path_vectors = PathVectorProtocol()
         self.obstacle: dict[Edge, None] = {}
         self.obstructed = 0
-        self._obstructed: dict[tuple[int, ...], int] = {}  # key of an attempt: the robot whose body stopped it
-        self._finished: dict[int, None] = {}  # dead robots that claimed no frontier when they died
+        self._bodies = Obstructions()
         self.plan_count = 0
         self._make_planner = make_planner
         self._references: dict[int, Reference] = {}
@@ -97,11 +94,11 @@ class LocalMap(NeighbourTable):
     def memory(self) -> SlotMemory:
         """Return the memory of this slot, for its next occupant."""
         log, me = self._planner.attempt_log, self.slot
-        references = []
-        for slot, (mean, count) in sorted(self._references.items()):
-            node = self.at(slot)
-            if node is not None:
-                references.append(ReferenceBearing(slot, node, cmath.phase(mean), count))
+        references = [
+            ReferenceBearing(slot, node, cmath.phase(mean), count)
+            for slot, (mean, count) in sorted(self._references.items())
+            if (node := self.at(slot)) is not None
+        ]
         return SlotMemory(
             me,
             tuple(references),
@@ -111,8 +108,25 @@ class LocalMap(NeighbourTable):
             tuple(log.attempts.items()),
             tuple(log.blocked.get(me, ())),
             self.path_vectors.newest_claim(me),
-            tuple(self._obstructed.items()),
+            tuple(self._bodies.stopped.items()),
+            tuple(self._slots.felt.get(me, ())),
+            tuple(self._planner.walls.tried.get(me, ())),
+            self.proof.memory(),
         )
+
+    def reopen(self) -> None:
+        """Try again all that has failed: a robot is missing, and the obstacle of that time may be gone."""
+        log = self._planner.attempt_log
+        log.closed, log.failed, log.attempts = {}, {}, {}
+        log.blocked.clear()
+        self._planner.walls.tried.clear()
+        self._bodies.stopped = {}
+        self.replan()
+
+    def replan(self) -> None:
+        """Make plans again, although neither the view nor a neighbour has changed."""
+        self._plan_basis = None
+        self.change()
 
     # --- robots that died or restarted --------------------------------------------------------------------------------
 
@@ -124,13 +138,14 @@ class LocalMap(NeighbourTable):
         """
         slot = self._slot_of(node)
         if slot != NOWHERE and not self.states[node].moving and not self.path_vectors.is_claimed(slot):
-            self._finished[node] = None
+            self._bodies.finished[node] = None
         self.path_vectors.forget(node, slot)
         log = self._planner.attempt_log
         for known in (log.closed, log.attempts):
             for key in [key for key in known if key[2] == 0]:
                 del known[key]
-        if node in self._obstructed.values():
+        self._planner.walls.tried.clear()
+        if node in self._bodies.stopped.values():
             self.reopen()  # a drive that pushes its body finds out what is behind it
         self._plan_basis = None
         self.forget(node)
@@ -154,8 +169,9 @@ class LocalMap(NeighbourTable):
         self._learned.clear()
         self._slots = Slots()
         self._planner = self._make_planner(self.parameters, self._slots)
-        self.plans, self.gaps, self.obstacle, self.obstructed = [], [], {}, 0
-        self._obstructed = {}
+        self._drop_plans()
+        self.proof = SlotProof()
+        self._bodies.stopped = {}
         self._plan_basis = None
         self._led = None
         self._handovers = {}
@@ -183,13 +199,20 @@ class LocalMap(NeighbourTable):
         log.failed = dict.fromkeys((key, me) for key in memory.failed)
         log.attempts = dict(memory.attempts)
         log.blocked[me] = list(memory.blocked)
-        self._obstructed = dict(memory.obstructed)
+        self._bodies.stopped = dict(memory.obstructed)
+        self._slots.felt[me] = list(memory.felt)
+        self._planner.walls.tried[me] = list(memory.explored)
+        self.proof.inherit(memory.proved)
 
     def leave_complex(self) -> None:
         """Leave the complex; the body stays at the slot."""
         self.redundant = True
-        self.plans, self.gaps, self.obstacle, self.obstructed = [], [], {}, 0
+        self._drop_plans()
         self.change()
+
+    def _drop_plans(self) -> None:
+        self.plans, self.gaps, self.wall_plans, self.obstacle = [], [], [], {}
+        self.obstructed = self.unproven = 0
 
     def abandon_push(self, fresh: int, follower: int | None) -> None:
         """Record that this robot led a push and stays: no robot occupies `fresh`, and `follower` should not come."""
@@ -240,34 +263,17 @@ class LocalMap(NeighbourTable):
         self.obstacle = dict.fromkeys(
             (*found.corners, *(side.edge for side in found.sides if (side.edge, side.sign) not in could))
         )
-        self.obstructed = self._count_obstructed(scan)
+        seen = {node: each.bearing_rad + (self.heading or 0.0) for node, each in self.seen.items()}
+        self.obstructed = self._bodies.count(me, scan, planner.fence, seen, self.states, mutual.values())
+        if self.parameters.walls == "followed":
+            self._plan_walks(scan)
 
-    def _count_obstructed(self, scan: ScanResult) -> int:
-        """Return the number of sides and gaps here that are closed only by the body of a dead robot.
-
-        No robot must look behind a dead robot that did not claim a frontier when it died. The same holds if a neighbour
-        sees the body from the other side.
-        """
-        if not self._obstructed:
-            return 0
-        me = self.slot
-        sides = {(*side.edge, side.sign) for side in self._planner.fence.sides}
-        around = {(me, a) for _, a, _, gap in wedges(scan.views, scan.complex_, [me]) if gap >= 2.0 * VERTEX_BESIDE_RAD}
-        return sum(
-            (key[:3] in sides or (key[2] == 0 and key[:2] in around)) and not self._is_seen_past(body)
-            for key, body in self._obstructed.items()
-        )
-
-    def _is_seen_past(self, body: int) -> bool:
-        seen = self.seen.get(body)
-        if body in self._finished or body in self.states or seen is None:
-            return True
-        here = seen.bearing_rad + (self.heading or 0.0)
-        return any(
-            each.node == body and angle_between(each.direction_rad, here) > BEHIND_RAD
-            for state in self.mutual().values()
-            for each in state.seen
-        )
+    def _plan_walks(self, scan: ScanResult) -> None:
+        """Find the open arcs around this robot, and the walks into them. A robot without neighbours has none."""
+        me, slots = self.slot, self._slots
+        self.proof.update(me, scan.views[me], scan.complex_, (*slots.walls.get(me, ()), *slots.felt.get(me, ())))
+        arcs, beside = self.proof.open_arcs(), next(iter(self.proof.around), me)
+        self.wall_plans, self.unproven = self._planner.walls.plans_at(me, beside, arcs if beside != me else ())
 
     def scan(self) -> ScanResult:
         """Return the views of this robot and its neighbours as a scan, by this robot's slot."""
@@ -290,40 +296,36 @@ class LocalMap(NeighbourTable):
 
     def best_plan(self) -> Plan | None:
         """Return the plan to carry out here, or None."""
-        wanted = self.plans or self.gaps
+        wanted = self.plans or self.gaps or self.wall_plans
         return min(wanted, key=lambda each: each.key) if wanted else None
 
     def note_attempt(self, plan: Plan) -> None:
         """Record that a plan is tried."""
         self._planner.note_attempt(plan)
-        self._plan_basis = None
-        self.change()
-
-    def reopen(self) -> None:
-        """Try again all that has failed: a robot is missing, and the obstacle of that time may be gone."""
-        log = self._planner.attempt_log
-        log.closed, log.failed, log.attempts = {}, {}, {}
-        log.blocked.clear()
-        self._obstructed = {}
-        self._plan_basis = None
-        self.change()
+        self.replan()
 
     def note_obstruction(self, plan: Plan, driven_m: float, body: int) -> None:
         """Record that a robot's body stopped a plan after `driven_m`: if it is dead, nobody may know what is behind it."""
-        self._obstructed[plan.key] = body
+        self._bodies.stopped[plan.key] = body
         self.note_failure(plan, driven_m)
 
     def unblock(self, node: int) -> None:
         """Try again what had failed, if a robot was in the way that is alive again."""
-        self._finished.pop(node, None)
-        if node in self._obstructed.values():
+        self._bodies.finished.pop(node, None)
+        if node in self._bodies.stopped.values():
             self.reopen()
 
     def note_failure(self, plan: Plan, driven_m: float) -> None:
         """Record that a wall stopped a plan after `driven_m`."""
         self._planner.note_failure(plan, driven_m)
-        self._plan_basis = None
-        self.change()
+        self.replan()
+
+    def note_walls(self, felt: Iterable[float], near: Iterable[tuple[float, float]] = ()) -> None:
+        """Record walls felt close to this slot [rad], and arcs (start, width) [rad] in which one was followed close to it."""
+        for each in felt:
+            self._planner.walls.note_wall(self.slot, each)
+        self.proof.add_near(near)
+        self.replan()
 
     # --- the route to the frontier ------------------------------------------------------------------------------------
 
@@ -334,8 +336,13 @@ class LocalMap(NeighbourTable):
 
     @property
     def to_gap(self) -> bool:
-        """True if the route leads to a gap."""
+        """True if the route leads to a gap, or to a wall that must be followed."""
         return self.route is not None and self.route.cost >= GAP_COST
+
+    @property
+    def to_wall(self) -> bool:
+        """True if the route leads to a wall that must be followed."""
+        return self.route is not None and self.route.cost >= WALL_COST
 
     @property
     def has_route(self) -> bool:
@@ -356,7 +363,9 @@ class LocalMap(NeighbourTable):
     def find_route(self, tick: int) -> None:
         """Choose the route to the frontier by the neighbours' routes."""
         placed = self.slot not in (0, NOWHERE)
-        cost = 0.0 if placed and self.plans else GAP_COST if placed and self.gaps else None
+        cost = None
+        if placed:
+            cost = 0.0 if self.plans else GAP_COST if self.gaps else WALL_COST if self.wall_plans else None
         obstacle_cost = self.parameters.obstacle_cost
         weights = {
             state.slot: obstacle_cost if edge(self.slot, state.slot) in self.obstacle else 1.0

@@ -1,7 +1,7 @@
 """One decentralised robot's situation, which its components share: readings, activity, local map, and mailbox."""
 
 import math
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -15,6 +15,14 @@ from zwerm.agents.sensor_coverage.motion.homing import Vector
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive, Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult, DriveToResult, correct, deploy, move
+from zwerm.agents.sensor_coverage.motion.wall_walk import (
+    CLEAR_M,
+    FEEL_M,
+    LEG_M,
+    DriveToWalk,
+    WalkResult,
+    WallWalk,
+)
 from zwerm.agents.sensor_coverage.neighbourhood.failure_detector import FailureDetector
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap, MakePlanner
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
@@ -41,7 +49,10 @@ class Situation:
         self.tick = 0
         self.motion = Locomotion(parameters, setup)
         self.motion.rest = 0.0, 0.0
-        planner_parameters = PlannerParameters(link_m=parameters.link_m, margin_m=parameters.margin_m)
+        self.wall_walk = WallWalk(self.motion)
+        planner_parameters = PlannerParameters(
+            link_m=parameters.link_m, margin_m=parameters.margin_m, walls=parameters.walls
+        )
         self.local_map = LocalMap(setup.node, planner_parameters, make_planner, setup.incarnation)
         self.mailbox = ReliableMailbox()
         self.failure_detector = FailureDetector()
@@ -52,8 +63,8 @@ class Situation:
         self.telemetry: dict[str, float | bool] = {}
         self.snapshot = b""
         self.on_cleared: Callable[[], None] = lambda: None
-        self.on_arrived: Callable[[DriveResult], None] = lambda _: self.stand()
-        self._activity: Generator[BodyVelocity, None, DriveResult | None] | None = self._look_around()
+        self.on_arrived: Callable[[DriveResult | WalkResult], None] = lambda _: self.stand()
+        self._activity: Generator[BodyVelocity, None, DriveResult | WalkResult | None] | None = self._look_around()
 
     # --- every tick -------------------------------------------------------------------------------------------------
 
@@ -73,7 +84,7 @@ class Situation:
             except StopIteration as end:
                 self._activity, result = None, end.value
         self.driving = velocity != STOP
-        if isinstance(result, DriveResult):
+        if isinstance(result, DriveResult | WalkResult):
             self.motion.settle()
             self.on_arrived(result)
         return velocity
@@ -96,7 +107,8 @@ class Situation:
     @property
     def claims(self) -> int:
         """Number of frontier claims of this robot; what a dead robot's body closes is frontier, too."""
-        return len(self.local_map.plans) + len(self.local_map.gaps) + self.local_map.obstructed
+        local_map = self.local_map
+        return len(local_map.plans) + len(local_map.gaps) + len(local_map.wall_plans) + local_map.obstructed
 
     def dead_ahead(self, bearing_rad: float, within_rad: float) -> int | None:
         """Return the dead robot that is visible next to a bearing [rad] of this robot's frame, within an angle, or None."""
@@ -190,13 +202,21 @@ class Situation:
         """Begin to correct the scale."""
         self._drive(correct(self.motion, anchors))
 
+    def to_wall(self, bearing_rad: float, hop_m: float, hand: int) -> None:
+        """Begin to drive to a wall, and along it until the start is clear."""
+        self._drive(self.wall_walk.to_wall(bearing_rad, hop_m, FEEL_M, CLEAR_M, hand))
+
+    def follow_wall(self, hand: int, keep: Collection[int]) -> None:
+        """Begin to follow the wall in touch, in sight of a robot of `keep`, or of any robot if `keep` is empty."""
+        self._drive(self.wall_walk.along(hand, LEG_M, keep, (), self.motion.parameters.margin_m))
+
     def stand(self) -> None:
         """End a drive: the robot stands still, for neighbours to average its bearing."""
         self._check_at_base()
         self.local_map.end_drive()
         self.motion.frame.forget()
 
-    def _drive(self, drive: DriveToResult) -> None:
+    def _drive(self, drive: DriveToResult | DriveToWalk) -> None:
         self.local_map.begin_drive()
         self._activity = drive
 

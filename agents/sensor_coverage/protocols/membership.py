@@ -74,10 +74,13 @@ class Membership(Component):
     def _redundant(self, advised: bool) -> bool:
         """Return whether coverage does not need this robot, and there is a frontier for it.
 
+        No robot leaves for a walk along a wall: its neighbours' proofs of coverage need it.
         With a coordinator only `advised` robots leave, and they need not check the criterion that makes it safe.
         """
         situation, local_map = self._situation, self._situation.local_map
         if local_map.slot in (0, NOWHERE) or not (situation.stands and local_map.has_route and situation.clear):
+            return False
+        if local_map.to_wall:
             return False
         mutual = local_map.mutual()
         others = [local_map.states.get(node) for node in situation.motion.frame.seen if node not in mutual]

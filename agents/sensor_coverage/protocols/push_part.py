@@ -19,7 +19,8 @@ from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 
 # Bounds of the ticks to wait. LINK, WAVE: for the token, and for another robot's drive. VACATED, ARMED, HOLD: for the
 # leader to leave or to give up, and for its neighbours to agree. LOST: for a robot out of range. CLOSE: for this
-# robot's neighbours to agree at the end. TELL: for a robot behind that is out of range at the end.
+# robot's neighbours to agree at the end. TELL: for a robot behind that is out of range at the end. WALK: for a leader
+# that follows a wall.
 LINK_TICKS: Final = 1000
 WAVE_TICKS: Final = 600
 VACATED_TICKS: Final = 80
@@ -28,6 +29,7 @@ HOLD_TICKS: Final = 600
 LOST_TICKS: Final = 100
 CLOSE_TICKS: Final = 80
 TELL_TICKS: Final = 4
+WALK_TICKS: Final = 1200
 # After VACATED_TICKS a follower checks this often [ticks] whether the leader's slot is vacant.
 VACANCY_PERIOD_TICKS: Final = 20
 # A leader that is visible within this angle [rad] of its slot's direction is still there, or back.
@@ -95,6 +97,7 @@ class PushPart:
         self._result = DriveResult(True)
         self._anchors: tuple[Sighting, ...] = ()
         self._leader_epoch = -1
+        self._walks = self._walk_over = False  # whether the leader follows a wall, and has ended
         self._lost: dict[int, None] = {}  # robots that have restarted since this robot takes part
 
     # --- conditions ---------------------------------------------------------------------------------------------------
@@ -151,13 +154,16 @@ class PushPart:
         return self._situation.tick + 1
 
     def _wake_for_ahead(self) -> int:
-        return self._wake_after(self._wait_ticks(self._chain.ahead))
+        return self._wake_after(self._wait_for_ahead_ticks())
 
     def _wake_for_behind(self) -> int:
         return self._wake_after(self._wait_ticks(self._chain.behind))
 
     def _waited_for_ahead(self) -> bool:
-        return self._waited > self._wait_ticks(self._chain.ahead)
+        return self._waited > self._wait_for_ahead_ticks()
+
+    def _wait_for_ahead_ticks(self) -> int:
+        return WALK_TICKS if self._walks and self.phase == "await" else self._wait_ticks(self._chain.ahead)
 
     def _settled_behind(self) -> bool:
         return self._behind_settled or self._waited > self._wait_ticks(self._chain.behind)

@@ -6,6 +6,7 @@ redundant robot that has offered itself. Without a route for some time the base 
 
 from typing import Any, ClassVar, Final
 
+from zwerm.agents.sensor_coverage.frontier.plan import Plan
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
 from zwerm.agents.sensor_coverage.messages.incarnations import first_count
 from zwerm.agents.sensor_coverage.messages.pushes import (
@@ -106,7 +107,9 @@ class PushScheduler(Component):
                 self._situation.mailbox.write(sender, PushAborted(push, False))
             case RedundantOffer(_, slots):
                 self._offers[slots[0]] = slots
-            case PushAborted(push, tried) if push == self._active:
+            case PushAborted(push, tried, felt) if push == self._active:
+                if felt:
+                    self._map.note_walls(felt)
                 self._end(tried)
             case PushDone(push) if push == self._active:
                 self._end(True, True)
@@ -156,15 +159,18 @@ class PushScheduler(Component):
         """Start the next push, or wait for its conditions."""
         visible = self._situation.bearings
         alone = not any(node in visible and each.slot not in (0, NOWHERE) for node, each in self._map.states.items())
+        wall = None
         if not alone and not self._map.has_route:
-            self._watch_quiet(tick)
-            return
-        if not alone and self._map.to_gap and tick - self._edges_since < GAP_TICKS:
+            wall = self._own_wall_plan(tick)
+            if wall is None:
+                self._watch_quiet(tick)
+                return
+        if not alone and wall is None and self._map.to_gap and tick - self._edges_since < GAP_TICKS:
             return  # news of an edge may be on its way
         self._termination.disturb()
         if self._pauses(tick):
             return
-        if not alone and self._offers:
+        if not alone and wall is None and self._offers:
             self._call(tick)
             return
         waiting = [node for node, state in sorted(self._map.states.items()) if state.waiting and node in visible]
@@ -172,12 +178,21 @@ class PushScheduler(Component):
             if not self._not_ready(tick):
                 self._let_out(tick)
             return
-        via = NOWHERE if alone else self._map.next_hop()
+        via = NOWHERE if alone or wall is not None else self._map.next_hop()
         if via is None:
             return
         self._released_at = None
         push = self._begin(tick, first=alone, rear=waiting[0])
-        self._situation.mailbox.write(waiting[0], PushToken(push, push, (), via))
+        token = PushToken(push, push, (), via)
+        if wall is not None:
+            self._map.note_attempt(wall)
+            token = PushToken(push, push, (), via, wall.direction, wall.hand)
+        self._situation.mailbox.write(waiting[0], token)
+
+    def _own_wall_plan(self, tick: int) -> Plan | None:
+        """Return the plan into an open arc of the base itself, if no path leads to a frontier."""
+        quiet = self._situation.clear and self._map.route is None and tick - self._edges_since >= GAP_TICKS
+        return min(self._map.wall_plans, key=lambda each: each.key) if quiet and self._map.wall_plans else None
 
     def _call(self, tick: int) -> None:
         """Start the next push at a redundant robot."""

@@ -19,7 +19,7 @@ next wake-up.
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
@@ -39,10 +39,12 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
 )
 from zwerm.agents.sensor_coverage.motion.push_drives import AHEAD_RAD, DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import direction_to
+from zwerm.agents.sensor_coverage.motion.wall_walk import WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS, PushPart
+from zwerm.agents.sensor_coverage.protocols.walls.wall_push import WallPush
 
 # A dead robot's body within BODY_AHEAD_RAD of a drive's direction may stop the drive. A robot in touch within
 # BODY_BESIDE_RAD has stopped it.
@@ -52,7 +54,7 @@ BODY_BESIDE_RAD: Final = math.pi / 2.0
 PUSHED_MAX: Final = 3
 
 
-class TokenPush(PushPart):
+class TokenPush(PushPart, WallPush):
     """One robot's part in one push: what it does on messages, at the end of drives, and at the end of a wait."""
 
     _situation: Situation
@@ -65,15 +67,17 @@ class TokenPush(PushPart):
         match body:
             case LeaderReady():
                 self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
-                self._leader_epoch = body.epoch
+                self._leader_epoch, self._walks = body.epoch, body.walk
                 self._enter("armed")
             case TakeSlot():
                 self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
+                self._walks = body.walk
                 self._call()
             case PushAborted():
                 self.close(body)
             case AllStanding():
                 self._ahead_stands = True
+                self._near = body.near
             case AllSettled():
                 self._behind_settled = True
             case PushDone():
@@ -111,8 +115,8 @@ class TokenPush(PushPart):
             self._vacated = True
             self._announce_vacated(self.id)
 
-    def arrived(self, result: DriveResult) -> None:
-        """Take in the end of a drive."""
+    def arrived(self, result: DriveResult | WalkResult) -> None:
+        """Take in the end of a drive or of a walk."""
         PHASES[self.phase].arrived(self, result)
 
     def poll(self) -> None:
@@ -133,8 +137,9 @@ class TokenPush(PushPart):
         self._enter("holding")
 
     def _offer(self) -> None:
-        self._map.update_plans()
-        self._plan = None if self._first_bearings else self._map.best_plan()
+        if self._plan is None:
+            self._map.update_plans()
+            self._plan = None if self._first_bearings else self._map.best_plan()
         behind = self._chain.behind
         if self._first_bearings or (self._plan is not None and behind is None):
             self._deploy()
@@ -142,10 +147,15 @@ class TokenPush(PushPart):
             self.close(PushAborted(self.id, False))
         else:
             self._enter("offering")
-            ready = LeaderReady(self.id, self._chain.links, self._map.memory(), self._map.epoch)
+            if self._plan.walk:
+                self._map.note_attempt(self._plan)  # before the follower gets the slot's memory
+            ready = LeaderReady(self.id, self._chain.links, self._map.memory(), self._map.epoch, self._plan.walk)
             self._situation.mailbox.write(behind, ready)
 
     def _deploy(self) -> None:
+        if self._plan is not None and self._plan.walk:
+            self._approach(self._plan)
+            return
         self._enter("deploying")
         parameters = self._map.parameters
         if self._first_bearings:
@@ -224,7 +234,8 @@ class TokenPush(PushPart):
         if behind is None:
             self._follow()
         else:
-            self._situation.mailbox.write(behind, TakeSlot(self.id, self._chain.links, self._map.memory()))
+            taken = TakeSlot(self.id, self._chain.links, self._map.memory(), self._walks)
+            self._situation.mailbox.write(behind, taken)
 
     def _follow(self) -> None:
         """Drive to the slot ahead, and inherit it."""
@@ -250,6 +261,8 @@ class TokenPush(PushPart):
 
     def _report_standing(self) -> None:
         self._enter("standing")
+        if self._near:
+            self._map.note_walls((), self._near)
         if self._chain.is_rear:
             self._behind_settled = True
         else:
@@ -308,6 +321,7 @@ class TokenPush(PushPart):
         """Send the outcome of the push to the robot behind; join no other push until that is acknowledged."""
         if self._map.moving:
             self._situation.stand()
+        self._leave_if_spare()
         self.over = self.end is None or self._back is None
         if self.end is not None:
             self._write(self.end)
@@ -332,7 +346,7 @@ class Phase(NamedTuple):
     """
 
     transitions: tuple[tuple[Callable[[TokenPush], bool], Callable[[TokenPush], None]], ...] = ()
-    arrived: Callable[[TokenPush, DriveResult], None] = lambda push, result: push._situation.stand()
+    arrived: Callable[[TokenPush, Any], None] = lambda push, result: push._situation.stand()
     wake: Callable[[TokenPush], int] = lambda push: push._since + WAVE_TICKS + 1
 
 
@@ -345,7 +359,9 @@ PHASES: Final[Mapping[str, Phase]] = {
     "holding": Phase(((TokenPush._may_offer, TokenPush._offer),), wake=TokenPush._next_tick),
     "offering": Phase(),
     "deploying": Phase(arrived=TokenPush._deployed),
-    "out": Phase(((TokenPush._settled_behind, TokenPush._correct),), wake=TokenPush._wake_for_behind),
+    "approaching": Phase(arrived=TokenPush._approached),
+    "out": Phase(((TokenPush._settled_behind, TokenPush._go_on),), wake=TokenPush._wake_for_behind),
+    "walking": Phase(arrived=TokenPush._walked),
     "correcting": Phase(arrived=lambda push, _: push._settled()),
     # Follower of the leader: wait until the leader's slot is vacant.
     "armed": Phase(((lambda push: push._leader_is_back() or push._waited > ARMED_TICKS,
@@ -360,7 +376,7 @@ PHASES: Final[Mapping[str, Phase]] = {
     "standing": Phase(((TokenPush._settled_behind, TokenPush._straighten),), wake=TokenPush._wake_for_behind),
     "straightening": Phase(arrived=lambda push, _: push._home()),
     "homing": Phase(arrived=lambda push, _: push._settled()),
-    "await": Phase(((TokenPush._waited_for_ahead, lambda push: push.close(PushDone(push.id))),),
+    "await": Phase(((lambda push: push._walk_over or push._waited_for_ahead(), lambda push: push.close(PushDone(push.id))),),
                    wake=TokenPush._wake_for_ahead),
     # All: wait until the view agrees with the neighbours, inform the robot behind, and end.
     "closing": Phase(((TokenPush._may_finish, TokenPush._finish),), wake=TokenPush._next_tick),

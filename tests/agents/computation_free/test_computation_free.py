@@ -109,10 +109,10 @@ def test_the_guides_first_controller_runs_from_the_users_folder_by_the_guides_co
         check=False,
     )
     assert ran.returncode == 0, ran.stderr
-    said = json.loads(ran.stdout)
-    assert (said["outcome"], said["ticks"], said["robot_ticks"]) == ("time-limit", 50, 50 * 25)
+    printed = json.loads(ran.stdout)
+    assert (printed["outcome"], printed["ticks"], printed["robot_ticks"]) == ("time-limit", 50, 50 * 25)
     other = run("computation-free", 1, "inline", ["time.duration_s=5"])
-    assert said["trace"] != other.trace
+    assert printed["trace"] != other.trace
 
 
 # --- random walk ----------------------------------------------------------------------------------------------------

@@ -8,12 +8,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
-from zwerm.agents.landmark_exploration.mapping.frontier_status import BOUNDARY, key_of
+from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, BOUNDARY, TIMED_OUT, UNEXPLORED, key_of
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
-from zwerm.agents.landmark_exploration.sharing.landmark_messages import Register
-from zwerm.agents.landmark_exploration.sharing.log_entries import observation_entries, status_entries
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, Register, RegisterBeacon, Vector
+from zwerm.agents.landmark_exploration.sharing.log_entries import (
+    ENTRY_BYTES_MAX,
+    failure_entry,
+    observation_entries,
+    status_entries,
+)
 from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
+from zwerm.agents.landmark_exploration.sharing.packing import ORIGINS_END
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 
@@ -213,3 +219,51 @@ def test_small_packets_are_small(robots_count: int) -> None:
         scribble(fate.choice(robots), fate)
         longest = max(longest, exchange(robots, everybody, fate, 0.4, 12))
     assert 40 < longest <= messages.SMALL_BYTES
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 99_999), st.integers(1, 300), st.integers(0, 10**7)), min_size=1, max_size=12),
+    st.integers(0, 2**32),
+    st.integers(0, 2**62),
+)
+@settings(max_examples=60, deadline=None)
+def test_no_packet_is_longer_than_the_cap_for_any_identifiers(
+    robots: list[tuple[int, int, int]], claim: int, frozen: int
+) -> None:
+    registers, replica = Registers(150, 1_500, len(robots)), Replica()
+    me = robots[0][0]
+    gossip = Gossip(me, replica, registers, lambda stretch, held: None, messages.SMALL_BYTES)
+    for node, incarnation, stamp in robots:
+        registers.merge(Register(node, incarnation, stamp, claim, frozen), 0)
+        replica.append(origin_of(node, incarnation), [bytes(ENTRY_BYTES_MAX)] * 3)
+        gossip.announce(Stretch(origin_of(node, incarnation), 0, (bytes(ENTRY_BYTES_MAX),) * 3))
+    gossip.hurry()
+    gossip.hear(me + 1, RegisterBeacon(2**62, ()), 1)
+    gossip.hear(me + 1, Vector(0, ORIGINS_END, (), True), 1)
+    said = gossip.tick(1, lambda: Register(me, 300, 10**7, claim, frozen))
+    assert {type(each.message) for each in said} == {Entries, Vector, RegisterBeacon}
+    assert max(len(messages.write(each.message)) for each in said) <= messages.SMALL_BYTES
+
+
+@given(st.permutations(range(5)))
+def test_failures_of_all_robots_count_together_in_any_order(order: list[int]) -> None:
+    key = key_of(1, 2)
+    stretches = [Stretch(origin, 0, (failure_entry(key),)) for origin in range(5)]
+    seen = BearingSnapshot((1, 2, 3), (0, 10, 20))
+    statuses = []
+    map_ = LandmarkMap()
+    map_.observe(seen)
+    for origin in order:
+        map_.read(stretches[origin], 0)
+        statuses.append(map_.frontiers.statuses[key])
+    assert statuses == [UNEXPLORED, TIMED_OUT, TIMED_OUT, ABANDONED, ABANDONED]
+
+
+def test_registers_tell_how_long_others_were_not_heard() -> None:
+    registers = Registers(150, 1_500, 3)
+    assert registers.last_heard(0) is None
+    for node, tick in ((0, 90), (1, 10), (2, 50)):
+        registers.merge(Register(node, 1, 1), tick)
+    assert registers.last_heard(0) == 50
+    assert registers.is_fresh(0, 60, 51)
+    assert not registers.is_fresh(0, 60, 50)

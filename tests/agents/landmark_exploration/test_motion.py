@@ -133,6 +133,22 @@ def test_sliding_keeps_its_hand_in_a_corner() -> None:
     assert math.sin(first) * math.sin(second) > 0.0
 
 
+def test_no_hand_leads_round_and_round_in_a_corner() -> None:
+    """From a corner at the origin a robot wants to go along the left wall: the other hand leads it down into the corner."""
+    slide, place = Slide(random()), np.array([0.0, 0.02])
+    slide.along(-1.3, view_with((-math.pi / 2,), 0))  # takes the hand that leads down
+    for tick in range(1, 200):
+        contacts = tuple(
+            direction for near, direction in zip(place <= 0.01, (math.pi, -math.pi / 2), strict=True) if near
+        )
+        direction = slide.along(2.06, view_with(contacts, tick))
+        assert direction is not None
+        place = np.maximum(place + 0.05 * np.array([math.cos(direction), math.sin(direction)]), 0.0)
+        if place[1] > 2.0:
+            break
+    assert place[1] > 2.0
+
+
 def test_a_robot_that_is_shut_in_stands_still() -> None:
     shut_in = view_with(tuple(np.linspace(0.0, 6.0, 8)))
     assert Slide(random()).along(0.0, shut_in) is None

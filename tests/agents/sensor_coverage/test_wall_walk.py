@@ -4,8 +4,10 @@ import math
 
 import pytest
 
+from zwerm.agents.sensor_coverage.frontier.walks import Arc
+from zwerm.agents.sensor_coverage.frontier.wall_proof import united
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
-from zwerm.agents.sensor_coverage.motion.wall_walk import swept
+from zwerm.agents.sensor_coverage.motion.wall_walk import NearPoint, arcs_around, swept
 from zwerm.run.runner import run
 
 PRESS_DEG = 20
@@ -36,6 +38,25 @@ def test_a_robot_turns_round_at_a_dead_end() -> None:
 def test_a_robot_goes_into_an_opening_at_its_hand() -> None:
     """The corner of the opening is behind on the left: the sweep begins at the direction of the wall."""
     assert heading_deg(90.0, [(150.0, None)], 1) == 80
+
+
+def test_a_wall_followed_close_to_a_slot_closes_the_arc_of_the_corner() -> None:
+    """The slot touches a wall in the west. The robot follows the wall in the north into the corner, and comes back."""
+    way = [(0.1, (90,)), (0.05, (90,)), (0.0, (90, 180))]
+    points = [NearPoint((x, 0.14), True, tuple(math.radians(each) for each in walls)) for x, walls in way]
+    points += [NearPoint((0.0, y), True, (math.pi,)) for y in (0.09, 0.04, 0.0)]
+    arcs = arcs_around((0.0, 0.0), points, -1, 0.07)
+    closed = united([Arc(*each) for each in arcs])
+    assert len(closed) == 1
+    first, last = closed[0].start_rad, closed[0].start_rad + closed[0].width_rad
+    assert math.degrees(first) < 65.0
+    assert math.degrees(last) == pytest.approx(180.0)
+
+
+def test_walls_in_different_directions_close_no_arc_between_them() -> None:
+    """The robot drives from one wall to another: what is between is not followed."""
+    apart = [NearPoint((0.2, 0.0), True, (0.0,)), NearPoint((0.0, 0.2), True, (math.pi / 2.0,))]
+    assert arcs_around((0.0, 0.0), apart, 1, 0.07) == ()
 
 
 # --- whole runs -----------------------------------------------------------------------------------------------------
@@ -71,6 +92,18 @@ def test_a_run_is_completed_only_where_all_is_seen(building: tuple[str, ...]) ->
     result = run("sensor-coverage-narrow", 101, "inline", (*building, FOLLOWED))
     assert result.outcome == "completed"
     assert result.metrics["reachable_coverage_fraction"] > 0.99
+
+
+def test_robots_without_a_coordinator_find_a_door() -> None:
+    result = run("sensor-coverage-narrow", 101, "inline", (*TWO_ROOMS, "services.path=gradient"))
+    assert result.outcome == "completed"
+    assert result.metrics["reachable_coverage_fraction"] > 0.99
+
+
+def test_robots_without_a_coordinator_miss_the_door_by_the_rules_of_the_paper() -> None:
+    paper = ('robots.parameters.walls="paper"', 'base.parameters.walls="paper"')
+    result = run("sensor-coverage-narrow", 101, "inline", (*TWO_ROOMS, "services.path=gradient", *paper))
+    assert result.metrics["falsely_completed"] == 1.0
 
 
 @pytest.mark.xfail(reason="robots that followed walls stay where they are, 1.42 and 1.75 times the packing")

@@ -170,14 +170,14 @@ def test_within_the_threshold_and_as_a_beacon_a_robot_stays():
 # --- over a radio ---------------------------------------------------------------------------------------------------
 
 
-def heard(node, time_s, place, value=1.0):
+def received(node, time_s, place, value=1.0):
     return Packet(CHANNEL, pack(node, NeighbourReport(time_s, place[0], place[1], value)))
 
 
 def test_neighbours_known_by_radio_give_the_command_of_sensed_neighbours():
     others = [(0.8, 0.5), (0.1, 0.9), (0.4, 0.2)]
     sensed = controller("voronoi-coverage").step(observe((0.3, 0.5), others, 1.0, (0.5, 0.2), 0.7))
-    inbox = tuple(heard(node, 0.0, place) for node, place in enumerate(others, 1))
+    inbox = tuple(received(node, 0.0, place) for node, place in enumerate(others, 1))
     told = controller("voronoi-radio").step(observe((0.3, 0.5), [], 1.0, (0.5, 0.2), 0.7, inbox=inbox, tick=2))
     assert velocity(told) == pytest.approx(velocity(sensed), abs=1e-12)
 
@@ -185,7 +185,7 @@ def test_neighbours_known_by_radio_give_the_command_of_sensed_neighbours():
 def test_a_late_packet_does_not_replace_a_newer_one_and_old_packets_are_removed():
     robot = controller("voronoi-radio", memory_s=1.0)
     half = 5.0 * (0.25 - 0.2)
-    newer, older = heard(1, 0.5, (0.8, 0.5)), heard(1, 0.4, (0.4, 0.5))
+    newer, older = received(1, 0.5, (0.8, 0.5)), received(1, 0.4, (0.4, 0.5))
     assert velocity(robot.step(observe((0.2, 0.5), [], inbox=(newer, older), tick=6)))[0] == pytest.approx(half)
     assert velocity(robot.step(observe((0.2, 0.5), [], tick=15)))[0] == pytest.approx(half)
     assert velocity(robot.step(observe((0.2, 0.5), [], tick=16))) == (0.0, 0.0)
@@ -194,7 +194,7 @@ def test_a_late_packet_does_not_replace_a_newer_one_and_old_packets_are_removed(
 def test_a_robot_listens_for_a_period_before_it_first_moves():
     robot = controller("voronoi-radio", every_s=0.2)
     moves = [
-        velocity(robot.step(observe((0.2, 0.5), [], inbox=(heard(1, 0.0, (0.8, 0.5)),), tick=t))) for t in range(4)
+        velocity(robot.step(observe((0.2, 0.5), [], inbox=(received(1, 0.0, (0.8, 0.5)),), tick=t))) for t in range(4)
     ]
     assert moves[:3] == [(0.0, 0.0)] * 3
     assert moves[3] != (0.0, 0.0)

@@ -106,8 +106,8 @@ def test_robots_spread_from_a_corner_and_beacons_stay_on_the_walls():
 def test_neighbours_known_by_radio_give_the_coverage_of_sensed_neighbours():
     few = ("robots.count=12", "time.duration_s=10.0")
     seen = inline("voronoi-radio", "robots.controller=voronoi-coverage", *_SENSED, *few, seed=2).metrics
-    heard = inline("voronoi-radio", *few, seed=2).metrics
-    assert heard["coverage_cost"] == pytest.approx(seen["coverage_cost"], rel=0.01)
+    received = inline("voronoi-radio", *few, seed=2).metrics
+    assert received["coverage_cost"] == pytest.approx(seen["coverage_cost"], rel=0.01)
 
 
 def test_integers_cover_as_well_as_floating_point():

@@ -75,7 +75,7 @@ class Life:
         """Return the ticks at which a node was observed."""
         return [tick for tick, observed in enumerate(self.observed) if node in observed]
 
-    def heard(self, receiver: int, sender: int) -> list[int]:
+    def received(self, receiver: int, sender: int) -> list[int]:
         """Return the ticks at which the packets were sent that one node received from another."""
         return [
             tick - 1
@@ -134,24 +134,24 @@ def test_a_partition_blocks_exactly_the_crossing_links_and_heals() -> None:
             if sender != receiver:
                 together = {sender, receiver} == {0, 1}
                 expected = [tick for tick in ALL[:-1] if together or tick not in during]
-                assert life.heard(receiver, sender) == expected, (receiver, sender)
+                assert life.received(receiver, sender) == expected, (receiver, sender)
     assert life.world.medium.summary()["dropped"] == {"partition": 10 * 5}
 
 
 def test_a_cut_link_is_one_way_unless_both_is_set() -> None:
     life = Life(faulty({"kind": "cut", "senders": [0], "receivers": [1], "at_s": 0.0}))
-    assert life.heard(1, 0) == []
-    assert life.heard(0, 1) == ALL[:-1]
+    assert life.received(1, 0) == []
+    assert life.received(0, 1) == ALL[:-1]
     both = Life(faulty({"kind": "cut", "senders": [0], "receivers": [1], "both": True, "at_s": 0.0}))
-    assert both.heard(1, 0) == both.heard(0, 1) == []
-    assert both.heard(2, 0) == ALL[:-1]
+    assert both.received(1, 0) == both.received(0, 1) == []
+    assert both.received(2, 0) == ALL[:-1]
 
 
 @pytest.mark.parametrize("region", [{"center_m": [1.7, 0.3], "radius_m": 0.5}, {"rectangle_m": [1.0, 0.0, 2.0, 1.0]}])
 def test_a_jammer_blocks_receivers_in_its_region_only(region: dict[str, Any]) -> None:
     life = Life(faulty({"kind": "jam", "at_s": 1.0, **region}))
-    assert life.heard(1, 0) == ALL[:10]
-    assert life.heard(0, 1) == ALL[:-1]
+    assert life.received(1, 0) == ALL[:10]
+    assert life.received(0, 1) == ALL[:-1]
 
 
 def test_a_blackout_blocks_its_channel_only() -> None:
@@ -161,9 +161,9 @@ def test_a_blackout_blocks_its_channel_only() -> None:
             coordinator={"controller": "radioed:Counts"},
         )
     )
-    assert life.heard(4, 0) == ALL[10:-1]
-    assert life.heard(0, 4) == ALL[10:-1]
-    assert life.heard(0, 1) == ALL[:-1]
+    assert life.received(4, 0) == ALL[10:-1]
+    assert life.received(0, 4) == ALL[10:-1]
+    assert life.received(0, 1) == ALL[:-1]
 
 
 def test_a_heal_ends_every_active_fault_except_a_crash() -> None:
@@ -177,11 +177,11 @@ def test_a_heal_ends_every_active_fault_except_a_crash() -> None:
             {"kind": "cut", "senders": [0], "receivers": [1], "at_s": 1.5},
         )
     )
-    assert life.heard(0, 2) == [0, 1, *range(11, 19)], "its last slow answer comes at tick 11"
+    assert life.received(0, 2) == [0, 1, *range(11, 19)], "its last slow answer comes at tick 11"
     assert life.awake(1) == [0, 1, *range(10, 20)]
     assert life.awake(3) == [0, 1]
     # At tick 10 it also finds what was sent before its pause and the blackout, at tick 1.
-    assert life.heard(1, 0) == [0, 9, *range(10, 15)], "what began after the healing is not healed"
+    assert life.received(1, 0) == [0, 9, *range(10, 15)], "what began after the healing is not healed"
 
 
 def test_overlapping_faults_are_all_active_and_end_one_by_one() -> None:
@@ -191,8 +191,8 @@ def test_overlapping_faults_are_all_active_and_end_one_by_one() -> None:
             {"kind": "cut", "senders": [0], "receivers": [1, 2], "at_s": 0.5, "until_s": 1.5},
         )
     )
-    assert life.heard(1, 0) == [0, 1, *range(15, 19)]
-    assert life.heard(2, 0) == [*range(5), *range(15, 19)]
+    assert life.received(1, 0) == [0, 1, *range(15, 19)]
+    assert life.received(2, 0) == [*range(5), *range(15, 19)]
 
 
 # --- conditions -----------------------------------------------------------------------------------------------------
@@ -203,7 +203,7 @@ def test_a_fault_begins_when_a_robot_is_deployed() -> None:
     life = Life(faulty({"kind": "blackout", "when": {"robot_deployed": 2}, "for_s": 0.3}, robots=robots))
     entered = life.awake(2)[0]
     assert entered == 8
-    assert life.heard(1, 0) == [*range(4, 8), *range(11, 19)]
+    assert life.received(1, 0) == [*range(4, 8), *range(11, 19)]
 
 
 def test_a_fault_begins_when_a_coverage_is_reached() -> None:
@@ -214,9 +214,9 @@ def test_a_fault_begins_when_a_coverage_is_reached() -> None:
         robots = {"entrance": {"every_s": 0.1, "entry_m": [0.1, 0.1, 1.9, 1.9]}, "placement": {}, "count": 8}
         when = {"metric": metric, "at_least": 0.7}
         life = Life(faulty({"kind": "blackout", "when": when}, robots=robots, metrics=metrics))
-        begun = life.heard(1, 0)[-1] + 1
+        begun = life.received(1, 0)[-1] + 1
         assert 1 < begun < 12
-        assert life.heard(3, 2)[-1:] in ([begun - 1], [])
+        assert life.received(3, 2)[-1:] in ([begun - 1], [])
 
 
 # --- nodes ----------------------------------------------------------------------------------------------------------
@@ -225,7 +225,7 @@ def test_a_fault_begins_when_a_coverage_is_reached() -> None:
 def test_a_crashed_robot_is_not_observed_and_returns_without_memory_as_a_new_incarnation() -> None:
     life = Life(faulty({"kind": "crash", "nodes": [1], "at_s": 0.5, "for_s": 0.5}))
     assert life.awake(1) == [*range(5), *range(10, 20)]
-    assert life.heard(0, 1) == [*range(5), *range(10, 19)]
+    assert life.received(0, 1) == [*range(5), *range(10, 19)]
     assert life.steps(0, 1) == [*range(1, 6), *range(1, 10)], "it counts from one again"
     words = [p.payload.split()[2] for seen in life.observed if 0 in seen for p in seen[0].inbox if p.sender == 1]
     assert len(set(words)) == len(words), "its new life has a random stream of its own"
@@ -256,7 +256,7 @@ def test_undelivered_packets_of_a_restarted_robot_are_dropped() -> None:
 def test_a_paused_robot_keeps_its_packets_and_memory_and_its_motors_stop_after_the_deadman_time() -> None:
     life = Life(faulty({"kind": "pause", "nodes": [1], "at_s": 0.5, "for_s": 1.0}, time={"deadman_s": 0.3}))
     assert life.awake(1) == [*range(5), *range(15, 20)]
-    assert life.heard(0, 1) == [*range(5), *range(15, 19)]
+    assert life.received(0, 1) == [*range(5), *range(15, 19)]
     assert life.steps(0, 1) == list(range(1, 10)), "it goes on where it was"
     assert len(life.observed[15][1].inbox) == 3 * 11, "its mail has waited"
     assert life.world.status.history == {"paused": [1]}
@@ -267,7 +267,7 @@ def test_a_slow_robot_is_observed_once_in_every_ticks_and_its_packets_are_that_l
     life = Life(faulty({"kind": "slow", "nodes": [1], "every_ticks": 4, "at_s": 0.4, "for_s": 1.2}))
     assert life.awake(1) == [0, 1, 2, 3, 4, 8, 12, 16, 17, 18, 19]
     # Observed at 4, 8 and 12, it answers at 7, 11 and 15.
-    assert life.heard(0, 1) == [0, 1, 2, 3, 7, 11, 15, 16, 17, 18]
+    assert life.received(0, 1) == [0, 1, 2, 3, 7, 11, 15, 16, 17, 18]
     assert life.world.status.history == {"slow": [1]}
 
 
@@ -323,8 +323,8 @@ def test_a_fault_changes_no_random_numbers_of_other_links_and_robots() -> None:
     for receiver in range(4):
         for sender in range(4):
             if (sender, receiver) not in ((0, 3), (receiver, receiver)):
-                assert without.heard(receiver, sender) == with_cut.heard(receiver, sender)
-    assert without.heard(3, 0) != with_cut.heard(3, 0)
+                assert without.received(receiver, sender) == with_cut.received(receiver, sender)
+    assert without.received(3, 0) != with_cut.received(3, 0)
 
 
 # --- random robots and times ----------------------------------------------------------------------------------------

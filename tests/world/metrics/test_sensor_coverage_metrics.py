@@ -98,9 +98,14 @@ def test_a_conclusion_is_early_where_a_living_robot_claims_or_the_hall_is_not_co
     for node, claim in claims.items():
         metric.report(record(node, {"claims_frontier": not claim}))
         metric.report(record(node, {"claims_frontier": claim}))
-    metric.sample(truth_at(places, dead, completed))
-    assert metric.metrics() == {"concluded_early": early}
+    truth = truth_at(places, dead, completed)
+    metric.sample(truth)
+    unseen = completed and (len(places) < len(FULL) or len(dead) > 1)
+    assert metric.metrics() == {"concluded_early": early, "falsely_completed": unseen}
     assert Conclusion(None, context()).metrics() == {}
+    central = Conclusion(None, context())
+    central.sample(truth)
+    assert central.metrics() == {"falsely_completed": unseen}
 
 
 @pytest.mark.parametrize(("down_then", "dead_later", "unsafe"), [((), (), 1.0), ((), (0,), 1.0), ((0,), (0,), 0.0)])

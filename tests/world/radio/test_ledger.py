@@ -93,9 +93,9 @@ def test_the_counts_by_link_are_sorted_and_add_up_to_the_summary() -> None:
     assert sum(counts["sent"]) == summary["sent"]
     assert sum(counts["delivered"]) == summary["delivered"]
     assert sum(counts["dropped"]["loss"]) == summary["dropped"]["loss"]
-    heard = Counter((packet.sender, node) for node, got in radio.received.items() for _, packet in got)
+    received = Counter((packet.sender, node) for node, got in radio.received.items() for _, packet in got)
     pairs = zip(counts["sender"], counts["receiver"], strict=True)
-    assert counts["delivered"] == [heard[pair] for pair in pairs]
+    assert counts["delivered"] == [received[pair] for pair in pairs]
 
 
 def test_the_radio_table_has_every_cause_and_the_links_that_lost_most() -> None:

@@ -301,7 +301,7 @@ def test_a_one_way_link_stays_one_way() -> None:
     assert fate == {(0, 1): 0, (0, 2): 20, (1, 0): 20, (1, 2): 20, (2, 0): 20, (2, 1): 20}
 
 
-def heard(radio: Radio, ticks: int, nodes: int) -> list[list[tuple[int, int | None, bytes]]]:
+def received(radio: Radio, ticks: int, nodes: int) -> list[list[tuple[int, int | None, bytes]]]:
     """Return the packets that nodes below `nodes` received while all nodes sent numbered broadcasts."""
     for tick in range(ticks):
         payload = tick.to_bytes(2, "big")
@@ -323,18 +323,18 @@ ALL_RANDOM = [
 
 
 def test_another_robot_changes_no_random_numbers_of_other_links() -> None:
-    four = heard(Radio(ring(4), ALL_RANDOM), 60, 4)
-    assert four == heard(Radio([*ring(4), (52.0, 50.0)], ALL_RANDOM), 60, 4)
-    assert four != heard(Radio(ring(4), ALL_RANDOM, seed=2), 60, 4)
+    four = received(Radio(ring(4), ALL_RANDOM), 60, 4)
+    assert four == received(Radio([*ring(4), (52.0, 50.0)], ALL_RANDOM), 60, 4)
+    assert four != received(Radio(ring(4), ALL_RANDOM, seed=2), 60, 4)
 
 
 def test_another_model_changes_no_random_numbers_of_other_models() -> None:
     idle = {"kind": "rate_limit", "rate_bytes_s": 1e12, "queue_bytes": 1e12}
-    four = heard(Radio(ring(4), ALL_RANDOM), 60, 4)
-    assert four == heard(Radio(ring(4), [idle, *ALL_RANDOM]), 60, 4)
+    four = received(Radio(ring(4), ALL_RANDOM), 60, 4)
+    assert four == received(Radio(ring(4), [idle, *ALL_RANDOM]), 60, 4)
     named = [model | {"name": f"mine-{model['kind']}"} for model in ALL_RANDOM]
     another = {"kind": "loss", "fraction": 0.0}
-    assert heard(Radio(ring(4), named), 60, 4) == heard(Radio(ring(4), [another, *named]), 60, 4)
+    assert received(Radio(ring(4), named), 60, 4) == received(Radio(ring(4), [another, *named]), 60, 4)
 
 
 def test_the_packets_of_one_robot_change_no_random_numbers_of_other_links() -> None:
@@ -370,8 +370,8 @@ def test_a_model_of_a_user_has_random_numbers_of_its_own_and_its_cause_in_the_le
     summary = Radio(ring(10), [rain]).all_broadcast(100)
     within(summary["dropped"]["rain"] / 9_000, 0.3, math.sqrt(0.3 * 0.7), 9_000)
     assert summary["out_of_reach"] == 0
-    four = heard(Radio(ring(4), ALL_RANDOM), 60, 4)
-    assert four == heard(Radio(ring(4), [rain | {"mm_per_h": 0.0}, *ALL_RANDOM]), 60, 4)
+    four = received(Radio(ring(4), ALL_RANDOM), 60, 4)
+    assert four == received(Radio(ring(4), [rain | {"mm_per_h": 0.0}, *ALL_RANDOM]), 60, 4)
 
 
 def test_a_model_states_its_range_and_others_have_no_bound() -> None:

@@ -93,11 +93,11 @@ def test_five_robots_over_3000_ticks_stay_within_the_stated_bound_of_memory(scen
 
 def test_a_listener_gets_every_record_that_the_sink_drops(scene: Scene) -> None:
     sink = TelemetrySink(numbers_max=0, bytes_max=0)
-    heard: list[telemetry.TelemetryRecord] = []
-    sink.listeners.append(heard.append)
+    received: list[telemetry.TelemetryRecord] = []
+    sink.listeners.append(received.append)
     sink.accept(scene, 3, Command(telemetry={"x": True}, snapshot=b"s"))
     sink.accept(scene, 3, Command())
-    [record] = heard
+    [record] = received
     assert (record.node, record.numbers, record.snapshot) == (3, {"x": 1.0}, b"s")
     assert sink.dropped == 2
 

@@ -52,6 +52,7 @@ class Census:
         self._base = base
         self._listed: tuple[int, ...] = ()
         self._claims = 0
+        self._unproven = 0
         self._dead = 0
         self._roster = 0
         self._wave_roster = 0  # as the wave brought it
@@ -100,11 +101,15 @@ class Census:
         self._disturbed = self._number
         self._concluded = False
 
-    def update(self, neighbours: Iterable[int], claims: int, busy: bool, dead: Iterable[int] = ()) -> None:
+    def update(
+        self, neighbours: Iterable[int], claims: int, busy: bool, dead: Iterable[int] = (), unproven: int = 0
+    ) -> None:
         """Take in the visible robots, the number of frontier claims, and whether the robot moves or waits for an answer.
 
-        `dead` are visible robots that are declared dead; they are no neighbours.
+        `dead` are visible robots that are declared dead; they are no neighbours. `unproven` counts the open arcs around
+        this robot that no attempt has closed.
         """
+        self._unproven = unproven
         self._dead = robot_set(dead)
         listed = tuple(sorted(neighbours))
         if listed != self._listed or claims or busy:
@@ -192,6 +197,7 @@ class Census:
             to_bytes(present),
             to_bytes(dead),
             b"" if self._roster == self._wave_roster else to_bytes(self._roster),
+            self._unproven + sum(each.unproven for each in tallies),
         )
         self._counted = counted
         if self._parent is not None:

@@ -30,7 +30,7 @@ class CompletionProtocol(Component):
         self._census = Census(setup.node, POLL_TICKS * setup.dt_s, WAVE_TICKS * setup.dt_s, incarnation, base)
         self._asks = asks
         self._outbox: list[Outgoing] = []
-        self._updated: tuple[tuple[int, ...], int, tuple[int, ...]] | None = None
+        self._updated: tuple[tuple[int, ...], int, tuple[int, ...], int] | None = None
         self._tick = 0
 
     @property
@@ -66,17 +66,24 @@ class CompletionProtocol(Component):
         self._census.restarted(node)
 
     def update(
-        self, tick: int, neighbours: Collection[int], claims: int, busy: bool, dead: Collection[int] = ()
+        self,
+        tick: int,
+        neighbours: Collection[int],
+        claims: int,
+        busy: bool,
+        dead: Collection[int] = (),
+        unproven: int = 0,
     ) -> None:
         """Take in the visible robots, the number of frontier claims, and whether the robot is busy; first in every tick.
 
-        `dead` are visible robots that are declared dead; they are not in `neighbours`.
+        `dead` are visible robots that are declared dead; they are not in `neighbours`. `unproven` counts the open arcs
+        around this robot that no attempt has closed.
         """
         self._tick = tick
-        updated = tuple(neighbours), claims, tuple(dead)
+        updated = tuple(neighbours), claims, tuple(dead), unproven
         if busy or claims or updated != self._updated:
             self._updated = updated
-            self._census.update(updated[0], claims, busy, dead)
+            self._census.update(updated[0], claims, busy, dead, unproven)
 
     def receive(self, sender: int, message: CensusMessage, tick: int) -> None:
         """Take in a message of the census."""

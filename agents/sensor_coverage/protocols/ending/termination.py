@@ -12,6 +12,7 @@ from typing import Final
 from zwerm.agents.sensor_coverage.protocols.ending.completion_census import CompletionProtocol
 
 COVERED: Final = "covered"
+UNPROVEN: Final = "unproven: a wall was not followed to its end"
 
 # Ticks without a frontier before the census.
 QUIET_TICKS: Final = 60
@@ -56,7 +57,8 @@ class Termination:
             return ""
         missing = self._completion.missing
         if not missing:
-            return COVERED
+            last = self._completion.last
+            return COVERED if last is None or not last.unproven else UNPROVEN
         if self._missing_since is None:
             self._missing_since = tick
         if tick - self._missing_since <= MISSING_TICKS:

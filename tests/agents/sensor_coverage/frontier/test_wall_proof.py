@@ -6,10 +6,12 @@ import pytest
 
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
-from zwerm.agents.sensor_coverage.frontier.wall_proof import open_arcs
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SlotProof, open_arcs
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 from zwerm.maths.simplicial import FlagComplex
 
+# Directions of a walk, and the walls that it touches.
+CORNER = ((10, (0.0,)), (20, ()), (30, ()), (40, ()), (60, (0.0,)))
 ALONE = {0: dict[int, float]()}
 
 
@@ -41,6 +43,25 @@ def test_a_walk_around_the_robot_itself_closes_nothing() -> None:
 
 def test_a_walk_without_touch_closes_nothing() -> None:
     assert opened(around(*range(0, 361, 20), hand=-1, touched=False)) == [(0, 360)]
+
+
+def test_a_walk_that_turns_round_a_corner_still_follows_the_wall() -> None:
+    points = [WalkPoint({0: math.radians(each)}, walls, ()) for each, walls in CORNER]
+    assert opened(Walk(0, -1, tuple(points))) == [(60, 310)]
+
+
+def test_a_walk_that_loses_the_wall_no_longer_follows_it() -> None:
+    free = [WalkPoint({0: math.radians(each)}, (), ()) for each in range(20, 100, 10)]
+    assert opened(Walk(0, -1, (WalkPoint({0: 0.0}, (0.0,), ()), *free))) == [(40, 320)]
+
+
+def test_a_robot_may_lose_a_walk_behind_a_corner() -> None:
+    hidden = WalkPoint({}, (0.0,), ())
+    seen = [WalkPoint({0: math.radians(each)}, (0.0,), ()) for each in (10, 35, 70)]
+    assert opened(Walk(0, -1, (seen[0], hidden, seen[1]))) == [(35, 335)]
+    assert opened(Walk(0, -1, (seen[0], hidden, seen[2]))) == [(0, 360)], "too wide an arc"
+    lost = [WalkPoint({}, (), ())] * 4
+    assert opened(Walk(0, -1, (seen[0], *lost, seen[1]))) == [(0, 360)], "the robot was not in touch"
 
 
 def test_a_walk_closes_the_arc_that_it_was_seen_in() -> None:
@@ -84,3 +105,25 @@ def test_walks_turn_with_the_frame_in_which_they_were_seen() -> None:
     slots.take_walk(8, 1, (Waypoint(0.0, 0.0, (Sighting(7, 0.25),), (1.0,), (7,)),))
     assert slots.walks[1] == Walk(7, 1, (WalkPoint({0: 0.75 + math.pi}, (1.5,), (0,)),))
     assert slots.walks[1].turned(3, 1.0) == Walk(3, 1, (WalkPoint({0: 1.75 + math.pi}, (2.5,), (0,)),))
+
+
+def test_a_slot_keeps_what_a_walk_closed_and_passes_it_on() -> None:
+    """Slot 0 sees slot 1. The walk closes an arc with slot 1, and an arc by a step along the wall."""
+    views = {0: {1: 0.0}, 1: {0: math.pi}}
+    points = [
+        WalkPoint({0: -0.5, 1: math.pi + 0.5}, (-math.pi / 2.0,), ()),
+        WalkPoint({0: -0.9}, (-math.pi / 2.0,), ()),
+    ]
+    proof = SlotProof()
+    proof.update(0, views[0], FlagComplex(views), ())
+    assert proof.pass_point(0, None, points[0], 1)
+    assert proof.open_arcs() == [pytest.approx((0.0, math.tau - 0.5))]
+    assert proof.pass_point(0, points[0], points[1], 1)
+    assert not proof.pass_point(0, points[0], points[1], 1), "nothing is new"
+    assert proof.open_arcs() == [pytest.approx((0.0, math.tau - 0.9))]
+    heir = SlotProof()
+    heir.inherit(proof.memory())
+    heir.update(0, views[0], FlagComplex(views), ())
+    assert heir.open_arcs() == proof.open_arcs()
+    heir.update(0, {}, FlagComplex({0: {}}), ())
+    assert heir.open_arcs() == [pytest.approx((math.tau - 0.5, math.tau - 0.4))], "slot 1 is gone"

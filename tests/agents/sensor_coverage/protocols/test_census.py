@@ -282,3 +282,14 @@ def test_the_census_does_not_count_an_ended_claim() -> None:
     base.poll(200)
     assert base.last is not None
     assert base.last.claims == 0
+
+
+def test_a_tally_counts_the_open_arcs_of_all_robots() -> None:
+    base, robot = Census(0, POLL_S, EVERY_S, 0, base=True), Census(1, POLL_S, EVERY_S, 1)
+    base.update([1], 0, False, (), 1)
+    robot.update([0], 0, False, (), 2)
+    for _, wave in base.poll(0.0):
+        for _, answer in robot.receive(0, wave, 0.0):
+            base.receive(1, answer, 0.0)
+    assert base.last is not None
+    assert (base.last.robots, base.last.claims, base.last.unproven) == (2, 0, 3)

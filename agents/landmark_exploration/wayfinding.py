@@ -1,0 +1,109 @@
+"""Ways through the map: to a set of landmarks, and to the meeting place of robots that have nothing left to explore.
+
+Generators of directions, as in `motion`. A way is the cheapest path in the navigation graph (section V-B of
+Ramaithitima and Bhattacharya 2018). Robots with nothing left to explore have to exchange their last entries, and to agree
+that all is explored. Robots with a short radio range would take long to meet by chance. So they meet at the landmark
+with the smallest id of their map, which is the same on equal maps.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
+
+import numpy as np
+
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
+from zwerm.agents.landmark_exploration.mapping.cost_utility import path_to, reach
+from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.motion import Drive, travel, wander
+from zwerm.agents.landmark_exploration.view import ExplorerView
+
+# Ways tried before a goal is given up.
+TRIES_MAX: Final = 30
+# Ticks of walking about between two tries, and where no way is known.
+ASTRAY_TICKS: Final = 15
+# Ticks at the meeting place, and then of walking about: robots whose maps have no landmark in common have two places, and a
+# robot may know no way to the place. VISIT_TICKS: of a robot that has frontiers to explore.
+MEETING_TICKS: Final = 1_000
+VISIT_TICKS: Final = 40
+PARTING_TICKS: Final = 200
+
+
+class Follow(Protocol):
+    """Follows a path of observations until `arrived()`; `motion.travel` is one."""
+
+    def __call__(
+        self,
+        view: ExplorerView,
+        path: Sequence[BearingSnapshot],
+        random: np.random.Generator,
+        arrived: Callable[[], bool],
+        /,
+    ) -> Drive:
+        """Return the directions, and how it ended."""
+
+
+def navigate(
+    view: ExplorerView, map_: LandmarkMap, goal: Sequence[int], random: np.random.Generator, follow: Follow = travel
+) -> Drive:
+    """Go to where all landmarks of `goal` are seen, or as many as the map has ever seen together."""
+
+    def arrived() -> bool:
+        return all(landmark in view.bearing for landmark in goal)
+
+    for _ in range(TRIES_MAX):
+        if arrived():
+            return "arrived"
+        path = way_to(map_, view.snapshot.landmarks, goal)
+        outcome = "unreached"
+        if path:
+            outcome = yield from follow(view, [map_.complex.snapshot_of(each) for each in path], random, arrived)
+        if outcome == "arrived":
+            return "arrived"
+        astray = wander(view, random)
+        for _ in range(ASTRAY_TICKS):
+            yield next(astray)
+            if arrived():
+                return "arrived"
+    return "unreached"
+
+
+def way_to(map_: LandmarkMap, landmarks: Sequence[int], goal: Sequence[int]) -> tuple[int, ...]:
+    """Return the vertices on the cheapest way to one with most landmarks of the goal, or nothing where there is no way."""
+    before: dict[int, int] = {}
+    best: tuple[int, int] | None = None
+    wanted = set(goal)
+    for _, vertex, previous in reach(map_.complex, landmarks):
+        before[vertex] = previous
+        shared = len(wanted.intersection(map_.complex.simplices[vertex]))
+        if shared and (best is None or shared > best[0]):
+            best = shared, vertex
+            if shared == len(wanted):
+                break
+    return () if best is None else path_to(best[1], before)
+
+
+def visit(view: ExplorerView, map_: LandmarkMap, random: np.random.Generator, ticks: Callable[[], int]) -> Drive:
+    """Go to the meeting place, and stay there for `ticks()` while its landmark is seen."""
+    place = map_.complex.smallest_landmark()
+    if place is None:
+        return "unreached"
+    outcome = yield from navigate(view, map_, (place,), random)
+    arrived = view.tick
+    while place in view.bearing and view.tick - arrived < ticks():
+        yield view.bearing[place]
+    return outcome
+
+
+def meet(
+    view: ExplorerView,
+    map_: LandmarkMap,
+    random: np.random.Generator,
+    idle: Callable[[], float | None],
+    ticks: Callable[[], int],
+) -> Drive:
+    """Go to the meeting place, stay for `ticks()`, walk about as `idle` does, and so on for ever."""
+    while True:
+        yield from visit(view, map_, random, ticks)
+        until = view.tick + PARTING_TICKS
+        while view.tick < until:
+            yield idle()

@@ -1,0 +1,41 @@
+"""Messages of a walk along a wall without a coordinator: between the walking robot and the robots that it passes.
+
+Directions are in the frame of the base.
+"""
+
+from msgspec import Struct
+
+
+class _WalkMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A whole message, which begins with its tag."""
+
+
+class PassedPoint(_WalkMessage, frozen=True, tag="passed"):
+    """To all: the `number`-th point of the walk of a push. The wall is at the `hand` (+1 left, -1 right).
+
+    `seen` has (robot, direction [rad] from that robot to the point). `walls` are directions of touched walls, and
+    `robots` touched robots. The walking robot has been in touch since the point with the number `touch_since`.
+    """
+
+    push: int
+    number: int
+    hand: int
+    touch_since: int
+    seen: tuple[tuple[int, float], ...]
+    walls: tuple[float, ...]
+    robots: tuple[int, ...]
+
+
+class ArcClosed(_WalkMessage, frozen=True, tag="arc-closed"):
+    """To the walking robot: a point of the walk has closed a part of an open arc around the sender."""
+
+    push: int
+
+
+class WalkOver(_WalkMessage, frozen=True, tag="walk-over"):
+    """To all, forwarded once by each robot: the walk of a push has ended."""
+
+    push: int
+
+
+WalkMessage = PassedPoint | ArcClosed | WalkOver

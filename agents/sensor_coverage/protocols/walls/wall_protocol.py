@@ -1,0 +1,186 @@
+"""Walks without a coordinator: the walking robot announces its way, and the robots that it passes prove their slots.
+
+Each robot that a point of the walk names takes the point into the proof of its own slot, and answers if that closed
+something. The end of a walk is flooded, because the walking robot is out of range of its push by then. A lost message
+leaves an arc open, which is tried again.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import ClassVar, Final, NamedTuple, Protocol
+
+from zwerm.agents.sensor_coverage.frontier.directions import wrapped
+from zwerm.agents.sensor_coverage.frontier.walks import WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, SlotProof, TouchCounter, point_before
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
+from zwerm.agents.sensor_coverage.messages.commands import Waypoint
+from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
+from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, PassedPoint, WalkMessage, WalkOver
+from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
+
+# A robot makes plans again this many ticks after the latest point that closed something: the walk has passed.
+PASSED_TICKS: Final = 10
+
+
+class ProvedSlot(Protocol):
+    """What a robot knows of its slot, its neighbours, and the proof of coverage there."""
+
+    slot: int
+    moving: bool
+    redundant: bool
+    heading: float | None
+    proof: SlotProof
+
+    def mutual(self) -> Mapping[int, StateBeacon]:
+        """Return the states of the robots that this robot sees and that see it."""
+
+    def replan(self) -> None:
+        """Make plans again."""
+
+
+class StepReporter(Protocol):
+    """A walk that reports each of its points to `on_step`."""
+
+    on_step: Callable[[Waypoint], None]
+
+
+class WalkSituation(Protocol):
+    """The part of a robot's situation that walks depend on."""
+
+    @property
+    def wall_walk(self) -> StepReporter:
+        """The robot's own walk."""
+
+    @property
+    def node(self) -> int:
+        """The robot's id."""
+
+    @property
+    def local_map(self) -> ProvedSlot:
+        """The robot's slot and its neighbours."""
+
+
+class _Received(NamedTuple):
+    """The latest point that was received from a walking robot, and the slot where it was received."""
+
+    push: int
+    slot: int
+    seen: SeenPoint
+
+
+class WallProtocol(Component):
+    """One robot's part in walks, its own and those of others."""
+
+    channel: ClassVar[str] = CHANNEL
+    accepts: ClassVar[tuple[type, ...]] = (PassedPoint, ArcClosed, WalkOver)
+
+    def __init__(self, situation: WalkSituation, on_over: Callable[[int], None] = lambda _: None) -> None:
+        """Call `on_over` with the number of the push when a walk has ended."""
+        self._situation = situation
+        self._on_over = on_over
+        self._outbox: list[Outgoing] = []
+        self._push: int | None = None  # the push of this robot's own walk
+        self._hand = 1
+        self._number = 0
+        self._touch = TouchCounter()
+        self._closed = False
+        self._received: dict[int, _Received] = {}
+        self._replan_at: int | None = None
+        self._over: dict[int, None] = {}
+
+    # --- this robot's own walk ----------------------------------------------------------------------------------------
+
+    def begin(self, push: int, hand: int) -> None:
+        """Announce the points of the walk that begins now."""
+        if push != self._push:
+            self._push, self._hand, self._number, self._touch = push, hand, 0, TouchCounter()
+        self._closed = False
+        self._situation.wall_walk.on_step = self._announce
+
+    def has_closed(self) -> bool:
+        """Return whether a robot answered since the latest `begin` that an open arc became smaller."""
+        return self._closed
+
+    def end(self, push: int) -> None:
+        """Announce that the walk is over."""
+        self._push = None
+        self._situation.wall_walk.on_step = lambda _: None
+        self._spread(push)
+
+    def _announce(self, at: Waypoint) -> None:
+        heading = self._situation.local_map.heading or 0.0
+        self._number += 1
+        self._touch.take(self._number, bool(at.touched or at.robots))
+        point = PassedPoint(
+            self._push or 0,
+            self._number,
+            self._hand,
+            self._touch.since,
+            tuple((each.node, wrapped(each.bearing_rad + heading + math.pi)) for each in at.sightings),
+            tuple(wrapped(each + heading) for each in at.touched),
+            at.robots,
+        )
+        self._outbox.append(Outgoing(None, point))
+
+    # --- walks of others ----------------------------------------------------------------------------------------------
+
+    def receive(self, sender: int, message: WalkMessage, tick: int) -> None:
+        """Take in a point of another robot's walk, an answer to this robot's walk, or the end of a walk."""
+        match message:
+            case PassedPoint():
+                self._pass(sender, message, tick)
+            case ArcClosed(push):
+                self._closed = self._closed or push == self._push
+            case WalkOver(push) if push not in self._over:
+                self._spread(push)
+                self._on_over(push)
+            case _:
+                pass
+
+    def _pass(self, sender: int, passed: PassedPoint, tick: int) -> None:
+        """Take a point into the proof of this robot's slot."""
+        local_map = self._situation.local_map
+        slot = local_map.slot
+        if slot == NOWHERE or local_map.moving or local_map.redundant or local_map.heading is None:
+            return
+        slots = {node: state.slot for node, state in local_map.mutual().items()} | {self._situation.node: slot}
+        point = WalkPoint(
+            {slots[node]: direction for node, direction in passed.seen if node in slots},
+            passed.walls,
+            tuple(slots[node] for node in passed.robots if node in slots),
+        )
+        if slot not in point.seen:
+            return
+        received = self._received.get(sender)
+        last = received.seen if received is not None and received[:2] == (passed.push, slot) else None
+        now = SeenPoint(passed.number, point)
+        self._received[sender] = _Received(passed.push, slot, now)
+        before = point_before(slot, last, now, passed.touch_since)
+        if local_map.proof.pass_point(slot, before, point, passed.hand):
+            self._replan_at = tick + PASSED_TICKS
+            self._outbox.append(Outgoing(sender, ArcClosed(passed.push)))
+
+    def _spread(self, push: int) -> None:
+        self._over[push] = None
+        self._outbox.append(Outgoing(None, WalkOver(push)))
+
+    # --- every tick ---------------------------------------------------------------------------------------------------
+
+    def restarted(self, node: int, tick: int) -> None:
+        """Forget the points of a former incarnation."""
+        self._received.pop(node, None)
+
+    def poll(self, tick: int) -> None:
+        """Make plans again once a walk has passed."""
+        if self._replan_at is not None and tick >= self._replan_at:
+            self._replan_at = None
+            self._situation.local_map.replan()
+
+    def outgoing(self) -> list[Outgoing]:
+        """Return the messages to send now."""
+        sent, self._outbox = self._outbox, []
+        return sent
+
+    def next_wake(self) -> int | None:
+        """Return the tick at which plans are made again."""
+        return self._replan_at

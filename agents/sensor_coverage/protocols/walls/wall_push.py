@@ -1,0 +1,170 @@
+"""The leader of a push at a wall: it drives into an open arc, its followers close up, and it follows the wall.
+
+A wall close to its slot is only felt, and the push ends there. The walk ends where it closes nothing any more. Then the
+leader leaves the complex, and the next push may begin with it. Where no standing robot sees it further on, it keeps its
+new slot, and the deployment goes on from there.
+"""
+
+from abc import abstractmethod
+from collections.abc import Collection
+from typing import Final, Protocol
+
+from zwerm.agents.sensor_coverage.frontier.directions import wrapped
+from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, Sighting
+from zwerm.agents.sensor_coverage.messages.pushes import AllStanding, Body, PushAborted
+from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
+from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
+from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
+from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
+from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
+from zwerm.maths.simplicial import may_leave
+
+# Bound of the legs of one walk.
+LEGS_MAX: Final = 15
+
+
+class WallSituation(Protocol):
+    """The part of a robot's situation that a push at a wall depends on."""
+
+    @property
+    def tick(self) -> int:
+        """The number of the current tick."""
+
+    def stand(self) -> None:
+        """End a drive."""
+
+    def to_wall(self, bearing_rad: float, hop_m: float, hand: int) -> None:
+        """Begin to drive to a wall, and along it until the start is clear."""
+
+    def follow_wall(self, hand: int, keep: Collection[int]) -> None:
+        """Begin to follow the wall in touch, in sight of a robot of `keep`, or of any robot if `keep` is empty."""
+
+
+class WallPush:
+    """The part of a push that leads to a wall, beside a `PushPart`. `walls` is the robot's protocol of walks."""
+
+    walls: WallProtocol | None = None
+    id: int
+    phase: str
+    _since: int
+    _fresh: int
+    _back: int | None
+    _chain: PushChain
+    _plan: Plan | None
+    _anchors: tuple[Sighting, ...]
+    _behind_settled: bool
+    _walks: bool
+    _walk_over: bool
+    _situation: WallSituation
+    _map: LocalMap
+    _legs = _idle_legs = 0
+    _near: tuple[tuple[float, float], ...] = ()  # arcs around this robot's slot that the leader has closed
+    _is_spare = False  # the walk has ended in sight of the swarm, which needs no robot there
+
+    @property
+    @abstractmethod
+    def _heading(self) -> float: ...
+
+    @abstractmethod
+    def _enter(self, phase: str) -> None: ...
+
+    @abstractmethod
+    def lead(self) -> None:
+        """Be the leader."""
+
+    @abstractmethod
+    def cleared(self) -> None:
+        """Take in that the follower can take the leader's slot."""
+
+    @abstractmethod
+    def close(self, end: Body) -> None:
+        """End the push."""
+
+    @abstractmethod
+    def _find_anchors(self) -> tuple[Sighting, ...]: ...
+
+    @abstractmethod
+    def _correct(self) -> None: ...
+
+    @abstractmethod
+    def _settled(self) -> None: ...
+
+    @abstractmethod
+    def _write(self, body: Body) -> None: ...
+
+    def lead_from_base(self, direction_rad: float, hand: int) -> None:
+        """Be the leader, from the base's point into an open arc of the base."""
+        hop_m = self._map.parameters.hop_m
+        self._plan = Plan((0, 0, 0, WALLS), 0, direction_rad, hop_m, 0.0, (0,), walk=True, hand=hand)
+        self.lead()
+
+    def walk_ended(self) -> None:
+        """Take in that the leader's walk has ended: wait no longer than after another push."""
+        self._walks, self._since = False, self._situation.tick if self.phase == "await" else self._since
+        self._walk_over = self._chain.ahead == self._chain.leader[1]
+
+    def _approach(self, plan: Plan) -> None:
+        """Drive into an open arc, to a wall."""
+        self._enter("approaching")
+        self._situation.to_wall(wrapped(plan.direction - self._heading), plan.hop_m, -plan.hand)
+
+    def _approached(self, result: DriveResult | WalkResult) -> None:
+        """Leave the slot to the follower, unless a wall is close to it, or there is no way on."""
+        near: tuple[tuple[float, float], ...] = ()
+        if isinstance(result, WalkResult):
+            near = tuple((start + self._heading, width) for start, width in result.near)
+        if not isinstance(result, WalkResult) or result.end == SHUT:
+            felt = tuple(wrapped(each + self._heading) for each in result.touched)
+            at_base = self._map.slot == NOWHERE
+            if not at_base:
+                self._map.note_walls(felt, near)
+            self._situation.stand()
+            self.close(PushAborted(self.id, True, felt if at_base else ()))
+            return
+        self._walks = result.end != OPEN
+        self._anchors = () if self._walks else self._find_anchors()
+        self._map.occupy(self._fresh)
+        self._enter("out")
+        self._behind_settled = self._chain.is_rear
+        self.cleared()
+        self._write(AllStanding(self.id, near))
+
+    def _go_on(self) -> None:
+        """Correct the scale, or follow the wall."""
+        if self._walks:
+            self._walk()
+        else:
+            self._correct()
+
+    def _walk(self) -> None:
+        """Follow the wall for one leg."""
+        plan, protocol = self._plan, self.walls
+        if plan is None or protocol is None:
+            self._settled()
+            return
+        self._enter("walking")
+        self._legs += 1
+        protocol.begin(self.id, plan.hand)
+        self._situation.follow_wall(plan.hand, (self._back,) if plan.beside and self._back is not None else ())
+
+    def _walked(self, result: DriveResult | WalkResult) -> None:
+        """Follow the wall further while that closes something; else stand at the new slot where the walk has ended."""
+        protocol = self.walls
+        closed = protocol is not None and protocol.has_closed()
+        self._idle_legs = 0 if closed else self._idle_legs + 1
+        on = isinstance(result, WalkResult) and result.end == STRETCH
+        if on and self._legs < LEGS_MAX and self._idle_legs < IDLE_LEGS_MAX:
+            self._walk()
+            return
+        if protocol is not None:
+            protocol.end(self.id)
+        self._is_spare = isinstance(result, WalkResult) and result.end != LOST
+        self._settled()
+
+    def _leave_if_spare(self) -> None:
+        """Leave the complex after a walk, unless that would part the robots around."""
+        slot = self._map.slot
+        if self._is_spare and may_leave(slot, self._map.scan().complex_.neighbours):
+            self._map.leave_complex()
