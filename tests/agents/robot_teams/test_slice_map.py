@@ -3,7 +3,7 @@
 from itertools import permutations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from zwerm.agents.robot_teams.mapping.facts import (
@@ -55,11 +55,13 @@ def room(slices: int) -> list[Fact]:
     return facts
 
 
+@settings(deadline=None)
 @given(FACTS, FACTS)
 def test_merging_is_commutative(one: list[Fact], other: list[Fact]) -> None:
     assert summary(known([*one, *other])) == summary(known([*other, *one]))
 
 
+@settings(deadline=None)
 @given(FACTS, FACTS, FACTS)
 def test_merging_is_associative(a: list[Fact], b: list[Fact], c: list[Fact]) -> None:
     left = known(known([*a, *b]).facts.since(0) + c)
@@ -67,6 +69,7 @@ def test_merging_is_associative(a: list[Fact], b: list[Fact], c: list[Fact]) -> 
     assert summary(left) == summary(right)
 
 
+@settings(deadline=None)
 @given(FACTS)
 def test_merging_is_idempotent(facts: list[Fact]) -> None:
     slice_map = known(facts)
@@ -75,6 +78,7 @@ def test_merging_is_idempotent(facts: list[Fact]) -> None:
     assert summary(slice_map) == before
 
 
+@settings(deadline=None)
 @given(FACTS, st.randoms(use_true_random=False))
 def test_the_order_of_facts_has_no_influence(facts: list[Fact], random: object) -> None:
     shuffled = list(facts)
