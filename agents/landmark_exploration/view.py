@@ -5,8 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot, all_to_steps
-from zwerm.agents.landmark_exploration.mapping.frontier_status import LANDMARKS_MAX
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import LANDMARKS_MAX, BearingSnapshot, all_to_steps
 from zwerm.wire.messages import BodyVelocity, Observation
 
 _FULL: Final = 2.0 * math.pi

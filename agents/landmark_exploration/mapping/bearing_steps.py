@@ -8,6 +8,9 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
+# Landmark ids are below this.
+LANDMARKS_MAX: Final = 1 << 16
+
 STEPS: Final = 256
 HALF: Final = STEPS // 2
 _PER_RAD: Final = STEPS / (2.0 * math.pi)

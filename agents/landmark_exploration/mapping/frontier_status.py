@@ -20,9 +20,6 @@ CLEAR: Final = 6
 
 _IS_OPEN: Final = (False, True, False, True, False, False, False)
 
-# Landmark ids are below this.
-LANDMARKS_MAX: Final = 1 << 16
-
 # The widest angle between adjacent bearings of an observer that is inside beyond doubt: 14 degrees less than a half turn,
 # which is 5 standard deviations of the sensor.
 AREA_GAP_MAX: Final = HALF - 10

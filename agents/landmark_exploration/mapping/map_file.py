@@ -12,10 +12,9 @@ from typing import Annotated, Any, Final
 import msgspec
 from msgspec import Meta, Struct
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import STEPS, BearingSnapshot
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import LANDMARKS_MAX, STEPS, BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.frontier_status import (
     CLEAR,
-    LANDMARKS_MAX,
     REOPENED,
     UNKNOWN,
     key_of,
