@@ -14,12 +14,12 @@ from zwerm.scenario.load import load
         (
             "robots.parameters.link=2",
             "robots.parameters.link: unknown key; did you mean link_m?; known are link_m, ",
-            "drive_ticks_max",
+            "drive_ticks_max, walls",
         ),
         (
             "base.parameters.link=2",
             "base.parameters.link: unknown key; did you mean link_m?; known are link_m, ",
-            "drive_ticks_max",
+            "drive_ticks_max, walls",
         ),
         (
             "coordinator.parameters.link=2",

@@ -84,7 +84,7 @@ DEAD_END = (
     "building",
     [
         pytest.param(TWO_ROOMS, id="door of 0.3"),
-        pytest.param(BENT_CORRIDOR, id="corner", marks=pytest.mark.xfail(reason="the run fails: an arc stays open")),
+        pytest.param(BENT_CORRIDOR, id="corner"),
         pytest.param(DEAD_END, id="turn of 0.4"),
     ],
 )
