@@ -104,6 +104,8 @@ def test_the_failure_of_a_controller_arrives_and_its_process_exits_with_1(nothin
     with LocalSwarm("run", {**members(2), 1: members(2, "small_controllers:Wordy")[1]}) as swarm:
         # The other node answers after everything else, as it may under load.
         swarm.supervisor.send_signal(0, signal.SIGSTOP)
+        status = Path(f"/proc/{swarm.supervisor.pids[0]}/stat")
+        until(lambda: status.read_text().rpartition(")")[2].split()[0] == "T", "node 0 stopped")
         for node in range(2):
             swarm.link.send(node, encode(Observation(5, 0.0)))
         said, end = swarm.link.receive(20.0), swarm.link.receive(20.0)

@@ -78,8 +78,8 @@ def test_messages_of_each_node_arrive_in_order_and_exactly_once(open_link: Open)
         for node in NODES:
             link.send(node, f"{node} {number}".encode())
     taken = take(link, count * len(NODES) // 2)
-    while sum(map(len, taken.values())) < count * len(NODES):
-        for node, payload in link.receive_many(100, 20.0):
+    while missing := count * len(NODES) - sum(map(len, taken.values())):
+        for node, payload in link.receive_many(min(100, missing), 20.0):
             assert payload is not None
             taken[node].append(payload)
     for node in NODES:
