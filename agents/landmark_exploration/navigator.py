@@ -4,13 +4,11 @@ It has a map, bearings, contact and its compass, and needs no radio. A goal is a
 sees all of them. The map comes from a file (see `map_file`), whose text is a parameter.
 """
 
-from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Annotated, ClassVar
 
-import numpy as np
 from msgspec import Meta, Struct
 
-from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.map_file import read_map
 from zwerm.agents.landmark_exploration.mapping.map_reports import GoalReport, write_report
 from zwerm.agents.landmark_exploration.motion import Drive, travel
@@ -58,7 +56,7 @@ class Navigator(Controller):
         self._follow: Follow = travel
         if rules.presence_only:
             self._tracker = PresenceTracker(rules.range_m / (self._speed_m_s * setup.dt_s))
-            self._follow = self._seek
+            self._follow = partial(seek, self._tracker)
         self._moved: float | None = None
         self._report = b""
         self._drive = self._live()
@@ -78,16 +76,6 @@ class Navigator(Controller):
         direction = self._moved = self._slide.along(next(self._drive), self.view)
         report, self._report = self._report, b""
         return Command(drive=self.view.drive(direction, self._speed_m_s), done=self._done, snapshot=report)
-
-    def _seek(
-        self,
-        view: ExplorerView,
-        path: Sequence[BearingSnapshot],
-        random: np.random.Generator,
-        arrived: Callable[[], bool],
-    ) -> Drive:
-        assert self._tracker is not None
-        return seek(view, self._tracker, path, random, arrived)
 
     def _live(self) -> Drive:
         for goal in self._goals:

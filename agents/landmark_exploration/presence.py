@@ -123,8 +123,8 @@ def _mean(places: Sequence[Place]) -> Place | None:
 
 
 def seek(
-    view: ExplorerView,
     tracker: PresenceTracker,
+    view: ExplorerView,
     path: Sequence[BearingSnapshot],
     random: np.random.Generator,
     arrived: Callable[[], bool],

@@ -101,7 +101,7 @@ def test_a_path_of_observations_leads_to_where_all_of_the_last_is_seen_in_a_few_
 
     assert not arrived()
     random = np.random.default_rng(seed)
-    ends = [walk.follow(seek(walk.view, walk.tracker, path, random, arrived), 3_000) for _ in range(4)]
+    ends = [walk.follow(seek(walk.tracker, walk.view, path, random, arrived), 3_000) for _ in range(4)]
     assert ends[-1] == "arrived"
     assert set(goal) <= set(walk.seen())
 
@@ -109,5 +109,5 @@ def test_a_path_of_observations_leads_to_where_all_of_the_last_is_seen_in_a_few_
 def test_a_goal_that_does_not_exist_is_given_up() -> None:
     walk = Walk((1.0, 1.0))
     nowhere = BearingSnapshot((500, 501), (0, 0))
-    drive = seek(walk.view, walk.tracker, [nowhere], np.random.default_rng(1), lambda: False)
+    drive = seek(walk.tracker, walk.view, [nowhere], np.random.default_rng(1), lambda: False)
     assert walk.follow(drive, 3_000) == "unreached"
