@@ -13,12 +13,12 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
 from csv_rows import add_csv_option, write_csv
+from waiting import until
 
 from zwerm.deploy.runtime_directory import sweep
 
@@ -27,7 +27,6 @@ ROBOTS: Final = 6
 SIGNALS: Final = ("INT", "TERM", "HUP", "KILL", "STOP")
 PHASES: Final = ("joining", "running", "drawing")
 ROLES: Final = ("world", "server", "robot")
-DEADLINE_S: Final = 120.0
 ENDLESS_S: Final = 1e6
 INTERRUPTED: Final = 130
 
@@ -56,15 +55,6 @@ def processes(session: int) -> dict[int, int]:
     while fresh := {pid: parent for pid, parent in parents.items() if parent in found and pid not in found}:
         found |= fresh
     return found
-
-
-def until(holds: Callable[[], object], what: str) -> None:
-    """Return when `holds()` is true. Raises TimeoutError after DEADLINE_S."""
-    end_s = time.monotonic() + DEADLINE_S
-    while not holds():
-        if time.monotonic() > end_s:
-            raise TimeoutError(f"not within {DEADLINE_S:g} s: {what}")
-        time.sleep(0.01)
 
 
 def robots_of(world: int) -> tuple[int, list[int]]:

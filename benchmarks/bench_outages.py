@@ -11,30 +11,19 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
 from csv_rows import add_csv_option, write_csv
+from waiting import DEADLINE_S, until
 
 from zwerm.deploy.network.namespaces import Namespaces, address_of
 
 ROOT: Final = Path(__file__).parents[1]
 OUTAGE_S: Final = 10.0
 NAMED_WITHIN_S: Final = OUTAGE_S + 5.0  # the promise of docs/security.md
-DEADLINE_S: Final = 120.0
 GROWTH_BYTES: Final = 30_000
-
-
-def until(holds: Callable[[], object], what: str) -> float:
-    """Return the seconds until `holds()` is true. Raises TimeoutError after DEADLINE_S."""
-    begin_s = time.monotonic()
-    while not holds():
-        if time.monotonic() > begin_s + DEADLINE_S:
-            raise TimeoutError(f"not within {DEADLINE_S:g} s: {what}")
-        time.sleep(0.01)
-    return time.monotonic() - begin_s
 
 
 def outage(for_s: float, on_crash: str) -> dict[str, str]:
