@@ -35,7 +35,11 @@ class WallIndex:
         lines, xs, ys = [np.arange(len(a))], [np.floor(a[:, 0])], [np.floor(a[:, 1])]
         for axis in (0, 1):  # the cells entered through a side across this axis
             line, entered, t = _crossings(a[:, axis], b[:, axis])
-            other = np.floor(a[line, 1 - axis] + t * (b[line, 1 - axis] - a[line, 1 - axis]))
+            beside = a[line, 1 - axis] + t * (b[line, 1 - axis] - a[line, 1 - axis])
+            corner = np.flatnonzero(np.abs(beside - np.round(beside)) <= _SLACK)  # it may enter either of two cells there
+            line = np.concatenate([line, line[corner], line[corner]])
+            entered = np.concatenate([entered, entered[corner], entered[corner]])
+            other = np.concatenate([np.floor(beside), np.round(beside[corner]), np.round(beside[corner]) - 1.0])
             lines.append(line)
             xs.append(entered if axis == 0 else other)
             ys.append(other if axis == 0 else entered)

@@ -9,7 +9,7 @@ from unittest import mock
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
 
@@ -64,6 +64,8 @@ WAYS = ("comparing all with all", "blocks", "the index")
 @pytest.mark.parametrize("way", WAYS)
 @settings(deadline=None, max_examples=50)
 @given(walls=st.lists(lattice_line, min_size=1, max_size=6), lines=st.lists(lattice_line, min_size=1, max_size=6))
+@example(walls=[((0, 0), (0, 1)), ((0, 0), (0, 1)), ((0, 0), (0, 1)), ((0, 0), (4, 4))], lines=[((5, 5), (3, 3))])
+@example(walls=[((2, 1), (1, 2))] * 4, lines=[((4, 4), (0, 0)), ((0, 0), (4, 4))])
 def test_a_line_is_blocked_if_its_inside_meets_a_wall_in_a_point_or_along_it(way: str, walls: Any, lines: Any) -> None:
     # On a lattice every touch, corner and overlap is exact, and comes up often.
     arena = Arena(box(-1, -1, 7, 7), [LineString(wall) for wall in walls])
