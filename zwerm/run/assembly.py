@@ -38,7 +38,6 @@ def assemble_run(scenario: Scenario, seed: int) -> tuple[World, Observers]:
 
     Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the faults and the placement.
     """
-    search_first(scenario.folder)
     scenario = _with_landmarks(scenario, seed)
     arena, sensors, observers = prepare(scenario)
     mistakes: list[str] = []
