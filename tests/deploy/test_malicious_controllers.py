@@ -11,6 +11,9 @@ from zwerm.world.world import FLOOD as REFUSALS_MAX
 ATTACKER, AT_TICK = 1, 3
 
 
+pytestmark = pytest.mark.usefixtures("impatient")
+
+
 def attacked(attack: str, **time: float) -> RunResult:
     robots = {"controller": f"malicious:{attack}", "count": 3, "on_crash": "continue"}
     return run(scenario(robots=robots, radio={"range_m": 1.0}, time={"duration_s": 1.0} | time))

@@ -19,6 +19,7 @@ from zwerm.world.arena.scatter import with_landmarks
 from zwerm.world.bodies.drives import find_drive
 from zwerm.world.fields import Field
 from zwerm.world.fields.registry import make_field
+from zwerm.world.geometry import search_tree
 from zwerm.world.metrics.observers import Observers, make_observers
 from zwerm.world.sensors import Sensor, Surroundings
 from zwerm.world.sensors.registry import find as find_sensor
@@ -83,6 +84,7 @@ def prepare(scenario: Scenario) -> Prepared:
     if arena is not None and (field is not None or table is None):
         sensors = _attempt(lambda: _sensors(scenario, arena, field), scenario, mistakes)
         observers = _attempt(lambda: make_observers(scenario, arena, field), scenario, mistakes)
+    search_tree.prepare(scenario.robots.count)
     if arena is None or sensors is None or observers is None or mistakes:
         raise ScenarioError(blame(mistakes, scenario.place, scenario.overrides))
     return Prepared(arena, sensors, observers)
