@@ -66,8 +66,9 @@ def _robots_importable(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.fixture
-def private_tmp(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def private_tmp(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A directory for temporary files of this test's alone, with a path short enough for a socket."""
+    tmp_path_factory.getbasetemp()  # the folders of later tests are not made in this directory
     multiprocessing.util.get_temp_dir()  # the start server's socket stays there for later tests
     directory = Path(tempfile.mkdtemp(prefix="zt-"))
     monkeypatch.setattr(tempfile, "tempdir", str(directory))
