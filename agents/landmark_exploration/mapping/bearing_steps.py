@@ -52,7 +52,8 @@ def widest_gap(bearings: Sequence[int]) -> int:
     if len(bearings) < 2:
         return STEPS
     ordered = sorted(bearings)
-    return max(ordered[0] - ordered[-1] + STEPS, *map(sub, ordered[1:], ordered))
+    gaps: list[int] = [ordered[0] - ordered[-1] + STEPS, *map(sub, ordered[1:], ordered)]
+    return max(gaps)
 
 
 def is_inside(bearings: Sequence[int]) -> bool:

@@ -48,7 +48,9 @@ class Registers:
             node = each.node
             known = newest.get(node)
             is_newer = known is None or (
-                each.stamp > known.stamp if each.incarnation == known.incarnation else each.incarnation > known.incarnation
+                each.stamp > known.stamp
+                if each.incarnation == known.incarnation
+                else each.incarnation > known.incarnation
             )
             if is_newer and node != me:
                 newest[node] = each
@@ -65,8 +67,9 @@ class Registers:
         return all(tick - heard < ticks for node, heard in self._heard.items() if node != me)
 
     def last_heard(self, me: int) -> int | None:
-        """Return the tick at which a new register of any robot but `me` came last, or None where none is known."""
-        return max((heard for node, heard in self._heard.items() if node != me), default=None)
+        """Return the tick since which half of the known robots but `me` are silent, or None where none is known."""
+        heard = sorted([heard for node, heard in self._heard.items() if node != me])
+        return heard[len(heard) // 2] if heard else None
 
     def claims(self, me: int, tick: int) -> Iterator[int]:
         """Yield the keys of the frontiers that other robots claim, by a lease that has not run out."""
