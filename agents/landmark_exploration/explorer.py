@@ -51,9 +51,9 @@ CUT_OFF_TICKS: Final = 200
 AVOID_TICKS: Final = 300
 # An idle robot goes to the meeting place for news, if it has not heard of some robot for this many ticks. Its map may be old.
 FRESH_TICKS: Final = 100
-# A robot goes there before its next frontier, too, if it has not heard of any robot for this many ticks, and twice as many
+# A robot goes there before its next frontier, too, if half of the others were silent for this many ticks, and twice as many
 # after each visit in vain: it might explore what others have explored.
-LONELY_TICKS: Final = 400
+LONELY_TICKS: Final = 250
 # Ticks between two snapshots that a robot reports to observers of the run.
 TELEMETRY_TICKS: Final = 25
 
@@ -173,7 +173,11 @@ class Explorer(Controller):
         idle = wander(self.view, self.random, self.parameters.turn_sd_rad)
         if self.parameters.presence_only:
             idle = roam(self.view, self.random, lambda: self._news_at == self.view.tick)
-        meeting = meet(self.view, self.map, self.random, lambda: next(idle), self._meeting_ticks)
+
+        def to_meeting() -> Drive:
+            return meet(self.view, self.map, self.random, lambda: next(idle), self._meeting_ticks)
+
+        meeting = to_meeting()
         meets = self._carries and not self.parameters.presence_only
         while True:
             if meets and self._task is None and self._is_lonely():
@@ -194,13 +198,14 @@ class Explorer(Controller):
             if task is self._task:
                 self._conclude(task, outcome)
                 self._task = None
+            meeting = to_meeting()  # the robot is far from where it waited before
 
     def _meeting_ticks(self) -> int:
         """Return how long to stay at the meeting place: not long if a walk may find the way to an open frontier."""
         return MEETING_TICKS if self._no_way_since is None else VISIT_TICKS
 
     def _is_lonely(self) -> bool:
-        """Return whether no known robot has been heard of for so long that it is worth the way to the meeting place."""
+        """Return whether half of the others have been silent for so long that it is worth the way to the meeting place."""
         heard, tick = self.registers.last_heard(self.setup.node), self.view.tick
         if heard is not None and tick - heard < LONELY_TICKS:
             self._lonely_ticks = LONELY_TICKS

@@ -25,8 +25,8 @@ ARRIVED: Final = 0.08
 JITTER_TICKS: Final = 5
 # So often may that happen before the robot gives the path up.
 STALLS_MAX: Final = 15
-# Ticks for each vertex of the path, and one more, before the robot gives the path up.
-HOP_TICKS: Final = 60
+# Ticks without a vertex of the path in view that is farther on than all before: the robot then gives the path up.
+PROGRESS_TICKS: Final = 120
 
 # Phase 2: the sum of the unit vectors to both landmarks is shorter than this on the line between them, or near it.
 NEAR_LINE: Final = 0.25
@@ -77,17 +77,32 @@ def travel(
     random: np.random.Generator,
     arrived: Callable[[], bool],
 ) -> Drive:
-    """Follow `path` until `arrived()`, aiming at the farthest vertex that shares enough landmarks with what is seen."""
+    """Follow `path` until `arrived()`, aiming at the farthest vertex that shares enough landmarks with what is seen.
+
+    A robot that loses sight of the vertex that it aims at falls back to one before it. It then goes all the way to that
+    one. Otherwise it could see the farther vertex again, lose it again, and go to and fro between the two.
+    """
     targets = [dict(zip(each.landmarks, map(to_rad, each.bearings), strict=True)) for each in path]
-    until = view.tick + HOP_TICKS * (len(path) + 1)
+    last = len(targets) - 1
+    best, before, farthest = -1, -1, last
+    until = view.tick + PROGRESS_TICKS
     stalls = 0
     while not arrived():
         if view.tick >= until or stalls > STALLS_MAX:
             return "unreached"
-        aim = _farthest(view.bearing, targets)
+        aim = _farthest(view.bearing, targets[: farthest + 1])
         length, direction = (0.0, 0.0) if aim is None else homing(view.bearing, targets[aim])
-        if length >= ARRIVED:
-            yield direction
+        if aim is not None:
+            if aim > best:
+                best, until = aim, view.tick + PROGRESS_TICKS
+            if aim < before:
+                farthest = aim
+            before = aim
+            if length >= ARRIVED:
+                yield direction
+                continue
+        if farthest < last:
+            farthest, before = last, -1
             continue
         stalls += 1
         direction = float(random.uniform(-math.pi, math.pi))

@@ -31,7 +31,7 @@ class ExplorerParameters(Struct, frozen=True, forbid_unknown_fields=True):
     cross_ticks: Ticks = 40
     search_ticks: Ticks = 40
     message_bytes_max: Annotated[int, Meta(ge=SMALL_BYTES, le=LARGE_BYTES)] = LARGE_BYTES
-    lease_ticks: Ticks = 150
+    lease_ticks: Ticks = 300
     dead_ticks: Ticks = 1_500
     freeze_ticks: Ticks = 40
     robots_expected: Annotated[int, Meta(ge=1, le=100_000)] = 1

@@ -89,8 +89,11 @@ def visit(view: ExplorerView, map_: LandmarkMap, random: np.random.Generator, ti
         return "unreached"
     outcome = yield from navigate(view, map_, (place,), random)
     arrived = view.tick
-    while place in view.bearing and view.tick - arrived < ticks():
-        yield view.bearing[place]
+    while outcome == "arrived" and view.tick - arrived < ticks():
+        if place in view.bearing:
+            yield view.bearing[place]
+        else:  # other robots push
+            outcome = yield from navigate(view, map_, (place,), random)
     return outcome
 
 

@@ -129,12 +129,12 @@ class Offer:
 
         Each is (gain, -key, vertex). The gain is the utility, if it is to be `useful`, less `price`.
         """
-        at = self._frontiers.open_at
-        live = [landmark for landmark in simplex if at.get(landmark)]
+        open_of = self._frontiers.open_of
+        live = [landmark for landmark in simplex if open_of.get(landmark)]
         if len(live) < 2:
             return best
         if best is not None and useful:
-            counts = sorted([at[landmark] for landmark in live])
+            counts = sorted([len(open_of[landmark]) for landmark in live])
             if counts[-1] + counts[-2] - price < best[0]:
                 return best
         open_ = self._frontiers.open
@@ -195,7 +195,7 @@ def frontier_costs(complex_: LandmarkComplex, landmarks: Sequence[int], frontier
 
 
 def _note_costs(simplex: Sequence[int], vertex: int, cost: float, frontiers: Frontiers, found: Costs) -> None:
-    live = [landmark for landmark in simplex if frontiers.open_at.get(landmark)]
+    live = [landmark for landmark in simplex if frontiers.open_of.get(landmark)]
     for i, a in enumerate(live):
         for b in live[i + 1 :]:
             for key in (a << 16 | b, b << 16 | a):

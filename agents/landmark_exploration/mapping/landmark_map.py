@@ -59,20 +59,24 @@ class LandmarkMap:
             self.raise_all([key], ABANDONED if failures >= 2 * FAILURES_MAX else TIMED_OUT)
 
     def _read(self, origin: int, number: int, entry: bytes) -> None:
+        kind = entry[0] if entry else -1
         try:
-            if entry[:1] == bytes([entries.STATUSES]):
+            if kind == entries.OBSERVATION and origin not in self._parts:
+                self.observe(entries.read_observation(entry), (number, origin))
+                return
+            if kind == entries.STATUSES:
                 status, keys = entries.read_statuses(entry)
                 if status <= CLEAR:
                     self.raise_all(keys, status)
                 return
-            if entry[:1] == bytes([entries.FAILURE]):
+            if kind == entries.FAILURE:
                 self.fail(entries.read_failure(entry))
                 return
             bearings = entries.read_bearings(entry)
         except ValueError:
             return
         whole = [*self._parts.pop(origin, ()), *bearings]
-        if entry[0] == entries.OBSERVATION:
+        if kind == entries.OBSERVATION:
             self.observe(entries.snapshot_of(whole), (number, origin))
         elif len(whole) <= _PARTS_MAX:
             self._parts[origin] = whole

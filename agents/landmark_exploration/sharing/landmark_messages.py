@@ -5,6 +5,7 @@ With a cap of `SMALL_BYTES` every packet fits into a small radio frame. Entries 
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Annotated, Final
 
 from msgspec import Meta, Struct
@@ -107,4 +108,5 @@ Message = Entries | Vector | RegisterBeacon | TaskReport | TaskPart
 
 _sealed: Final = Sealed(Message)
 write: Final[Callable[[Message], bytes]] = _sealed.write
-read: Final[Callable[[bytes], Message | None]] = _sealed.read
+# Many robots of one process hear the same broadcast.
+read: Final[Callable[[bytes], Message | None]] = lru_cache(maxsize=1 << 11)(_sealed.read)

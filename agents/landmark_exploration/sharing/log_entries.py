@@ -9,6 +9,7 @@ Numbers are little-endian. The entries of a log, read in order, are complete wit
 """
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from struct import iter_unpack, pack, unpack
 from typing import Final
 
@@ -80,3 +81,10 @@ def snapshot_of(bearings: Iterable[tuple[int, int]]) -> BearingSnapshot:
         found.setdefault(landmark, bearing % STEPS)
     landmarks = tuple(sorted(found))
     return BearingSnapshot(landmarks, tuple(found[landmark] for landmark in landmarks))
+
+
+# Many robots of one process read the same entry.
+@lru_cache(maxsize=1 << 14)
+def read_observation(entry: bytes) -> BearingSnapshot:
+    """Return the observation of an entry that holds all of it. Raises ValueError where it is none."""
+    return snapshot_of(read_bearings(entry))

@@ -97,8 +97,8 @@ class Gossip:
             case Vector():
                 self._answer(sender, message, tick)
             case RegisterBeacon():
-                news = [self._registers.merge(each, tick) for each in message.registers if each.node != self._me]
-                if self._hub and any(news):
+                news = self._registers.merge_all(message.registers, self._me, tick)
+                if self._hub and news:
                     self._beacon_at = min(self._beacon_at, tick + 1)
                 if message.digest != self._replica.digest:
                     self._differs[sender] = tick

@@ -39,12 +39,24 @@ class Registers:
 
     def merge(self, register: Register, tick: int) -> bool:
         """Take in a register heard at `tick`; return whether it was newer than what is known of its robot."""
-        known = self.newest.get(register.node)
-        if known is not None and _age(register) <= _age(known):
-            return False
-        self.newest[register.node] = register
-        self._heard[register.node] = tick
-        return True
+        return self.merge_all((register,), None, tick)
+
+    def merge_all(self, registers: Iterable[Register], me: int | None, tick: int) -> bool:
+        """Take in the registers of others than `me` heard at `tick`; return whether any was newer than what is known."""
+        newest, news = self.newest, False
+        for each in registers:
+            node = each.node
+            known = newest.get(node)
+            is_newer = known is None or (
+                each.stamp > known.stamp
+                if each.incarnation == known.incarnation
+                else each.incarnation > known.incarnation
+            )
+            if is_newer and node != me:
+                newest[node] = each
+                self._heard[node] = tick
+                news = True
+        return news
 
     def is_silent(self, node: int, tick: int) -> bool:
         """Return whether a robot is presumed dead, because no new register of it has come for `dead_ticks`."""
@@ -55,8 +67,9 @@ class Registers:
         return all(tick - heard < ticks for node, heard in self._heard.items() if node != me)
 
     def last_heard(self, me: int) -> int | None:
-        """Return the tick at which a new register of any robot but `me` came last, or None where none is known."""
-        return max((heard for node, heard in self._heard.items() if node != me), default=None)
+        """Return the tick since which half of the known robots but `me` are silent, or None where none is known."""
+        heard = sorted([heard for node, heard in self._heard.items() if node != me])
+        return heard[len(heard) // 2] if heard else None
 
     def claims(self, me: int, tick: int) -> Iterator[int]:
         """Yield the keys of the frontiers that other robots claim, by a lease that has not run out."""
@@ -87,7 +100,3 @@ class Registers:
         if self._agreed is None or self._agreed[0] != digest:
             self._agreed = digest, tick
         return tick - self._agreed[1] >= self._settle_ticks
-
-
-def _age(register: Register) -> tuple[int, int]:
-    return register.incarnation, register.stamp

@@ -264,6 +264,8 @@ def test_registers_tell_how_long_others_were_not_heard() -> None:
     assert registers.last_heard(0) is None
     for node, tick in ((0, 90), (1, 10), (2, 50)):
         registers.merge(Register(node, 1, 1), tick)
-    assert registers.last_heard(0) == 50
+    assert registers.last_heard(0) == 50, "half of the others, here one of two, are silent since then"
+    registers.merge(Register(3, 1, 1), 20)
+    assert registers.last_heard(0) == 20
     assert registers.is_fresh(0, 60, 51)
     assert not registers.is_fresh(0, 60, 50)
