@@ -2,7 +2,8 @@
 
 `--only GROUP ...` carries out some groups of trials, and `--show` none. A trial is one run, inline on one core. All trials are
 kept as lines of JSON in `runs/landmark-numbers.jsonl`, with the commit of the code. Trials of other commits are left out,
-unless `--commit` names one. The halls of the group `halls` are drawn: their size, obstacles, landmarks, robots and trouble.
+unless `--commit` names one. `--runs FILE` writes them as CSV.
+The halls of the group `halls` are drawn: their size, obstacles, landmarks, robots and trouble.
 """
 
 import argparse
@@ -65,6 +66,7 @@ KEPT: Final = (
     "navigation_iterations_mean",
     "bytes_per_robot_mean",
 )
+COLUMNS: Final = ("group", "seed", "commit", "outcome", "problems", "processor_s", *KEPT)
 
 
 def hall(seed: int) -> tuple[str, ...]:
@@ -241,12 +243,16 @@ def main() -> None:
     )
     parser.add_argument("--show", action="store_true", help="run nothing: show what is kept")
     parser.add_argument("--commit", help="count as this commit, whatever the code is")
+    parser.add_argument("--runs", type=Path, metavar="FILE", help="write all trials to this CSV file, too")
     add_csv_option(parser)
     options = parser.parse_args()
     commit = options.commit or commit_now()
     for group in () if options.show else options.only:
         carry_out(group, commit)
-    rows = summary(list(trials(commit)))
+    some = sorted(trials(commit), key=lambda trial: (list(GROUPS).index(trial["group"]), trial["seed"]))
+    if options.runs is not None:
+        write_csv(options.runs, [{name: trial.get(name, "") for name in COLUMNS} for trial in some])
+    rows = summary(some)
     for row in rows:
         print(f"{row['what']:48} {row['asked']:18} {row['measured']:28} n {row['n']}")
     write_csv(options.csv, rows)
