@@ -31,9 +31,10 @@ def locate(name: str) -> Path:
 
     Raises ScenarioError where neither exists.
     """
-    if name in built_in():
-        return built_in()[name]
     path = Path(name)
+    own = BUILT_IN / f"{name}.toml"
+    if path.name == name and is_file(own):
+        return own
     if is_file(path):
         return path
     if is_file(STUDIES / f"{name}.toml"):

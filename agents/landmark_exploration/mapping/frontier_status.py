@@ -41,7 +41,7 @@ def pair_of(key: int) -> Pair:
 Undecided = tuple[int, int, int]
 
 
-class Verdict(NamedTuple):
+class ObservationVerdict(NamedTuple):
     """The conclusions from one observation: the frontiers that it clears, the others, and whether it proves an area."""
 
     clear: tuple[int, ...]
@@ -51,7 +51,7 @@ class Verdict(NamedTuple):
 
 # Robots hear of the same observations, and one process may hold many robots.
 @lru_cache(maxsize=1 << 14)
-def verdict(snapshot: BearingSnapshot) -> Verdict:
+def verdict(snapshot: BearingSnapshot) -> ObservationVerdict:
     """Return the conclusions from an observation, by the rule of Frontiers.note."""
     landmarks, bearings = snapshot
     count = len(landmarks)
@@ -63,7 +63,7 @@ def verdict(snapshot: BearingSnapshot) -> Verdict:
         inside = [0 < (bearings[j] - bearings[i]) % STEPS < HALF for i, j, _ in other]
         clear = [each[2] for each, is_clear in zip(other, inside, strict=True) if is_clear]
         other = [each for each, is_clear in zip(other, inside, strict=True) if not is_clear]
-    return Verdict(tuple(clear), tuple(other), gap <= AREA_GAP_MAX)
+    return ObservationVerdict(tuple(clear), tuple(other), gap <= AREA_GAP_MAX)
 
 
 class Frontiers:

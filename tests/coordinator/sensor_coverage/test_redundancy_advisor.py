@@ -38,7 +38,7 @@ from zwerm.wire.messages import Observation, Packet
 DT_S = 0.1
 BASE = 1
 CENTRE = 99
-Said = list[tuple[int | None, AdviceMessage]]
+Messages = list[tuple[int | None, AdviceMessage]]
 
 
 def wheel(steps: tuple[int, ...] = (1, 2, 4, 5)) -> dict[int, StandingReport]:
@@ -56,10 +56,10 @@ class Centre:
         self.advisor = RedundancyAdvisor(Setup(CENTRE, "coordinator", DT_S, (), b"0" * 32, bases=(BASE,)))
         self.tick = -1
 
-    def hear(self, words: Iterable[tuple[int, AdviceMessage]] = (), ticks: int = 1) -> Said:
+    def hear(self, words: Iterable[tuple[int, AdviceMessage]] = (), ticks: int = 1) -> Messages:
         """Return its messages after it received these, over a number of ticks."""
         inbox = tuple(Packet(CHANNEL, write(word), sender) for sender, word in words)
-        said: Said = []
+        said: Messages = []
         for number in range(ticks):
             self.tick += 1
             observation = Observation(self.tick, self.tick * DT_S, inbox=() if number else inbox)
@@ -70,7 +70,7 @@ class Centre:
         return said
 
 
-def spared(said: Said) -> dict[int | None, RedundantAdvice]:
+def spared(said: Messages) -> dict[int | None, RedundantAdvice]:
     return {to: word for to, word in said if isinstance(word, RedundantAdvice)}
 
 
@@ -310,10 +310,11 @@ def test_without_locks_late_advice_opens_holes() -> None:
 
 # --- whole deployments ------------------------------------------------------------------------------------------------
 
-# Robots stand so near to each other that now and then one can be spared.
+# Robots stand so near to each other that now and then one is redundant. No robot walks along walls, which takes long.
 HALL = (
     *("arena.size_m=[2.2,1.8]", "base.pose=[0.2,0.9,0.0]", "robots.count=24"),
     *("robots.parameters.margin_m=0.45", "base.parameters.margin_m=0.45"),
+    *('robots.parameters.walls="paper"', 'base.parameters.walls="paper"'),
     *("services.path=gradient", "services.redundancy=coordinator"),
 )
 
