@@ -100,8 +100,31 @@ class Offer:
     def most(self) -> float:
         """Return an upper bound of all utilities, now and later."""
         if self._most is None:
-            self._most = float(self._frontiers.most_at_a_pair())
+            self._most = self._bound()
         return self._most
+
+    def _bound(self) -> float:
+        """Return the greatest (n_a + n_b) / (1 + m) of all free <a, b>; n_a is the number of open frontiers with landmark a.
+
+        Landmarks come by descending n_a. So a frontier not seen before has n_b <= n_a, and the bound 2 n_a / (1 + m_a).
+        """
+        open_of, sent, taken, best = self._frontiers.open_of, self._sent, self._taken, 0.0
+        count = dict(zip(open_of, map(len, open_of.values()), strict=True))
+        for landmark in sorted(count, key=count.__getitem__, reverse=True):
+            twice = 2 * count[landmark]
+            if twice <= best:
+                break
+            if twice <= best * (1 + sent.get(landmark, 0)):
+                continue
+            for key in open_of[landmark]:
+                a, b = key >> 16, key & 0xFFFF
+                robots = sent.get(a, 0) + sent.get(b, 0)
+                if robots:
+                    if key in taken:
+                        continue
+                    robots -= (b << 16 | a) in taken
+                best = max(best, (count[a] + count[b]) / (1 + robots))
+        return best
 
     def is_empty(self) -> bool:
         """Return whether no frontier is free."""

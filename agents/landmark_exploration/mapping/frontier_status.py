@@ -110,20 +110,6 @@ class Frontiers:
                 open_of[b].discard(key)
         return True
 
-    def most_at_a_pair(self) -> int:
-        """Return the largest sum, over the two landmarks of an open frontier, of the open frontiers that each is part of.
-
-        It is 0 without any. Landmarks come by descending count. No pair whose larger count is half of the best sum or less
-        can exceed it.
-        """
-        open_of, best = self.open_of, 0
-        for keys in sorted(open_of.values(), key=len, reverse=True):
-            if 2 * len(keys) <= best:
-                break
-            for key in keys:
-                best = max(best, len(open_of[key >> 16]) + len(open_of[key & 0xFFFF]))
-        return best
-
     def open_at(self, landmark: int) -> int:
         """Return how many open frontiers a landmark is part of."""
         return len(self.open_of.get(landmark, ()))
