@@ -43,7 +43,7 @@ run: setup  ## run a scenario (SCENARIO=name; default sensor-coverage)
 	$(BIN)/zwerm run $(SCENARIO)
 
 test: dev  ## run the tests, two files at a time
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 lint: dev  ## check style, types and import boundaries
 	$(BIN)/ruff check .

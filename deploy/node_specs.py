@@ -1,5 +1,6 @@
 """Node specifications: the controller class and the Setup of every node of a run."""
 
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import msgspec
@@ -68,30 +69,28 @@ def node_specs(scenario: Scenario, seed: int) -> dict[int, tuple[str, Setup]]:
     services = services_of(scenario)
     specs: dict[int, tuple[str, Setup]] = {}
 
-    def add(node: int, role: Role, controller: str, parameters: dict[str, Any]) -> None:
+    def add(nodes: Iterable[int], role: Role, name: str, given: Mapping[str, Any]) -> None:
         placed = role != COORDINATOR
-        key = draws.stream_key("controller", node)
-        specs[node] = (
-            controller_for(scenario, role, controller),
-            Setup(
+        controller = controller_for(scenario, role, name)
+        parameters = with_file_texts(given, scenario.folder, f"{TABLES[role]}.parameters")
+        for node in nodes:
+            setup = Setup(
                 node=node,
                 role=role,
                 dt_s=scenario.time.dt_s,
                 sensors=sensors if placed else (),
-                stream_key=key,
+                stream_key=draws.stream_key("controller", node),
                 body=body if placed else None,
                 channels=channels if placed else ("uplink",),
-                parameters=with_file_texts(parameters, scenario.folder, f"{TABLES[role]}.parameters"),
+                parameters=dict(parameters),
                 services=services,
                 bases=() if placed or scenario.base is None else tuple(range(scenario.base.stations)),
-            ),
-        )
+            )
+            specs[node] = controller, setup
 
-    for node in range(robots.count):
-        add(node, ROBOT, robots.controller, robots.parameters)
+    add(range(robots.count), ROBOT, robots.controller, robots.parameters)
     if scenario.base is not None:
-        for node in range(scenario.base.stations):
-            add(node, BASE, scenario.base.controller, scenario.base.parameters)
+        add(range(scenario.base.stations), BASE, scenario.base.controller, scenario.base.parameters)
     if scenario.coordinator is not None:
-        add(robots.count, COORDINATOR, scenario.coordinator.controller, scenario.coordinator.parameters)
+        add([robots.count], COORDINATOR, scenario.coordinator.controller, scenario.coordinator.parameters)
     return specs

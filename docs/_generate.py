@@ -322,8 +322,8 @@ def _command(name: str, command: Any) -> str:
 
 
 def _plain(text: str | None) -> str:
-    """Return help text as Markdown: what the terminal shows bold is code."""
-    return re.sub(r"\[/?bold\]", "`", inspect.cleandoc(text or ""))
+    """Return help text as Markdown: a paragraph that is a command is code."""
+    return re.sub(r"^\x08\n +(.*)$", r"`\1`", inspect.cleandoc(text or ""), flags=re.MULTILINE)
 
 
 GALLERY: Final = Path(__file__).parent / "images" / "gallery"

@@ -19,6 +19,38 @@ if TYPE_CHECKING:  # most tests need no study
 # then wait without end.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# The files that take longest, the longest first. They start first, so that no worker ends with a long one.
+LONG = (
+    "docs/test_readme.py",
+    "agents/sensor_coverage/test_lost_memory.py",
+    "docs/test_catalogue_rows.py",
+    "agents/sensor_coverage/test_wall_walk.py",
+    "agents/sensor_coverage/test_local_coverage.py",
+    "study/test_trial_identity.py",
+    "agents/sensor_coverage/protocols/test_interleavings.py",
+    "study/test_study_distribution.py",
+    "study/test_study_command.py",
+    "docs/test_tutorial.py",
+    "world/faults/test_fault_processes.py",
+    "coordinator/sensor_coverage/test_redundancy_advisor.py",
+    "twin/test_twin.py",
+    "compare/test_comparison_output.py",
+    "study/test_study_trials.py",
+    "run/test_determinism.py",
+    "deploy/test_run_manifests.py",
+    "docs/test_search.py",
+    "docs/test_recipes.py",
+    "deploy/test_supervisor.py",
+    "cli/test_new_project.py",
+    "agents/sensor_coverage/test_sensor_coverage.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the tests of the LONG files first; the order of all others stays."""
+    place = {Path(__file__).parent / name: number for number, name in enumerate(LONG)}
+    items.sort(key=lambda item: place.get(item.path, len(LONG)))
+
 
 @pytest.fixture(autouse=True)
 def _robots_importable(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -34,8 +66,9 @@ def _robots_importable(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.fixture
-def private_tmp(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def private_tmp(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A directory for temporary files of this test's alone, with a path short enough for a socket."""
+    tmp_path_factory.getbasetemp()  # the folders of later tests are not made in this directory
     multiprocessing.util.get_temp_dir()  # the start server's socket stays there for later tests
     directory = Path(tempfile.mkdtemp(prefix="zt-"))
     monkeypatch.setattr(tempfile, "tempdir", str(directory))
@@ -51,6 +84,13 @@ def nothing_left(private_tmp: Path) -> Iterator[None]:
     assert robots_of_this_process() == set(), "robot processes left"
     left = [path for path in private_tmp.iterdir() if path.name.startswith("zwerm-")]
     assert left == [], "private directories left"
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """End robots that do not leave 0.3 s after the request, and kill them 0.3 s later, not after 3 s and 2 s."""
+    monkeypatch.setattr("zwerm.deploy.swarm.LEAVE_WAIT_S", 0.3)
+    monkeypatch.setattr("zwerm.deploy.supervisor.TERMINATE_WAIT_S", 0.3)
 
 
 @pytest.fixture

@@ -84,11 +84,16 @@ class Explorer:
         """Visit every state, and return how many there are. Raises Violation."""
         first = self._first()
         known = {first}
+        reached: set[State] = set()  # before messages are deleted: most events lead to a state again
         stack = [first]
         while stack:
             state = stack.pop()
             self._check_exclusion(state)
-            for after in map(self._forgotten, self._events(state)):
+            for raw in self._events(state):
+                if raw in reached:
+                    continue
+                reached.add(raw)
+                after = self._forgotten(raw)
                 if after not in known and self._anybody_may_leave(after):
                     known.add(after)
                     stack.append(after)

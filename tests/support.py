@@ -15,6 +15,9 @@ from zwerm.scenario.tables import Scenario
 ROOT = Path(__file__).parent.parent
 ROBOTS = Path(__file__).parent / "robots"
 
+# Where Matplotlib keeps its list of fonts. A process with a home of its own would make the list again.
+FONT_CACHE = os.environ.get("MPLCONFIGDIR") or str(Path.home() / ".cache" / "matplotlib")
+
 # The command line, without relying on what is on PATH.
 ZWERM = ["-c", "from zwerm.cli.app import main; main()"]
 

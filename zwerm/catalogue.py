@@ -8,6 +8,7 @@ Everything that lists, checks, preloads or documents algorithms and plug-ins rea
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from typing import Final, Literal
 
 Role = Literal["robot", "base", "coordinator"]
@@ -313,6 +314,7 @@ def row_of(file_name: str) -> Algorithm | None:
     return next((row for row in ALGORITHMS if any(fnmatchcase(file_name, each) for each in row.scenarios)), None)
 
 
+@lru_cache(maxsize=256)
 def algorithm_of(controller: str) -> Algorithm | None:
     """Return the row that has a controller of this name, of any role, or None."""
     for row in ALGORITHMS:

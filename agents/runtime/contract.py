@@ -5,6 +5,7 @@ information about the node itself. Each `Observation` holds all information abou
 convenience: any class with the same constructor and `step` is accepted.
 """
 
+from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
 import msgspec
@@ -60,7 +61,7 @@ class Controller:
     """Base class of the controllers that ship here.
 
     `sensors` names the observation fields the controller needs, `Parameters` types what a scenario may set.
-    `self.random` is the node's own stream of randomness, the same in every runner.
+    `self.random` is the node's own stream of random numbers, the same in every runner.
     """
 
     sensors: ClassVar[tuple[str, ...]] = ()
@@ -69,7 +70,11 @@ class Controller:
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
         self.parameters: Any = msgspec.convert(setup.parameters, self.Parameters)
-        self.random: np.random.Generator = stream(setup.stream_key)
+
+    @cached_property
+    def random(self) -> np.random.Generator:
+        """The node's own stream of random numbers, made when it is first used."""
+        return stream(self.setup.stream_key)
 
     def step(self, observation: Observation) -> Command:
         """Return the answer to one observation."""

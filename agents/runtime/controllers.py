@@ -4,14 +4,17 @@ import inspect
 import traceback
 from hashlib import blake2b
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
 from zwerm.agents.runtime.contract import NoParameters, Setup, Stepper
 from zwerm.catalogue import ROBOT, algorithm_of, names
 from zwerm.errors import ControllerError
-from zwerm.scenario.plugin_names import class_named
+from zwerm.scenario.plugin_names import class_named, takes
+
+# The names of the catalogue's controllers, for messages.
+BUILT_IN: Final = sorted(names(ROBOT))
 
 
 def find(name: str) -> type[Any]:
@@ -22,15 +25,13 @@ def find(name: str) -> type[Any]:
     try:
         row = algorithm_of(name)
         built_in = {} if row is None else row.controllers.get(ROBOT, {})
-        found = class_named(built_in.get(name, name), "controller", sorted(names(ROBOT)))
+        found = class_named(built_in.get(name, name), "controller", BUILT_IN)
     except ValueError as error:
         raise ControllerError(str(error)) from error
     if not callable(getattr(found, "step", None)):
         raise ControllerError(f"{name}: a controller needs a method step(observation) -> Command")
-    try:
-        inspect.signature(found).bind(None)
-    except (TypeError, ValueError):
-        raise ControllerError(f"{name}: a controller's constructor takes its Setup: __init__(self, setup)") from None
+    if not takes(found, 1):
+        raise ControllerError(f"{name}: a controller's constructor takes its Setup: __init__(self, setup)")
     kind: Any = parameters_of(found)
     if not isinstance(kind, type) or not issubclass(kind, msgspec.Struct):
         raise ControllerError(f"{name}: its Parameters must be a subclass of msgspec.Struct, got {kind!r}")

@@ -19,9 +19,9 @@ from zwerm.wire.messages import (
     Command,
     Failure,
     Observation,
+    check_records,
     decode_observation,
     encode,
-    encode_command,
 )
 from zwerm.wire.text import printable
 
@@ -66,7 +66,7 @@ class Node:
         self.answer = self._answering(step_with_radio)
 
     def _answering(self, step: Callable[[Observation], Command]) -> Answer:
-        decode, write, fail = decode_observation, encode_command, self._fail
+        decode, write, fail = decode_observation, encode, self._fail
 
         def answer(payload: bytes) -> bytes:
             observation = decode(payload)
@@ -76,6 +76,8 @@ class Node:
                 if command.__class__ is not Command:
                     raise TypeError(f"step() returned {command!r:.80}, expected a Command")
                 command.tick = tick
+                if command.telemetry or command.snapshot:
+                    check_records(command)
                 payload_out = write(command)
                 if len(payload_out) > MESSAGE_BYTES_MAX:
                     raise ValueError(

@@ -11,7 +11,7 @@ import pytest
 from comparisons import VARIANTS, planned
 from matplotlib.figure import Figure
 from rich.console import Console
-from support import ROOT, ZWERM
+from support import FONT_CACHE, ROOT, ZWERM
 
 from zwerm.compare.comparison import Comparison, make_comparison
 from zwerm.compare.comparison_figure import axis_label, draw_comparison
@@ -94,6 +94,7 @@ def test_comparison_tables_fit_the_width_of_the_terminal(gossip: Path, tmp_path:
 
 def zwerm(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "140", "HOME": str(cwd)}
+    environment["MPLCONFIGDIR"] = FONT_CACHE
     return subprocess.run(
         [sys.executable, *ZWERM, *arguments], cwd=cwd, env=environment, capture_output=True, text=True, timeout=120
     )

@@ -51,7 +51,7 @@ def test_a_robot_killed_mid_run_does_not_end_the_run_if_on_crash_is_continue(not
     assert result.middleware_lost == 0
 
 
-def test_a_straggler_ends_the_run_with_its_name(nothing_left: None) -> None:
+def test_a_straggler_ends_the_run_with_its_name(nothing_left: None, impatient: None) -> None:
     result = run(scenario(robots=troubled("Hangs"), time={"straggler_s": 0.5}))
     assert result.outcome == "failed"
     assert result.reason == "tick 3: no command from node 1 within 0.5 s"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support import ROOT, scenario
+from support import FONT_CACHE, ROOT, scenario
 
 from zwerm.scenario.tables import Scenario
 from zwerm.scenario.user_modules import find_user_modules, spec_of
@@ -47,7 +47,7 @@ def write(folder: Path, imports: str = "from ident_helper import speed", body: s
 def run_study(folder: Path, *options: str) -> str:
     """Run the study in a process of its own, and return the line that counts trials and those after it."""
     command = "import sys; sys.path.insert(0, '.'); from zwerm.cli.app import main; main()"
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "120", "MPLCONFIGDIR": str(folder)}
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "120", "MPLCONFIGDIR": FONT_CACHE}
     done = subprocess.run(
         [sys.executable, "-c", command, "study", "study.toml", "--jobs", "1", *options],
         cwd=folder,

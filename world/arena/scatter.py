@@ -9,12 +9,12 @@ place of the grid has one in reach. (Uniform sampling until all is covered takes
 from typing import Final
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import ScatterTable, Scenario
 from zwerm.world.arena.arena import Arena
+from zwerm.world.geometry.search_tree import tree_of
 from zwerm.world.scene import Floats
 
 # The grid of places is this many times finer than the dispersion.
@@ -42,7 +42,7 @@ def scatter(table: ScatterTable, arena: Arena, seed: int) -> Floats:
     places = np.array([xmin, ymin]) + spacing * (np.column_stack([cell % columns, cell // columns]) + offset)
     inside = arena.contains(places)
     places, cell = places[inside], cell[inside]
-    tree = cKDTree(places)
+    tree = tree_of(places)
     covered = np.zeros(len(places), dtype=np.bool_)
     chosen: list[int] = []
     for place in np.argsort(draws.bits("landmark-scatter-order", cell), kind="stable").tolist():

@@ -17,8 +17,6 @@ from shapely.geometry import LineString, MultiPolygon, Polygon, box
 from zwerm.errors import ScenarioError
 from zwerm.scenario.tables import ArenaTable
 from zwerm.scenario.types import Point, is_file
-from zwerm.world.arena.grid_maps import SUFFIXES, grid_space
-from zwerm.world.arena.maps import read_map
 
 Space: TypeAlias = Polygon | MultiPolygon
 T = TypeVar("T")
@@ -86,6 +84,10 @@ def _space(table: ArenaTable, folder: Path) -> Space:
         raise ScenarioError([f"arena: expected exactly one of {', '.join(_SOURCES)}, got {got}"])
     if table.map is not None:
         path = _find(table.map, folder, "arena.map")
+        # Not above: what reads maps is slow to import, and few arenas are maps.
+        from zwerm.world.arena.grid_maps import SUFFIXES, grid_space
+        from zwerm.world.arena.maps import read_map
+
         return grid_space(path, table) if path.suffix.lower() in SUFFIXES else read_map(path, table)
     stray = [key for key in ("resolution_m", "start") if getattr(table, key) is not None]
     if stray:

@@ -14,7 +14,6 @@ from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import BodyVelocity, WheelSpeeds
 from zwerm.world.arena.arena import Arena
 from zwerm.world.arena.entrance import Depots, EntrySchedule
-from zwerm.world.arena.grid_maps import root_placement
 from zwerm.world.arena.placement import place
 from zwerm.world.bodies.drives import Drives
 from zwerm.world.bodies.physics import Physics
@@ -53,6 +52,8 @@ class Bodies:
         elif self._entry is None:
             placement = scenario.robots.placement
             if placement.kind == "roots":
+                from zwerm.world.arena.grid_maps import root_placement  # slow to import, and few arenas are maps
+
                 placement = root_placement(placement, scenario.arena, scenario.folder, count)
             positions, headings = place(placement, arena, count, body.radius_m, draws)
             for robot in range(count):

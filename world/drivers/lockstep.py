@@ -80,9 +80,11 @@ class LockStep(Driver):
                     self._take(arrival)
                     missing = len(world.awaited())
                     continue
-                with contextlib.suppress(ProtocolError):  # the world has counted the refusal
+                try:
                     accept(node, payload)
-                    missing -= 1
+                except ProtocolError:
+                    continue  # the world has counted the refusal
+                missing -= 1
             if self._evicted:
                 missing, self._evicted = len(world.awaited()), False
             if not fatal and world.ending(within_tick=True) is not None:

@@ -3,7 +3,6 @@
 Input: `[[faults]]` tables of a scenario. Output: checked parameters, or every mistake in a table at once.
 """
 
-import inspect
 from typing import Any
 
 from pydantic import ValidationError
@@ -11,7 +10,7 @@ from pydantic import ValidationError
 from zwerm.catalogue import FAULTS
 from zwerm.errors import ScenarioError
 from zwerm.scenario.diagnostics import mistakes
-from zwerm.scenario.plugin_names import class_named
+from zwerm.scenario.plugin_names import class_named, takes
 from zwerm.scenario.tables import Scenario
 from zwerm.scenario.types import OpenTable
 from zwerm.world.faults import Fault, FaultTable, unknown_nodes
@@ -28,10 +27,8 @@ def find(kind: str) -> type[Fault]:
         raise ValueError(f"{kind} is no fault: its `Parameters` must be a subclass of FaultTable")
     # A class with the same methods need not inherit: it gets the defaults of the base class behind its own attributes.
     kept = found if issubclass(found, Fault) else type(found.__name__, (found, Fault), {})
-    try:
-        inspect.signature(kept).bind(None, None)
-    except (TypeError, ValueError):
-        raise ValueError(f"{kind} is no fault: its constructor must take (parameters, context)") from None
+    if not takes(kept, 2):
+        raise ValueError(f"{kind} is no fault: its constructor must take (parameters, context)")
     return kept
 
 

@@ -11,7 +11,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError
 
 from zwerm.world.geometry.pairs import every_pair
 from zwerm.world.scene import Floats, Ints
@@ -43,6 +42,8 @@ class Tessellation:
     """The Delaunay pairs of moving points."""
 
     def __init__(self) -> None:
+        import scipy.spatial  # noqa: F401  now, so that no tick waits for it
+
         self._mesh: _Mesh | None = None
         self._rows: dict[
             tuple[int, int], int
@@ -179,6 +180,8 @@ def _triangulate(position: Floats) -> tuple[_Mesh | None, Ints]:
     count = len(position)
     if count < 4:
         return None, np.column_stack(every_pair(count))
+    from scipy.spatial import Delaunay, QhullError  # slow to import, and few swarms need it
+
     try:
         found = Delaunay(position)
     except QhullError:  # all points on one line, or at one place

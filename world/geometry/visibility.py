@@ -8,17 +8,14 @@ quadratic, and cubic if robots also occlude each other. Headings, noise and radi
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from zwerm.world.arena.arena import Arena
 from zwerm.world.geometry.pairs import every_pair
+from zwerm.world.geometry.search_tree import FEW_ROBOTS, tree_of
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 
 # Occluding robots are tested against this many lines at a time: it bounds memory and fits the cache.
 _TRIPLES_AT_ONCE = 1 << 15
-
-# Up to this many robots all pairs are measured: a search tree costs more.
-_FEW_ROBOTS = 128
 
 # Up to this fraction of the present robots, observers are measured against all robots: the other pairs are not needed.
 _FEW_OBSERVERS = 0.25
@@ -98,14 +95,14 @@ class NearPairs:
         position = scene.position[ids]
         # Slightly too far, so that the comparison in `pairs` alone decides at the edge.
         farther_m = reach_m * (1.0 + 1e-9)
-        if len(ids) <= _FEW_ROBOTS:
+        if len(ids) <= FEW_ROBOTS:
             first, second = every_pair(len(ids))
             x, y = position.T
             apart2 = (x[second] - x[first]) ** 2 + (y[second] - y[first]) ** 2
             near = np.flatnonzero(apart2 <= farther_m**2)
             pairs, apart2 = np.column_stack([first[near], second[near]]), apart2[near]
         else:
-            pairs = cKDTree(position).query_pairs(farther_m, output_type="ndarray")
+            pairs = tree_of(position).query_pairs(farther_m, output_type="ndarray")
             pairs = pairs[np.argsort(pairs[:, 0] * len(ids) + pairs[:, 1])]
             dx, dy = position[pairs[:, 1]].T - position[pairs[:, 0]].T
             apart2 = dx**2 + dy**2

@@ -34,6 +34,8 @@ class VoronoiCells:
         self._outline, self._field = outline_of(arena), field
         self._tessellation = Tessellation()
         self._cells: list[CachedVoronoiCell] = []
+        # The newest pairs, and both of their directions.
+        self._last: tuple[Ints, tuple[Ints, Ints, list[int]]] | None = None
 
     def cells(self, position: Floats) -> list[Polygon]:
         """Return for each of position (n, 2) its cell's corners relative to it [m]; empty for one that has none."""
@@ -46,12 +48,12 @@ class VoronoiCells:
         """Return (n, 2) the vector from each of position (n, 2) to the goal of an undisturbed robot there [m]."""
         if len(self._cells) != len(position):
             self._cells = [CachedVoronoiCell() for _ in position]
-        value, gradient = self._field.value(position).tolist(), self._field.gradient(position).tolist()
+        value, gradient = self._field.sample(position)
         return np.array(
             [
                 cell.target(outline, others, phi, gx, gy)
                 for cell, outline, others, phi, (gx, gy) in zip(
-                    self._cells, *self._seen(position), value, gradient, strict=True
+                    self._cells, *self._seen(position), value.tolist(), gradient.tolist(), strict=True
                 )
             ]
         )
@@ -59,11 +61,10 @@ class VoronoiCells:
     def _seen(self, position: Floats) -> tuple[list[list[Corner]], list[tuple[Neighbour, ...]]]:
         """Return the outline and the Voronoi neighbours relative to each of position (n, 2)."""
         pairs = self._tessellation.pairs(position)
-        observer, seen = np.concatenate([pairs, pairs[:, ::-1]]).T
-        order = np.argsort(observer, kind="stable")
-        observer, seen = observer[order], seen[order]
+        if self._last is None or self._last[0] is not pairs:
+            self._last = pairs, _both_ways(pairs, len(position))
+        observer, seen, ends = self._last[1]
         x, y = (position[seen] - position[observer]).T.tolist()
-        ends = np.searchsorted(observer, np.arange(len(position)), side="right").tolist()
         others = list(map(Neighbour, seen.tolist(), x, y))
         outlines = [list(map(tuple, outline)) for outline in (self._outline - position[:, None, :]).tolist()]
         return outlines, [tuple(others[start:end]) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
@@ -81,6 +82,14 @@ class VoronoiCells:
             for cell, (px, py) in zip(self.cells(position), position.tolist(), strict=True)
         ]
         return integrate(cells, position, self._field)
+
+
+def _both_ways(pairs: Ints, count: int) -> tuple[Ints, Ints, list[int]]:
+    """Return both directions of pairs (k, 2) of rows below `count`: the observer, ascending; the other; each observer's end."""
+    observer, seen = np.concatenate([pairs, pairs[:, ::-1]]).T
+    order = np.argsort(observer, kind="stable")
+    observer, seen = observer[order], seen[order]
+    return observer, seen, np.searchsorted(observer, np.arange(count), side="right").tolist()
 
 
 class Rings:

@@ -36,9 +36,8 @@ class WallIndex:
         for axis in (0, 1):  # the cells entered through a side across this axis
             line, entered, t = _crossings(a[:, axis], b[:, axis])
             beside = a[line, 1 - axis] + t * (b[line, 1 - axis] - a[line, 1 - axis])
-            corner = np.flatnonzero(
-                np.abs(beside - np.round(beside)) <= _SLACK
-            )  # it may enter either of two cells there
+            # At a corner of the grid a line may enter either of two cells.
+            corner = np.flatnonzero(np.abs(beside - np.round(beside)) <= _SLACK)
             line = np.concatenate([line, line[corner], line[corner]])
             entered = np.concatenate([entered, entered[corner], entered[corner]])
             other = np.concatenate([np.floor(beside), np.round(beside[corner]), np.round(beside[corner]) - 1.0])

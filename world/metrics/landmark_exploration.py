@@ -10,13 +10,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Final
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from zwerm.agents.landmark_exploration.mapping.map_reports import GoalReport, MapReport, read_report
 from zwerm.maths.strong_collapse import betti
 from zwerm.scenario.tables import Scenario
 from zwerm.world.arena.arena import Arena
 from zwerm.world.arena.scatter import with_landmarks
+from zwerm.world.geometry.search_tree import tree_of
 from zwerm.world.metrics import Metric, MetricContext, Truth
 from zwerm.world.metrics.sight import obstacles
 from zwerm.world.scene import Floats
@@ -89,7 +89,7 @@ def visible(arena: Arena, landmarks: Floats, range_m: float, places: Floats) -> 
     seen: list[list[int]] = [[] for _ in places]
     if not len(landmarks) or not len(places):
         return seen
-    near = cKDTree(landmarks).query_ball_point(places, range_m, return_sorted=True)
+    near = tree_of(landmarks).query_ball_point(places, range_m, return_sorted=True)
     place = np.repeat(np.arange(len(places)), [len(each) for each in near])
     landmark = np.concatenate([np.array(each, dtype=np.int64) for each in near])
     for start in range(0, len(place), _LINES_AT_ONCE):

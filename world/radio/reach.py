@@ -8,8 +8,8 @@ distances. For many senders it keeps the pairs within the bound and a margin, un
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from zwerm.world.geometry.search_tree import tree_of
 from zwerm.world.scene import Bools, Floats, Ints, Scene
 
 # The search is slightly too far, so that the model alone decides at the edge of its range.
@@ -109,7 +109,7 @@ class _NearPairs:
         self._margin_m = _MARGIN_FRACTION * bound_m
         self._position = position
         self._ids = ids
-        pairs = ids[cKDTree(position[ids]).query_pairs(bound_m + self._margin_m, output_type="ndarray")]
+        pairs = ids[tree_of(position[ids]).query_pairs(bound_m + self._margin_m, output_type="ndarray")]
         sender, receiver = np.concatenate([pairs, pairs[:, ::-1]]).T
         self._receiver = receiver[np.argsort(sender * len(position) + receiver)]
         self._counts = np.bincount(sender, minlength=len(position))

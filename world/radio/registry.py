@@ -4,7 +4,6 @@ Input: the shorthands and the `models` tables of a channel. Output: the models i
 the tables at once. The shorthands come first: range, line of sight, loss.
 """
 
-import inspect
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,7 +15,7 @@ from zwerm.catalogue import RADIO_MODELS
 from zwerm.errors import ScenarioError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.diagnostics import mistakes
-from zwerm.scenario.plugin_names import class_named
+from zwerm.scenario.plugin_names import class_named, takes
 from zwerm.scenario.tables import ChannelTable, Scenario
 from zwerm.scenario.types import OpenTable
 from zwerm.world.arena.arena import Arena
@@ -80,10 +79,8 @@ def find(kind: str) -> type[RadioModel]:
     parameters = getattr(found, "Parameters", RadioModelTable)
     if not isinstance(parameters, type) or not issubclass(parameters, RadioModelTable):
         raise ValueError(f"{kind} is no radio model: its `Parameters` must be a subclass of RadioModelTable")
-    try:
-        inspect.signature(found).bind(None, None)
-    except (TypeError, ValueError):
-        raise ValueError(f"{kind} is no radio model: its constructor must take (parameters, context)") from None
+    if not takes(found, 2):
+        raise ValueError(f"{kind} is no radio model: its constructor must take (parameters, context)")
     # A class with the same methods need not inherit: it gets the defaults of the base class behind its own attributes.
     return found if issubclass(found, RadioModel) else type(found.__name__, (found, RadioModel), {})
 

@@ -10,11 +10,11 @@ from collections.abc import Callable, Collection
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from zwerm.maths.angles import wrap
 from zwerm.scenario.types import NonNegative, Positive, Table
 from zwerm.wire.messages import LandmarkBearing
+from zwerm.world.geometry.search_tree import tree_of
 from zwerm.world.geometry.visibility import WallVerdicts
 from zwerm.world.scene import Bools, Ints, Scene
 from zwerm.world.sensors import Sensor, Surroundings, chosen, portions, random_angle
@@ -51,7 +51,7 @@ class Landmarks(Sensor):
         self._presence_only = parameters.presence_only
         self._through_walls = parameters.through_walls or surroundings.arena.is_convex
         self._landmarks = surroundings.landmarks
-        self._tree = cKDTree(surroundings.landmarks)
+        self._tree = tree_of(surroundings.landmarks)
         self._verdicts = WallVerdicts()
         self._read_at = np.full((surroundings.count, 2), np.nan)
 
@@ -83,7 +83,7 @@ class Landmarks(Sensor):
             return row, landmark
         # Slightly too far, so that only the exact comparison below decides at the edge of the range.
         reach_m = self._range_m * (1.0 + 1e-9)
-        found = cKDTree(position).sparse_distance_matrix(self._tree, reach_m, output_type="ndarray")
+        found = tree_of(position).sparse_distance_matrix(self._tree, reach_m, output_type="ndarray")
         order = np.argsort(found["i"] * len(landmarks) + found["j"])
         row, landmark = found["i"][order], found["j"][order]
         apart = landmarks[landmark] - position[row]

@@ -4,7 +4,6 @@ Input: the `[[robots.sensors]]` tables of a scenario. Output: sensors that fill 
 mistake in the tables at once.
 """
 
-import inspect
 from collections.abc import Sequence
 
 from pydantic import ValidationError
@@ -12,7 +11,7 @@ from pydantic import ValidationError
 from zwerm.catalogue import SENSORS
 from zwerm.errors import ScenarioError
 from zwerm.scenario.diagnostics import mistakes
-from zwerm.scenario.plugin_names import class_named
+from zwerm.scenario.plugin_names import class_named, takes
 from zwerm.scenario.types import OpenTable, Table
 from zwerm.wire.messages import SENSOR_FIELDS, Observation
 from zwerm.world.sensors import Sensor, Surroundings
@@ -36,10 +35,8 @@ def find(kind: str) -> type[Sensor]:
     parameters = getattr(found, "Parameters", None)
     if not isinstance(parameters, type) or not issubclass(parameters, Table):
         raise ValueError(f"{kind} is no sensor: its `Parameters` must be a subclass of zwerm.scenario.types.Table")
-    try:
-        inspect.signature(found).bind(None, None)
-    except (TypeError, ValueError):
-        raise ValueError(f"{kind} is no sensor: its constructor must take (parameters, surroundings)") from None
+    if not takes(found, 2):
+        raise ValueError(f"{kind} is no sensor: its constructor must take (parameters, surroundings)")
     # A class with the same methods need not inherit: it gets the defaults of the base class behind its own attributes.
     return found if issubclass(found, Sensor) else type(found.__name__, (found, Sensor), {})
 

@@ -24,7 +24,7 @@ from zwerm.version import __version__
 
 HELP: Final = (
     "Emulate robot swarms as what they are: many processes that pass messages, with bit-identical runs.\n\n"
-    "[bold]zwerm my_module:my_command ARGS[/bold] runs a command of your own: a typer or click command, or a function with "
+    "`zwerm my_module:my_command ARGS` runs a command of your own: a typer or click command, or a function with "
     "type annotations, in my_module.py of the current directory or in an installed package."
 )
 
@@ -38,9 +38,10 @@ class LazyCommands(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in self._loaded:
             module, _, function = COMMANDS[name].partition(":")
-            single = typer.Typer(add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False)
+            single = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
             found = getattr(import_module(module), function)
-            single.command(name, help=_unwrapped(found.__doc__))(found)
+            text = help_text(found.__doc__)
+            single.command(name, help=text, short_help=text.partition("\n\n")[0])(found)
             self._loaded[name] = typer.main.get_command(single)
         return self._loaded[name]
 
@@ -51,9 +52,11 @@ class LazyCommands(Mapping[str, Any]):
         return len(COMMANDS)
 
 
-def _unwrapped(docstring: str) -> str:
-    """Return a docstring with each paragraph on one line: the terminal wraps it."""
-    return re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.cleandoc(docstring))
+def help_text(docstring: str) -> str:
+    """Return a docstring as help: the terminal wraps its paragraphs, but not the commands that are paragraphs."""
+    paragraphs = re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.cleandoc(docstring))
+    commands = re.sub(r"^\[bold\](.*)\[/bold\]$", r"\b\n    \1", paragraphs, flags=re.MULTILINE)
+    return re.sub(r"\[/?bold\]", "`", commands).replace(r"\[", "[")
 
 
 class LazyGroup(TyperGroup):
@@ -64,12 +67,13 @@ class LazyGroup(TyperGroup):
         self.commands: Any = LazyCommands()
 
 
+# Without markup: importing what renders it takes more time than all else of the help.
 app = typer.Typer(
     name="zwerm",
     cls=LazyGroup,
     no_args_is_help=True,
     add_completion=True,
-    rich_markup_mode="rich",
+    rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     help=HELP,

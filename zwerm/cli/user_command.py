@@ -53,7 +53,7 @@ def command_runner(name: str) -> Callable[..., Any]:
 
 def _as_app(function: Callable[..., Any]) -> typer.Typer:
     settings = {"help_option_names": ["-h", "--help"]}
-    single = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich")
+    single = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     single.command(context_settings=settings)(function)
     return single
 

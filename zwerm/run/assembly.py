@@ -19,6 +19,7 @@ from zwerm.world.arena.scatter import with_landmarks
 from zwerm.world.bodies.drives import find_drive
 from zwerm.world.fields import Field
 from zwerm.world.fields.registry import make_field
+from zwerm.world.geometry import search_tree
 from zwerm.world.metrics.observers import Observers, make_observers
 from zwerm.world.sensors import Sensor, Surroundings
 from zwerm.world.sensors.registry import find as find_sensor
@@ -38,7 +39,6 @@ def assemble_run(scenario: Scenario, seed: int) -> tuple[World, Observers]:
 
     Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the faults and the placement.
     """
-    search_first(scenario.folder)
     scenario = _with_landmarks(scenario, seed)
     arena, sensors, observers = prepare(scenario)
     mistakes: list[str] = []
@@ -84,6 +84,7 @@ def prepare(scenario: Scenario) -> Prepared:
     if arena is not None and (field is not None or table is None):
         sensors = _attempt(lambda: _sensors(scenario, arena, field), scenario, mistakes)
         observers = _attempt(lambda: make_observers(scenario, arena, field), scenario, mistakes)
+    search_tree.prepare(scenario.robots.count)
     if arena is None or sensors is None or observers is None or mistakes:
         raise ScenarioError(blame(mistakes, scenario.place, scenario.overrides))
     return Prepared(arena, sensors, observers)

@@ -31,9 +31,10 @@ def locate(name: str) -> Path:
 
     Raises ScenarioError where neither exists.
     """
-    if name in built_in():
-        return built_in()[name]
     path = Path(name)
+    own = BUILT_IN / f"{name}.toml"
+    if path.name == name and is_file(own):
+        return own
     if is_file(path):
         return path
     if is_file(STUDIES / f"{name}.toml"):
@@ -69,7 +70,7 @@ def load(name: str, overrides: tuple[str, ...] = (), blamed: tuple[str, ...] | N
     mistake.
     """
     tables, path = tables_of(name, overrides)
-    return validate(tables, str(path), path.parent, overrides if blamed is None else blamed)
+    return _validated(tables, str(path), path.parent, overrides if blamed is None else blamed)
 
 
 def tables_of(name: str, overrides: tuple[str, ...] = ()) -> tuple[dict[str, Any], Path]:
@@ -92,6 +93,10 @@ def validate(tables: dict[str, Any], place: str, folder: Path, overrides: tuple[
     """
     tables = copy.deepcopy(tables)
     rename(tables, place)
+    return _validated(tables, place, folder, overrides)
+
+
+def _validated(tables: dict[str, Any], place: str, folder: Path, overrides: tuple[str, ...]) -> Scenario:
     try:
         scenario = Scenario.model_validate(tables)
     except ValidationError as error:

@@ -4,9 +4,11 @@ A module is looked for in the scenario's folder, then in the working directory, 
 """
 
 import importlib
+import inspect
 import sys
 import traceback
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from importlib.machinery import PathFinder
 from pathlib import Path
 from types import ModuleType
@@ -52,6 +54,20 @@ def class_named(name: str, what: str, built_in: Iterable[str]) -> type[Any]:
         module_name, _, class_name = name.partition(":")
         raise ValueError(f"module {module_name!r} has no class {class_name!r}")
     return found
+
+
+def takes(found: Any, count: int) -> bool:
+    """Return whether a class can be called with `count` arguments. A swarm asks this of one class many times."""
+    return _takes(found, count)
+
+
+@lru_cache(maxsize=128)
+def _takes(found: Any, count: int) -> bool:
+    try:
+        inspect.signature(found).bind(*(None for _ in range(count)))
+    except (TypeError, ValueError):
+        return False
+    return True
 
 
 def _imported(name: str, what: str) -> Any:

@@ -293,13 +293,14 @@ def open_answer(payload: bytes) -> Command | Failure:
         raise ProtocolError("telemetry", str(found)) if "`$.telemetry" in str(found) else found from None
     if type(answer) is Command:
         drive, wake = answer.drive, answer.wake
-        # Most drives are finite velocities: these pass without a function call.
-        if not (
-            drive is None
-            or (type(drive) is BodyVelocity and isfinite(drive.forward_m_s + drive.left_m_s + drive.turn_rad_s))
-            or is_finite_drive(drive)
-        ):
-            raise ProtocolError("not-finite", repr(drive))
+        if drive is not None:
+            # A sum is finite only if each of its terms is.
+            if isinstance(drive, BodyVelocity):
+                total = drive.forward_m_s + drive.left_m_s + drive.turn_rad_s
+            else:
+                total = drive.left_m_s + drive.right_m_s
+            if not isfinite(total):
+                raise ProtocolError("not-finite", repr(drive))
         if wake is not None and wake.at_s is not None and not isfinite(wake.at_s):
             raise ProtocolError("not-finite", repr(wake))
         if answer.telemetry and (rule := telemetry_error(answer.telemetry)):
@@ -312,11 +313,20 @@ def encode_command(command: Command) -> bytes:
 
     Raises TypeError or ValueError that names the field, the rule and the value.
     """
+    if command.telemetry or command.snapshot:
+        check_records(command)
+    return encode(command)
+
+
+def check_records(command: Command) -> None:
+    """Check a controller's telemetry and snapshot, and turn the telemetry into plain floats.
+
+    Raises TypeError or ValueError that names the field, the rule and the value.
+    """
     if command.telemetry:
         command.telemetry = plain_numbers(command.telemetry)
     if command.snapshot and type(command.snapshot) is not bytes:
         raise TypeError(f"snapshot: expected bytes, got {type(command.snapshot).__name__}")
-    return encode(command)
 
 
 def traced_bytes(command: Command, payload: bytes) -> bytes:
@@ -327,10 +337,3 @@ def traced_bytes(command: Command, payload: bytes) -> bytes:
     if not command.telemetry and not command.snapshot:
         return payload
     return encode(msgspec.structs.replace(command, telemetry={}, snapshot=b""))
-
-
-def is_finite_drive(drive: BodyVelocity | WheelSpeeds) -> bool:
-    """Return whether every number of `drive` is finite."""
-    if isinstance(drive, BodyVelocity):
-        return isfinite(drive.forward_m_s + drive.left_m_s + drive.turn_rad_s)
-    return isfinite(drive.left_m_s + drive.right_m_s)

@@ -1,11 +1,12 @@
 """Bearings in 256 steps of a full turn, and conclusions from a set of them about the place of the observer.
 
 A step is 1.4 degrees, less than the standard deviation of the sensor (pi/72), and fits into a byte of a message. All robots
-derive the same from an observation because all derive it from these steps.
+draw the same conclusions from an observation because all use these steps.
 """
 
 import math
 from collections.abc import Iterable, Sequence
+from operator import sub
 from typing import Final, NamedTuple
 
 # Landmark ids are below this.
@@ -51,11 +52,8 @@ def widest_gap(bearings: Sequence[int]) -> int:
     if len(bearings) < 2:
         return STEPS
     ordered = sorted(bearings)
-    before, widest = ordered[-1] - STEPS, 0
-    for each in ordered:
-        widest = max(widest, each - before)
-        before = each
-    return widest
+    gaps: list[int] = [ordered[0] - ordered[-1] + STEPS, *map(sub, ordered[1:], ordered)]
+    return max(gaps)
 
 
 def is_inside(bearings: Sequence[int]) -> bool:

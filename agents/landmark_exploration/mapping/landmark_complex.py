@@ -5,7 +5,9 @@ face of another one. The navigation graph (section IV-B) joins two of them that 
 edge costs 1 / (shared - 1) (section IV-C). The result does not depend on the order of the observations.
 """
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
 from typing import Final
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
@@ -20,7 +22,7 @@ Simplex = tuple[int, ...]
 
 
 class LandmarkComplex:
-    """Free simplices by a number of their own, with what each is next to.
+    """Free simplices, each with a number of its own and its neighbours.
 
     `simplices[v]` are the landmarks of vertex v, ascending; `neighbours[v]` maps the vertices next to v to how many landmarks
     they share. Both hold vertices that are free now; `landmarks_of` also those that were.
@@ -74,7 +76,7 @@ class LandmarkComplex:
         return True
 
     def update(self, snapshot: BearingSnapshot, rank: Rank = (0, 0)) -> bool:
-        """Take in an observation (algorithm 2); return whether the complex has a simplex more."""
+        """Add an observation (algorithm 2); return whether the complex has a new simplex."""
         simplex = snapshot.landmarks
         known = self._bearings.get(simplex)
         if known is not None:
@@ -84,25 +86,22 @@ class LandmarkComplex:
         if not simplex:
             return False
         self._bearings[simplex] = rank, snapshot.bearings
-        if self.contains(simplex):
-            return False
-        self._insert(simplex)
+        shared = self.shared_with(simplex)
+        if max(shared.values(), default=0) == len(simplex):
+            return False  # it is a face
+        self._insert(simplex, shared)
         return True
 
-    def shared_with(self, landmarks: Sequence[int]) -> dict[int, int]:
+    def shared_with(self, landmarks: Sequence[int]) -> Mapping[int, int]:
         """Return the vertices that share landmarks with these, and how many."""
-        shared: dict[int, int] = {}
-        for landmark in landmarks:
-            for vertex in self._holders.get(landmark, ()):
-                shared[vertex] = shared.get(vertex, 0) + 1
-        return shared
+        holders = self._holders
+        return Counter(chain.from_iterable([holders[each] for each in landmarks if each in holders]))
 
     def adjacent(self, landmarks: Sequence[int]) -> dict[int, int]:
         """Return the vertices that share enough landmarks with these to navigate by, and how many."""
         return {vertex: count for vertex, count in self.shared_with(landmarks).items() if count >= SHARED_MIN}
 
-    def _insert(self, simplex: Simplex) -> None:
-        shared = self.shared_with(simplex)
+    def _insert(self, simplex: Simplex, shared: Mapping[int, int]) -> None:
         vertex = len(self._ever)
         self._ever.append(simplex)
         around: dict[int, int] = {}

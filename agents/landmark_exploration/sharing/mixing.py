@@ -1,10 +1,12 @@
 """A 64-bit mix of small numbers, for digests that robots compare (SplitMix64's finaliser; Steele, Lea, Flood 2014)."""
 
+from functools import lru_cache
 from typing import Final
 
 _MASK: Final = (1 << 64) - 1
 
 
+@lru_cache(maxsize=1 << 14)
 def mix(*parts: int) -> int:
     """Return 64 bits that depend on all of `parts` (non-negative integers) and their order; never 0."""
     state = 0

@@ -91,7 +91,7 @@ def test_a_reopened_frontier_is_open_again_and_counts_at_both_landmarks() -> Non
     for status, is_open in ((UNEXPLORED, True), (TIMED_OUT, False), (REOPENED, True), (BOUNDARY, False)):
         frontiers.raise_to(key, status)
         assert frontiers.is_open(7, 9) is is_open
-        assert frontiers.open_at == {7: int(is_open), 9: int(is_open)}
+        assert [frontiers.open_at(landmark) for landmark in (7, 9)] == [is_open, is_open]
 
 
 def test_utility_counts_each_frontier_that_shares_a_landmark_once() -> None:
@@ -117,7 +117,7 @@ def test_statuses_do_not_depend_on_the_order_of_observations(some: list[BearingS
     for each in shuffled:
         other.note(each)
     assert one.statuses == other.statuses
-    assert one.open_at.keys() | set() >= {each for key in one.open for each in pair_of(key)}
+    assert one.open_of.keys() >= {each for key in one.open for each in pair_of(key)}
     assert sorted(one.open) == sorted(other.open) == sorted(k for k, s in one.statuses.items() if s == UNEXPLORED)
 
 

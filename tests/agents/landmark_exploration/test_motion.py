@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot, to_steps
-from zwerm.agents.landmark_exploration.motion import CROSSED_TICKS, Drive, explore, homing, travel, wander
+from zwerm.agents.landmark_exploration.motion import (
+    CROSSED_TICKS,
+    PROGRESS_TICKS,
+    Drive,
+    explore,
+    homing,
+    travel,
+    wander,
+)
 from zwerm.agents.landmark_exploration.view import ExplorerView, Slide
 from zwerm.wire.messages import Contact, LandmarkBearing, Observation
 
@@ -81,6 +89,39 @@ def test_travel_gives_up_where_nothing_on_the_path_is_seen() -> None:
     plane = Plane(0.3, 0.2)
     drive = travel(plane.view, [BearingSnapshot((90, 91), (0, 64))], random(), lambda: False)
     assert plane.follow(drive) == "unreached"
+
+
+def test_travel_goes_all_the_way_back_to_a_vertex_where_the_next_is_lost_from_sight() -> None:
+    """The vertex ahead is seen at every other tick only: a robot that aims at it whenever it can does not get on."""
+    plane = Plane(0.4, 0.3)
+    here, ahead = snapshot_at(0.3, 0.6), BearingSnapshot((90, 91), (0, 64))  # to the left, and down to the right
+    aims: list[str] = []
+    take = plane.look
+
+    def look() -> None:
+        take()
+        if len(aims) % 2 == 0:
+            plane.view.bearing |= {90: -0.8, 91: -0.2}
+        aims.append("both" if 90 in plane.view.bearing else "one")
+
+    plane.look = look  # type: ignore[method-assign]
+    look()
+    closest = math.inf
+    drive = travel(plane.view, [here, ahead], random(), lambda: False)
+    for _ in range(30):
+        direction = next(drive)
+        assert direction is not None
+        plane.x, plane.y = plane.x + STEP * math.cos(direction), plane.y + STEP * math.sin(direction)
+        plane.look()
+        closest = min(closest, math.hypot(plane.x - 0.3, plane.y - 0.6))
+    assert closest < 0.15
+
+
+def test_travel_gives_up_without_progress_however_long_the_path_is() -> None:
+    plane = Plane(0.3, 0.2, above=0.3)
+    path = [snapshot_at(0.3, 0.9)] + [BearingSnapshot((90, 91), (0, 64))] * 50
+    assert plane.follow(travel(plane.view, path, random(), lambda: False)) == "unreached"
+    assert plane.tick < 2 * PROGRESS_TICKS
 
 
 def test_exploring_ends_left_of_the_line_wherever_it_begins() -> None:

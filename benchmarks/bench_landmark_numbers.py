@@ -1,0 +1,262 @@
+"""The numbers that landmark-based exploration is asked for, in runs that can be interrupted: each trial is kept in a file.
+
+`--only GROUP ...` carries out some groups of trials, and `--show` none. A trial is one run, inline on one core. All trials are
+kept as lines of JSON in `runs/landmark-numbers.jsonl`, with the commit of the code. Trials of other commits are left out,
+unless `--commit` names one. `--runs FILE` writes them as CSV.
+The halls of the group `halls` are drawn: their size, obstacles, landmarks, robots and trouble.
+"""
+
+import argparse
+import json
+import subprocess
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from statistics import mean
+from typing import Any, Final
+
+import numpy as np
+from csv_rows import add_csv_option, write_csv
+
+from zwerm import run
+
+ROOT: Final = Path(__file__).parents[1]
+TRIALS: Final = ROOT / "runs" / "landmark-numbers.jsonl"
+CODE: Final = ("zwerm", "agents", "coordinator", "world", "scenarios")
+
+GOSSIP: Final = ("services.map=gossip", "services.assignment=claims")
+LONG: Final = "time.duration_s=1200"
+
+
+def robots(count: int) -> tuple[str, str]:
+    """Return the settings for a number of robots."""
+    return f"robots.count={count}", f"robots.parameters.robots_expected={count}"
+
+
+# Group: scenario, settings, seeds.
+GROUPS: Final[dict[str, tuple[str, tuple[str, ...], int]]] = {
+    "free": ("landmark-free", (LONG,), 10),
+    "free-gossip": ("landmark-free", (LONG, *GOSSIP), 10),
+    "free-gossip-loss": ("landmark-free", (LONG, *GOSSIP, "radio.loss=0.5"), 8),
+    "free-gossip-range": ("landmark-free", (LONG, *GOSSIP, "radio.range_m=0.7"), 10),
+    "simple": ("landmark-simple", (LONG,), 8),
+    # The first runs end by themselves, the others when completion is certain.
+    "complex-whole": ("landmark-complex", (LONG,), 2),
+    "complex": ("landmark-complex", ("time.duration_s=350",), 8),
+    "complex-gossip": ("landmark-complex", ("time.duration_s=200", *GOSSIP), 2),
+    "complex-20": ("landmark-complex", ("time.duration_s=400", *robots(20)), 3),
+    "complex-10": ("landmark-complex", ("time.duration_s=700", *robots(10)), 3),
+    "navigate": ("landmark-navigate", (), 1),
+    "halls": ("landmark-free", GOSSIP, 100),
+}
+
+KEPT: Final = (
+    "completion_fraction",
+    "iterations",
+    "iterations_to_90_percent_completion",
+    "iterations_to_91_5_percent_completion",
+    "iterations_to_95_percent_completion",
+    "landmarks",
+    "landmark_complex_holes",
+    "obstacles",
+    "open_frontiers",
+    "concluded_early",
+    "navigation_goals",
+    "navigation_success_fraction",
+    "navigation_iterations_mean",
+    "bytes_per_robot_mean",
+)
+COLUMNS: Final = ("group", "seed", "commit", "outcome", "problems", "processor_s", *KEPT)
+
+
+def hall(seed: int) -> tuple[str, ...]:
+    """Return the settings of a drawn hall: up to two boxes in it, 4 to 7 robots, and trouble of the radio."""
+    random = np.random.default_rng([14, seed])
+    width, height = random.uniform(2.6, 4.6), random.uniform(2.4, 3.6)
+    boxes = []
+    for each in range(int(random.integers(0, 3))):
+        x, y = width * (0.2 + 0.45 * each), random.uniform(0.7, height - 1.3)
+        dx, dy = random.uniform(0.3, 0.7, 2)
+        boxes.append([[x, y], [x + dx, y], [x + dx, y + dy], [x, y + dy]])
+    robots = int(random.integers(4, 8))
+    trouble = (
+        ("radio.loss=0.5",),
+        ("radio.range_m=0.7",),
+        ("radio.loss=0.5", "radio.range_m=0.7"),
+        ("radio.models=[{kind='gilbert_elliott', loss_fraction=0.5, burst_packets=32.0}]",),
+        ("faults=[{kind='partition', groups=[[0, 1], [2, 3]], at_s=2.0, for_s=60.0}]",),
+        (
+            "radio.loss=0.3",
+            "faults=[{kind='crash', nodes=[1], at_s=15.0}, {kind='crash', nodes=[2], at_s=20.0, until_s=30.0}]",
+        ),
+    )[seed % 6]
+    return (
+        f"arena.size_m=[{width:.3f},{height:.3f}]",
+        f"arena.obstacles={json.dumps([[[round(x, 3), round(y, 3)] for x, y in box] for box in boxes])}",
+        f"scatter.dispersion_m={random.uniform(0.45, 0.65):.3f}",
+        f"robots.count={robots}",
+        f"robots.parameters.robots_expected={robots}",
+        "robots.parameters.dead_ticks=800",
+        "robots.on_crash=continue",
+        *trouble,
+    )
+
+
+def commit_now() -> str:
+    """Return the last commit that changed the code."""
+    command = ["git", "log", "-1", "--format=%h", "--abbrev=7", "--", *CODE]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def trials(commit: str) -> Iterator[dict[str, Any]]:
+    """Yield the trials that are kept of a commit."""
+    lines = TRIALS.read_text(encoding="utf-8").splitlines() if TRIALS.exists() else []
+    yield from (trial for trial in map(json.loads, lines) if trial["commit"] == commit)
+
+
+def carry_out(group: str, commit: str) -> None:
+    """Run the trials of a group that are not kept yet, and keep each."""
+    scenario, settings, seeds = GROUPS[group]
+    done = {trial["seed"] for trial in trials(commit) if trial["group"] == group}
+    for seed in range(1, seeds + 1):
+        if seed in done:
+            continue
+        began = time.process_time()
+        result = run(scenario, seed, "inline", [*settings, *(hall(seed) if group == "halls" else ())])
+        trial = {
+            "group": group,
+            "seed": seed,
+            "commit": commit,
+            "outcome": result.outcome,
+            "problems": len(result.problems),
+            "processor_s": round(time.process_time() - began, 1),
+            **{name: result.metrics[name] for name in KEPT if name in result.metrics},
+        }
+        TRIALS.parent.mkdir(parents=True, exist_ok=True)
+        with TRIALS.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(trial) + "\n")
+        print(group, seed, trial["outcome"], int(result.ticks), trial["processor_s"], flush=True)
+
+
+class Group:
+    """The trials of one group."""
+
+    def __init__(self, name: str, some: Sequence[dict[str, Any]]) -> None:
+        self.trials = [trial for trial in some if trial["group"] == name]
+
+    def __len__(self) -> int:
+        return len(self.trials)
+
+    def values(self, metric: str) -> list[float]:
+        """Return the values of a metric in the trials that have it."""
+        return [trial[metric] for trial in self.trials if metric in trial]
+
+    def mean(self, metric: str) -> float:
+        """Return the mean of a metric."""
+        return mean(self.values(metric))
+
+
+def summary(some: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return a row for each number that is asked for and of which there are trials."""
+    groups = {name: Group(name, some) for name in GROUPS}
+    rows: list[dict[str, Any]] = []
+
+    def row(what: str, asked: str, measured: str, *names: str) -> None:
+        counts = sorted({len(groups[name]) for name in names})
+        rows.append({"what": what, "asked": asked, "measured": measured, "n": " and ".join(map(str, counts))})
+
+    def spread(group: Group, metric: str, digits: int) -> str:
+        values = group.values(metric)
+        return f"{mean(values):.{digits}f} ({min(values):.{digits}f} to {max(values):.{digits}f})"
+
+    for name, asked in (("free", ".96"), ("simple", ".95"), ("complex", ".915")):
+        group = groups[name]
+        if not group:
+            continue
+        row(f"completion, {name}", f"at least 0{asked}", spread(group, "completion_fraction", 3), name)
+        completed = sum(each["outcome"] == "completed" for each in group.trials)
+        if name != "complex":
+            row(f"runs completed, {name}", "", f"{completed} of {len(group)}", name)
+            row(f"iterations to the end, {name}", "", spread(group, "iterations", 0), name)
+    if groups["complex-whole"]:
+        group = groups["complex-whole"]
+        completed = sum(each["outcome"] == "completed" for each in group.trials)
+        row("runs completed, complex-whole", "", f"{completed} of {len(group)}", "complex-whole")
+        row("iterations to the end, complex-whole", "", spread(group, "iterations", 0), "complex-whole")
+        row("completion, complex-whole", "at least 0.915", spread(group, "completion_fraction", 3), "complex-whole")
+    whole = [each for name in ("free", "simple", "complex", "complex-whole") for each in groups[name].trials]
+    if whole:
+        equal = sum(each["landmark_complex_holes"] == each["obstacles"] for each in whole)
+        rows.append(
+            {
+                "what": "holes equal obstacles",
+                "asked": "in at least 95 %",
+                "measured": f"{equal} of {len(whole)}",
+                "n": str(len(whole)),
+            }
+        )
+    name = "iterations_to_91_5_percent_completion"
+    if groups["complex"]:
+        row("iterations to 91.5 %, complex", "at most 2373", spread(groups["complex"], name, 0), "complex")
+    for few, count in (("complex-10", 10), ("complex-20", 20)):
+        if groups[few] and groups["complex"]:
+            ratio = groups[few].mean(name) / groups["complex"].mean(name)
+            least = 0.85 * 30 / count
+            row(f"speed of 30 robots over {count}, to 91.5 %", f"at least {least:.2f}", f"{ratio:.2f}", few, "complex")
+    if groups["complex-gossip"] and groups["complex"]:
+        ratio = groups["complex-gossip"].mean(name) / groups["complex"].mean(name)
+        what = "iterations to 91.5 %, complex-gossip over complex"
+        row(what, "at most 1.3", f"{ratio:.2f}", "complex-gossip", "complex")
+    for of, over, asked in (
+        ("free-gossip", "free", 1.3),
+        ("free-gossip-loss", "free-gossip", 2),
+        ("free-gossip-range", "free-gossip", 2),
+    ):
+        if groups[of] and groups[over]:
+            ratio = groups[of].mean("iterations") / groups[over].mean("iterations")
+            row(f"iterations, {of} over {over}", f"at most {asked}", f"{ratio:.2f}", of, over)
+            apart = groups[of].mean("completion_fraction") - groups[over].mean("completion_fraction")
+            row(f"completion, {of} less {over}", "at least -0.010", f"{apart:+.3f}", of, over)
+    if groups["navigate"]:
+        goals = sum(groups["navigate"].values("navigation_goals"))
+        reached = round(goals * groups["navigate"].mean("navigation_success_fraction"))
+        row("goals reached", "100 of 100", f"{reached} of {goals:.0f}", "navigate")
+    ended = [each for each in some if "concluded_early" in each]
+    if ended:
+        early = sum(each["concluded_early"] for each in ended)
+        completed = sum(each["outcome"] == "completed" for each in ended)
+        rows.append(
+            {
+                "what": "runs that concluded early",
+                "asked": "0 in 100",
+                "measured": f"{early:.0f}; {completed} completed",
+                "n": str(len(ended)),
+            }
+        )
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--only", nargs="+", choices=GROUPS, default=list(GROUPS), metavar="GROUP", help=", ".join(GROUPS)
+    )
+    parser.add_argument("--show", action="store_true", help="run nothing: show what is kept")
+    parser.add_argument("--commit", help="count as this commit, whatever the code is")
+    parser.add_argument("--runs", type=Path, metavar="FILE", help="write all trials to this CSV file, too")
+    add_csv_option(parser)
+    options = parser.parse_args()
+    commit = options.commit or commit_now()
+    for group in () if options.show else options.only:
+        carry_out(group, commit)
+    some = sorted(trials(commit), key=lambda trial: (list(GROUPS).index(trial["group"]), trial["seed"]))
+    if options.runs is not None:
+        write_csv(options.runs, [{name: trial.get(name, "") for name in COLUMNS} for trial in some])
+    rows = summary(some)
+    for row in rows:
+        print(f"{row['what']:48} {row['asked']:18} {row['measured']:28} n {row['n']}")
+    write_csv(options.csv, rows)
+
+
+if __name__ == "__main__":
+    main()
