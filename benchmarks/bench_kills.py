@@ -157,6 +157,8 @@ def main() -> None:
     parser.add_argument("--signal", choices=SIGNALS, nargs="+", default=list(SIGNALS))
     add_csv_option(parser)
     options = parser.parse_args()
+    # A job in the background of a shell ignores interrupts, and so would its children.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     rows, failures = [], 0
     for role in options.role:
         for name in options.signal:

@@ -1,8 +1,8 @@
-"""A study that is killed at random times until it is complete: no row may be lost, doubled or different.
+"""A study or a comparison that is killed at random times: no row may be lost, doubled or different.
 
-The process group of `zwerm study` gets SIGKILL at a random time, then the same command starts again. After each kill the
-rows in file and journal are read: none that was there before may be missing. At the end the rows are those of a study
-without kills.
+The process group of `zwerm study` or `zwerm compare` gets SIGKILL at a random time, then the same command starts again.
+After each kill the rows in file and journal are read: none that was there before may be missing. At the end the rows are
+those of a command without kills.
 """
 
 import argparse
@@ -28,14 +28,19 @@ metrics = ["cell_coverage_fraction"]
 [grid]
 "robots.count" = [3, 5]
 """
+KINDS: Final = ("study", "comparison")
 KEPT: Final = ("variant", "seed", "trace", "cell_coverage_fraction", "outcome", "ticks")
 
 
-def command(folder: Path, out: str, seeds: int) -> list[str]:
-    """Return the command of the study."""
+def command(folder: Path, kind: str, out: str, seeds: int, duration_s: float) -> list[str]:
+    """Return the command of the study, or of the comparison of the same trials."""
     program = [sys.executable, "-c", "from zwerm.cli.app import main; main()"]
     options = ["--seeds", str(seeds), "--jobs", "2", "--out", str(folder / out), "--json"]
-    return [*program, "study", str(folder / "study.toml"), *options]
+    if kind == "study":
+        return [*program, "study", str(folder / "study.toml"), *options]
+    variants = ["--variant", "three:robots.count=3", "--variant", "five:robots.count=5"]
+    settings = ["--set", f"time.duration_s={duration_s}", "--metrics", "cell_coverage_fraction"]
+    return [*program, "compare", "computation-free", *variants, *settings, *options]
 
 
 def rows_in(path: Path) -> dict[Any, tuple[Any, ...]]:
@@ -49,17 +54,10 @@ def rows_in(path: Path) -> dict[Any, tuple[Any, ...]]:
         return {key: tuple(row.get(name) for name in KEPT) for key, row in rows.held.items()}
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--kills", type=int, default=50, help="the least number of kills")
-    parser.add_argument("--seeds", type=int, default=30, help="trials of each of the two points")
-    parser.add_argument("--duration-s", type=float, default=60.0, help="virtual time of a trial")
-    parser.add_argument("--longest-s", type=float, default=6.0, help="the longest time until a kill")
-    parser.add_argument("--seed", type=int, default=1)
-    add_csv_option(parser)
-    options = parser.parse_args()
+def campaign(kind: str, options: argparse.Namespace) -> list[tuple[str, int, str]]:
+    """Kill a command at random times, and return what was counted, each with what is asked for."""
     draw = random.Random(options.seed)
-    kills = finished = lost = changed = leftovers = 0
+    kills = finished = lost = changed = 0
     before: dict[Any, tuple[Any, ...]] = {}
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -68,7 +66,7 @@ def main() -> None:
 
         def start(out: str) -> subprocess.Popen[bytes]:
             return subprocess.Popen(
-                command(folder, out, options.seeds),
+                command(folder, kind, out, options.seeds, options.duration_s),
                 cwd=folder,
                 env=environment,
                 stdout=subprocess.DEVNULL,
@@ -93,7 +91,10 @@ def main() -> None:
             lost += len(before.keys() - found.keys())
             changed += sum(found[key] != row for key, row in before.items() if key in found)
             before = found
-            print(f"{kills} kills, {finished} finished, {len(found)} rows, {lost} lost, {changed} changed", flush=True)
+            print(
+                f"{kind}: {kills} kills, {finished} finished, {len(found)} rows, {lost} lost, {changed} changed",
+                flush=True,
+            )
             if len(found) == 2 * options.seeds and kills < options.kills:  # complete: begin again
                 path.unlink(missing_ok=True)
                 path.with_name(path.name + ".journal").unlink(missing_ok=True)
@@ -106,18 +107,35 @@ def main() -> None:
         whole, last = rows_in(folder / "whole.parquet"), rows_in(path)
         differing = sum(whole.get(key) != last.get(key) for key in whole.keys() | last.keys())
         leftovers = len([each for each in folder.iterdir() if each.name.startswith("zwerm-")])
-    rows = [
+    return [
         ("kills", kills, ""),
         ("rows lost", lost, "0"),
         ("rows changed", changed, "0"),
-        ("rows that differ from a study without kills", differing, "0"),
+        ("rows that differ from a run without kills", differing, "0"),
         ("rows at the end", len(last), str(2 * options.seeds)),
         ("folders left for temporary files", leftovers, "0"),
     ]
-    write_csv(options.csv, [{"what": what, "measured": str(value), "asked": asked} for what, value, asked in rows])
+
+
+def main() -> None:
+    """Carry out the campaigns, print their counts, and exit with status 1 where one is not as asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kind", nargs="+", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--kills", type=int, default=50, help="the least number of kills")
+    parser.add_argument("--seeds", type=int, default=30, help="trials of each of the two points")
+    parser.add_argument("--duration-s", type=float, default=60.0, help="virtual time of a trial")
+    parser.add_argument("--longest-s", type=float, default=6.0, help="the longest time until a kill")
+    parser.add_argument("--seed", type=int, default=1)
+    add_csv_option(parser)
+    options = parser.parse_args()
+    rows = [(kind, *row) for kind in options.kind for row in campaign(kind, options)]
+    write_csv(
+        options.csv,
+        [{"command": kind, "what": what, "measured": str(value), "asked": asked} for kind, what, value, asked in rows],
+    )
     for row in rows:
         print(*row, sep="\t")
-    if any(asked and str(value) != asked for _, value, asked in rows):
+    if any(asked and str(value) != asked for _, _, value, asked in rows):
         raise SystemExit(1)
 
 

@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+from zwerm.errors import LinkError
+
 _PREFIX: Final = "zwerm-"
 _HELD: Final = "held"
 
@@ -44,6 +46,12 @@ def sweep(home: Path) -> None:
 
 
 def _short_directory() -> Path:
-    """Return the directory for temporary files, or /tmp if the path of a socket below it would be too long."""
-    chosen = tempfile.gettempdir()
+    """Return the directory for temporary files, or /tmp if the path of a socket below it would be too long.
+
+    Raises LinkError where no directory for temporary files can be written to.
+    """
+    try:
+        chosen = tempfile.gettempdir()
+    except FileNotFoundError as error:
+        raise LinkError(f"{error.strerror}: set TMPDIR to a folder that can be written to") from None
     return Path(chosen if len(chosen) < _SOCKET_PATH_BYTES_MAX - len("/zwerm-12345678/listener-12345678") else "/tmp")

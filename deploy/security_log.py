@@ -5,6 +5,7 @@ reason. So many lines of one node and reason are written, then only counted: an 
 """
 
 import contextlib
+import fcntl
 import os
 import threading
 from collections import Counter
@@ -38,10 +39,19 @@ class SecurityLog:
         self._lock = threading.Lock()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, _MODE)
+            descriptor = os.open(path, os.O_WRONLY | os.O_CREAT, _MODE)
         except OSError as error:
             raise ScenarioError([f"{path}: cannot write a security log: {error.strerror}"]) from None
         self._file = os.fdopen(descriptor, "wb", buffering=0)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._file.close()
+            raise ScenarioError([f"{path}: cannot write a security log: another run is writing to it"]) from None
+        except OSError:  # this file system has no locks
+            pass
+        with contextlib.suppress(OSError):  # a device
+            self._file.truncate(0)
         self._router: RouterMessages | None = capture() if router else None
         if self._router is not None:
             self._router.on_event = self._on_router

@@ -75,9 +75,10 @@ def main(
     sys.stdout = _Prefixed(sys.stderr, f"node {credential.node}: ")
     set_threads(ONE_THREAD if is_local(endpoint) and station is None else TWO_THREADS)
     sys.breakpointhook = _no_terminal
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.append(here)  # the place of a user's own controllers
+    with contextlib.suppress(FileNotFoundError):  # the folder may be deleted while the run goes on
+        here = str(Path.cwd())
+        if here not in sys.path:
+            sys.path.append(here)  # the place of a user's own controllers
     try:
         if station is not None:
             enter_namespace(station.namespace)

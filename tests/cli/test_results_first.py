@@ -53,3 +53,21 @@ def test_the_credentials_never_replace_a_file_that_exists(tmp_path: Path) -> Non
     assert ran.returncode == 2
     assert f"zwerm: {mine}: cannot write credentials: File exists" in ran.stderr
     assert mine.read_text() == "years of work"
+
+
+@pytest.mark.parametrize("command", ["study", "compare"])
+def test_the_results_of_a_study_are_printed_although_its_picture_and_its_csv_cannot_be_written(
+    tmp_path: Path, command: str
+) -> None:
+    (tmp_path / "rows.png").symlink_to("/dev/full")
+    (tmp_path / "rows.csv").symlink_to("/dev/full")
+    (tmp_path / "small.toml").write_text(
+        'scenario = "computation-free"\nset = ["time.duration_s=0.3"]\nseeds = 1\nmetrics = ["area_coverage_fraction"]\n'
+    )
+    more = ("small.toml",) if command == "study" else ("computation-free", "--variant", "a", "--variant", "b", *SHORT)
+    ran = zwerm(command, *more, "--seeds", "1", "--jobs", "1", "--out", "rows.csv", cwd=tmp_path)
+    assert ran.returncode == 2
+    assert "area_coverage_fraction" in ran.stdout
+    assert "zwerm: rows.png: " in ran.stderr
+    assert "zwerm: rows.csv: cannot be written: No space left on device" in ran.stderr
+    assert "Traceback" not in ran.stderr

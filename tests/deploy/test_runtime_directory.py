@@ -12,6 +12,7 @@ import pytest
 from support import ROOT
 
 from zwerm.deploy.runtime_directory import private_directory, sweep
+from zwerm.errors import LinkError
 
 HOLDER = """
 import os, signal, sys
@@ -82,3 +83,11 @@ def test_a_temporary_folder_with_a_long_path_is_not_used_for_sockets(
                 assert len(str(path / "listener-12345678")) <= 100, length
         except FileNotFoundError:  # a short path is used, although no such folder exists here
             assert length < 79
+
+
+def test_no_folder_for_temporary_files_is_an_error_of_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", None)
+    monkeypatch.setattr("tempfile._candidate_tempdir_list", lambda: ["/proc/nobody"])
+    expected = r"^No usable temporary directory .*: set TMPDIR to a folder that"
+    with pytest.raises(LinkError, match=expected), private_directory():
+        pass

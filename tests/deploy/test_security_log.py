@@ -78,6 +78,15 @@ def test_a_log_that_cannot_be_written_is_an_error_of_one_line_before_the_run(tmp
         run("gossip-max", runner="inline", security_log=tmp_path)
 
 
+def test_two_runs_at_once_never_share_a_log(tmp_path: Path) -> None:
+    path = tmp_path / "log"
+    with SecurityLog(path, router=False) as log:
+        with pytest.raises(ScenarioError, match=r"log: cannot write a security log: another run is writing to it$"):
+            SecurityLog(path, router=False)
+        log.note(3, "malformed")
+    assert len(lines_of(path)) == 2
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full disk to write to")
 def test_a_full_disk_ends_no_run_and_is_a_problem_of_its_result() -> None:
     tables = scenario(robots={"controller": "refused:NotANumber"})

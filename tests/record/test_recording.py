@@ -76,3 +76,14 @@ def readable(path: Path) -> list[McapRecord]:
         for record in StreamReader(file).records:
             found.append(record)  # noqa: PERF402 - keep what was read before the end
     return found
+
+
+def test_two_recordings_at_once_never_share_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    expected = r"run.mcap: cannot write a recording: another run is writing to it$"
+    with Recording(path, 0.1, {}), pytest.raises(ScenarioError, match=expected):
+        Recording(path, 0.1, {})
+    whole = path.read_bytes()
+    with Recording(path, 0.1, {}):
+        pass
+    assert path.read_bytes() == whole, "the next run replaces the file"

@@ -111,6 +111,38 @@ def test_a_deleted_working_directory_is_an_error_of_one_line(tmp_path: Path) -> 
     )
 
 
+@pytest.mark.parametrize(
+    ("number", "line"),
+    [("ENOSPC", "zwerm: file: No space left on device"), ("EROFS", "zwerm: file: Read-only file system")],
+)
+def test_a_fault_of_the_machine_is_an_error_of_one_line(number: str, line: str) -> None:
+    script = (
+        "import errno, os, sys; import zwerm.cli.app as app; error = errno." + number + "\n"
+        "def fail(): raise OSError(error, os.strerror(error), 'file')\n"
+        "app.app = fail; sys.argv[1:] = ['list']; app.main()"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", script], env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
+    assert (ran.returncode, ran.stderr.strip()) == (2, line)
+
+
+def test_a_working_directory_that_is_deleted_in_the_start_of_a_run_is_an_error_of_one_line(tmp_path: Path) -> None:
+    (tmp_path / "gone").mkdir()
+    (tmp_path / "late.py").write_text(
+        "import os\nif os.path.exists(os.environ['GONE']):\n    os.rmdir(os.environ['GONE'])\n"
+        "from zwerm.agents.computation_free.reactive import *\n"
+    )
+    command = ("run", "computation-free", "--json", "--set", "robots.controller=late:ComputationFree")
+    ran = subprocess.run(
+        [sys.executable, *ZWERM, *command], cwd=tmp_path / "gone",
+        env=os.environ | {"PYTHONPATH": f"{ROOT}:{tmp_path}", "GONE": str(tmp_path / "gone")},
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert ran.returncode == 2
+    assert "Traceback" not in ran.stderr
+
+
 def test_no_text_of_a_robot_reaches_the_terminal_with_control_characters() -> None:
     assert printable("\x1b[2J\x07\x9b1m\udcff\tok\n") == "\\x1b[2J\\x07\\x9b1m\\udcff\tok\n"
     result = run(scenario(robots={"controller": "ends:Escapes"}), runner="inline")

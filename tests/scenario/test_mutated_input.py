@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from support import ROOT, script
 
+from zwerm.errors import ScenarioError
+
 bench_malformed = script(ROOT / "benchmarks" / "bench_malformed.py")
 
 
@@ -53,3 +55,9 @@ def test_a_period_of_samples_without_end_is_no_traceback() -> None:
     settings = ("metrics.every_s=1e308", "time.dt_s=0.1")
     observers = bench_malformed.prepare(bench_malformed.load("voronoi-light", settings)).observers
     assert not observers.is_due(10**9)
+
+
+@pytest.mark.parametrize("value", ['"\\u0000"', "[]", "true", "nan"])
+def test_a_footprint_of_another_type_is_no_traceback(value: str) -> None:
+    with pytest.raises(ScenarioError, match=r"robots.parameters.footprint_m"):
+        bench_malformed.prepare(bench_malformed.load("robot-teams-one", (f"robots.parameters.footprint_m={value}",)))

@@ -1,11 +1,14 @@
 """Rows of a study are on the disk before they count as stored: they survive a loss of power."""
 
+import errno
+import io
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from zwerm.study.rows import Rows, read_rows
+from zwerm.study.rows import Rows, StorageError, read_rows
 from zwerm.study.trial import Row
 
 
@@ -70,3 +73,54 @@ def test_a_journal_that_ends_within_a_row_loses_that_row_only(tmp_path: Path) ->
         journal.write_bytes(whole[:end])
         with Rows(path) as rows:
             assert sorted(key[2] for key in rows.held) == [1, 2][: (end >= first) + (end >= len(whole))]
+
+
+class FullDisk:
+    """A journal's file on a disk that takes `space` more bytes."""
+
+    def __init__(self, file: io.FileIO, space: int) -> None:
+        self._file, self._space = file, space
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
+
+    def write(self, line: bytes) -> int:
+        """Write what there is space for, as the system does; raise OSError where there is none."""
+        if not self._space:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        taken, self._space = line[: self._space], max(0, self._space - len(line))
+        return self._file.write(taken)
+
+
+@pytest.mark.parametrize("space", [0, 10])
+def test_a_full_disk_refuses_a_row_in_one_line_and_damages_none_before_it(tmp_path: Path, space: int) -> None:
+    path = tmp_path / "rows.parquet"
+    with Rows(path) as rows:
+        rows.add(row(1))
+        whole = rows._journal
+        rows._journal = FullDisk(whole, space)  # type: ignore[assignment]
+        with pytest.raises(
+            StorageError, match=r"rows.parquet: cannot be written: No space left on device; the rows so"
+        ):
+            rows.add(row(2))
+        rows._journal = whole
+        rows.add(row(3))
+    with Rows(path) as again:
+        assert sorted(key[2] for key in again.held) == [1, 3]
+
+
+def test_a_full_disk_at_the_end_keeps_the_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(table: object, path: Path) -> None:
+        path.write_bytes(b"half")
+        raise OSError(errno.ENOSPC, "Error writing bytes to file")
+
+    path = tmp_path / "rows.parquet"
+    with monkeypatch.context() as patched, Rows(path) as rows:
+        patched.setattr("pyarrow.parquet.write_table", refuse)
+        rows.add(row(1))
+        with pytest.raises(StorageError, match=r"cannot be written: No space left on device"):
+            rows.merge([])
+    assert [each.name for each in tmp_path.iterdir()] == ["rows.parquet.journal"]
+    with Rows(path) as again:
+        again.merge([])
+    assert [each["seed"] for each in read_rows(path)] == [1]

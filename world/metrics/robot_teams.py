@@ -106,7 +106,9 @@ class TeamCoverage(Metric):
         robots = context.scenario.robots
         self._free = context.arena.free
         self._radius_m = robots.body.radius_m
-        self._footprint_m = float(robots.parameters.get("footprint_m", 0.5))
+        footprint_m = robots.parameters.get("footprint_m")
+        # Another type is a mistake that the check of the controller reports.
+        self._footprint_m = float(footprint_m) if isinstance(footprint_m, int | float) else 0.5
         self._coordinator = context.coordinator
         self._width_m_s = 2.0 * self._footprint_m * robots.body.max_speed_m_s
         self._paths: list[Floats] = []

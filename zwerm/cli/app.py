@@ -4,6 +4,7 @@ Tables that are a command's result go to standard output, progress and errors to
 is one JSON object. Exit status: 0 success, 1 the run failed, 2 an error in the input, 130 interrupted by Ctrl-C.
 """
 
+import errno
 import inspect
 import os
 import re
@@ -13,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NoReturn
 
 import typer
 from typer.core import TyperGroup
@@ -27,6 +28,9 @@ HELP: Final = (
     "`zwerm my_module:my_command ARGS` runs a command of your own: a typer or click command, or a function with "
     "type annotations, in my_module.py of the current directory or in an installed package."
 )
+
+# Errors that a correct program meets on a machine with a full or read-only disk, or with too few descriptors.
+_FAULTS_OF_THE_MACHINE: Final = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE}
 
 
 class LazyCommands(Mapping[str, Any]):
@@ -96,8 +100,7 @@ def main() -> None:
     try:
         sys.path.insert(0, str(Path.cwd()))
     except FileNotFoundError:
-        err.print("zwerm: the working directory was deleted; change to another one", style="red")
-        sys.exit(EXIT_USER_ERROR)
+        _exit_without_directory()
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores hang-ups
             signal.signal(number, _interrupt)
@@ -116,3 +119,24 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(EXIT_FAILED)
+    except OSError as error:
+        if not _has_directory():  # deleted while the command ran
+            _exit_without_directory()
+        if error.errno not in _FAULTS_OF_THE_MACHINE:
+            raise
+        place = f"{error.filename}: " if error.filename else ""
+        err.print(f"zwerm: {place}{error.strerror}", style="red", markup=False, highlight=False, soft_wrap=True)
+        sys.exit(EXIT_USER_ERROR)
+
+
+def _has_directory() -> bool:
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _exit_without_directory() -> NoReturn:
+    err.print("zwerm: the working directory was deleted; change to another one", style="red")
+    sys.exit(EXIT_USER_ERROR)

@@ -1,6 +1,6 @@
 """Options and output that `zwerm study` and `zwerm compare` share."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn, Optional
@@ -56,6 +56,29 @@ def rows_file(output: Path | None, name: str) -> Path:
     path = output or Path("runs") / f"{name}.parquet"
     check_outputs([OutputFile("--out", path, ROWS)])
     return path.with_suffix(".parquet")
+
+
+def write_files(*writers: tuple[Path | None, Callable[[], Sequence[Path]]]) -> tuple[list[Path], list[str]]:
+    """Write the files of a study, each by its function, and return those written, and why others cannot be written.
+
+    The result is printed anyway.
+    """
+    paths: list[Path] = []
+    problems: list[str] = []
+    for path, write in writers:
+        try:
+            paths += write()
+        except ZwermError as error:
+            problems.append(str(error))
+        except OSError as error:
+            problems.append(f"{path}: cannot be written: {error.strerror}")
+    return paths, problems
+
+
+def raise_problems(result: "StudyResult", problems: Sequence[str]) -> None:
+    """Raise ZwermError where the rows of a study or its files could not be written."""
+    if lines := [*result.problems, *problems]:
+        raise ZwermError("\n".join(lines))
 
 
 def write_csv(output: Path | None, result: "StudyResult") -> list[Path]:

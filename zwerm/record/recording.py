@@ -7,12 +7,13 @@ closed, after Ctrl-C too, is complete and indexed; one cut off by a kill holds a
 """
 
 import contextlib
+import fcntl
 import json
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self
+from typing import BinaryIO, Final, Self
 
 from mcap.writer import Writer
 
@@ -47,6 +48,22 @@ _TELEMETRY_SCHEMA: Final = {
 FLUSH_S: Final = 0.5
 
 
+def _open_alone(path: Path) -> BinaryIO:
+    """Open a new file, or an old one as empty. Raises OSError, also where another run is writing to it."""
+    file = path.open("ab")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.close()
+        raise OSError(0, "another run is writing to it") from None
+    except OSError:  # this file system has no locks
+        pass
+    with contextlib.suppress(OSError):  # a device
+        file.truncate(0)
+        file.seek(0)
+    return file
+
+
 class Recording:
     """Writes one run to `path`. Raises ScenarioError where that cannot be written."""
 
@@ -57,7 +74,7 @@ class Recording:
         self._channels: dict[str, int] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("wb")
+            self._file = _open_alone(path)
         except OSError as error:
             raise ScenarioError([f"{path}: cannot write a recording: {error.strerror}"]) from None
         self._flush_s = time.monotonic() + FLUSH_S

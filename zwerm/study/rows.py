@@ -4,6 +4,8 @@ Each row is written to the journal when its trial ends, so it survives a crash o
 atomically by one with all rows. One study at a time writes to a file.
 """
 
+import contextlib
+import errno
 import fcntl
 import os
 from collections.abc import Iterable, Sequence
@@ -66,6 +68,10 @@ def export_csv(path: Path, csv: Path) -> Path:
     return csv
 
 
+class StorageError(ScenarioError):
+    """The disk does not take rows: it is full or read-only."""
+
+
 class Rows:
     """The rows in `path` and in its journal, by key."""
 
@@ -100,24 +106,48 @@ class Rows:
         self._journal.close()
 
     def add(self, row: Row) -> None:
-        """Store a row."""
+        """Store a row. Raises StorageError where the disk does not take it; the rows before it stay."""
         self.held[key_of(row)] = row  # first: an interrupt while the journal is written must not lose the row
-        self._journal.write(msgspec.json.encode(row) + b"\n")
-        os.fsync(self._journal.fileno())
+        line, end = msgspec.json.encode(row) + b"\n", self._journal.seek(0, os.SEEK_END)
+        try:
+            if self._journal.write(line) < len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            os.fsync(self._journal.fileno())
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                self._journal.truncate(end)  # a row after half a line would make the journal unreadable
+            raise self._not_written(error) from None
 
     def merge(self, axes: Sequence[str], superseded: Iterable[Key] = ()) -> None:
-        """Write all rows except `superseded` to the Parquet file, the columns `axes` first, and delete the journal."""
+        """Write all rows except `superseded` to the Parquet file, the columns `axes` first, and delete the journal.
+
+        Raises StorageError where the disk does not take the file: the file before it and the journal then stay.
+        """
         for key in superseded:
             self.held.pop(key, None)
         rows = sorted(self.held.values(), key=lambda row: _order(row, axes))
         if rows:
             schema = _schema(rows, axes)
             fresh = self.path.with_name(self.path.name + ".new")
-            pq.write_table(pa.Table.from_pylist([_fitted(row, schema) for row in rows], schema), fresh)
-            _sync(fresh)
-            fresh.replace(self.path)
-            _sync(self.path.parent)
+            table = pa.Table.from_pylist([_fitted(row, schema) for row in rows], schema)
+            try:
+                pq.write_table(table, fresh)
+                _sync(fresh)
+                fresh.replace(self.path)
+                _sync(self.path.parent)
+            except OSError as error:
+                with contextlib.suppress(OSError):
+                    fresh.unlink(missing_ok=True)
+                raise self._not_written(error) from None
         self._journal_path.unlink()
+
+    def _not_written(self, error: OSError) -> StorageError:
+        why = os.strerror(error.errno) if error.errno else str(error)
+        return StorageError(
+            [
+                f"{self.path}: cannot be written: {why}; the rows so far are kept, and the same command goes on from there"
+            ]
+        )
 
     def _replay(self) -> None:
         """Read the journal of an interrupted study; its last line may be incomplete."""

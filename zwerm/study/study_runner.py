@@ -18,7 +18,7 @@ from zwerm.run.runner import Runner
 from zwerm.study.distribute.cluster import run_on_cluster
 from zwerm.study.distribute.shard import Shard
 from zwerm.study.pool import run_trials
-from zwerm.study.rows import Key, Rows
+from zwerm.study.rows import Key, Rows, StorageError
 from zwerm.study.study_tables import Setting, Study
 from zwerm.study.summary import Results
 from zwerm.study.trial import Row
@@ -40,7 +40,10 @@ class StudyListener(Protocol):
 
 @dataclass(frozen=True)
 class StudyResult:
-    """The result of a study: of `planned` trials, `ran` were run now, and `done` are in the file `path`."""
+    """The result of a study: of `planned` trials, `ran` were run now, and `done` are in the file `path`.
+
+    `problems` says in lines why the file is not written; its journal then holds the rows.
+    """
 
     results: Results
     path: Path
@@ -48,6 +51,7 @@ class StudyResult:
     ran: int
     done: int
     interrupted: bool
+    problems: tuple[str, ...] = ()
 
     @property
     def unknown(self) -> list[str]:
@@ -98,7 +102,7 @@ def run_study(
             if trial.key in rows.held and not _trusted(trial, rows.held[trial.key]):
                 del rows.held[trial.key]
         todo = [trial for trial in distinct if _wanted(rows.held.get(trial.key), retry)]
-        ran, interrupted = 0, False
+        ran, interrupted, problems = 0, False, list[str]()
         if listener is not None:
             listener.begin(len(todo))
         try:
@@ -114,10 +118,16 @@ def run_study(
                         listener.ended(row["outcome"] == FAILED)
         except KeyboardInterrupt:
             interrupted = True
+        except StorageError as error:
+            problems += error.mistakes
         axes = list(study.table.grid)
         done = [rows.held[trial.key] for trial in distinct if trial.key in rows.held]
-        rows.merge(axes, _superseded(rows.held, trials, axes))
-    return StudyResult(Results(study, points, done), out, len(distinct), ran, len(done), interrupted)
+        try:
+            rows.merge(axes, _superseded(rows.held, trials, axes))
+        except StorageError as error:
+            problems += error.mistakes
+    found = Results(study, points, done)
+    return StudyResult(found, out, len(distinct), ran, len(done), interrupted, tuple(dict.fromkeys(problems)))
 
 
 def _distinct(trials: Sequence[Trial]) -> list[Trial]:

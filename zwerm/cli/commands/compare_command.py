@@ -16,9 +16,11 @@ from zwerm.cli.trials import (
     Timeout,
     exit_with,
     print_trial_counts,
+    raise_problems,
     rows_file,
     study_extra,
     write_csv,
+    write_files,
 )
 
 
@@ -126,11 +128,14 @@ def compare(
                 listener=progress,
             )
         comparison = Comparison(result.results)
-        drawn = draw_comparison(drawing, comparison, wanted) if result.done else []
-        drawn += write_csv(output, result)
+        drawn, problems = write_files(
+            (drawing, lambda: draw_comparison(drawing, comparison, wanted) if result.done else []),
+            (output, lambda: write_csv(output, result)),
+        )
         if as_json:
             print_json(comparison_json(result, comparison, drawn))
         elif result.done:
             print_comparison(out, comparison)
             print_trial_counts(result, drawn)
+        raise_problems(result, problems)
     exit_with(result, failed_trials_count=False)

@@ -15,9 +15,11 @@ from zwerm.cli.trials import (
     Timeout,
     exit_with,
     print_trial_counts,
+    raise_problems,
     rows_file,
     study_extra,
     write_csv,
+    write_files,
 )
 
 
@@ -95,11 +97,15 @@ def study(
                 shard=part,
                 cluster=cluster,
             )
-        drawn = [draw_study(path.with_suffix(".png"), result.results)] if result.done else []
-        drawn += write_csv(output, result)
+        picture = path.with_suffix(".png")
+        drawn, problems = write_files(
+            (picture, lambda: [draw_study(picture, result.results)] if result.done else []),
+            (output, lambda: write_csv(output, result)),
+        )
         if as_json:
             print_json(study_json(result, drawn))
         elif result.done:
             print_results(out, result.results)
             print_trial_counts(result, drawn)
+        raise_problems(result, problems)
     exit_with(result)

@@ -1,0 +1,359 @@
+"""Faults of the environment of a command: outcome, exit status, what it prints, and what it leaves.
+
+Faults: a full disk below the working directory or below the folder for temporary files, a read-only file system, no HOME, a
+temporary folder with a path of 90 characters, 256 descriptors, another user, two runs at once, and a working directory that
+is deleted before or in a run. Commands: a run with processes, a run inline, and a study.
+
+A trial is as documented if its exit status is one of those expected, its failure is told in lines that begin with `zwerm: `,
+nothing is a traceback, and no process, socket or temporary file is left. Needs Linux and root.
+"""
+
+import argparse
+import contextlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+from csv_rows import add_csv_option, write_csv
+from waiting import DEADLINE_S, until
+
+ROOT: Final = Path(__file__).parents[1]
+TMPFS_BYTES: Final = 1 << 20
+LEFT_BYTES: Final = 8_192  # of a full disk, so that files can be made, and not be filled
+LONG_CHARS: Final = 90
+DESCRIPTORS: Final = 256
+MANY: Final = 30
+OTHER_USER: Final = "61300"
+SESSION: Final = 3  # the place of the session id in /proc/PID/stat, after the name
+
+STUDY: Final = """
+scenario = "computation-free"
+seeds = 4
+set = ["time.duration_s=1.0", "robots.count=3"]
+metrics = ["cell_coverage_fraction"]
+"""
+SHORT: Final = ("computation-free", "--set", "robots.count=3", "--set", "time.duration_s=1.0")
+FILES: Final = ("--record", "run.mcap", "--picture", "run.png", "--security-log", "log.jsonl")
+COMMANDS: Final = {
+    "run": ("run", *SHORT, *FILES),
+    "run --inline": ("run", *SHORT, *FILES, "--inline"),
+    "study": ("study", "study.toml", "--jobs", "2", "--out", "rows.parquet"),
+}
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where and how a command runs.
+
+    Its working directory, its folder for temporary files, changes of its environment ("" removes a variable), and the words
+    before the command, and more after it. `begin` is called once the command runs.
+    """
+
+    here: Path
+    temporary: Path
+    changes: dict[str, str] = field(default_factory=dict)
+    before: tuple[str, ...] = ()
+    more: tuple[str, ...] = ()
+    begin: Callable[[], object] = bool
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """The environment of the command."""
+        found = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "120", "TMPDIR": str(self.temporary)} | self.changes
+        return {name: value for name, value in found.items() if value}
+
+    def start(self, *arguments: str) -> "subprocess.Popen[str]":
+        """Start `zwerm ARGUMENTS`, the leader of a session."""
+        python = (sys.executable,) if "python" not in self.changes else (self.changes["python"],)
+        return subprocess.Popen(
+            [*self.before, *python, "-c", "from zwerm.cli.app import main; main()", *arguments, *self.more],
+            cwd=self.here,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+
+@contextlib.contextmanager
+def mounted(folder: Path, *options: str) -> Iterator[None]:
+    """Mount a small file system in memory on a folder."""
+    size = ",".join((f"size={TMPFS_BYTES}", *options))
+    subprocess.run(["mount", "-t", "tmpfs", "-o", size, "tmpfs", str(folder)], check=True)
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+@contextlib.contextmanager
+def full(folder: Path) -> Iterator[None]:
+    """Let `folder` be on a disk with LEFT_BYTES left."""
+    kept = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with mounted(folder):
+        for name, content in kept.items():
+            (folder / name).write_bytes(content)
+        with (folder / "fill").open("wb", buffering=0) as filler, contextlib.suppress(OSError):
+            while filler.write(bytes(4_096)):
+                pass
+        os.truncate(folder / "fill", (folder / "fill").stat().st_size - LEFT_BYTES)
+        yield
+
+
+# --- the faults -----------------------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def no_fault(place: Place) -> Iterator[Place]:
+    """Change nothing."""
+    yield place
+
+
+@contextlib.contextmanager
+def full_disk(place: Place) -> Iterator[Place]:
+    """Fill the disk below the working directory."""
+    with full(place.here):
+        yield place
+
+
+@contextlib.contextmanager
+def full_temporary(place: Place) -> Iterator[Place]:
+    """Fill the disk below the folder for temporary files completely."""
+    with full(place.temporary):
+        with contextlib.suppress(OSError), (place.temporary / "more").open("wb", buffering=0) as filler:
+            while filler.write(bytes(4_096)):
+                pass
+        yield place
+
+
+@contextlib.contextmanager
+def read_only(place: Place) -> Iterator[Place]:
+    """Let the working directory be on a read-only file system."""
+    kept = (place.here / "study.toml").read_bytes()
+    with mounted(place.here):
+        (place.here / "study.toml").write_bytes(kept)
+        subprocess.run(["mount", "-o", "remount,ro", str(place.here)], check=True)
+        yield place
+
+
+@contextlib.contextmanager
+def no_home(place: Place) -> Iterator[Place]:
+    """Let HOME and the folders for settings and caches be unset."""
+    yield replace(place, changes=dict.fromkeys(("HOME", "MPLCONFIGDIR", "XDG_CONFIG_HOME", "XDG_CACHE_HOME"), ""))
+
+
+@contextlib.contextmanager
+def missing_home(place: Place) -> Iterator[Place]:
+    """Let HOME be a folder that nobody can make."""
+    yield replace(place, changes={"HOME": "/proc/nobody", "MPLCONFIGDIR": ""})
+
+
+@contextlib.contextmanager
+def long_path(place: Place) -> Iterator[Place]:
+    """Let the folder for temporary files have a path of LONG_CHARS characters."""
+    long = place.temporary / ("x" * (LONG_CHARS - len(str(place.temporary)) - 1))
+    long.mkdir()
+    yield replace(place, temporary=long)
+
+
+@contextlib.contextmanager
+def few_descriptors(place: Place) -> Iterator[Place]:
+    """Allow each process DESCRIPTORS descriptors."""
+    yield replace(place, before=("prlimit", f"--nofile={DESCRIPTORS}:{DESCRIPTORS}"))
+
+
+@contextlib.contextmanager
+def too_few_descriptors(place: Place) -> Iterator[Place]:
+    """Allow each process DESCRIPTORS descriptors, and ask for MANY robots."""
+    with few_descriptors(place) as limited:
+        yield replace(limited, more=("--set", f"robots.count={MANY}"))
+
+
+@contextlib.contextmanager
+def other_user(place: Place) -> Iterator[Place]:
+    """Run as a user without a name and a home, in a folder of its own.
+
+    The interpreter may be in a folder that only root can enter: a mount that only this command sees makes it reachable.
+    """
+    python = place.temporary.parent / "python"
+    python.mkdir()
+    python.parent.chmod(0o755)
+    for folder in (place.here, place.temporary):
+        os.chown(folder, int(OTHER_USER), int(OTHER_USER))
+    user = f"setpriv --reuid {OTHER_USER} --regid {OTHER_USER} --clear-groups"
+    entered = f'mount --bind -o ro {sys.base_prefix} {python} && exec {user} "$@"'
+    changes = {
+        "python": str(python / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"),
+        "PYTHONPATH": f"{ROOT}:{sysconfig.get_path('purelib')}",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "LD_LIBRARY_PATH": str(python / "lib"),
+        "HOME": "",
+        "MPLCONFIGDIR": "",
+    }
+    yield replace(place, changes=changes, before=("unshare", "--mount", "sh", "-c", entered, "sh"))
+
+
+@contextlib.contextmanager
+def folder_of_another(place: Place) -> Iterator[Place]:
+    """Run as another user in a folder in which it may not write."""
+    with other_user(place) as other:
+        os.chown(place.here, 0, 0)
+        yield other
+
+
+@contextlib.contextmanager
+def deleted_before(place: Place) -> Iterator[Place]:
+    """Delete the working directory before the command starts."""
+    shutil.rmtree(place.here)
+    place.here.mkdir()
+    script = f'cd "{place.here}" && rmdir "{place.here}" && exec "$@"'
+    yield replace(place, here=place.temporary, before=("sh", "-c", script, "sh"))
+
+
+@contextlib.contextmanager
+def deleted_later(place: Place) -> Iterator[Place]:
+    """Delete the working directory as soon as the command has made a file in it."""
+
+    def delete() -> None:
+        known = set(place.here.iterdir())
+        until(lambda: set(place.here.iterdir()) - known, "the command makes a file")
+        shutil.rmtree(place.here, ignore_errors=True)
+
+    yield replace(place, begin=delete)
+
+
+RAN: Final = {"run": {0}, "run --inline": {0}, "study": {0}}
+NOT_WRITTEN: Final = {"run": {2}, "run --inline": {2}, "study": {2}}
+# For each fault: how it is made, the exit statuses that are expected of the commands, and what a failure must name.
+FAULTS: Final = {
+    "none": (no_fault, RAN, ""),
+    "full disk": (full_disk, NOT_WRITTEN, "No space left on device"),
+    # Python then takes /tmp.
+    "full temporary folder": (full_temporary, RAN, ""),
+    "read-only file system": (read_only, NOT_WRITTEN, "no permission to write|Read-only file system"),
+    "no HOME": (no_home, RAN, ""),
+    "HOME that does not exist": (missing_home, RAN, ""),
+    f"temporary path of {LONG_CHARS} characters": (long_path, RAN, ""),
+    f"{DESCRIPTORS} descriptors": (few_descriptors, RAN, ""),
+    f"{DESCRIPTORS} descriptors, {MANY} robots": (too_few_descriptors, RAN | {"run": {2}}, "open files, the limit is"),
+    "another user": (other_user, RAN, ""),
+    "another user, in a folder of root": (folder_of_another, NOT_WRITTEN, "no permission to write|Permission denied"),
+    "working directory deleted before": (deleted_before, NOT_WRITTEN, "the working directory was deleted"),
+    "working directory deleted in the run": (
+        deleted_later,
+        NOT_WRITTEN,
+        "No such file or directory|working directory was",
+    ),
+}
+
+
+# --- trials ---------------------------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def places() -> Iterator[Place]:
+    """Make the folders of a trial, and remove them afterwards."""
+    with TemporaryDirectory(prefix="e-") as name:
+        here, temporary = Path(name, "here"), Path(name, "t")
+        here.mkdir()
+        temporary.mkdir()
+        (here / "study.toml").write_text(STUDY)
+        yield Place(here, temporary)
+
+
+def one(fault: str, command: str) -> tuple[str, str]:
+    """Carry out a trial, and return the exit status, and what is wrong or ""."""
+    make, expected, names = FAULTS[fault]
+    with places() as first, make(first) as place:
+        ran = place.start(*COMMANDS[command])
+        place.begin()
+        printed, said = ran.communicate(timeout=DEADLINE_S)
+        return judged(place, ran, printed, said, expected[command], names)
+
+
+def judged(
+    place: Place, ran: "subprocess.Popen[str]", printed: str, said: str, expected: set[int], names: str
+) -> tuple[str, str]:
+    """Return the exit status of a command that has ended, and what is wrong or ""."""
+    mistakes = [line for line in said.splitlines() if line.startswith("zwerm: ")]
+    wrong = []
+    if ran.returncode not in expected:
+        wrong.append(f"exit status {ran.returncode}, expected {sorted(expected)}: {said[-400:]}")
+    if "Traceback" in said + printed:
+        wrong.append(f"a traceback: {said[-1500:]}")
+    if ran.returncode and not (mistakes and re.search(names, "\n".join(mistakes))):
+        wrong.append(f"no line that names it: {said[-400:]}")
+    return str(ran.returncode), "; ".join(wrong + left(place, ran.pid))
+
+
+def left(place: Place, session: int) -> list[str]:
+    """Return the processes, files and sockets that a command left."""
+    found = []
+    with contextlib.suppress(TimeoutError):
+        until(lambda: not living(session), "all processes end")
+    if living(session):
+        found.append(f"left: processes {living(session)}")
+    files = [each.name for each in place.temporary.iterdir() if each.name.startswith(("zwerm-", "pymp-"))]
+    sockets = [line for line in Path("/proc/net/unix").read_text().splitlines() if str(place.temporary) in line]
+    return [*found, *(["left: " + ", ".join(files)] if files else []), *(["left: sockets"] if sockets else [])]
+
+
+def living(session: int) -> list[int]:
+    """Return the processes of a session, and the robots that it started, that live."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError, ValueError):
+            fields = entry.read_text().rpartition(")")[2].split()
+            if int(fields[SESSION]) == session and fields[0] != "Z":
+                found.append(int(entry.parent.name))
+    return found
+
+
+def pair(command: str) -> tuple[str, str]:
+    """Run a command twice at once in one folder: one succeeds, the other may be refused as its files are in use."""
+    with places() as place:
+        both = [place.start(*COMMANDS[command]) for _ in range(2)]
+        ends = [(each, *each.communicate(timeout=DEADLINE_S)) for each in both]
+        judgements = [judged(place, *each, {0, 2}, "another (study|run) is writing to it") for each in ends]
+        statuses = sorted(status for status, _ in judgements)
+        wrong = [each for _, each in judgements if each]
+        if statuses[0] != "0":
+            wrong.append("none succeeded")
+        return ", ".join(statuses), "; ".join(wrong)
+
+
+def main() -> None:
+    """Carry out all trials, print each, and exit with status 1 where one was not as documented."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--fault", nargs="+", choices=[*FAULTS, "two at once"], default=[*FAULTS, "two at once"])
+    parser.add_argument("--command", nargs="+", choices=list(COMMANDS), default=list(COMMANDS))
+    add_csv_option(parser)
+    options = parser.parse_args()
+    rows, failures = [], 0
+    for fault in options.fault:
+        row = {"fault": fault} | dict.fromkeys(options.command, "")
+        wrongs = []
+        for command in options.command:
+            status, wrong = pair(command) if fault == "two at once" else one(fault, command)
+            print(fault, command, status, wrong or "as documented", sep="\t", flush=True)
+            row[command] = status
+            wrongs += [wrong] if wrong else []
+        failures += len(wrongs)
+        rows.append(row | {"tracebacks, or left behind": str(len(wrongs))})
+    write_csv(options.csv, rows)
+    if failures:
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()
