@@ -57,7 +57,7 @@ def test_small_circles_beside_robots_are_no_headway() -> None:
 
 
 def traced(away_m: float) -> BoundaryTrace:
-    """Follow a wall along y = 5 from slice 0, then one that is `away_m` below it, to slice 1. Bodies lead from one to the other."""
+    """Follow a wall along y = 5 from slice 0, then one `away_m` below it, to slice 1. Bodies lead from one to the other."""
     trace = BoundaryTrace(End(0, TOP, 5_000), RIGHT, GRID, lambda senses: [])
     path = [(x, 5.0, True) for x in np.arange(0.0, 0.5, 0.05)]
     path += [(0.5, 5.0 - y, False) for y in np.linspace(0.0, away_m, 20)]
