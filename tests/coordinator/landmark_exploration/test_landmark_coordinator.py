@@ -4,11 +4,11 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from zwerm.agents.landmark_exploration.sharing.exploration_tasks import landmark_bytes, read_task
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.cost_utility import Offer, cost_utility
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
+from zwerm.agents.landmark_exploration.sharing.exploration_tasks import landmark_bytes, read_task
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, TaskPart, TaskReport, Vector
 from zwerm.agents.runtime.contract import Setup
 from zwerm.coordinator.landmark_exploration import LandmarkCoordinator
