@@ -215,7 +215,7 @@ class LocalSupervisor:
         """
         waiting = deque(credentials)
         missing: dict[int, tuple[ForkServerProcess, float]] = {}
-        heard = b""
+        reports = b""
         reader, writer = self._context.Pipe(duplex=False)
         with reader, writer:
             while waiting or missing:
@@ -228,11 +228,11 @@ class LocalSupervisor:
                 sentinels = [process.sentinel for process, _ in missing.values()]
                 ready = wait([reader, *sentinels], max(0.0, end_s - time.monotonic()))
                 if reader in ready:  # before the sentinels: a joined robot may have ended since
-                    heard += os.read(reader.fileno(), READ_BYTES)
-                    for node in [node for node in missing if self._credentials[node].password.encode() in heard]:
+                    reports += os.read(reader.fileno(), READ_BYTES)
+                    for node in [node for node in missing if self._credentials[node].password.encode() in reports]:
                         del missing[node]
                         yield node
-                    heard = heard[-PASSWORD_BYTES_MAX:]
+                    reports = reports[-PASSWORD_BYTES_MAX:]
                     continue
                 for process, _ in missing.values():
                     if process.sentinel in ready:

@@ -65,8 +65,10 @@ def in_words(schema: Schema) -> str:
     if kind == "array" and "prefixItems" in schema:
         return "[" + ", ".join(in_words(each) for each in schema["prefixItems"]) + "]"
     if kind == "array":
-        least = f", {schema['minItems']} at least" if schema.get("minItems") else ""
-        return f"array of {in_words(schema.get('items', {}))}{least}".replace("array of array", "array of arrays")
+        item, least, most = in_words(schema.get("items", {})), schema.get("minItems"), schema.get("maxItems")
+        if least and most:
+            return f"array of {least} to {most} {item}s"
+        return f"array of {item}{f', {least} at least' if least else ''}".replace("array of array", "array of arrays")
     return {"boolean": "true or false", "object": "table", "string": "string"}.get(kind, "any")
 
 

@@ -1,9 +1,9 @@
 """The robot of landmark-based exploration (Ramaithitima and Bhattacharya 2018), with a coordinator or without.
 
-It knows bearings to the landmarks it sees, contact, its compass and its radio. At every tick it adds its observation to
-its map, and writes new entries into its log. The log goes to the coordinator, or by gossip to the other robots. Its
-tasks, a frontier and the way there, come from the coordinator, or it chooses and claims them by itself. `services` says
-which.
+The robot senses bearings to the landmarks that it sees, contact and its compass heading, and has a radio. At every tick it
+adds its observation to its map, and new entries to its log. It sends the log to the coordinator, or by gossip to the
+other robots. A task is a frontier and the path there. The coordinator assigns tasks, or the robot chooses and claims
+them itself, as `services` says.
 """
 
 from typing import ClassVar, Final
@@ -24,10 +24,10 @@ from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, col
 from zwerm.agents.landmark_exploration.motion import Drive, Outcome, explore, roam, travel, wander
 from zwerm.agents.landmark_exploration.parameters import ExplorerParameters
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
+from zwerm.agents.landmark_exploration.sharing.exploration_tasks import ExplorationTask, TaskIntake, landmark_bytes
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Message, Register, TaskPart, TaskReport, Vector
 from zwerm.agents.landmark_exploration.sharing.log_entries import failure_entry, observation_entries, status_entries
-from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
-from zwerm.agents.landmark_exploration.sharing.orders import ExplorationTask, OrderIntake, landmark_bytes
+from zwerm.agents.landmark_exploration.sharing.log_gossip import AddressedMessage, Gossip
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 from zwerm.agents.landmark_exploration.sharing.upload import Upload
@@ -43,18 +43,18 @@ BUSY_REPORT_TICKS: Final = 50
 # Ticks after which a robot that found no frontier to explore looks for one again: at first, and at most.
 RETRY_TICKS: Final = 10
 RETRY_TICKS_MAX: Final = 80
-# A robot looks around where it begins, and then only while it explores: what an idle robot happens to see would open
-# frontiers for ever. It looks again if, for CUT_OFF_TICKS, there was a frontier for it and no way there.
+# A robot adds observations to its map in its first LOOK_TICKS, and then only while it explores: observations of an idle
+# robot would open frontiers without end. It does so again if no path led to any free frontier for CUT_OFF_TICKS.
 LOOK_TICKS: Final = 5
 CUT_OFF_TICKS: Final = 200
-# Ticks for which a robot leaves a frontier alone that it did not get to.
+# Ticks for which a robot does not choose a frontier that it did not reach.
 AVOID_TICKS: Final = 300
-# An idle robot goes to the meeting place for news, if it has not heard of some robot for this many ticks. Its map may be old.
+# An idle robot goes to the meeting place if it received no register of some robot for this time: its map may be old.
 FRESH_TICKS: Final = 100
-# A robot goes there before its next frontier, too, if half of the others were silent for this many ticks, and twice as many
-# after each visit in vain: it might explore what others have explored.
-LONELY_TICKS: Final = 250
-# Ticks between two snapshots that a robot reports to observers of the run.
+# A robot also goes there before its next task if half of the others were silent for this time: it might explore what
+# others have explored. The time doubles after each visit without a message.
+ISOLATED_TICKS: Final = 250
+# Ticks between two snapshots for the observers of the run.
 TELEMETRY_TICKS: Final = 25
 
 ROBOTS: Final = "robots"
@@ -91,7 +91,7 @@ class Explorer(Controller):
         self._upload: Upload | None = None
         if not self._claims and UPLINK in setup.channels:
             self._upload = Upload(self.replica, self._origin, rules.message_bytes_max)
-        self._intake = OrderIntake(setup.incarnation % 256)
+        self._intake = TaskIntake(setup.incarnation % 256)
         self._task: ExplorationTask | None = None
         self._halted = False
         self._reached = True
@@ -105,31 +105,31 @@ class Explorer(Controller):
         self._news_at = 0
         self._no_way_since: int | None = None
         self._cut_off = False
-        self._lonely_ticks = LONELY_TICKS
+        self._isolated_ticks = ISOLATED_TICKS
         self._avoid_until: dict[int, int] = {}
         self._outbox: list[Transmission] = []
         self._seen: list[BearingSnapshot] = []
-        self._told_status = (False, False)
-        self._drive: Drive = self._live()
+        self._reported_status = (False, False)
+        self._drive: Drive = self._run_tasks()
         self.done = False
 
     def step(self, observation: Observation) -> Command:
-        """Perceive, receive, act, send."""
+        """Update the view, process packets, choose a motion, and send messages."""
         self.view.take(observation)
         for packet in observation.inbox:
-            self._hear(packet)
+            self._receive(packet)
         if self._looks():
             self._observe()
         direction = self._slide.along(next(self._drive), self.view)
-        self._judge()
-        self._speak()
+        self._update_end()
+        self._send_messages()
         outbox, self._outbox = tuple(self._outbox), []
         return Command(
             drive=self.view.drive(direction, self._speed_m_s), outbox=outbox, done=self.done, snapshot=self._snapshot()
         )
 
     def _looks(self) -> bool:
-        """Return whether the robot adds what it sees to the map."""
+        """Return whether the robot adds its observations to the map."""
         if self._frozen or self._halted:
             return False
         if self.parameters.strategy == "random-walk" or self.parameters.presence_only:
@@ -139,7 +139,7 @@ class Explorer(Controller):
     # --- the map ----------------------------------------------------------------------------------------------------
 
     def _observe(self) -> None:
-        """Take what is seen into the map, and write it down if it is news."""
+        """Add the observation to the map, and to the log if it changed the map."""
         snapshot = self.view.snapshot
         number = self.replica.vector.get(self._origin, 0)
         parts = (len(snapshot.landmarks) - 1) // 13  # the entry that completes an observation gives it its rank
@@ -150,7 +150,7 @@ class Explorer(Controller):
                 self._seen.append(snapshot)
 
     def _raise(self, keys: list[int], status: int) -> None:
-        """Raise frontiers to a status, and write it down."""
+        """Raise frontiers to a status, and add this to the log."""
         if self.map.raise_all(keys, status):
             self._write(status_entries(keys, status))
 
@@ -160,16 +160,16 @@ class Explorer(Controller):
             self._gossip.announce(stretch)
 
     def _learn(self, stretch: Stretch, held: int) -> None:
-        """Take in what others wrote. A frozen robot thaws if that leaves anything to explore."""
+        """Add entries of other robots to the map. A frozen robot resumes if a frontier is open then."""
         self.map.read(stretch, held)
         if self._frozen and (self.map.frontiers.open or self.parameters.presence_only):
             self._frozen = False
         self._quiet_since = self.view.tick
 
-    # --- what to do -------------------------------------------------------------------------------------------------
+    # --- tasks ------------------------------------------------------------------------------------------------------
 
-    def _live(self) -> Drive:
-        """Carry out one task after the other, and walk about while there is none."""
+    def _run_tasks(self) -> Drive:
+        """Carry out one task after the other, with a random walk between them."""
         idle = wander(self.view, self.random, self.parameters.turn_sd_rad)
         if self.parameters.presence_only:
             idle = roam(self.view, self.random, lambda: self._news_at == self.view.tick)
@@ -180,14 +180,13 @@ class Explorer(Controller):
         meeting = to_meeting()
         meets = self._carries and not self.parameters.presence_only
         while True:
-            if meets and self._task is None and self._is_lonely():
-                self._lonely_ticks *= 2
+            if meets and self._task is None and self._is_isolated():
+                self._isolated_ticks *= 2
                 yield from visit(self.view, self.map, self.random, lambda: VISIT_TICKS)
             if self._task is None:
                 self._choose()
             if self._task is None or self._task.key is None:
-                # If robots carry the map to each other, the idle robots do this. If a coordinator has the map, idle
-                # robots wait for it.
+                # Without a coordinator, idle robots move to exchange the map. With one, they wait for a task.
                 if self._halted or not (self._carries or self._cut_off):
                     yield None
                 else:
@@ -198,25 +197,25 @@ class Explorer(Controller):
             if task is self._task:
                 self._conclude(task, outcome)
                 self._task = None
-            meeting = to_meeting()  # the robot is far from where it waited before
+            meeting = to_meeting()  # the robot is far from its former waiting place
 
     def _meeting_ticks(self) -> int:
-        """Return how long to stay at the meeting place: not long if a walk may find the way to an open frontier."""
+        """Return the time at the meeting place: short if a random walk may find a path to an open frontier."""
         return MEETING_TICKS if self._no_way_since is None else VISIT_TICKS
 
-    def _is_lonely(self) -> bool:
-        """Return whether half of the others have been silent for so long that it is worth the way to the meeting place."""
-        heard, tick = self.registers.last_heard(self.setup.node), self.view.tick
-        if heard is not None and tick - heard < LONELY_TICKS:
-            self._lonely_ticks = LONELY_TICKS
-        return heard is not None and tick - heard >= self._lonely_ticks
+    def _is_isolated(self) -> bool:
+        """Return whether half of the others have been silent for longer than the present limit."""
+        since, tick = self.registers.half_silent_since(self.setup.node), self.view.tick
+        if since is not None and tick - since < ISOLATED_TICKS:
+            self._isolated_ticks = ISOLATED_TICKS
+        return since is not None and tick - since >= self._isolated_ticks
 
     def _waits_for_news(self) -> bool:
-        """Return whether others may know what this robot, which has nothing to do, does not."""
+        """Return whether other robots may have entries that this idle robot lacks."""
         return self._frozen or not self.registers.is_fresh(self.setup.node, self.view.tick, FRESH_TICKS)
 
     def _carry_out(self, task: ExplorationTask) -> Drive:
-        """Navigate to the frontier, then explore it; end early where there is another task."""
+        """Navigate to the frontier, then explore it; end early if another task arrives."""
         assert task.key is not None
         (a, b), rules = pair_of(task.key), self.parameters
 
@@ -235,13 +234,13 @@ class Explorer(Controller):
         return (yield from explore(self.view, a, b, self.random, is_clear, rules.cross_ticks, rules.search_ticks))
 
     def _conclude(self, task: ExplorationTask, outcome: Outcome) -> None:
-        """Note how a task ended."""
+        """Record how a task ended."""
         assert task.key is not None
         self._reached = outcome != "unreached"
         self._claim = 0
         self._report_at = 0
         if self._gossip is not None:
-            self._gossip.hurry()
+            self._gossip.beacon_soon()
         if outcome == "boundary":
             self._raise([task.key], BOUNDARY)
         elif outcome == "timed-out":
@@ -252,7 +251,7 @@ class Explorer(Controller):
             self._avoid_until[task.key] = self.view.tick + AVOID_TICKS
 
     def _choose(self) -> None:
-        """Choose a frontier and claim it, where robots do that by themselves."""
+        """Choose a frontier and claim it, if robots assign themselves."""
         rules, tick = self.parameters, self.view.tick
         if not self._claims or self._frozen or rules.strategy == "random-walk" or tick < self._choose_at:
             return
@@ -280,10 +279,10 @@ class Explorer(Controller):
         self._task = ExplorationTask(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status)
         self._claim = choice.key + 1
         if self._gossip is not None:
-            self._gossip.hurry()
+            self._gossip.beacon_soon()
 
-    def _judge(self) -> None:
-        """Freeze where nothing has been left to explore for a while, and conclude where all robots have."""
+    def _update_end(self) -> None:
+        """Freeze after a time without an open frontier, and conclude when all robots are frozen."""
         tick = self.view.tick
         if not self._claims or self._gossip is None:
             return
@@ -291,7 +290,7 @@ class Explorer(Controller):
         if rules.presence_only:
             has_news = self._news_at == tick
         else:
-            # A map without an area is not explored: landmarks are too few, or in one line.
+            # A map without an area is not explored: there are too few landmarks, or all are on one line.
             has_news = bool(self.map.frontiers.open) or not self.map.frontiers.has_area
         if self._task is not None or has_news:
             self._quiet_since = tick
@@ -303,24 +302,24 @@ class Explorer(Controller):
                 self._quiet_since = tick
             elif self.parameters.strategy != "random-walk":
                 self._frozen = True
-                self._gossip.hurry()
+                self._gossip.beacon_soon()
         self.done = self._frozen and self.registers.concluded(self.replica.digest, tick)
 
     # --- the radio --------------------------------------------------------------------------------------------------
 
-    def _hear(self, packet: Packet) -> None:
+    def _receive(self, packet: Packet) -> None:
         message = messages.read(packet.payload)
         if message is None or packet.sender is None:
             return
         if packet.channel == UPLINK and isinstance(message, TaskPart):
-            self._obey(message)
+            self._accept_task(message)
         elif packet.channel == UPLINK and self._upload is not None and isinstance(message, Vector):
             self._upload.acknowledge(message)
         elif packet.channel == self._channel and self._gossip is not None:
-            self._gossip.hear(packet.sender, message, self.view.tick)
+            self._gossip.receive(packet.sender, message, self.view.tick)
 
-    def _obey(self, order: TaskPart) -> None:
-        task = None if self._claims else self._intake.accept(order)
+    def _accept_task(self, part: TaskPart) -> None:
+        task = None if self._claims else self._intake.accept(part)
         if task is None:
             return
         self._report_at = 0
@@ -329,39 +328,41 @@ class Explorer(Controller):
         self._reached = True
         self._task = None if task.key is None else task
 
-    def _speak(self) -> None:
+    def _send_messages(self) -> None:
         tick = self.view.tick
         if self._gossip is not None:
             self._send(self._channel, self._gossip.tick(tick, self._register))
         if self._upload is not None:
-            self._send(UPLINK, [Said(None, each) for each in self._upload.tick(tick)])
+            self._send(UPLINK, [AddressedMessage(None, each) for each in self._upload.tick(tick)])
             if tick >= self._report_at:
                 free = self._task is None
                 self._report_at = tick + (FREE_REPORT_TICKS if free else BUSY_REPORT_TICKS)
-                self._send(UPLINK, [Said(None, self._report(free))])
+                self._send(UPLINK, [AddressedMessage(None, self._report(free))])
 
     def _report(self, free: bool) -> Message:
-        incarnation, order = self._intake.newest
+        incarnation, task_number = self._intake.newest
         landmarks = landmark_bytes(self.view.snapshot.landmarks)
         entries = self.replica.vector.get(self._origin, 0)
-        return TaskReport(self.setup.incarnation % 256, incarnation, order, free, self._reached, entries, landmarks)
+        return TaskReport(
+            self.setup.incarnation % 256, incarnation, task_number, free, self._reached, entries, landmarks
+        )
 
     def _register(self) -> Register:
         self._stamp += 1
         frozen = self.replica.digest + 1 if self._frozen else 0
         return Register(self.setup.node, self.setup.incarnation, self._stamp, self._claim, frozen)
 
-    def _send(self, channel: str, said: list[Said]) -> None:
-        self._outbox += [Transmission(channel, messages.write(message), to) for to, message in said]
+    def _send(self, channel: str, outgoing: list[AddressedMessage]) -> None:
+        self._outbox += [Transmission(channel, messages.write(message), to) for to, message in outgoing]
 
-    # --- for those who watch ----------------------------------------------------------------------------------------
+    # --- telemetry --------------------------------------------------------------------------------------------------
 
     def _snapshot(self) -> bytes:
-        """Return what those who watch the run may know: what this robot saw first, and what it has left to do."""
+        """Return the snapshot for the observers of the run: new observations of this robot, open frontiers and its claim."""
         status = (bool(self.map.frontiers.open), self.done)
-        if not self._claims or (self.view.tick % TELEMETRY_TICKS and status == self._told_status):
+        if not self._claims or (self.view.tick % TELEMETRY_TICKS and status == self._reported_status):
             return b""
-        self._told_status = status
+        self._reported_status = status
         seen, self._seen = self._seen, []
         claim = () if not self._claim else ((self.setup.node, *pair_of(self._claim - 1)),)
         count = len(self.map.frontiers.open)

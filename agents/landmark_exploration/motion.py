@@ -1,7 +1,7 @@
 """Execution of a task by a robot: both phases of section IV-D of Ramaithitima and Bhattacharya 2018, as generators.
 
-A generator is asked once a tick for the direction to drive in, in the compass frame (None: stand still), and returns how it
-ended. Phase 1 follows a path of observations by bearings alone (the controller of section II-B). Phase 2 crosses the line
+A generator yields, once a tick, the direction to drive in, in the compass frame (None: stand still), and returns the
+outcome. Phase 1 follows a path of observations by bearings alone (the controller of section II-B). Phase 2 crosses the line
 between the frontier's landmarks and searches the region behind it by a biased random walk.
 """
 
@@ -21,19 +21,19 @@ Drive = Generator[Direction, None, Outcome]
 
 # The bearing-only controller has arrived where its output is shorter than this.
 ARRIVED: Final = 0.08
-# Ticks of random motion where the controller has arrived and does not see what comes next.
+# Ticks of random motion after the controller has arrived without the next vertex in view.
 JITTER_TICKS: Final = 5
-# So often may that happen before the robot gives the path up.
+# Number of such motions before the robot gives the path up.
 STALLS_MAX: Final = 15
-# Ticks without a vertex of the path in view that is farther on than all before: the robot then gives the path up.
+# Ticks without progress along the path, after which the robot gives the path up.
 PROGRESS_TICKS: Final = 120
 
 # Phase 2: the sum of the unit vectors to both landmarks is shorter than this on the line between them, or near it.
 NEAR_LINE: Final = 0.25
 # Contact on the near side counts as contact at the line where the sum of the unit vectors is shorter than this.
 AT_LINE: Final = 0.6
-# Contact within this number of ticks of the crossing is an obstacle at the line, if it lasts for TOUCH_TICKS: other
-# robots move on.
+# Contact within this number of ticks of the crossing is an obstacle at the line, if it lasts for TOUCH_TICKS: contact with
+# another robot is shorter.
 CROSSED_TICKS: Final = 4
 TOUCH_TICKS: Final = 6
 # The angle from the outward direction, from tick to tick: the fraction that remains, and the deviation added [rad].
@@ -43,7 +43,7 @@ TURN_SD_RAD: Final = 0.35
 # The idle walk: the deviation of its direction [rad] from tick to tick.
 WANDER_SD_RAD: Final = 0.05
 
-# The walk without bearings: the deviation of its direction [rad] where nothing is new, and how long news keep it straight.
+# The walk without bearings: the deviation of its direction [rad], and the straight ticks after a new observation.
 ROAM_SD_RAD: Final = 0.3
 NEWS_TICKS: Final = 10
 
@@ -79,8 +79,8 @@ def travel(
 ) -> Drive:
     """Follow `path` until `arrived()`, aiming at the farthest vertex that shares enough landmarks with what is seen.
 
-    A robot that loses sight of the vertex that it aims at falls back to one before it. It then goes all the way to that
-    one. Otherwise it could see the farther vertex again, lose it again, and go to and fro between the two.
+    A robot that loses sight of its target vertex returns to one before it, and goes all the way to that one. Otherwise it
+    could see the farther vertex again, lose it again, and alternate between the two.
     """
     targets = [dict(zip(each.landmarks, map(to_rad, each.bearings), strict=True)) for each in path]
     last = len(targets) - 1
@@ -129,7 +129,7 @@ def explore(
     ticks: int,
     after_ticks: int,
 ) -> Drive:
-    """Explore the frontier <a, b>: get to the left of the line from a to b, and search there (phase 2).
+    """Explore the frontier <a, b>: move to the left of the line from a to b, and search there (phase 2).
 
     Takes at most `ticks` to cross the line and `after_ticks` behind it.
     """
@@ -172,7 +172,7 @@ def explore(
 
 
 def wander(view: ExplorerView, random: np.random.Generator, turn_sd_rad: float = WANDER_SD_RAD) -> Drive:
-    """Walk at random for ever, and turn away from what is touched."""
+    """Do a random walk without end, and turn away from contacts."""
     direction = float(random.uniform(-math.pi, math.pi))
     while True:
         if any(math.cos(direction - contact) > 0.0 for contact in view.contacts):
@@ -186,10 +186,9 @@ def wander(view: ExplorerView, random: np.random.Generator, turn_sd_rad: float =
 
 
 def roam(view: ExplorerView, random: np.random.Generator, is_new: Callable[[], bool]) -> Drive:
-    """Explore without bearings, for ever: go straight on while that shows anything new, and else turn at random.
+    """Explore without bearings and without end: go straight after a new observation, and else turn at random.
 
-    `is_new` is true if the present observation was new to the map. The direction is kept for `NEWS_TICKS` after the
-    last news.
+    `is_new` is true if the present observation was new to the map. The direction is kept for `NEWS_TICKS` after it.
     """
     direction = float(random.uniform(-math.pi, math.pi))
     until = view.tick

@@ -1,7 +1,7 @@
-"""Exploitation: a robot finds its way to a set of landmarks by a map that others made (section V-B of the paper).
+"""Exploitation: a robot navigates to sets of landmarks by a map that other robots made (section V-B of the paper).
 
-It has a map, bearings, contact and its compass, and needs no radio. A goal is a set of landmarks; the robot is there when it
-sees all of them. The map comes from a file (see `map_file`), whose text is a parameter.
+The robot has a map, bearings, contact and its compass, and needs no radio. A goal is a set of landmarks. The robot has
+reached it when it sees all of them. The map comes from a file (see `map_file`), whose text is a parameter.
 """
 
 from functools import partial
@@ -59,7 +59,7 @@ class Navigator(Controller):
             self._follow = partial(seek, self._tracker)
         self._moved: float | None = None
         self._report = b""
-        self._drive = self._live()
+        self._drive = self._visit_goals()
         self._done = False
 
     def _draw(self, count: int) -> tuple[tuple[int, ...], ...]:
@@ -69,7 +69,7 @@ class Navigator(Controller):
         return tuple(simplices[each] for each in self.random.integers(len(simplices), size=count))
 
     def step(self, observation: Observation) -> Command:
-        """Perceive and go on."""
+        """Update the view, and drive on towards the goal."""
         self.view.take(observation)
         if self._tracker is not None:
             self._tracker.update(self.view, self._moved)
@@ -77,7 +77,7 @@ class Navigator(Controller):
         report, self._report = self._report, b""
         return Command(drive=self.view.drive(direction, self._speed_m_s), done=self._done, snapshot=report)
 
-    def _live(self) -> Drive:
+    def _visit_goals(self) -> Drive:
         for goal in self._goals:
             began = self.view.tick
             outcome = yield from navigate(self.view, self.map, goal, self.random, self._follow)

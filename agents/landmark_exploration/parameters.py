@@ -9,7 +9,7 @@ from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BY
 Ticks = Annotated[int, Meta(ge=1, le=1_000_000)]
 NonNegative = Annotated[float, Meta(ge=0.0)]
 
-# Of robots that choose by themselves, and of a coordinator that assigns.
+# Strategies of robots that choose frontiers themselves, and of a coordinator that assigns them.
 Strategy = Literal["cost-utility", "nearest-frontier", "random-walk"]
 CentralStrategy = Literal["cost-utility", "nearest-frontier", "min-pos"]
 
@@ -19,11 +19,11 @@ class ExplorerParameters(Struct, frozen=True, forbid_unknown_fields=True):
 
     `beta` weighs the cost against the utility. A robot has `cross_ticks` to cross the line of a frontier, and `search_ticks` to
     search behind it (minimal effort: 1). `message_bytes_max` caps every radio message. A claim is void when its robot has
-    been silent for `lease_ticks`; a robot silent for `dead_ticks` is presumed dead. A robot that has found nothing left
-    to explore for `freeze_ticks` stops adding to the map. `robots_expected` is the number of robots that must agree
-    that all is explored. A robot without any message counts as silent from the start. `turn_sd_rad` is the random
-    walk's turn a tick. With `presence_only` no bearing is used: robots know which landmarks they see, and stop when
-    nothing was new for `stagnation_ticks`.
+    been silent for `lease_ticks`; a robot silent for `dead_ticks` is presumed dead. A robot without an open frontier for
+    `freeze_ticks` freezes: it adds no entry to the map. `robots_expected` robots must agree that exploration is complete. A
+    robot that never sent a message counts as silent from the start. `turn_sd_rad` is the deviation of the random walk's turn
+    in a tick. With `presence_only` no bearing is used: robots know which landmarks they see, and stop when no observation
+    was new for `stagnation_ticks`.
     """
 
     beta: NonNegative = 10.0

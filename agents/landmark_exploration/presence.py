@@ -18,22 +18,22 @@ from zwerm.agents.landmark_exploration.mapping.landmark_complex import SHARED_MI
 from zwerm.agents.landmark_exploration.motion import Drive
 from zwerm.agents.landmark_exploration.view import ExplorerView
 
-# Ticks after which the place of a landmark that is not seen is forgotten.
-FORGET_TICKS: Final = 120
-# A place is forgotten, too, where its landmark is not seen from within this fraction of the range.
+# Ticks after which the place of a landmark that is not seen is dropped.
+DROP_TICKS: Final = 120
+# A place is dropped, too, if its landmark is not seen from within this fraction of the range.
 DISPROVED: Final = 0.7
 # Events of a landmark that are kept, and passes over them that move its place onto their circles.
 EVENTS_MAX: Final = 5
 PASSES: Final = 4
-# Ticks for each vertex of the path, and one more, before the robot gives the path up.
+# Ticks for each vertex of the path, and for one more, before the robot gives the path up.
 SEEK_TICKS: Final = 120
-# The robot is at a place where that is nearer than this [steps].
+# The robot is at a place if the distance is less than this [steps].
 NEAR_STEPS: Final = 1.0
-# Ticks of a straight walk where the robot is at the place that it aimed at, and does not see what it expected there.
+# Ticks of a straight walk if the robot is at its target place, and does not see the landmarks that it expected there.
 SEARCH_TICKS: Final = 12
-# If more than half of that is seen, the walks are short at first, and longer each time, up to this.
+# Lengths of the successive walks if it sees more than half of these landmarks.
 LOCAL_SEARCH_TICKS: Final = (2, 4, 6, 8)
-# Searches where nothing of the path is seen, before the robot gives the path up.
+# Searches without any landmark of the path in view before the robot gives the path up.
 LOST_MAX: Final = 5
 # The deviation of its direction [rad] from the one that leads away from landmarks that are not expected there.
 SEARCH_SD_RAD: Final = 0.8
@@ -51,7 +51,7 @@ class PresenceTracker:
         self._seen_at: dict[int, int] = {}
 
     def update(self, view: ExplorerView, moved_rad: float | None) -> None:
-        """Take in what is seen after a step in the direction `moved_rad`, or after a tick without one."""
+        """Update the places after a step in the direction `moved_rad`, or after a tick without a step."""
         dx, dy = (0.0, 0.0) if moved_rad is None else (math.cos(moved_rad), math.sin(moved_rad))
         tick, range_steps, seen = view.tick, self._range_steps, view.bearing
         for landmark, (x, y) in list(self.places.items()):
@@ -65,7 +65,7 @@ class PresenceTracker:
                     self.places[landmark] = _onto_circle((x, y), (0.0, 0.0), range_steps)
             elif self._seen_at[landmark] == tick - 1:
                 self._cross(landmark, dx, dy)
-            elif length < DISPROVED * range_steps or tick - self._seen_at[landmark] > FORGET_TICKS:
+            elif length < DISPROVED * range_steps or tick - self._seen_at[landmark] > DROP_TICKS:
                 del self.places[landmark], self._events[landmark], self._seen_at[landmark]
         for landmark in seen:
             if landmark not in self.places:
@@ -79,7 +79,7 @@ class PresenceTracker:
         return self._events.get(landmark, ())
 
     def _cross(self, landmark: int, dx: float, dy: float) -> None:
-        """Note that a landmark appeared or disappeared during the step (dx, dy), one range away."""
+        """Record that a landmark appeared or disappeared during the step (dx, dy), one range away."""
         events = self._events[landmark] = [*self._events[landmark], (-0.5 * dx, -0.5 * dy)][-EVENTS_MAX:]
         place = self.places[landmark]
         for _ in range(PASSES):
@@ -164,7 +164,7 @@ def seek(
 def _aim(view: ExplorerView, path: Sequence[BearingSnapshot], aim: int) -> int:
     """Return the number of the farthest vertex of which enough landmarks are seen, or of `aim` if any of its are; or -1.
 
-    To keep an aim of which little is seen prevents that the robot goes to and fro between two aims.
+    A robot that kept no aim could alternate between two of them.
     """
     for number in range(len(path) - 1, -1, -1):
         shared = sum(landmark in view.bearing for landmark in path[number].landmarks)

@@ -22,7 +22,7 @@ class ExplorerView:
         self.snapshot = BearingSnapshot((), ())
 
     def take(self, observation: Observation) -> None:
-        """Take in an observation. Landmarks with ids of LANDMARKS_MAX or more are left out: an entry of a log has no room."""
+        """Store an observation. Landmarks with ids of LANDMARKS_MAX or more are left out: they do not fit into an entry."""
         self.tick += 1
         heading = self.heading_rad = observation.compass_rad or 0.0
         seen = observation.landmarks or ()
@@ -45,11 +45,11 @@ def apart_rad(a_rad: float, b_rad: float) -> float:
 
 
 class Slide:
-    """Slides along what the body touches: turns the wanted direction away from contacts, to the same hand for a while."""
+    """Slides along obstacles: turns the wanted direction away from contacts, to the same side for a time."""
 
-    # Ticks for which a hand is kept after the last contact.
+    # Ticks for which a side is kept after the last contact.
     KEEP_TICKS: Final = 15
-    # Ticks for which it is kept at most: in a corner one hand leads from wall to wall for ever.
+    # Ticks for which it is kept at most: in a corner one side leads from wall to wall without end.
     HAND_TICKS_MAX: Final = 60
     # The wanted direction is turned in steps of this size until it leads away from every contact.
     _TURN_RAD: Final = math.radians(12.0)

@@ -1,9 +1,9 @@
-"""Ways through the map: to a set of landmarks, and to the meeting place of robots that have nothing left to explore.
+"""Paths through the map: to a set of landmarks, and to the meeting place of robots without an open frontier.
 
-Generators of directions, as in `motion`. A way is the cheapest path in the navigation graph (section V-B of
-Ramaithitima and Bhattacharya 2018). Robots with nothing left to explore have to exchange their last entries, and to agree
-that all is explored. Robots with a short radio range would take long to meet by chance. So they meet at the landmark
-with the smallest id of their map, which is the same on equal maps.
+Generators of directions, as in `motion`. A path is the cheapest one in the navigation graph (section V-B of
+Ramaithitima and Bhattacharya 2018). Robots without an open frontier exchange their last entries, and agree that
+exploration is complete. With a short radio range they would seldom meet by chance. So they meet at the landmark with
+the smallest id of their map, which is the same on equal maps.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,12 +17,12 @@ from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.motion import Drive, travel, wander
 from zwerm.agents.landmark_exploration.view import ExplorerView
 
-# Ways tried before a goal is given up.
+# Paths that are tried before a goal is given up.
 TRIES_MAX: Final = 30
-# Ticks of walking about between two tries, and where no way is known.
-ASTRAY_TICKS: Final = 15
-# Ticks at the meeting place, and then of walking about: robots whose maps have no landmark in common have two places, and a
-# robot may know no way to the place. VISIT_TICKS: of a robot that has frontiers to explore.
+# Ticks of random walk between two tries, and if no path is known.
+WANDER_TICKS: Final = 15
+# Ticks at the meeting place, and of the random walk after them: robots whose maps share no landmark have two meeting
+# places, and a robot may know no path to its place. VISIT_TICKS: for a robot that has frontiers to explore.
 MEETING_TICKS: Final = 1_000
 VISIT_TICKS: Final = 40
 PARTING_TICKS: Final = 200
@@ -39,13 +39,13 @@ class Follow(Protocol):
         arrived: Callable[[], bool],
         /,
     ) -> Drive:
-        """Return the directions, and how it ended."""
+        """Yield directions, and return the outcome."""
 
 
 def navigate(
     view: ExplorerView, map_: LandmarkMap, goal: Sequence[int], random: np.random.Generator, follow: Follow = travel
 ) -> Drive:
-    """Go to where all landmarks of `goal` are seen, or as many as the map has ever seen together."""
+    """Go to a place where all landmarks of `goal` are seen, or as many of them as any observation of the map has."""
 
     def arrived() -> bool:
         return all(landmark in view.bearing for landmark in goal)
@@ -60,7 +60,7 @@ def navigate(
         if outcome == "arrived":
             return "arrived"
         astray = wander(view, random)
-        for _ in range(ASTRAY_TICKS):
+        for _ in range(WANDER_TICKS):
             yield next(astray)
             if arrived():
                 return "arrived"
@@ -68,7 +68,7 @@ def navigate(
 
 
 def way_to(map_: LandmarkMap, landmarks: Sequence[int], goal: Sequence[int]) -> tuple[int, ...]:
-    """Return the vertices on the cheapest way to one with most landmarks of the goal, or nothing where there is no way."""
+    """Return the vertices of the cheapest path to a vertex with most landmarks of the goal; () where no path exists."""
     before: dict[int, int] = {}
     best: tuple[int, int] | None = None
     wanted = set(goal)
@@ -92,7 +92,7 @@ def visit(view: ExplorerView, map_: LandmarkMap, random: np.random.Generator, ti
     while outcome == "arrived" and view.tick - arrived < ticks():
         if place in view.bearing:
             yield view.bearing[place]
-        else:  # other robots push
+        else:  # another robot has pushed this one away
             outcome = yield from navigate(view, map_, (place,), random)
     return outcome
 
@@ -104,7 +104,7 @@ def meet(
     idle: Callable[[], float | None],
     ticks: Callable[[], int],
 ) -> Drive:
-    """Go to the meeting place, stay for `ticks()`, walk about as `idle` does, and so on for ever."""
+    """Repeat without end: go to the meeting place, stay for `ticks()`, then move as `idle` does."""
     while True:
         yield from visit(view, map_, random, ticks)
         until = view.tick + PARTING_TICKS

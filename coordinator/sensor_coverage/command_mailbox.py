@@ -60,7 +60,7 @@ class _PendingRequest:
     since: int
     due: int
     tries: int = 0  # since the latest message about it
-    heard: bool = False
+    received: bool = False
     cleared: bool = False
     ping: bool = False
 
@@ -126,8 +126,8 @@ class CommandMailbox:
         pending.tries = 0
         self.retry_policy.lossy = self.retry_policy.lossy or response.heard < response.attempt
         if isinstance(response.answer, Ack | Cleared):
-            if not pending.heard:
-                pending.heard, pending.since = True, self.tick
+            if not pending.received:
+                pending.received, pending.since = True, self.tick
             wait = BUSY_TICKS if self.retry_policy.lossy else pending.ticks_max // OVERDUE_DIVISOR
             pending.due = self.tick + wait
             if isinstance(response.answer, Cleared) and not pending.cleared:
@@ -144,9 +144,9 @@ class CommandMailbox:
         waited = self.tick - pending.since
         if pending.ping:
             return waited >= pending.ticks_max
-        silent = sum(not each.heard and not each.ping for each in self._pending.values())
+        silent = sum(not each.received and not each.ping for each in self._pending.values())
         jammed = silent >= max(JAMMED_MIN, JAMMED_FRACTION * len(self.incarnations))
-        if pending.heard and pending.tries <= 2:
+        if pending.received and pending.tries <= 2:
             return waited >= STUCK_FACTOR * pending.ticks_max
         limit = pending.ticks_max * (JAMMED_FACTOR if jammed else 1)
         return waited >= limit and pending.tries >= self.retry_policy.tries_max
@@ -172,8 +172,8 @@ class CommandMailbox:
         If nothing is lost, all expected robots have acknowledged by now.
         """
         self._second_roll_call_tick = None
-        unheard = any(not each.heard for each in self._pending.values())
-        if self._roll_call is None or not (self.retry_policy.lossy or unheard):
+        unreceived = any(not each.received for each in self._pending.values())
+        if self._roll_call is None or not (self.retry_policy.lossy or unreceived):
             return
         request, tick = self._roll_call
         self._roll_call = self._call(request, ROLL_CALL_COPIES), tick

@@ -229,18 +229,23 @@ class PushExecution:
             rear = slot
 
     def _home_again(self, robots: Sequence[int], goals: Sequence[int], arrived: Mapping[int, Arrived]) -> Routine[None]:
-        """Home again, one by one, rear to front, on landmarks that were moving and stand still now."""
+        """Home again on landmarks that were moving before, in groups of robots that are no landmarks of each other.
+
+        A robot that must use a landmark of a later group goes once more.
+        """
         pending = {
             slot: robot for slot, robot in zip(goals, robots, strict=True) if _used_moving_landmarks(arrived, robot)
         }
         for _ in range(HOMING_ATTEMPTS):
             again: dict[int, int] = {}
-            for slot, robot in list(pending.items()):
-                del pending[slot]
-                self._move([robot], [slot], [slot], pending)
-                arrived = yield from self._arrivals([robot])
-                if _used_moving_landmarks(arrived, robot):
-                    again[slot] = robot
+            while pending:
+                knows = {slot: [other for other, _ in self._slots.known_from(slot)] for slot in pending}
+                group = {slot: pending[slot] for slot in no_landmarks_of_each_other(knows)}
+                pending = {slot: robot for slot, robot in pending.items() if slot not in group}
+                for slot, robot in group.items():
+                    self._move([robot], [slot], [slot], pending)
+                arrived = yield from self._arrivals(list(group.values()))
+                again |= {slot: robot for slot, robot in group.items() if _used_moving_landmarks(arrived, robot)}
             pending = again
 
     def correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Routine[None]:
@@ -253,6 +258,15 @@ class PushExecution:
         """Wait until robots have arrived or are given up."""
         answers = yield from self._mailbox.answers(robots, Arrived)
         return {node: answer for node, answer in answers.items() if isinstance(answer, Arrived)}
+
+
+def no_landmarks_of_each_other(knows: Mapping[int, Collection[int]]) -> list[int]:
+    """Return slots of which none is a landmark of another, the first one included; `knows` has each slot's landmarks."""
+    found: list[int] = []
+    for slot, landmarks in knows.items():
+        if not any(each in landmarks or slot in knows[each] for each in found):
+            found.append(slot)
+    return found
 
 
 def _used_moving_landmarks(arrived: Mapping[int, Arrived], robot: int) -> bool:

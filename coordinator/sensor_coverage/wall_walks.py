@@ -37,8 +37,10 @@ from zwerm.coordinator.sensor_coverage.sources import Sources
 # A leg closes something if the open arcs become smaller by this [rad].
 PROGRESS_RAD: Final = 0.1
 # A station's first robot follows a wall within the first length [m] for the second length [m], to learn its direction.
-AXIS_HOP_M: Final = 1.5
+AXIS_HOP_M: Final = 0.9
 AXIS_M: Final = 0.8
+# Directions in which it looks for a wall: parallel to a wall it meets none, so there are more than two at a right angle.
+AXIS_BEARINGS_RAD: Final = tuple(math.radians(each) for each in (180, 135, -135, 90, -90, 45, -45, 0))
 # So many waypoints, off a line by less than this [m] (root mean square), show the direction of a wall.
 LINE_POINTS_MIN: Final = 4
 LINE_OFF_M: Final = 0.02
@@ -125,11 +127,11 @@ class WallWalks:
         if robot is None:
             return FIRST_BEARINGS_RAD
         cycle = self._pushing.cycle
-        for bearing in FIRST_BEARINGS_RAD[::-1]:
+        for bearing in AXIS_BEARINGS_RAD:
             walked = yield from self._order(robot, ToWall(cycle, bearing, AXIS_HOP_M, 0.0, 0.0, 1))
             if walked is None:
                 break
-            way = there = walked.x_m, walked.y_m
+            way = walked.x_m, walked.y_m
             found = None
             if walked.end == STRETCH:
                 walked = yield from self._order(robot, FollowWall(cycle, AXIS_M, 1, (), ()))
@@ -140,10 +142,8 @@ class WallWalks:
             self._mailbox.send(robot, back, drive=True)
             yield from self._mailbox.answers([robot], Arrived)
             if found is not None:
-                away = min(
-                    (found + turn for turn in FIRST_BEARINGS_RAD),
-                    key=lambda each: math.cos(each - math.atan2(there[1], there[0])),
-                )
+                wall_rad = next(each.touched[0] for each in walked.waypoints if each.touched)
+                away = min((found + turn for turn in FIRST_BEARINGS_RAD), key=lambda each: math.cos(each - wall_rad))
                 return [away + turn for turn in FIRST_BEARINGS_RAD]
         return FIRST_BEARINGS_RAD
 

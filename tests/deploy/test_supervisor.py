@@ -93,6 +93,7 @@ def test_a_router_that_takes_no_more_sessions_is_named(nothing_left: None, monke
 
     with monkeypatch.context() as patched:
         patched.setattr("zwerm.deploy.swarm.router_settings", full)
+        patched.setattr("zwerm.deploy.swarm.PROBE_S_MAX", 1.0)
         with pytest.raises(LinkError, match=r"^node [01] .*; the router takes no more sessions$"):
             LocalSwarm("run", members(2), deadline_s=2.0).__enter__()
     with LocalSwarm("run", members(2)) as swarm:

@@ -107,7 +107,7 @@ def test_every_provenance_is_complete_and_names_no_machine(measured: ModuleType)
         assert not re.search(r"(^| )/\w|@|localhost", " ".join(origin.values())), name
 
 
-def test_every_table_is_measured_by_a_command_or_says_what_made_it(measured: ModuleType) -> None:
+def test_every_table_is_measured_by_a_command_or_names_its_origin(measured: ModuleType) -> None:
     for name, plan in measured.plans()["tables"].items():
         assert len({"command", "recorded_command", "of"} & plan.keys()) == 1, name
         known = set(measured.plans()["metrics"])
@@ -219,7 +219,7 @@ def test_a_value_has_the_spread_that_its_plan_asks_for(measured: ModuleType) -> 
     assert measured.value(ROW | {"most": "0.25"}, {}, trials=4, spread="range") == "0.25"
 
 
-def test_a_value_of_some_trials_says_of_how_many(measured: ModuleType) -> None:
+def test_a_value_of_some_trials_shows_their_number(measured: ModuleType) -> None:
     assert measured.value(ROW, {}, trials=5) == "0.5 ± 0.2 (4 of 5)"
     none = {"n": "0", "mean": "", "half_width": ""}
     assert measured.value({"metric": "convergence_time_s", **none}, {}, trials=5) == "never"

@@ -64,7 +64,7 @@ def test_the_readme_has_its_two_commands_and_they_are_targets() -> None:
 @pytest.mark.skipif(
     not (ROOT / ".venv/.run-ready").exists(), reason="the environment of `make setup` is not what runs this"
 )
-def test_make_run_fills_the_hall_and_says_where_the_picture_is() -> None:
+def test_make_run_fills_the_hall_and_prints_the_path_of_the_picture() -> None:
     ran = subprocess.run(["make", "run"], cwd=ROOT, capture_output=True, text=True, timeout=300)
     assert ran.returncode == 0, ran.stderr
     picture = re.search(r"runs/\S+\.png", ran.stdout)

@@ -46,14 +46,14 @@ def test_a_deployment_that_cannot_continue_states_its_reason(settings: tuple[str
 
 def test_a_frontier_that_no_path_leads_to_is_cut_off() -> None:
     """In a corridor the robots in the middle die, and their replacements die, until no robot is sent there again."""
-    corridor = ("arena.size_m=[4.8,0.5]", "base.pose=[0.2,0.25,0.0]", "robots.on_crash=continue")
+    corridor = ("arena.size_m=[6.0,0.5]", "base.pose=[0.2,0.25,0.0]", "robots.on_crash=continue")
 
     def strike(world: World) -> None:
         position = world.scene.position
         alive = [robot for robot in world.scene.present_ids().tolist() if robot not in world.status.crashed]
-        if world.status.crashed or position[alive, 0].max() > 2.9:
+        if world.status.crashed or position[alive, 0].max() > 3.4:
             for robot in alive:
-                if 1.3 < position[robot, 0] < 2.2 and world.tick % 40 == 0:
+                if 1.6 < position[robot, 0] < 2.6 and world.tick % 40 == 0:
                     world.crash(robot, "struck by lightning")
 
     outcome, world = drive(load("sensor-coverage", corridor), strike)

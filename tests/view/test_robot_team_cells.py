@@ -28,7 +28,7 @@ def test_the_order_of_slices_and_sweeps_in_parts_have_no_influence() -> None:
     assert len(cells_of(slices).middles) == 1
 
 
-def test_slices_that_nobody_swept_in_between_leave_cells_apart() -> None:
+def test_slices_that_no_robot_swept_keep_cells_apart() -> None:
     found = cells_of([(0.0, 0.0, 5.0), (1.0, 0.0, 5.0), (4.0, 0.0, 5.0)])
     assert len(found.middles) == 2
     assert found.edges == []

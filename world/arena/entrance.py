@@ -62,15 +62,15 @@ class Depots:
         stations = table.stations
         if stations >= count:
             raise ScenarioError([f"robots.count: expected more than the {stations} base stations, got {count}"])
-        if table.pose is not None:
-            self.position, self.heading = placed([table.pose], ["base.pose"], arena, radius_m)
-        elif table.poses is not None:
-            keys = [f"base.poses.{station}" for station in range(stations)]
-            self.position, self.heading = placed(table.poses, keys, arena, radius_m)
+        if given := table.poses or ([table.pose] if table.pose else []):
+            keys = [f"base.poses.{station}" for station in range(stations)] if table.poses else ["base.pose"]
+            drawn = -np.pi + 2.0 * np.pi * draws.uniform("base-heading", np.arange(stations))
+            poses = [
+                (each[0], each[1], each[2] if len(each) > 2 else turn) for each, turn in zip(given, drawn, strict=True)
+            ]
+            self.position, self.heading = placed(poses, keys, arena, radius_m)
         else:
             self.position, self.heading = place(PlacementTable(), arena, stations, radius_m, draws)
-        if table.heading == "drawn":
-            self.heading = -np.pi + 2.0 * np.pi * draws.uniform("base-heading", np.arange(stations))
         self.stations = stations
         self._waiting = [deque(range(stations + station, count, stations)) for station in range(stations)]
         self._entering: deque[tuple[int, int]] = deque()

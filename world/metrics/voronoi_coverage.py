@@ -27,6 +27,9 @@ STATISTICS: Final[dict[str, Callable[[Floats], float]]] = {
     "convergence_time_max_s": lambda error: float(error.max()),
 }
 
+# Factor of a lower bound of a mean that is computed with rounding.
+_ROUNDED_DOWN: Final = 1.0 - 1e-9
+
 
 class VoronoiMetricsTable(Table):
     """Coverage of the field by Voronoi cells: errors, cost, and the times at which statistics of the error fall below
@@ -84,6 +87,10 @@ class VoronoiMetrics(Metric):
         error = self._coverage.errors(position)[self._table.stationary :]
         self._last = position, error
         self._mean_error_m.append(float(error.mean()))
+        # No statistic is below the smallest error and its square, but for rounding.
+        lowest = _ROUNDED_DOWN * float(error.min())
+        if min(lowest, lowest**2) >= self._table.converged_m:
+            return
         for name, statistic in STATISTICS.items():
             if math.isnan(self._converged_s[name]) and statistic(error) < self._table.converged_m:
                 self._converged_s[name] = scene.time_s

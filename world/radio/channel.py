@@ -155,12 +155,12 @@ class Channel:
         for reason, judge in (("absent", absent), ("off", off), ("beyond", bound)):
             if judge is not None:
                 ledger.drop_unshown(reason, int(getattr(found, reason).sum()), judge.cause, judge.out_of_reach)
-        heard = np.repeat(which, found.counts)
-        near = self.links.rows(sender[heard], found.ids)
+        reached = np.repeat(which, found.counts)
+        near = self.links.rows(sender[reached], found.ids)
         ledger.send(near)
         if not len(alone):
-            return near, heard
-        transmission = np.concatenate([heard, transmission])
+            return near, reached
+        transmission = np.concatenate([reached, transmission])
         order = np.argsort(transmission, kind="stable")
         return np.concatenate([near, link])[order], transmission[order]
 

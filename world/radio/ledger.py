@@ -170,11 +170,11 @@ class Ledger:
     def link_ages_s(self, tick: int) -> tuple[Floats, Floats]:
         """Return by link the mean and the largest age of information up to `tick` [s]; nan before the first delivery."""
         newest, since = self._of(self._newest), self._of(self._since)
-        heard = newest >= 0
-        left = np.where(heard, tick - since, 0)
+        received = newest >= 0
+        left = np.where(received, tick - since, 0)
         ticks = self._of(self._age_ticks) + left
         total = self._of(self._age_sum) + left * (0.5 * (since + tick - 1) - newest)
-        counted = heard & (ticks > 0)
+        counted = received & (ticks > 0)
         peak = np.maximum(self._of(self._age_peak), tick - newest)
         mean = np.divide(total, ticks, out=np.full(len(ticks), np.nan), where=counted)
         return mean * self._dt_s, np.where(counted, peak, np.nan) * self._dt_s

@@ -70,7 +70,7 @@ def load(name: str, overrides: tuple[str, ...] = (), blamed: tuple[str, ...] | N
     mistake.
     """
     tables, path = tables_of(name, overrides)
-    return validate(tables, str(path), path.parent, overrides if blamed is None else blamed)
+    return _validated(tables, str(path), path.parent, overrides if blamed is None else blamed)
 
 
 def tables_of(name: str, overrides: tuple[str, ...] = ()) -> tuple[dict[str, Any], Path]:
@@ -93,6 +93,10 @@ def validate(tables: dict[str, Any], place: str, folder: Path, overrides: tuple[
     """
     tables = copy.deepcopy(tables)
     rename(tables, place)
+    return _validated(tables, place, folder, overrides)
+
+
+def _validated(tables: dict[str, Any], place: str, folder: Path, overrides: tuple[str, ...]) -> Scenario:
     try:
         scenario = Scenario.model_validate(tables)
     except ValidationError as error:

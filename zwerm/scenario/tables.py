@@ -31,6 +31,7 @@ from zwerm.scenario.types import (
     Grid,
     NonNegative,
     OpenTable,
+    Place,
     Point,
     Pose,
     Positive,
@@ -146,16 +147,15 @@ class BaseTable(Table):
 
     It stands at its `pose`, else at a random free place. With several `poses`, or `count` at random places, there are
     as many base stations: robots 0, 1, ... Each has a depot of its own, and the other robots are distributed to the
-    depots in turn. With `heading = "drawn"` the seed draws the heading, and that of `pose` and `poses` has no effect.
-    The robots of a station have its heading when they come out.
+    depots in turn. A pose is [x_m, y_m, heading_rad], or [x_m, y_m], where the seed draws the heading. The robots of a
+    station have its heading when they come out.
     """
 
     controller: str
     parameters: dict[str, Any] = {}
-    pose: Pose | None = None
-    poses: Annotated[list[Pose], Field(min_length=1)] | None = None
+    pose: Place | None = None
+    poses: Annotated[list[Place], Field(min_length=1)] | None = None
     count: Count | None = None
-    heading: Literal["given", "drawn"] = "given"
 
     @property
     def stations(self) -> int:

@@ -20,6 +20,8 @@ ARRAY = Field(strict=False)
 Point = Annotated[tuple[Finite, Finite], ARRAY]
 Size = Annotated[tuple[Positive, Positive], ARRAY]
 Pose = Annotated[tuple[Finite, Finite, Finite], ARRAY]
+# A place, with a heading or without one.
+Place = Annotated[tuple[Finite, ...], ARRAY, Field(min_length=2, max_length=3)]
 Grid = Annotated[tuple[Count, Count], ARRAY]
 
 

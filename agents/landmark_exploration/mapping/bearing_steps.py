@@ -1,7 +1,7 @@
 """Bearings in 256 steps of a full turn, and conclusions from a set of them about the place of the observer.
 
 A step is 1.4 degrees, less than the standard deviation of the sensor (pi/72), and fits into a byte of a message. All robots
-derive the same from an observation because all derive it from these steps.
+draw the same conclusions from an observation because all use these steps.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The next frontier for a robot, and the way there: cost-utility over the navigation graph.
+"""The next frontier for a robot, and the path there: cost-utility over the navigation graph.
 
 Section IV-C of Ramaithitima and Bhattacharya 2018: CU(S, <a, b>) = U(<a, b>) - beta C(S, <a, b>). The cost C is that of
 the cheapest path from the present observation S to an observation that contains a and b. The utility U is n / (m + 1).
@@ -17,12 +17,12 @@ from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkC
 # The vertex before the first of a path: the robot itself.
 HERE = -1
 
-# A cost limit is raised by this, so that rounding leaves out no vertex that is as good.
+# Margin of a cost limit, so that rounding excludes no vertex of equal gain.
 _ROUNDING: Final = 1e-6
 
 
 class Reached(NamedTuple):
-    """A vertex of the navigation graph and what it costs to get there. `before` HERE: from the present observation."""
+    """A vertex of the navigation graph, the cost of the path to it, and the vertex before it on that path, or HERE."""
 
     cost: float
     vertex: int
@@ -30,7 +30,7 @@ class Reached(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """A frontier (its key), the vertices to pass on the way to it, in order, and what the robot gains."""
+    """A frontier (its key), the vertices of the path to it, in order, and its gain."""
 
     key: int
     path: tuple[int, ...]
@@ -38,7 +38,7 @@ class Choice(NamedTuple):
 
 
 class CostLimit:
-    """The cost beyond which no vertex is wanted. A caller may lower it during a search."""
+    """The largest cost of a wanted vertex. A caller may lower it during a search."""
 
     def __init__(self) -> None:
         self.cost = math.inf
@@ -56,7 +56,7 @@ def reach(complex_: LandmarkComplex, landmarks: Sequence[int], limit: CostLimit 
     while queue:
         cost, vertex, before = heappop(queue)
         if cost > best[vertex]:
-            continue  # a cheaper way to it was found since
+            continue  # a cheaper path to it was found meanwhile
         yield Reached(cost, vertex, before)
         cost_max = limit.cost
         for other, shared in neighbours[vertex].items():
@@ -91,17 +91,40 @@ class Offer:
             self.take(key)
 
     def take(self, key: int) -> None:
-        """Note that a robot is sent to a frontier."""
+        """Record that a robot is sent to a frontier."""
         self._taken[key] = None
         for landmark in pair_of(key):
             self._sent[landmark] = self._sent.get(landmark, 0) + 1
         self._utility.clear()
 
     def most(self) -> float:
-        """Return a bound that no utility exceeds, now or later."""
+        """Return an upper bound of all utilities, now and later."""
         if self._most is None:
-            self._most = float(self._frontiers.most_at_a_pair())
+            self._most = self._bound()
         return self._most
+
+    def _bound(self) -> float:
+        """Return the greatest (n_a + n_b) / (1 + m) of all free <a, b>; n_a is the number of open frontiers with landmark a.
+
+        Landmarks come by descending n_a. So a frontier not seen before has n_b <= n_a, and the bound 2 n_a / (1 + m_a).
+        """
+        open_of, sent, taken, best = self._frontiers.open_of, self._sent, self._taken, 0.0
+        count = dict(zip(open_of, map(len, open_of.values()), strict=True))
+        for landmark in sorted(count, key=count.__getitem__, reverse=True):
+            twice = 2 * count[landmark]
+            if twice <= best:
+                break
+            if twice <= best * (1 + sent.get(landmark, 0)):
+                continue
+            for key in open_of[landmark]:
+                a, b = key >> 16, key & 0xFFFF
+                robots = sent.get(a, 0) + sent.get(b, 0)
+                if robots:
+                    if key in taken:
+                        continue
+                    robots -= (b << 16 | a) in taken
+                best = max(best, (count[a] + count[b]) / (1 + robots))
+        return best
 
     def is_empty(self) -> bool:
         """Return whether no frontier is free."""
@@ -177,7 +200,7 @@ class Costs(NamedTuple):
     before: dict[int, int]
 
     def path(self, key: int) -> tuple[int, ...]:
-        """Return the vertices on the way to a frontier."""
+        """Return the vertices of the path to a frontier."""
         vertex = self.vertex[key]
         return () if vertex == HERE else path_to(vertex, self.before)
 

@@ -1,4 +1,4 @@
-"""Frontiers: ordered pairs of landmarks, and what is known of the region to the left of each.
+"""Frontiers: ordered pairs of landmarks, and the status of the region to the left of each.
 
 The frontier <a, b> is the region left of the line from landmark a to landmark b (Ramaithitima and Bhattacharya 2018, section
 IV-A). A status only ever rises, so that statuses from several robots merge by maximum, in any order.
@@ -20,8 +20,8 @@ CLEAR: Final = 6
 
 _IS_OPEN: Final = (False, True, False, True, False, False, False)
 
-# The widest angle between adjacent bearings of an observer that is inside beyond doubt: 14 degrees less than a half turn,
-# which is 5 standard deviations of the sensor.
+# The widest angle between adjacent bearings of an observer that is certainly inside: 14 degrees less than a half turn, which
+# is 5 standard deviations of the sensor.
 AREA_GAP_MAX: Final = HALF - 10
 
 Pair = tuple[int, int]
@@ -49,7 +49,7 @@ class ObservationVerdict(NamedTuple):
     has_area: bool
 
 
-# Robots hear of the same observations, and one process may hold many robots.
+# Robots share observations, and one process may hold many robots.
 @lru_cache(maxsize=1 << 14)
 def verdict(snapshot: BearingSnapshot) -> ObservationVerdict:
     """Return the conclusions from an observation, by the rule of Frontiers.note."""
@@ -69,8 +69,8 @@ def verdict(snapshot: BearingSnapshot) -> ObservationVerdict:
 class Frontiers:
     """The status of every frontier. `open` holds the keys of those to be explored.
 
-    `has_area` is true once an observation was inside the hull of its landmarks beyond doubt. An observer on the line between
-    landmarks may seem to be inside because bearings are noisy.
+    `has_area` is true after an observation that was certainly inside the hull of its landmarks. An observer on the line
+    between landmarks may seem to be inside because bearings are noisy.
     """
 
     def __init__(self) -> None:
@@ -90,7 +90,7 @@ class Frontiers:
         return a << 16 | b in self.open
 
     def raise_to(self, key: int, status: int) -> bool:
-        """Raise a frontier to a status; return whether that was news."""
+        """Raise a frontier to a status; return whether its status rose."""
         known = self.statuses.get(key, UNKNOWN)
         if status <= known:
             return False
@@ -110,26 +110,12 @@ class Frontiers:
                 open_of[b].discard(key)
         return True
 
-    def most_at_a_pair(self) -> int:
-        """Return the largest sum, over the two landmarks of an open frontier, of the open frontiers that each is part of.
-
-        It is 0 without any. Landmarks come by descending count. No pair whose larger count is half of the best sum or less
-        can exceed it.
-        """
-        open_of, best = self.open_of, 0
-        for keys in sorted(open_of.values(), key=len, reverse=True):
-            if 2 * len(keys) <= best:
-                break
-            for key in keys:
-                best = max(best, len(open_of[key >> 16]) + len(open_of[key & 0xFFFF]))
-        return best
-
     def open_at(self, landmark: int) -> int:
         """Return how many open frontiers a landmark is part of."""
         return len(self.open_of.get(landmark, ()))
 
     def note(self, snapshot: BearingSnapshot) -> bool:
-        """Take in an observation; return whether any status rose.
+        """Process an observation; return whether any status rose.
 
         Seen from inside the hull of the landmarks, every frontier that the observer is in is clear. All others become
         unexplored if they were unknown. A pair in line with the observer is neither left nor right.
@@ -157,7 +143,7 @@ class Frontiers:
         return news
 
     def _note_first(self, snapshot: BearingSnapshot) -> bool:
-        """Take in the first observation of a set of landmarks; return whether any status rose."""
+        """Process the first observation of a set of landmarks; return whether any status rose."""
         clear, other, has_area = verdict(snapshot)
         self.has_area |= has_area
         statuses = self.statuses

@@ -22,7 +22,7 @@ Simplex = tuple[int, ...]
 
 
 class LandmarkComplex:
-    """Free simplices by a number of their own, with what each is next to.
+    """Free simplices, each with a number of its own and its neighbours.
 
     `simplices[v]` are the landmarks of vertex v, ascending; `neighbours[v]` maps the vertices next to v to how many landmarks
     they share. Both hold vertices that are free now; `landmarks_of` also those that were.
@@ -76,7 +76,7 @@ class LandmarkComplex:
         return True
 
     def update(self, snapshot: BearingSnapshot, rank: Rank = (0, 0)) -> bool:
-        """Take in an observation (algorithm 2); return whether the complex has a simplex more."""
+        """Add an observation (algorithm 2); return whether the complex has a new simplex."""
         simplex = snapshot.landmarks
         known = self._bearings.get(simplex)
         if known is not None:

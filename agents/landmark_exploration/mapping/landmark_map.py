@@ -16,7 +16,7 @@ from zwerm.agents.landmark_exploration.sharing.replica import Stretch
 # Parts of one observation beyond this number are invalid, and are dropped.
 _PARTS_MAX: Final = 4096
 
-# Failures to get to a frontier before it is given up: it is then taken for a potential obstacle boundary.
+# Failures to reach a frontier, after which it counts as a potential obstacle boundary.
 FAILURES_MAX: Final = 2
 
 
@@ -28,29 +28,29 @@ class LandmarkMap:
         self.complex = LandmarkComplex()
         self.frontiers = Frontiers()
         self.version = 0
-        self._failures: dict[int, int] = {}  # frontier: how often a robot did not get there
+        self._failures: dict[int, int] = {}  # frontier: the number of times a robot did not reach it
         self._parts: dict[int, list[tuple[int, int]]] = {}  # by origin, of an observation that is not complete
 
     def observe(self, snapshot: BearingSnapshot, rank: tuple[int, int] = (0, 0)) -> bool:
-        """Take in an observation; return whether it was news: a simplex more, or a status that rose."""
+        """Add an observation; return whether it changed the map: a new simplex, or a status that rose."""
         risen = not self._presence_only and self.frontiers.note(snapshot)
         news = self.complex.update(snapshot, rank) or risen
         self.version += news
         return news
 
     def read(self, stretch: Stretch, held: int) -> None:
-        """Take in the entries of a stretch from entry number `held` on; what cannot be read is left out."""
+        """Add the entries of a stretch from entry number `held` on; invalid entries are ignored."""
         for number in range(held, stretch.first + len(stretch.entries)):
             self._read(stretch.origin, number, stretch.entries[number - stretch.first])
 
     def raise_all(self, keys: Sequence[int], status: int) -> bool:
-        """Raise frontiers to a status; return whether that was news."""
+        """Raise frontiers to a status; return whether any status rose."""
         news = [self.frontiers.raise_to(key, status) for key in keys]
         self.version += any(news)
         return any(news)
 
     def fail(self, key: int) -> None:
-        """Note that a robot did not get to a frontier.
+        """Record that a robot did not reach a frontier.
 
         The frontier is timed out after FAILURES_MAX failures of any robots, and abandoned after twice as many.
         """
@@ -82,7 +82,7 @@ class LandmarkMap:
             self._parts[origin] = whole
 
     def content(self) -> Any:
-        """Return all that is known, in a form that is equal for equal maps."""
+        """Return the content in a form that is equal for equal maps."""
         return (
             sorted(self.complex.simplices.values()),
             self.complex.table,

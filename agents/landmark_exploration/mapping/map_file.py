@@ -1,4 +1,4 @@
-"""A landmark map as text, to be kept and used by later runs.
+"""A landmark map as the text of a file, for later runs.
 
 JSON, one object: `format` is "landmark-map/1"; `observations` is a list of [landmarks, bearings]. The landmarks are ids
 of one observation, ascending. The bearings are in steps of a 256th of a turn, counter-clockwise from the compass's
@@ -39,7 +39,7 @@ class MapFile(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def write_map(map_: LandmarkMap) -> str:
-    """Return a map as the text of its file: its free simplices, and the frontiers closed by what no observation shows."""
+    """Return a map as the text of its file: its free simplices, and the closed frontiers that no observation clears."""
     complex_ = map_.complex
     observations = sorted(complex_.snapshot_of(vertex) for vertex in complex_.simplices)
     closed = [

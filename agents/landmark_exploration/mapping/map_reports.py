@@ -1,6 +1,6 @@
-"""Reports of landmark exploration: what its nodes send to the observers of a run, as a snapshot in bytes.
+"""Reports of landmark exploration: snapshots in bytes from its nodes to the observers of a run.
 
-No node receives it.
+No node receives them.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ class MapReport(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-m
 
 
 class GoalReport(Struct, frozen=True, forbid_unknown_fields=True, tag="landmark-goal"):
-    """The end of a way to a goal, a set of landmarks."""
+    """The end of a path to a goal, a set of landmarks."""
 
     goal: tuple[int, ...]
     arrived: bool

@@ -1,1 +1,1 @@
-"""Sharing of logs, registers and orders between robots and the coordinator over a lossy radio."""
+"""Sharing of logs, registers and tasks between robots and the coordinator over a lossy radio."""

@@ -1,7 +1,7 @@
 """Messages of landmark-based exploration: under a checksum, and small.
 
-With a cap of `SMALL_BYTES` every packet fits into a small radio frame. Entries are never longer than one such packet (see
-`entries`); vectors, registers and paths are cut into packets that each make sense alone.
+With a cap of `SMALL_BYTES` every packet fits into a small radio frame. No entry is longer than such a packet (see
+`log_entries`). Vectors, registers and paths are cut into packets, and each packet can be read without the others.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from msgspec import Meta, Struct
 
 from zwerm.wire.checksum import Sealed
 
-# The smallest cap that is supported [bytes]; a radio of tens of bytes at a time has this much.
+# The smallest cap that is supported [bytes]: the frame of a small radio.
 SMALL_BYTES: Final = 64
 
 # Without a cap no packet is longer than about this [bytes].
@@ -54,7 +54,7 @@ class Register(Struct, frozen=True, array_like=True, forbid_unknown_fields=True)
     """The state that a robot announces; the register with the greatest (incarnation, stamp) counts.
 
     `claim`: the key of the frontier that it explores, plus 1; 0: none. `frozen`: 0, or the digest of the logs plus 1,
-    if the robot found nothing left to explore in these logs. It then adds no entry.
+    if the robot found no open frontier in these logs. It then adds no entry.
     """
 
     node: Count
@@ -75,15 +75,15 @@ class RegisterBeacon(_MapMessage, frozen=True, tag="b"):
 
 
 class TaskReport(_MapMessage, frozen=True, tag="r"):
-    """To the coordinator: the robot has the order `order` of the coordinator's incarnation `coordinator_incarnation`, and, if
-    `free`, has finished it.
+    """To the coordinator: the newest task that the robot has, by the coordinator's incarnation and the task's number.
 
-    `reached` False: it did not get to the frontier. `entries`: how many its log has. `landmarks`: those it sees, 2 bytes each.
+    `free`: the robot has finished the task. `reached` False: it did not reach the frontier. `entries`: the number of
+    entries in its log. `landmarks`: the ids of the landmarks that it sees, 2 bytes each.
     """
 
     incarnation: Count
     coordinator_incarnation: Count
-    order: Count
+    task_number: Count
     free: bool
     reached: bool
     entries: Count
@@ -91,14 +91,14 @@ class TaskReport(_MapMessage, frozen=True, tag="r"):
 
 
 class TaskPart(_MapMessage, frozen=True, tag="o"):
-    """To a robot: part `part` of `parts` of the order number `order`, in bytes.
+    """To a robot: part `part` of `parts` of the task `task_number`, in bytes.
 
-    The module `orders` defines the format of all parts together. `incarnation` is that of the robot it is meant for.
+    The module `exploration_tasks` defines the format of all parts together. `incarnation` is that of the receiver.
     """
 
     coordinator_incarnation: Count
     incarnation: Count
-    order: Count
+    task_number: Count
     part: Count
     parts: Count
     bytes_: Bytes
@@ -108,5 +108,5 @@ Message = Entries | Vector | RegisterBeacon | TaskReport | TaskPart
 
 _sealed: Final = Sealed(Message)
 write: Final[Callable[[Message], bytes]] = _sealed.write
-# Many robots of one process hear the same broadcast.
+# Many robots of one process receive the same broadcast.
 read: Final[Callable[[bytes], Message | None]] = lru_cache(maxsize=1 << 11)(_sealed.read)

@@ -3,7 +3,7 @@
     observation  kind, then landmark (2 bytes) and bearing (1 byte) for each; one of more than `LANDMARKS_AT_ONCE` landmarks
                  comes in parts, and only the last part is of the kind OBSERVATION
     statuses     kind, status, then the two landmarks (2 bytes each) of every frontier
-    failure      kind, then the two landmarks of a frontier that the robot did not get to
+    failure      kind, then the two landmarks of a frontier that the robot did not reach
 
 Numbers are little-endian. The entries of a log, read in order, are complete without other data.
 """
@@ -28,7 +28,7 @@ ENTRY_BYTES_MAX: Final = 1 + 3 * LANDMARKS_AT_ONCE
 
 
 def observation_entries(snapshot: BearingSnapshot) -> list[bytes]:
-    """Return the entries that say what was observed."""
+    """Return the entries of an observation."""
     pairs = list(zip(snapshot.landmarks, snapshot.bearings, strict=True))
     entries: list[bytes] = []
     for start in range(0, max(len(pairs), 1), LANDMARKS_AT_ONCE):
@@ -39,7 +39,7 @@ def observation_entries(snapshot: BearingSnapshot) -> list[bytes]:
 
 
 def status_entries(keys: Sequence[int], status: int) -> list[bytes]:
-    """Return the entries that say that frontiers have a status."""
+    """Return the entries that set the status of frontiers."""
     return [
         bytes([STATUSES, status])
         + b"".join(pack("<HH", key >> 16, key & 0xFFFF) for key in keys[start : start + FRONTIERS_AT_ONCE])
@@ -62,12 +62,12 @@ def read_statuses(entry: bytes) -> tuple[int, list[int]]:
 
 
 def failure_entry(key: int) -> bytes:
-    """Return the entry that says that the robot did not get to a frontier."""
+    """Return the entry of a frontier that the robot did not reach."""
     return pack("<BHH", FAILURE, key >> 16, key & 0xFFFF)
 
 
 def read_failure(entry: bytes) -> int:
-    """Return the key of the frontier that a robot did not get to. Raises ValueError where it is no such entry."""
+    """Return the key of the frontier that a robot did not reach. Raises ValueError where it is no such entry."""
     if len(entry) != 5 or entry[0] != FAILURE:
         raise ValueError("a failure is its kind and 4 bytes")
     a, b = unpack("<HH", entry[1:])
@@ -75,7 +75,7 @@ def read_failure(entry: bytes) -> int:
 
 
 def snapshot_of(bearings: Iterable[tuple[int, int]]) -> BearingSnapshot:
-    """Return the snapshot of (landmark, bearing) pairs; of a landmark that comes twice the first bearing counts."""
+    """Return the snapshot of (landmark, bearing) pairs; a landmark that occurs twice has its first bearing."""
     found: dict[int, int] = {}
     for landmark, bearing in bearings:
         found.setdefault(landmark, bearing % STEPS)

@@ -1,9 +1,9 @@
 """Gossip: robots in radio range make their logs and registers equal, although messages may be lost, late or repeated.
 
-New entries are broadcast once, at once. Beacons carry a digest of the version vector; a robot with another digest is
-sent the vector, rarely, and answers with the entries that the sender lacks (anti-entropy; Demers et al. 1987). Every
-message makes sense alone, and none is waited for: loss costs time only. A hub, the coordinator in the middle of a star,
-also forwards the messages that it receives.
+A robot broadcasts new entries once, in the tick in which it gets them. Beacons carry a digest of the version vector. A
+robot that receives another digest sends its vector, and the other robot answers with the missing entries (anti-entropy;
+Demers et al. 1987). Each message can be read without the others, and no robot waits for one: a lost
+message costs time only. A hub, the coordinator in the middle of a star, also forwards the messages that it receives.
 """
 
 from collections.abc import Callable
@@ -29,23 +29,23 @@ DIFFERS_TICKS: Final = 12
 # Entries in answer to one vector, at most.
 ANSWER_ENTRIES_MAX: Final = 150
 SMALL_ANSWER_ENTRIES_MAX: Final = 40
-# Bytes of a beacon beside its registers, and those that a register takes; where identifiers are large it takes more.
+# Bytes of a beacon beside its registers, and bytes of a register with small identifiers.
 _BEACON_BYTES: Final = 4 + 1 + 2 + 9 + 1
 _REGISTER_BYTES: Final = 22
 _REGISTERS_MAX: Final = 16
 
 
-class Said(NamedTuple):
-    """A message to one node, or (None) to all that hear it."""
+class AddressedMessage(NamedTuple):
+    """A message to one node, or to all in reach where `to` is None."""
 
     to: int | None
     message: Message
 
 
 class Gossip:
-    """One node's part. `learn` is called with every stretch that brought something, and how much of it was known before.
+    """One node's part. `learn` is called with every stretch of new entries, and the number of entries held before.
 
-    `me` is the node whose register is its own; a hub has none. `hear` must get every message that arrives. `tick` then
+    `me` is the node itself, which has a register; a hub has none. Pass every message that arrives to `receive`. `tick` then
     returns the messages to send.
     """
 
@@ -69,19 +69,19 @@ class Gossip:
         self._synced: dict[int, int] = {}  # node: the tick at which it was last sent the vector
         self._beacon_at = me % BEACON_TICKS
         self._sync_at = 0
-        self._outgoing: list[Said] = []
+        self._outgoing: list[AddressedMessage] = []
         self._fresh: list[Stretch] = []
 
     def announce(self, stretch: Stretch) -> None:
         """Broadcast new entries of this node's own log."""
         self._fresh.append(stretch)
 
-    def hurry(self) -> None:
-        """Send a beacon with the next tick: something of this node's register has changed."""
+    def beacon_soon(self) -> None:
+        """Send a beacon with the next tick, because this node's register has changed."""
         self._beacon_at = 0
 
-    def hear(self, sender: int, message: Message, tick: int) -> None:
-        """Take in a message."""
+    def receive(self, sender: int, message: Message, tick: int) -> None:
+        """Process a message."""
         match message:
             case Entries():
                 stretch = Stretch(message.origin, message.first, message.entries)
@@ -107,11 +107,11 @@ class Gossip:
             case _:
                 pass
 
-    def tick(self, tick: int, own: Callable[[], Register] | None) -> list[Said]:
+    def tick(self, tick: int, own: Callable[[], Register] | None) -> list[AddressedMessage]:
         """Return what to send now; `own` makes the node's own register, with a new stamp."""
-        said, self._outgoing = self._outgoing, []
+        outgoing, self._outgoing = self._outgoing, []
         for stretch in self._fresh:
-            said += [Said(None, each) for each in pack_entries(stretch, self._bytes_max)]
+            outgoing += [AddressedMessage(None, each) for each in pack_entries(stretch, self._bytes_max)]
         self._fresh.clear()
         if tick >= self._beacon_at:
             self._beacon_at = tick + BEACON_TICKS
@@ -120,10 +120,11 @@ class Gossip:
                 self._registers.merge(own(), tick)
                 leading = [self._me]
             most = min(_REGISTERS_MAX, max(1, (self._bytes_max - _BEACON_BYTES) // self._register_bytes()))
-            said.append(Said(None, RegisterBeacon(self._replica.digest, self._registers.to_tell(leading, most, tick))))
+            beacon = RegisterBeacon(self._replica.digest, self._registers.to_send(leading, most, tick))
+            outgoing.append(AddressedMessage(None, beacon))
         if tick >= self._sync_at:
-            said += self._ask(tick)
-        return said
+            outgoing += self._ask(tick)
+        return outgoing
 
     def _register_bytes(self) -> int:
         """Return the size of the largest register if few fit into a beacon, and else the usual size [bytes]."""
@@ -131,8 +132,8 @@ class Gossip:
             return _REGISTER_BYTES
         return max([_REGISTER_BYTES, *map(register_bytes, self._registers.newest.values())])
 
-    def _ask(self, tick: int) -> list[Said]:
-        """Send the version vector to the node, of those whose digests differ, that was sent it longest ago."""
+    def _ask(self, tick: int) -> list[AddressedMessage]:
+        """Return the version vector for one node with another digest: the one to which it was sent longest ago."""
         waiting = [node for node, since in self._differs.items() if tick - since <= DIFFERS_TICKS]
         if not waiting:
             return []
@@ -140,12 +141,14 @@ class Gossip:
         del self._differs[partner]
         self._synced[partner] = tick
         self._sync_at = tick + SYNC_TICKS
-        return [Said(partner, each) for each in pack_vector(self._replica.vector, self._bytes_max, ask=True)]
+        return [
+            AddressedMessage(partner, each) for each in pack_vector(self._replica.vector, self._bytes_max, ask=True)
+        ]
 
     def _answer(self, sender: int, vector: Vector, tick: int) -> None:
         theirs, mine = counts_of(vector), self._replica.vector
         origins = [origin for origin in sorted(mine) if vector.low <= origin < vector.high]
         for stretch in self._replica.missing(theirs, origins, self._answer_max):
-            self._outgoing += [Said(sender, each) for each in pack_entries(stretch, self._bytes_max)]
+            self._outgoing += [AddressedMessage(sender, each) for each in pack_entries(stretch, self._bytes_max)]
         if any(count > mine.get(origin, 0) for origin, count in theirs.items()):
             self._differs[sender] = tick

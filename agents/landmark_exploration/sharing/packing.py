@@ -8,19 +8,19 @@ from msgspec.structs import astuple
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, Register, Vector
 from zwerm.agents.landmark_exploration.sharing.replica import Stretch
 
-# Bytes of a packet of entries beside them: checksum, tag, origin, number; and of every entry beside it.
+# Overhead of a packet of entries [bytes]: checksum, tag, origin, number; and of each entry in it.
 _ENTRIES_BYTES: Final = 4 + 3 + 5 + 5 + 3
 _ENTRY_BYTES: Final = 2
-# The same for a vector, and the most that an (origin, count) pair takes.
+# The same for a vector, and the largest size of an (origin, count) pair.
 _VECTOR_BYTES: Final = 4 + 3 + 5 + 5 + 3 + 1
 _PAIR_BYTES: Final = 10
 
-# Past every origin.
+# An upper bound of all origins.
 ORIGINS_END: Final = 1 << 32
 
 
 def pack_entries(stretch: Stretch, bytes_max: int) -> Iterator[Entries]:
-    """Yield a stretch in messages of at most `bytes_max` bytes, or of one entry where that alone is longer."""
+    """Yield a stretch in messages of at most `bytes_max` bytes. An entry that is longer has a message of its own."""
     first, size = 0, _ENTRIES_BYTES
     for number, entry in enumerate(stretch.entries):
         needed = len(entry) + _ENTRY_BYTES
@@ -60,5 +60,5 @@ def _flat(origins: Sequence[int], vector: Mapping[int, int]) -> tuple[int, ...]:
 
 
 def counts_of(vector: Vector) -> dict[int, int]:
-    """Return the counts that a message says, by origin."""
+    """Return the counts in a message, by origin."""
     return dict(zip(vector.counts[::2], vector.counts[1::2], strict=False))

@@ -1,8 +1,8 @@
-"""Append-only logs, one for each origin, and the version vector that says how much of each is held.
+"""Append-only logs, one for each origin, and the version vector: the number of entries that are held of each log.
 
-An origin is a robot in one of its incarnations: only it appends to its log. So two replicas merge by taking the longer of
-each log, in any order and as often as one likes (a grow-only set; Shapiro et al. 2011), and two that have equal vectors hold
-the same. Entries are opaque bytes here.
+An origin is a robot in one of its incarnations, and only it appends to its log. So replicas merge by the longer of each
+log, in any order and any number of times (a grow-only set; Shapiro et al. 2011). Replicas with equal vectors are equal.
+This module does not read entries.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,7 +12,7 @@ from zwerm.agents.landmark_exploration.sharing.mixing import mix
 
 INCARNATIONS: Final = 256
 
-# Entries of one log that wait for those before them, about.
+# Approximate limit of entries of one log that wait for those before them.
 WAITING_MAX: Final = 1_000
 
 # Digests are below this.
@@ -20,7 +20,7 @@ DIGESTS: Final = 1 << 62
 
 
 def origin_of(node: int, incarnation: int) -> int:
-    """Return the origin that a robot is in one of its incarnations."""
+    """Return the origin of a robot in one of its incarnations."""
     return node * INCARNATIONS + incarnation % INCARNATIONS
 
 
@@ -33,7 +33,7 @@ class Stretch(NamedTuple):
 
 
 class Replica:
-    """Every log as far as it is known. `vector` maps an origin to how many of its entries are held."""
+    """The known part of every log. `vector` maps an origin to the number of its entries that are held."""
 
     def __init__(self) -> None:
         self.logs: dict[int, list[bytes]] = {}
@@ -42,7 +42,7 @@ class Replica:
         self._waiting: dict[int, dict[int, bytes]] = {}  # by origin and number, entries after a gap
 
     def extend(self, stretch: Stretch) -> Sequence[bytes]:
-        """Add what is new in a stretch, and return all that follows on what was held; entries after a gap wait for it."""
+        """Add the new entries of a stretch, and return all that were added. Entries after a gap wait until it is filled."""
         origin, first, entries = stretch
         held = self.vector.get(origin, 0)
         if first > held:
@@ -59,7 +59,7 @@ class Replica:
             if later:
                 self._waiting[origin] = later
             self.logs.setdefault(origin, []).extend(new)
-            # The digest is the sum of one number for each (origin, count), so that it can be kept up to date.
+            # The digest is a sum with one number for each (origin, count), so that an update is cheap.
             if held:
                 self.digest -= mix(origin, held)
             self.vector[origin] = held + len(new)
@@ -73,7 +73,7 @@ class Replica:
         return stretch
 
     def missing(self, vector: Mapping[int, int], origins: Iterable[int], entries_max: int) -> list[Stretch]:
-        """Return the entries of the logs of `origins` that the holder of `vector` lacks, up to a largest number."""
+        """Return the entries of the logs of `origins` that the holder of `vector` lacks, at most `entries_max`."""
         found: list[Stretch] = []
         for origin in origins:
             first = vector.get(origin, 0)

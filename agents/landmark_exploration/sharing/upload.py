@@ -1,4 +1,4 @@
-"""A robot's log on its way to the coordinator: sent as it grows, and again from the first entry that is not acknowledged."""
+"""The upload of a robot's log to the coordinator: new entries at once, and again from the first unacknowledged entry."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -9,7 +9,7 @@ from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch
 
 # Ticks without an acknowledgement after which the robot sends the entries again.
 RETRY_TICKS: Final = 5
-# So many entries are sent at a time, at most.
+# Entries that are sent in one tick, at most.
 WINDOW_ENTRIES: Final = 60
 
 
@@ -30,7 +30,7 @@ class Upload:
         return self._acknowledged == self._replica.vector.get(self._origin, 0)
 
     def acknowledge(self, vector: Vector) -> None:
-        """Take in what the coordinator holds: less than before, if it has lost its memory."""
+        """Store the number of entries that the coordinator holds; it is lower than before if it has lost its memory."""
         held = counts_of(vector).get(self._origin)
         if held is None:
             if not vector.low <= self._origin < vector.high:
@@ -40,7 +40,7 @@ class Upload:
         self._sent = max(self._sent, self._acknowledged)
 
     def tick(self, tick: int) -> Iterator[Entries]:
-        """Yield what to send now."""
+        """Yield the messages to send in this tick."""
         total = self._replica.vector.get(self._origin, 0)
         if self._acknowledged < total and self._sent >= total and tick >= self._retry_at:
             self._sent = self._acknowledged

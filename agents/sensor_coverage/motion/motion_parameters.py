@@ -23,7 +23,7 @@ class RobotParameters(Struct, frozen=True, forbid_unknown_fields=True):
     creep_m: Length = 0.02
     fine_m: Length = 0.005
     stop_samples: Count = 12
-    still_samples_max: Count = 120
+    still_samples_max: Count = 48
     drive_ticks_max: Count = 90
     walls: Literal["paper", "followed"] = "followed"
 

@@ -41,11 +41,15 @@ class FailureDetector(Component):
     def check(self, tick: int, table: NeighbourTable, visible: Mapping[int, float], samples: int) -> None:
         """Ask the robots whose states are needed, if it is time; averaging bearings takes `samples` ticks."""
         wanted = [node for node in dict.fromkeys(table.stale(visible)) if node not in self.dead]
-        wanted += [node for node in visible if node not in wanted and tick - table.heard.get(node, tick) > SILENT_TICKS]
+        wanted += [
+            node for node in visible if node not in wanted and tick - table.received_at.get(node, tick) > SILENT_TICKS
+        ]
         wanted = [
             node
             for node in wanted
-            if node not in table.states or not table.states[node].moving or tick - table.heard[node] > SILENT_TICKS
+            if node not in table.states
+            or not table.states[node].moving
+            or tick - table.received_at[node] > SILENT_TICKS
         ]
         if not wanted:
             self._requests.clear()
@@ -58,7 +62,7 @@ class FailureDetector(Component):
         self.due = tick + REPEAT_TICKS
         self._requests = {node: self._requests.get(node, 0) + 1 for node in wanted}
         for node, requests in self._requests.items():
-            silent = node not in table.heard or tick - table.heard[node] > SILENT_TICKS
+            silent = node not in table.received_at or tick - table.received_at[node] > SILENT_TICKS
             if requests > REQUESTS_MAX and silent:
                 table.remove_dead(node)
                 self.dead[node] = None

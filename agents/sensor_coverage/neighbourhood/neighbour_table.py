@@ -49,7 +49,7 @@ class NeighbourTable:
         self.samples = 0
         self.version = 0
         self.states: dict[int, StateBeacon] = {}
-        self.heard: dict[int, int] = {}  # node: tick of its latest state
+        self.received_at: dict[int, int] = {}  # node: tick of its latest state
         self.seen: dict[int, NeighbourRecord] = {}
         self._heard_in: dict[int, int] = {}  # node: this robot's epoch at that tick
         self._heading_readings = 0
@@ -68,7 +68,7 @@ class NeighbourTable:
     def receive(self, sender: int, state: StateBeacon, tick: int) -> bool:
         """Take in a neighbour's state; return whether the average of its bearing no longer holds."""
         known = self.states.get(sender)
-        self.heard[sender] = tick
+        self.received_at[sender] = tick
         self._heard_in[sender] = self.epoch
         if known is not None and state.number <= known.number:
             return False
@@ -106,7 +106,7 @@ class NeighbourTable:
     def forget(self, node: int) -> None:
         """Forget a robot that is dead or out of range."""
         self.states.pop(node, None)
-        self.heard.pop(node, None)
+        self.received_at.pop(node, None)
         self.change()
 
     def remove_dead(self, node: int) -> None:

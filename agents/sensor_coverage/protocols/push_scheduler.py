@@ -100,7 +100,7 @@ class PushScheduler(Component):
         """Take in a new neighbour's state, or a message of a push."""
         match message:
             case StateBeacon(slot=slot):
-                self._roster.hear(sender, message)
+                self._roster.receive(sender, message)
                 if sender not in self._map.states and slot == NOWHERE:
                     self._beaconing.repeat(tick)  # the new robot needs the base's view for its heading
             case PushToken(push):

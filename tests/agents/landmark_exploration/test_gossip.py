@@ -18,7 +18,7 @@ from zwerm.agents.landmark_exploration.sharing.log_entries import (
     observation_entries,
     status_entries,
 )
-from zwerm.agents.landmark_exploration.sharing.log_gossip import Gossip, Said
+from zwerm.agents.landmark_exploration.sharing.log_gossip import AddressedMessage, Gossip
 from zwerm.agents.landmark_exploration.sharing.packing import ORIGINS_END
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
@@ -127,7 +127,7 @@ class Robot:
         self.map.read(stretch, stretch.first)
         self.gossip.announce(stretch)
 
-    def said(self) -> list[Said]:
+    def outgoing(self) -> list[AddressedMessage]:
         self.tick += 1
         return self.gossip.tick(self.tick, None if self.hub else self.register)
 
@@ -142,7 +142,7 @@ def exchange(robots: list[Robot], links: set[tuple[int, int]], fate: random.Rand
     longest = 0
     for now in range(ticks):
         for robot in robots:
-            for to, message in robot.said():
+            for to, message in robot.outgoing():
                 packet = messages.write(message)
                 longest = max(longest, len(packet))
                 for other in range(len(robots)):
@@ -157,9 +157,9 @@ def exchange(robots: list[Robot], links: set[tuple[int, int]], fate: random.Rand
         late = [each for each in late if each[0] > now]
         fate.shuffle(due)
         for _, sender, to, packet in due:
-            heard = messages.read(packet)
-            assert heard is not None
-            robots[to].gossip.hear(sender, heard, robots[to].tick)
+            received = messages.read(packet)
+            assert received is not None
+            robots[to].gossip.receive(sender, received, robots[to].tick)
     return longest
 
 
@@ -198,7 +198,7 @@ def test_without_links_maps_stay_apart() -> None:
     assert robots[1].replica.digest != robots[0].replica.digest
 
 
-def test_a_hub_carries_the_map_between_robots_that_do_not_hear_each_other() -> None:
+def test_a_hub_forwards_the_map_between_robots_out_of_reach_of_each_other() -> None:
     fate = random.Random(3)
     robots = [Robot(0, 1000), Robot(1, 1000), Robot(2, 1000, hub=True)]
     star = {(0, 2), (2, 0), (1, 2), (2, 1)}
@@ -237,12 +237,12 @@ def test_no_packet_is_longer_than_the_cap_for_any_identifiers(
         registers.merge(Register(node, incarnation, stamp, claim, frozen), 0)
         replica.append(origin_of(node, incarnation), [bytes(ENTRY_BYTES_MAX)] * 3)
         gossip.announce(Stretch(origin_of(node, incarnation), 0, (bytes(ENTRY_BYTES_MAX),) * 3))
-    gossip.hurry()
-    gossip.hear(me + 1, RegisterBeacon(2**62, ()), 1)
-    gossip.hear(me + 1, Vector(0, ORIGINS_END, (), True), 1)
-    said = gossip.tick(1, lambda: Register(me, 300, 10**7, claim, frozen))
-    assert {type(each.message) for each in said} == {Entries, Vector, RegisterBeacon}
-    assert max(len(messages.write(each.message)) for each in said) <= messages.SMALL_BYTES
+    gossip.beacon_soon()
+    gossip.receive(me + 1, RegisterBeacon(2**62, ()), 1)
+    gossip.receive(me + 1, Vector(0, ORIGINS_END, (), True), 1)
+    outgoing = gossip.tick(1, lambda: Register(me, 300, 10**7, claim, frozen))
+    assert {type(each.message) for each in outgoing} == {Entries, Vector, RegisterBeacon}
+    assert max(len(messages.write(each.message)) for each in outgoing) <= messages.SMALL_BYTES
 
 
 @given(st.permutations(range(5)))
@@ -259,13 +259,13 @@ def test_failures_of_all_robots_count_together_in_any_order(order: list[int]) ->
     assert statuses == [UNEXPLORED, TIMED_OUT, TIMED_OUT, ABANDONED, ABANDONED]
 
 
-def test_registers_tell_how_long_others_were_not_heard() -> None:
+def test_registers_give_the_time_since_which_half_of_the_others_are_silent() -> None:
     registers = Registers(150, 1_500, 3)
-    assert registers.last_heard(0) is None
+    assert registers.half_silent_since(0) is None
     for node, tick in ((0, 90), (1, 10), (2, 50)):
         registers.merge(Register(node, 1, 1), tick)
-    assert registers.last_heard(0) == 50, "half of the others, here one of two, are silent since then"
+    assert registers.half_silent_since(0) == 50, "half of the others, here one of two, are silent since then"
     registers.merge(Register(3, 1, 1), 20)
-    assert registers.last_heard(0) == 20
+    assert registers.half_silent_since(0) == 20
     assert registers.is_fresh(0, 60, 51)
     assert not registers.is_fresh(0, 60, 50)

@@ -14,16 +14,16 @@ from zwerm.agents.landmark_exploration.mapping.map_file import map_of_reports, r
 from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, write_report
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing import log_entries as entries
-from zwerm.agents.landmark_exploration.sharing.landmark_messages import TaskReport, Vector
-from zwerm.agents.landmark_exploration.sharing.orders import (
+from zwerm.agents.landmark_exploration.sharing.exploration_tasks import (
     ExplorationTask,
-    OrderIntake,
+    TaskIntake,
     cut,
     landmark_bytes,
     landmarks_in,
     read_task,
     write_task,
 )
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import TaskReport, Vector
 from zwerm.agents.landmark_exploration.sharing.packing import counts_of, pack_entries, pack_vector
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch
 from zwerm.agents.landmark_exploration.sharing.upload import RETRY_TICKS, Upload
@@ -35,7 +35,7 @@ snapshots = st.dictionaries(ids, st.integers(0, 255), max_size=20).map(
 
 
 @given(st.lists(snapshots, max_size=3), st.integers(0, 200_000))
-def test_a_log_says_what_was_observed_in_packets_of_any_size(some: list[BearingSnapshot], origin: int) -> None:
+def test_a_log_holds_all_observations_in_packets_of_any_size(some: list[BearingSnapshot], origin: int) -> None:
     log = tuple(entry for each in some for entry in entries.observation_entries(each))
     assert all(len(entry) <= entries.ENTRY_BYTES_MAX for entry in log)
     direct, packed = LandmarkMap(), LandmarkMap()
@@ -72,22 +72,20 @@ tasks = st.builds(
 
 
 @given(tasks, st.randoms(), st.sampled_from([64, 1_000]))
-def test_an_order_is_put_together_from_parts_in_any_order(
-    task: ExplorationTask, order: random.Random, size: int
-) -> None:
+def test_a_task_is_joined_from_parts_in_any_order(task: ExplorationTask, order: random.Random, size: int) -> None:
     assert read_task(write_task(task)) == task
     parts = cut(write_task(task), 3, 1, 9, size)
     assert all(len(messages.write(part)) <= size for part in parts)
     shuffled = [*parts, *parts]
     order.shuffle(shuffled)
-    intake = OrderIntake(1)
+    intake = TaskIntake(1)
     found = [each for each in map(intake.accept, shuffled) if each is not None]
     assert found == [task]
     assert intake.newest == (3, 9)
 
 
-def test_late_parts_of_an_older_order_do_no_harm() -> None:
-    intake = OrderIntake(1)
+def test_late_parts_of_an_older_task_are_ignored() -> None:
+    intake = TaskIntake(1)
     (old,) = cut(write_task(ExplorationTask(key_of(1, 2))), 1, 1, 4, 64)
     (new,) = cut(write_task(ExplorationTask(key_of(3, 4))), 1, 1, 5, 64)
     (later_incarnation,) = cut(write_task(ExplorationTask(None)), 2, 1, 1, 64)
@@ -99,14 +97,14 @@ def test_late_parts_of_an_older_order_do_no_harm() -> None:
     assert intake.accept(new) is None
 
 
-@pytest.mark.parametrize("said", [b"", b"1234", b"\1\0\2\0\2\3\1\0\0"])
-def test_bytes_that_say_no_task_are_refused(said: bytes) -> None:
+@pytest.mark.parametrize("content", [b"", b"1234", b"\1\0\2\0\2\3\1\0\0"])
+def test_bytes_that_encode_no_task_are_refused(content: bytes) -> None:
     with pytest.raises(ValueError, match=r"a task|a vertex"):
-        read_task(said)
+        read_task(content)
 
 
 @pytest.mark.parametrize("entry", [b"", b"\1\0", b"\7\0\0\0", b"\2", b"\2\0\1\0\2\0", b"\2\7\1\0\2\0"])
-def test_entries_that_say_nothing_change_nothing(entry: bytes) -> None:
+def test_invalid_entries_change_nothing(entry: bytes) -> None:
     map_, empty = LandmarkMap(), LandmarkMap()
     map_.read(Stretch(1, 0, (entry,)), 0)
     assert map_.content() == empty.content()

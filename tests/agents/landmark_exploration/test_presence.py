@@ -79,7 +79,7 @@ def test_after_a_few_events_places_are_near_the_truth() -> None:
     assert np.median(errors) < 0.15
 
 
-def test_what_is_long_out_of_sight_is_forgotten() -> None:
+def test_a_place_long_out_of_sight_is_dropped() -> None:
     walk = Walk((0.5, 3.0))
     known = set(walk.view.bearing)
     for _ in range(100):

@@ -65,7 +65,7 @@ def test_a_robot_that_fell_silent_is_waited_for_and_then_presumed_dead() -> None
     assert concluded == [False, True]
 
 
-def test_a_robot_that_lost_its_memory_is_heard_before_all_agree_for_long_enough() -> None:
+def test_a_robot_that_lost_its_memory_is_received_before_all_agree_for_long_enough() -> None:
     registers = Registers(LEASE, DEAD, robots_expected=2)
     for node in (0, 1):
         registers.merge(Register(node, 1, 1, frozen=8), 0)

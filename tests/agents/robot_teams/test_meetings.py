@@ -163,7 +163,7 @@ def test_a_robot_ends_its_corridor_before_it_takes_a_plan_of_the_merged_team(bus
     assert all(busy not in plan.order for plan in robots[0].lead.plans if united and plan.epoch == epoch)
 
 
-def test_teams_that_hear_each_other_from_afar_stay_apart() -> None:
+def test_teams_within_radio_range_that_are_far_apart_do_not_join() -> None:
     """A negative control: only a meeting unites, and only then are maps shared."""
     robots = Robot(0, range(4), top(3), RIGHT), Robot(1, range(7), top(6), RIGHT)
     for robot in robots:

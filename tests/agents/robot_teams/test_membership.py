@@ -157,7 +157,7 @@ def explore(team: Team, depth: int, dies: int | None = None) -> int:
     return len(known)
 
 
-def test_robots_that_hear_each_other_are_one_team() -> None:
+def test_robots_within_radio_range_are_one_team() -> None:
     team = Team(4)
     assert {view.members for view in team.views()} == {(0, 1, 2, 3)}
     assert {view.lead for view in team.views()} == {0}

@@ -107,5 +107,5 @@ def test_a_lead_that_finds_a_cell_splits_the_formation_in_half() -> None:
     assert division(View(2, 0, (0,)), (0,), 0) is None
 
 
-def test_nobody_found_anything() -> None:
+def test_no_robot_found_anything() -> None:
     assert finder((0, 1), {0: status(0, 1), 1: status(1, 1)}) is None

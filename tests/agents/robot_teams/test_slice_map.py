@@ -164,7 +164,7 @@ def test_there_is_no_route_to_where_nothing_leads() -> None:
     assert End(5, TOP, 1_000) not in slice_map.distances(End(0, TOP, 1_000))
 
 
-def test_what_a_dead_robot_hides_is_not_open() -> None:
+def test_an_area_behind_a_dead_robot_is_not_open() -> None:
     facts: list[Fact] = [
         fact for fact in room(3) if not isinstance(fact, TracedArc) or End(1, TOP, 5_000) not in fact[:3]
     ]

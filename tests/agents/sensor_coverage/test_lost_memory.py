@@ -121,22 +121,22 @@ def state(slot: int = NOWHERE, moving: bool = False, waiting: bool = False) -> S
 def test_the_guests_of_the_base_are_robots_that_never_left() -> None:
     roster = ReleaseRoster(first_incarnation=True)
     roster.see([1, 2, 3])
-    roster.hear(1, state(slot=4))
-    roster.hear(2, state(moving=True))
-    roster.hear(3, state(waiting=True))
+    roster.receive(1, state(slot=4))
+    roster.receive(2, state(moving=True))
+    roster.receive(3, state(waiting=True))
     roster.see([1, 2, 3])
     for node in (1, 2):
-        roster.hear(node, state())  # after a restart
+        roster.receive(node, state())  # after a restart
     assert roster.guests == (3,)
     assert list(roster.known) == [1, 2, 3]
 
 
-def test_a_base_that_has_restarted_knows_only_guests_that_say_so() -> None:
+def test_a_base_that_has_restarted_knows_only_guests_that_report_their_wait() -> None:
     roster = ReleaseRoster(first_incarnation=False)
     roster.see([1, 2, 3])
-    roster.hear(1, state(slot=4))
-    roster.hear(2, state())
-    roster.hear(3, state(waiting=True))
+    roster.receive(1, state(slot=4))
+    roster.receive(2, state())
+    roster.receive(3, state(waiting=True))
     assert roster.guests == (3,)
 
 
@@ -289,7 +289,7 @@ def test_a_swarm_in_a_corridor_that_a_death_has_parted_is_joined_again() -> None
     assert is_covered(with_faults(corridor, '{kind="crash", nodes=[3], at_s=60.0}', 1, *PAPER))
 
 
-def test_the_base_waits_for_robots_that_it_does_not_hear() -> None:
+def test_the_base_waits_for_robots_out_of_its_reach() -> None:
     """The base receives nothing for four minutes; the others have not changed then.
 
     Where walls are followed, this run covers all and then ends as unproven, after 1,359 s.
@@ -299,7 +299,7 @@ def test_the_base_waits_for_robots_that_it_does_not_hear() -> None:
     assert result.sim_s > 270.0
 
 
-def test_a_base_that_never_hears_the_swarm_again_does_not_complete() -> None:
+def test_a_base_that_receives_no_message_any_more_does_not_complete() -> None:
     result = with_faults(HALL, '{kind="partition", groups=[[0]], at_s=30.0}', 1, "time.duration_s=900.0")
     assert result.outcome == "failed" or is_covered(result)
 

@@ -26,7 +26,7 @@ def hall(count: int, **tables: Any) -> Scenario:
 
 
 @pytest.mark.parametrize("uplink", [{}, {"loss": 0.3}], ids=["no-loss", "loss"])
-def test_robots_that_hear_the_coordinator_only_cover_the_hall(uplink: dict[str, Any]) -> None:
+def test_robots_with_only_the_coordinator_in_reach_cover_the_hall(uplink: dict[str, Any]) -> None:
     result = run(hall(3, uplink=uplink), 1, "inline")
     assert result.outcome == "completed"
     assert result.metrics["coverage_fraction"] >= 0.999
@@ -62,7 +62,7 @@ def beacon(sender: int, tick: int, *views: View) -> TeamBeacon:
     return TeamBeacon(sender, views, (), (), (status,), 0, 0)
 
 
-def test_the_coordinator_takes_in_what_it_hears_and_drops_the_silent() -> None:
+def test_the_coordinator_merges_received_messages_and_drops_silent_robots() -> None:
     membership = CoordinatorMembership(COORDINATOR, 1.0, 3.0)
     for tick in range(10):
         for node in (0, 1) if tick < 3 else (0,):

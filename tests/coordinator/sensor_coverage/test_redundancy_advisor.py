@@ -56,31 +56,31 @@ class Centre:
         self.advisor = RedundancyAdvisor(Setup(CENTRE, "coordinator", DT_S, (), b"0" * 32, bases=(BASE,)))
         self.tick = -1
 
-    def hear(self, words: Iterable[tuple[int, AdviceMessage]] = (), ticks: int = 1) -> Messages:
+    def receive(self, received: Iterable[tuple[int, AdviceMessage]] = (), ticks: int = 1) -> Messages:
         """Return its messages after it received these, over a number of ticks."""
-        inbox = tuple(Packet(CHANNEL, write(word), sender) for sender, word in words)
-        said: Messages = []
+        inbox = tuple(Packet(CHANNEL, write(message), sender) for sender, message in received)
+        sent: Messages = []
         for number in range(ticks):
             self.tick += 1
             observation = Observation(self.tick, self.tick * DT_S, inbox=() if number else inbox)
             for each in self.advisor.step(observation).outbox:
-                word = read(each.payload)
-                assert word is not None
-                said.append((each.to, word))
-        return said
+                message = read(each.payload)
+                assert message is not None
+                sent.append((each.to, message))
+        return sent
 
 
-def spared(said: Messages) -> dict[int | None, RedundantAdvice]:
-    return {to: word for to, word in said if isinstance(word, RedundantAdvice)}
+def advised(sent: Messages) -> dict[int | None, RedundantAdvice]:
+    return {to: message for to, message in sent if isinstance(message, RedundantAdvice)}
 
 
-# --- words ----------------------------------------------------------------------------------------------------------
+# --- received ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("word", [wheel()[1], ReportNoted(7), CollectReports(), RedundantAdvice(((1, 10), (2, 11)))])
-def test_every_advice_message_survives_the_wire_and_a_corrupt_one_is_ignored(word: AdviceMessage) -> None:
-    payload = write(word)
-    assert read(payload) == word
+@pytest.mark.parametrize("message", [wheel()[1], ReportNoted(7), CollectReports(), RedundantAdvice(((1, 10), (2, 11)))])
+def test_every_advice_message_survives_the_wire_and_a_corrupt_one_is_ignored(message: AdviceMessage) -> None:
+    payload = write(message)
+    assert read(payload) == message
     for slot in range(len(payload)):
         assert read(payload[:slot] + bytes([payload[slot] ^ 4]) + payload[slot + 1 :]) is None
     assert read(payload[:-1]) is None
@@ -91,11 +91,11 @@ def test_every_advice_message_survives_the_wire_and_a_corrupt_one_is_ignored(wor
 
 def test_the_advisor_advises_the_hub_of_a_wheel_with_list_versions_and_no_other_robot() -> None:
     centre = Centre()
-    said = centre.hear(wheel().items())
-    assert [to for to, word in said if isinstance(word, ReportNoted)] == list(range(7))
-    assert not spared(said)
-    assert spared(centre.hear(ticks=QUIET_TICKS)) == {0: RedundantAdvice(tuple((n, 10 + n) for n in range(1, 7)))}
-    assert spared(centre.hear(ticks=REPEAT_AT_COORDINATOR)).keys() == {0}, "it may have got lost"
+    sent = centre.receive(wheel().items())
+    assert [to for to, message in sent if isinstance(message, ReportNoted)] == list(range(7))
+    assert not advised(sent)
+    assert advised(centre.receive(ticks=QUIET_TICKS)) == {0: RedundantAdvice(tuple((n, 10 + n) for n in range(1, 7)))}
+    assert advised(centre.receive(ticks=REPEAT_AT_COORDINATOR)).keys() == {0}, "it may have got lost"
 
 
 @pytest.mark.parametrize(
@@ -109,14 +109,14 @@ def test_the_advisor_advises_the_hub_of_a_wheel_with_list_versions_and_no_other_
 def test_the_advisor_advises_no_robot_that_is_unwilling_or_whose_neighbours_differ_from_its_view(
     node: int, change: dict[str, object]
 ) -> None:
-    centre, words = Centre(), wheel()
-    fields = {name: getattr(words[node], name) for name in words[node].__struct_fields__}
-    words[node] = StandingReport(**fields | change)
-    assert not spared(centre.hear(words.items(), ticks=1 + QUIET_TICKS))
+    centre, received = Centre(), wheel()
+    fields = {name: getattr(received[node], name) for name in received[node].__struct_fields__}
+    received[node] = StandingReport(**fields | change)
+    assert not advised(centre.receive(received.items(), ticks=1 + QUIET_TICKS))
 
 
 def test_the_advisor_advises_no_robot_whose_departure_opens_a_hole() -> None:
-    assert not spared(Centre().hear(wheel(steps=(1, 5)).items(), ticks=1 + QUIET_TICKS))
+    assert not advised(Centre().receive(wheel(steps=(1, 5)).items(), ticks=1 + QUIET_TICKS))
 
 
 def test_the_advisor_advises_one_of_two_redundant_robots_that_see_each_other() -> None:
@@ -127,54 +127,54 @@ def test_the_advisor_advises_one_of_two_redundant_robots_that_see_each_other() -
     }
     twins[0] = StandingReport(5, 10, (1, 2, 3, 4, 5, 6, 7), (), True, True)
     twins[7] = StandingReport(5, 17, (0, 1, 2, 3, 4, 5, 6), (), True, True)
-    assert len(spared(Centre().hear(twins.items(), ticks=1 + QUIET_TICKS))) == 1
+    assert len(advised(Centre().receive(twins.items(), ticks=1 + QUIET_TICKS))) == 1
 
 
 def test_the_advisor_ignores_a_late_older_report() -> None:
-    centre, words = Centre(), wheel()
-    centre.hear(words.items())
-    new = StandingReport(6, 20, words[0].listed, (), True, False)
-    assert centre.hear([(0, new)]) == [(0, ReportNoted(6))]
-    assert centre.hear([(0, words[0]), (0, words[0])]) == [], "what is old needs not be noted again"
-    assert centre.hear([(0, new)]) == [(0, ReportNoted(6))], "that may have got lost"
-    assert not spared(centre.hear(ticks=QUIET_TICKS))
+    centre, received = Centre(), wheel()
+    centre.receive(received.items())
+    new = StandingReport(6, 20, received[0].listed, (), True, False)
+    assert centre.receive([(0, new)]) == [(0, ReportNoted(6))]
+    assert centre.receive([(0, received[0]), (0, received[0])]) == [], "what is old needs not be noted again"
+    assert centre.receive([(0, new)]) == [(0, ReportNoted(6))], "that may have got lost"
+    assert not advised(centre.receive(ticks=QUIET_TICKS))
 
 
 def test_a_restarted_advisor_asks_all_robots_and_then_visible_robots_without_a_report() -> None:
-    centre, words = Centre(), wheel()
-    assert centre.hear() == [(None, CollectReports())]
-    assert centre.hear(ticks=ASK_TICKS) == [(BASE, CollectReports())]
-    centre.hear([(BASE, words[BASE])])
-    asked = centre.hear(ticks=ASK_TICKS)
-    assert {to for to, word in asked if isinstance(word, CollectReports)} == set(words[BASE].listed)
-    assert spared(centre.hear(words.items(), ticks=1 + QUIET_TICKS)).keys() == {0}
+    centre, received = Centre(), wheel()
+    assert centre.receive() == [(None, CollectReports())]
+    assert centre.receive(ticks=ASK_TICKS) == [(BASE, CollectReports())]
+    centre.receive([(BASE, received[BASE])])
+    asked = centre.receive(ticks=ASK_TICKS)
+    assert {to for to, message in asked if isinstance(message, CollectReports)} == set(received[BASE].listed)
+    assert advised(centre.receive(received.items(), ticks=1 + QUIET_TICKS)).keys() == {0}
 
 
 # --- a robot --------------------------------------------------------------------------------------------------------
 
 
-def told(robot: AdviceClient, tick: int, standing: StandingReport | None) -> list[AdviceMessage | None]:
+def reported(robot: AdviceClient, tick: int, standing: StandingReport | None) -> list[AdviceMessage | None]:
     robot.update(tick, standing)
     return [read(write(each.message)) for each in robot.outgoing()]
 
 
 def test_a_robot_reports_once_its_report_has_settled_and_repeats_it_until_it_is_noted() -> None:
     robot, standing = AdviceClient(DT_S), StandingReport(0, 3, (1, 2), (), True, True)
-    said = {tick: words for tick in range(100) if (words := told(robot, tick, standing))}
-    assert list(said)[:3] == [SETTLED_TICKS, SETTLED_TICKS + REPEAT_TICKS, SETTLED_TICKS + 3 * REPEAT_TICKS]
-    ((first,), *others) = said.values()
+    sent = {tick: received for tick in range(100) if (received := reported(robot, tick, standing))}
+    assert list(sent)[:3] == [SETTLED_TICKS, SETTLED_TICKS + REPEAT_TICKS, SETTLED_TICKS + 3 * REPEAT_TICKS]
+    ((first,), *others) = sent.values()
     assert isinstance(first, StandingReport)
     assert all(each == [first] for each in others)
     robot.receive(CENTRE, ReportNoted(first.number - 1), 100)
     assert robot.next_wake() is not None
     robot.receive(CENTRE, ReportNoted(first.number), 100)
     assert robot.next_wake() is None
-    assert not told(robot, 400, standing)
+    assert not reported(robot, 400, standing)
     robot.receive(CENTRE, CollectReports(), 401)
-    assert told(robot, 401, standing) == [first], "a coordinator that begins anew asks"
+    assert reported(robot, 401, standing) == [first], "a coordinator that begins anew asks"
     moved = StandingReport(0, 4, (1,), (), True, True)
-    assert [told(robot, tick, moved) for tick in range(402, 402 + SETTLED_TICKS)] == [[]] * SETTLED_TICKS
-    ((new,),) = (told(robot, 402 + SETTLED_TICKS, moved),)
+    assert [reported(robot, tick, moved) for tick in range(402, 402 + SETTLED_TICKS)] == [[]] * SETTLED_TICKS
+    ((new,),) = (reported(robot, 402 + SETTLED_TICKS, moved),)
     assert isinstance(new, StandingReport)
     assert new.number > first.number
     assert new.listed == (1,)
@@ -193,7 +193,7 @@ def test_neighbours_grant_a_lock_by_advice_only_if_it_names_their_present_lists(
     for node, robot in robots.items():
         robot.update([1 - node], 1.0)
     version = robots[1].neighbour_list().version
-    assert robots[0].request(1.0) == [], "it has heard of no list"
+    assert robots[0].request(1.0) == [], "it has received no list"
     assert robots[0].request(1.0, ((2, version),)) == [], "it sees somebody else"
     for named, answer in ((version - 1, LockDenial), (version, LockGrant)):
         (asked,) = robots[0].request(1.0, ((1, named),))
@@ -244,11 +244,13 @@ class Swarm:
 
     def turn(self, tick: int) -> None:
         arrived = self.uplink.pop(tick, [])
-        words = [(sender, read(payload)) for sender, _, payload in arrived if sender is not None]
-        for to, word in self.centre.hear([(sender, word) for sender, word in words if word is not None]):
+        received = [(sender, read(payload)) for sender, _, payload in arrived if sender is not None]
+        for to, message in self.centre.receive(
+            [(sender, message) for sender, message in received if message is not None]
+        ):
             for each in self.slots if to is None else [to]:
-                self.send(tick, None, each, write(word))
-        heard, self.air = self.air, []
+                self.send(tick, None, each, write(message))
+        in_air, self.air = self.air, []
         for node, leaving in self.leaving.items():
             stands, advice = node not in self.gone_at, self.advice[node]
             sight = self.sees(node, tick)
@@ -257,7 +259,7 @@ class Swarm:
             for sender, to, payload in arrived:
                 if sender is None and to == node:
                     advice.receive(CENTRE, read(payload), tick)  # type: ignore[arg-type]
-            for sender, receiver, spoken in heard:
+            for sender, receiver, spoken in in_air:
                 if receiver == node and self.luck.random() >= 0.2:
                     leaving.receive(sender, spoken, tick)  # type: ignore[arg-type]
             versions = advice.advice(tick, sight)
@@ -287,7 +289,7 @@ class Swarm:
         self.gone_at[node] = tick
 
 
-def leave_as_told(late: int, locks: bool) -> tuple[int, int]:
+def leave_as_advised(late: int, locks: bool) -> tuple[int, int]:
     left = changed = 0
     for seed in range(4):
         swarm = Swarm(seed, late, locks)
@@ -299,13 +301,13 @@ def leave_as_told(late: int, locks: bool) -> tuple[int, int]:
 
 @pytest.mark.parametrize("late", [0, 80])
 def test_departures_by_advice_never_open_a_hole_on_a_lossy_uplink(late: int) -> None:
-    left, changed = leave_as_told(late, locks=True)
+    left, changed = leave_as_advised(late, locks=True)
     assert left > 8
     assert changed == 0
 
 
 def test_without_locks_late_advice_opens_holes() -> None:
-    assert leave_as_told(late=80, locks=False)[1] > 0
+    assert leave_as_advised(late=80, locks=False)[1] > 0
 
 
 # --- whole deployments ------------------------------------------------------------------------------------------------

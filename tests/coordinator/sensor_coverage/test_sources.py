@@ -131,7 +131,7 @@ def test_the_directions_of_a_swarm_are_in_the_frame_of_its_station() -> None:
     assert [truth.off(robot) for robot in (1, 4, 5)] == pytest.approx([-2.0] * 3)
 
 
-def test_two_frames_merge_where_swarms_see_each_other_and_all_remembered_directions_turn() -> None:
+def test_two_frames_merge_where_swarms_see_each_other_and_all_stored_directions_turn() -> None:
     truth = two_swarms()
     apart = ((0, 2), (0, 3), (2, 3), (1, 4), (1, 5), (4, 5))
     truth.update(*apart)

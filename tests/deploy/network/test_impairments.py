@@ -77,7 +77,7 @@ def test_a_model_of_a_user_can_name_its_rule_of_the_network() -> None:
         ({"kind": "own_faults:Static", "fraction": 0.5}, "no rule of the network is known for this fault"),
     ],
 )
-def test_a_fault_of_a_user_is_in_the_twin_only_if_it_says_so(fault: dict[str, Any], reason: str) -> None:
+def test_a_fault_of_a_user_is_in_the_twin_only_if_it_declares_that(fault: dict[str, Any], reason: str) -> None:
     chosen = scenario(radio={}, faults=[fault | {"at_s": 0.0}])
     if not reason:
         assert supported(chosen)[0].faults == chosen.faults

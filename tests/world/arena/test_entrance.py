@@ -2,10 +2,10 @@
 
 import math
 
-import numpy as np
 import pytest
 
 import zwerm
+from zwerm.errors import ScenarioError
 
 HALL = ("arena.size_m=[2.6,2.0]", "robots.count=8", "time.duration_s=12.0")
 
@@ -18,17 +18,18 @@ def headings(seed: int, *overrides: str) -> list[float]:
 
 
 def test_the_seed_draws_the_heading_of_a_base_station() -> None:
-    drawn = [headings(seed, "base.pose=[0.2,1.0,0.0]", 'base.heading="drawn"') for seed in (1, 2, 3)]
+    drawn = [headings(seed, "base.pose=[0.2,1.0]") for seed in (1, 2, 3)]
     assert all(first == last for first, last in drawn), "a station never moves"
     assert len({first for first, _ in drawn}) == 3
     assert all(-math.pi <= first < math.pi for first, _ in drawn)
-    assert headings(1, "base.pose=[0.2,1.0,0.0]", 'base.heading="drawn"') == drawn[0]
+    assert headings(1, "base.pose=[0.2,1.0]") == drawn[0]
 
 
-def test_a_given_heading_is_kept_without_it() -> None:
+def test_a_given_heading_is_kept() -> None:
     assert headings(1, "base.pose=[0.2,1.0,0.7]")[0] == pytest.approx(0.7)
 
 
-def test_the_heading_in_the_pose_has_no_effect_on_a_drawn_one() -> None:
-    one, other = (headings(5, f"base.pose=[0.2,1.0,{given}]", 'base.heading="drawn"') for given in (0.0, 1.0))
-    assert np.array_equal(one, other)
+@pytest.mark.parametrize("pose", ["[0.2]", "[0.2,1.0,0.0,0.0]"])
+def test_a_pose_has_two_or_three_numbers(pose: str) -> None:
+    with pytest.raises(ScenarioError, match=r"base\.pose: expected"):
+        headings(1, f"base.pose={pose}")

@@ -30,7 +30,7 @@ class ReleaseRoster:
                 if self._first_incarnation:
                     self._at_base[node] = None
 
-    def hear(self, sender: int, state: StateBeacon) -> None:
+    def receive(self, sender: int, state: StateBeacon) -> None:
         """Take in a robot's state: one that moves or has a slot has left the base for good."""
         if state.slot != NOWHERE or state.moving:
             self._departed[sender] = None
