@@ -30,6 +30,8 @@ NEARER_M: Final = 0.02
 SLACK_M: Final = 0.75
 # Largest distance between two touches of one boundary beside a body that stands there [m]: two bodies with their gaps.
 BESIDE_BODY_M: Final = 1.1
+# Largest distance of two touches across a straight wall [m].
+IN_LINE_M: Final = 0.05
 
 
 # Returns the ends at which the robots in contact stand.
@@ -166,7 +168,7 @@ class BoundaryTrace:
     """Follow the boundary from an end into the slab on the side `direction`, until it crosses a slice.
 
     Bodies may lead the robot away from the boundary. A wall that it touches far from its last touch may belong to another
-    boundary, so the trace gives no arc then.
+    boundary, so the trace gives no arc then, unless both touches are in line with the wall.
     """
 
     def __init__(self, start: End, direction: int, grid: SliceGrid, parked: Parked) -> None:
@@ -181,6 +183,7 @@ class BoundaryTrace:
         self._extreme: Vector = (-math.inf, 0.0)
         self._wall_tick = -10
         self._touched_m: Vector = self._x_m, start.y_mm / 1000.0
+        self._normals: tuple[Vector, ...] = ()
         self._strayed = False
         self.wrecks: dict[Wreck, None] = {}
         self.arc: TracedArc | None = None
@@ -191,8 +194,8 @@ class BoundaryTrace:
         x, y, d = senses.x_m, senses.y_m, self.direction
         self.wrecks.update(dict.fromkeys(senses.wrecks))
         if senses.walls:
-            self._strayed = self._strayed or not self._is_beside(x, y)
-            self._wall_tick, self._touched_m = senses.tick, (x, y)
+            self._strayed = self._strayed or not (self._is_beside(x, y) or self._is_in_line(senses))
+            self._wall_tick, self._touched_m, self._normals = senses.tick, (x, y), senses.walls
         last = self._last
         if last is not None:
             self._length_m += math.hypot(x - last[0], y - last[1])
@@ -240,6 +243,15 @@ class BoundaryTrace:
     def _is_beside(self, x_m: float, y_m: float) -> bool:
         """Return whether a point of the boundary is not farther from the last touch than a body hides."""
         return math.hypot(x_m - self._touched_m[0], y_m - self._touched_m[1]) <= BESIDE_BODY_M
+
+    def _is_in_line(self, senses: Senses) -> bool:
+        """Return whether the wall in touch is the straight wall of the last touch, as far as touch tells."""
+        dx, dy = senses.x_m - self._touched_m[0], senses.y_m - self._touched_m[1]
+        return any(
+            nx * mx + ny * my > 0.999 and abs(dx * nx + dy * ny) < IN_LINE_M
+            for nx, ny in senses.walls
+            for mx, my in self._normals
+        )
 
     def _stop(self, end: End) -> None:
         depth, extreme_y = self._extreme

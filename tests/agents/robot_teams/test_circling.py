@@ -78,6 +78,17 @@ def test_a_wall_far_from_the_last_touch_gives_no_arc() -> None:
     assert far.end == End(1, TOP, 2_000)
 
 
+def test_a_wall_in_line_with_the_last_touch_is_the_same_wall() -> None:
+    """Bodies lead the robot 3 m along a straight wall beside the slice."""
+    trace = BoundaryTrace(End(0, TOP, 5_000), RIGHT, GRID, lambda senses: [])
+    path = [(0.0, 5.0, True), (0.5, 5.0, True), *[(0.3, 5.0 - y, False) for y in np.linspace(0.0, 3.0, 60)]]
+    for tick, (x, y, touches) in enumerate([*path, (0.5, 2.0, True), (0.5, 1.5, True), (-0.01, 1.5, True)]):
+        walls = ((1.0, 0.0), (0.0, -1.0)) if touches else ()
+        trace.step(Senses(tick, float(x), float(y), walls, ()), ())
+    assert trace.arc is not None
+    assert trace.arc.stop == End(0, BOTTOM, 1_500)
+
+
 def test_a_robot_at_an_end_proves_nothing_to_a_robot_without_a_wall() -> None:
     parked = End(0, BOTTOM, 4_500)
     for walls in ((), ((0.0, 1.0),)):
