@@ -16,7 +16,6 @@ carried out in parts. Kinds of faults, halls and losses alternate, so each part 
 """
 
 import argparse
-import csv
 import subprocess
 import time
 from collections.abc import Iterator, Sequence
@@ -25,7 +24,7 @@ from typing import Any, Final
 
 import msgspec
 import numpy as np
-from csv_rows import add_csv_option, write_csv
+from csv_rows import add_csv_option, append_row, read_rows, write_csv
 
 from zwerm import RunResult, run
 from zwerm.scenario.tables import Scenario
@@ -154,26 +153,6 @@ def one_run(case: Case, more: Sequence[str]) -> dict[str, str]:
     }
 
 
-def stored(path: Path | None) -> list[dict[str, str]]:
-    """Return the rows of earlier parts of a campaign."""
-    if path is None or not path.exists():
-        return []
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def append(path: Path | None, row: dict[str, str]) -> None:
-    """Add a row to the file of a campaign."""
-    if path is None:
-        return
-    new = not path.exists()
-    with path.open("a", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(row), lineterminator="\n")
-        if new:
-            writer.writeheader()
-        writer.writerow(row)
-
-
 def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
     """Return one row for each variant, hall, kind of schedule and loss: how many runs were right, honest or wrong."""
     groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
@@ -219,14 +198,14 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, help="begin no run after this processor time [min]")
     add_csv_option(parser)
     asked = parser.parse_args()
-    rows = stored(asked.rows)
+    rows = read_rows(asked.rows)
     known = {tuple(row[each] for each in Case.__struct_fields__) for row in rows}
     for case in cases(asked):
         if asked.minutes is not None and time.process_time() > 60.0 * asked.minutes:
             break
         if msgspec.structs.astuple(case) not in known:
             rows.append(one_run(case, asked.set))
-            append(asked.rows, rows[-1])
+            append_row(asked.rows, rows[-1])
             print(*rows[-1].values(), sep="\t", flush=True)
     counts = {each: sum(row["verdict"] == each for row in rows) for each in VERDICTS}
     print(f"{len(rows)} runs: " + ", ".join(f"{count} {word}" for word, count in counts.items()))

@@ -10,7 +10,6 @@ may be stopped and continued. A death in a division or a merge needs the undistu
 """
 
 import argparse
-import csv
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -20,7 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 import shapely
-from csv_rows import add_csv_option, write_csv
+from csv_rows import add_csv_option, append_row, read_rows, write_csv
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
@@ -240,13 +239,6 @@ def one(row: dict[str, str], times: dict[tuple[str, str, str, str], float], sett
     return (row["arena"], setting, robots or row["robots"], row["seed"]) in times
 
 
-def read(path: Path) -> list[dict[str, str]]:
-    if not path.exists():
-        return []
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(
         description="Measure coverage by robot teams over drawn arenas, starts and faults."
@@ -261,7 +253,7 @@ def main() -> None:
     add_csv_option(parser)
     options = parser.parse_args()
     first, last = (int(each) for each in options.seeds.split("-"))
-    rows = read(options.runs)
+    rows = read_rows(options.runs)
     known = {key(row): row for row in rows}
     began = time.monotonic()
     wanted = [
@@ -280,12 +272,7 @@ def main() -> None:
             continue  # no such event, or its time is not known
         row = measure(arena, setting, robots, seed, float(event_s) if event_s else None)
         known[key(row)] = row
-        new = not options.runs.exists()
-        with options.runs.open("a", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-            if new:
-                writer.writeheader()
-            writer.writerow(row)
+        append_row(options.runs, row)
         print(" ".join(row.values()), flush=True)
     shown = [
         row

@@ -19,3 +19,23 @@ def write_csv(path: Path | None, rows: Sequence[dict[str, str]]) -> None:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
+
+
+def read_rows(path: Path | None) -> list[dict[str, str]]:
+    """Return the rows that earlier parts of a campaign stored."""
+    if path is None or not path.exists():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def append_row(path: Path | None, row: dict[str, str]) -> None:
+    """Add a row to the file of a campaign; do nothing where it is None."""
+    if path is None:
+        return
+    new = not path.exists()
+    with path.open("a", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(row), lineterminator="\n")
+        if new:
+            writer.writeheader()
+        writer.writerow(row)

@@ -191,7 +191,8 @@ class TeamRobot(Controller):
         """Find an end, then carry out one plan after the other; after a failure find an end again."""
         while True:
             try:
-                if self.work.at is None:
+                if self.work.here is None:
+                    # A wreck may hide the end at which the robot stood.
                     side = TOP if self.work.failures == 0 or self.random.random() < 0.5 else BOTTOM
                     yield from self.work.localise(side, self._swept_by_others)
                 plan = latest_plans(self.lead.plans, self.membership.view).get(self.setup.node)

@@ -249,15 +249,18 @@ class LandmarkCoordinator:
         A robot's best gain never rises while frontiers are assigned. So only the robot with the best gain is examined again.
         """
         given = 0
+        given_at: dict[int, int] = {}  # landmark: the number of the last frontier with it that was given away
         queue: list[tuple[float, int, int, Choice]] = []
         for node in free:
             self._consider(node, offer, given, queue)
         while queue:
             _, node, at, choice = heappop(queue)
-            if at < given:
+            # Frontiers without a landmark of this one change nothing: all others are worth the same as before, or less.
+            if any(given_at.get(landmark, 0) > at for landmark in pair_of(choice.key)):
                 self._consider(node, offer, given, queue)
                 continue
             given += 1
+            given_at.update(dict.fromkeys(pair_of(choice.key), given))
             offer.take(choice.key)
             self._give(node, choice)
 

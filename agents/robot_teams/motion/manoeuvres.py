@@ -28,6 +28,10 @@ HIDDEN_TICKS: Final = 20
 NEARER_M: Final = 0.02
 # Distance on the wrong side of its slice at which a trace may begin [m].
 SLACK_M: Final = 0.75
+# Largest distance between two touches of one boundary beside a body that stands there [m]: two bodies with their gaps.
+BESIDE_BODY_M: Final = 1.1
+# Largest distance of two touches across a straight wall [m].
+IN_LINE_M: Final = 0.05
 
 
 # Returns the ends at which the robots in contact stand.
@@ -161,7 +165,11 @@ class SliceSweep:
 
 
 class BoundaryTrace:
-    """Follow the boundary from an end into the slab on the side `direction`, until it crosses a slice."""
+    """Follow the boundary from an end into the slab on the side `direction`, until it crosses a slice.
+
+    Bodies may lead the robot away from the boundary. A wall that it touches far from its last touch may belong to another
+    boundary, so the trace gives no arc then, unless both touches are in line with the wall.
+    """
 
     def __init__(self, start: End, direction: int, grid: SliceGrid, parked: Parked) -> None:
         self.start, self.direction = start, direction
@@ -174,16 +182,20 @@ class BoundaryTrace:
         self._length_m = 0.0
         self._extreme: Vector = (-math.inf, 0.0)
         self._wall_tick = -10
+        self._touched_m: Vector = self._x_m, start.y_mm / 1000.0
+        self._normals: tuple[Vector, ...] = ()
+        self._strayed = False
         self.wrecks: dict[Wreck, None] = {}
         self.arc: TracedArc | None = None
         self.end: End | None = None
 
     def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
-        """Return where to go, or None at a crossing: then `end` is where, and `arc` the fact unless a robot hid it."""
+        """Return where to go, or None at a crossing: then `end` is where, and `arc` the fact unless it is uncertain."""
         x, y, d = senses.x_m, senses.y_m, self.direction
         self.wrecks.update(dict.fromkeys(senses.wrecks))
         if senses.walls:
-            self._wall_tick = senses.tick
+            self._strayed = self._strayed or not (self._is_beside(x, y) or self._is_in_line(senses))
+            self._wall_tick, self._touched_m, self._normals = senses.tick, (x, y), senses.walls
         last = self._last
         if last is not None:
             self._length_m += math.hypot(x - last[0], y - last[1])
@@ -204,7 +216,7 @@ class BoundaryTrace:
             self._inside = False
         if depth < -SLACK_M:
             return None
-        if blocks and self._inside:
+        if blocks and self._inside and senses.walls:
             ahead = (self.start.slice + d, self.start.side), (self.start.slice, -self.start.side)
             for end in self._parked(senses):
                 if (end.slice, end.side) in ahead:
@@ -225,13 +237,28 @@ class BoundaryTrace:
         # A robot hides the end: it stands there, or the arc stays open.
         self.end = End(k, side, mm(y))
         for end in self._parked(senses):
-            if (end.slice, end.side) == (k, side):
+            if (end.slice, end.side) == (k, side) and self._is_beside(self._grid.x_m(k), end.y_mm / 1000.0):
                 self._stop(end)
+
+    def _is_beside(self, x_m: float, y_m: float) -> bool:
+        """Return whether a point of the boundary is not farther from the last touch than a body hides."""
+        return math.hypot(x_m - self._touched_m[0], y_m - self._touched_m[1]) <= BESIDE_BODY_M
+
+    def _is_in_line(self, senses: Senses) -> bool:
+        """Return whether the wall in touch is the straight wall of the last touch, as far as touch tells."""
+        dx, dy = senses.x_m - self._touched_m[0], senses.y_m - self._touched_m[1]
+        return any(
+            nx * mx + ny * my > 0.999 and abs(dx * nx + dy * ny) < IN_LINE_M
+            for nx, ny in senses.walls
+            for mx, my in self._normals
+        )
 
     def _stop(self, end: End) -> None:
         depth, extreme_y = self._extreme
         extreme_x = self._x_m + self.direction * max(depth, 0.0)
         self.end = end
+        if self._strayed:
+            return
         self.arc = TracedArc(
             self.start, self.direction, end, mm(self._length_m), mm(extreme_x), mm(extreme_y), tuple(self.wrecks)
         )

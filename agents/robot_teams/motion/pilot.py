@@ -3,8 +3,9 @@
 The traffic rules depend only on the robot's own senses. If two robots meet head-on, the one with the smaller id waits,
 and the other goes around. A robot goes around a standing robot after a short wait. A robot that makes no progress goes
 back along its own trail, waits, and comes forward again. The distance is random, and doubles with every attempt. So if
-two robots meet in a passage for one, one of them leaves it backwards. The speed towards another body is limited to half
-of the gap a tick.
+two robots meet in a passage for one, one of them leaves it backwards. Two robots that go around each other make no
+progress either: if a retreat does not help them, the manoeuvre has failed. The speed towards another body is limited to
+half of the gap a tick.
 """
 
 import math
@@ -25,6 +26,11 @@ MOVING_WAIT_S: Final = 3.0
 # No progress: less than this distance in this time.
 HEADWAY_M: Final = 0.2
 HEADWAY_S: Final = 4.0
+# Circling: within this distance for this time, in contact with other robots at some time.
+CIRCLE_M: Final = 2.0
+CIRCLE_S: Final = 15.0
+# A robot nearer than this to where it was before has closed a circle [m].
+CLOSED_M: Final = 0.3
 # Number of retreats after which the manoeuvre has failed.
 ATTEMPTS_MAX: Final = 5
 # The longest retreat, on average [m].
@@ -92,6 +98,38 @@ def _around_robots(senses: Senses, way: Vector) -> Vector:
     return way
 
 
+class Headway:
+    """A robot's progress since the last `reset`: whether it stands, and whether it circles with other robots."""
+
+    def __init__(self, dt_s: float) -> None:
+        self._stand_ticks, self._circle_ticks = round(HEADWAY_S / dt_s), round(CIRCLE_S / dt_s)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin again at the robot's next place."""
+        self._stand: Vector = (math.inf, 0.0)
+        self._circle: Vector = (math.inf, 0.0)
+        self._stand_tick = self._circle_tick = 0
+        self._touched = False
+        self.gained = self.stands = self.circles = False
+
+    def note(self, senses: Senses, touches: bool) -> None:
+        """Take in one tick; `touches` is true in contact with a robot. `gained` is true after `HEADWAY_M` more."""
+        tick = senses.tick
+        self.gained = _apart(senses, self._stand) > HEADWAY_M
+        if self.gained:
+            self._stand, self._stand_tick = (senses.x_m, senses.y_m), tick
+        if _apart(senses, self._circle) > CIRCLE_M:
+            self._circle, self._circle_tick, self._touched = (senses.x_m, senses.y_m), tick, False
+        self._touched = self._touched or touches
+        self.stands = tick - self._stand_tick > self._stand_ticks
+        self.circles = self._touched and tick - self._circle_tick > self._circle_ticks
+
+
+def _apart(senses: Senses, place: Vector) -> float:
+    return math.hypot(senses.x_m - place[0], senses.y_m - place[1])
+
+
 class Pilot:
     """Steers one robot; `state` is the state of its manoeuvre."""
 
@@ -108,15 +146,14 @@ class Pilot:
         self._retreat: Retreat | None = None
         self._attempts = 0
         self._last: Vector | None = None
-        self._mark: Vector = (math.inf, 0.0)
-        self._mark_tick = 0
+        self._headway = Headway(dt_s)
         self._failed_at: Vector = (math.inf, 0.0)
 
     def start(self, manoeuvre: Manoeuvre) -> None:
         """Begin a manoeuvre."""
         self._manoeuvre = manoeuvre
         self.state = RUNNING
-        self._mark = (math.inf, 0.0)
+        self._headway.reset()
 
     def rest(self) -> None:
         """End the manoeuvre: stand, and move aside for others."""
@@ -151,7 +188,7 @@ class Pilot:
             way = self._retreat.step(senses, moved_m)
             if way is None:
                 self._retreat = None
-                self._mark = (math.inf, 0.0)
+                self._headway.reset()
             elif self._retreat.blocked:
                 self._retire_or_retry(senses)
                 return 0.0, 0.0
@@ -167,24 +204,39 @@ class Pilot:
         if way is None:
             self.state = DONE
             return 0.0, 0.0
-        if math.hypot(senses.x_m - self._mark[0], senses.y_m - self._mark[1]) > HEADWAY_M:
-            self._mark, self._mark_tick = (senses.x_m, senses.y_m), senses.tick
-            if math.hypot(senses.x_m - self._failed_at[0], senses.y_m - self._failed_at[1]) > 2.0:
-                self._attempts = 0
-        elif (senses.tick - self._mark_tick) * self._dt_s > HEADWAY_S:
+        headway = self._headway
+        headway.note(senses, bool(self._contact_ticks))
+        if headway.gained and _apart(senses, self._failed_at) > CIRCLE_M:
+            self._attempts = 0
+        if headway.circles:
+            if self._attempts > 0:
+                self._fail()
+                return 0.0, 0.0
+            self._leave_circle(senses)
+        if headway.stands or headway.circles:
             self._retire_or_retry(senses)
             return 0.0, 0.0
         return way
+
+    def _leave_circle(self, senses: Senses) -> None:
+        """Take the circles off the trail, so that the retreat leads out of them."""
+        for index, place in enumerate(self._trail):
+            if _apart(senses, place) < CLOSED_M:
+                del self._trail[index + 1 :]
+                return
 
     def _retire_or_retry(self, senses: Senses) -> None:
         self._attempts += 1
         self._retreat = None
         if self._attempts > ATTEMPTS_MAX or not senses.robots:
-            self.state = FAILED
-            self._attempts = 0
+            self._fail()
         else:
             self._failed_at = senses.x_m, senses.y_m
             self._begin_retreat(senses, min(RETREAT_M, 0.5 * 2.0**self._attempts))
+
+    def _fail(self) -> None:
+        self.state = FAILED
+        self._attempts = 0
 
     def _begin_retreat(self, senses: Senses, scale_m: float) -> None:
         self.retreats += 1
@@ -195,7 +247,7 @@ class Pilot:
 
     def _leave_trail(self, senses: Senses) -> None:
         trail = self._trail
-        if not trail or math.hypot(senses.x_m - trail[-1][0], senses.y_m - trail[-1][1]) > TRAIL_STEP_M:
+        if not trail or _apart(senses, trail[-1]) > TRAIL_STEP_M:
             trail.append((senses.x_m, senses.y_m))
             if len(trail) > TRAIL_POINTS:
                 del trail[: TRAIL_POINTS // 4]

@@ -17,8 +17,12 @@ from zwerm.agents.robot_teams.mapping.facts import (
 )
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.motion.manoeuvres import Approach, SliceGrid
+from zwerm.agents.robot_teams.motion.pilot import IDLE, RUNNING
 from zwerm.agents.robot_teams.motion.senses import Beside, Senses
 from zwerm.agents.robot_teams.motion.wrecks import STILL_S, TOUCHED_S, WreckWatch
+from zwerm.agents.robot_teams.robot import TeamRobot
+from zwerm.agents.runtime.contract import Body, Setup
+from zwerm.wire.messages import Observation, Pose
 
 DT_S, SILENCE_S = 0.5, 6.0
 LONG_TICKS = round((2.0 * SILENCE_S + STILL_S + TOUCHED_S) / DT_S) + 2
@@ -149,3 +153,19 @@ def test_an_approach_to_an_end_at_which_a_wreck_stands_ends_soon(dead: bool, end
     approach = Approach(End(0, BOTTOM, 1_000), SliceGrid(0.0, 0.95), lambda senses: [])
     steps = [approach.step(Senses(tick, 0.0, 2.0, (), (beside,)), []) for tick in range(30)]
     assert (None in steps) == ends == approach.hidden
+
+
+@pytest.mark.parametrize("hidden", [True, False])
+def test_a_robot_whose_end_a_wreck_hides_looks_for_another_end(hidden: bool) -> None:
+    """No way leads from a hidden end, so the lead would give this robot no task, and it would stand in the way."""
+    body = Body("holonomic", 0.25, 1.0, 1.0)
+    robot = TeamRobot(Setup(0, "robot", DT_S, TeamRobot.sensors, bytes(16), body, ("radio",)))
+    robot.map.merge(room(2)[:-1])
+    robot.work.at = End(0, TOP, 5_000)
+    states = []
+    for tick in range(2):
+        pose = Pose(0.5, 4.9, 0.0)
+        robot.step(Observation(tick, tick * DT_S, touch=(), neighbours=(), pose=pose))
+        states.append(robot.pilot.state)
+        robot.map.add(Void(0, -300, 4_600 if hidden else 5_600, 5_400 if hidden else 6_400, WRECK))
+    assert states == [IDLE, RUNNING if hidden else IDLE]

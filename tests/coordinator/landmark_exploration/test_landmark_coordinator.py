@@ -1,7 +1,15 @@
 """The coordinator of landmark-based exploration by itself: it acknowledges uploads, and ignores what it cannot decode."""
 
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
+from zwerm.agents.landmark_exploration.mapping.cost_utility import Offer, cost_utility
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
-from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, Vector
+from zwerm.agents.landmark_exploration.sharing.exploration_tasks import landmark_bytes, read_task
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, TaskPart, TaskReport, Vector
 from zwerm.agents.runtime.contract import Setup
 from zwerm.coordinator.landmark_exploration import LandmarkCoordinator
 from zwerm.wire.messages import Observation, Packet
@@ -46,3 +54,37 @@ def test_a_coordinator_without_memory_acknowledges_nothing_of_what_it_had() -> N
 
 def test_bytes_of_any_kind_are_ignored() -> None:
     assert answers(coordinator(), 0, b"", b"\xff" * 40, messages.write(Entries(7, 0, (b"a",)))[:-1]) == []
+
+
+@given(st.lists(st.sets(st.integers(0, 14), min_size=2, max_size=5), min_size=4, max_size=12), st.randoms())
+@settings(max_examples=40)
+def test_assignment_takes_the_best_pair_of_a_robot_and_a_frontier_again_and_again(
+    some: list[set[int]], random: Any
+) -> None:
+    robots = 5
+    node = LandmarkCoordinator(Setup(robots, "coordinator", 0.1, (), bytes(16), channels=("uplink",), incarnation=1))
+    for number, landmarks in enumerate(some):
+        seen = tuple(sorted(landmarks))
+        node.map.observe(BearingSnapshot(seen, tuple(random.randrange(256) for _ in seen)), (number, 0))
+    reports = [tuple(sorted(random.choice(some))) for _ in range(robots)]
+    expected: dict[int, int] = {}
+    offer, choose = Offer(node.map.frontiers, ()), cost_utility(10.0)
+    while True:
+        free = [robot for robot in range(robots) if robot not in expected]
+        choices = [(choice, robot) for robot in free if (choice := choose(node.map.complex, reports[robot], offer))]
+        if not choices:
+            break
+        best, robot = max(choices, key=lambda each: (each[0].gain, -each[1]))
+        expected[robot] = best.key
+        offer.take(best.key)
+    inbox = tuple(
+        Packet("uplink", messages.write(TaskReport(1, 0, 0, True, True, 0, landmark_bytes(report))), robot)
+        for robot, report in enumerate(reports)
+    )
+    outbox = node.step(Observation(0, 0.0, inbox)).outbox
+    assigned = {}
+    for each in outbox:
+        part = messages.read(each.payload)
+        if isinstance(part, TaskPart) and each.to is not None and (key := read_task(part.bytes_).key) is not None:
+            assigned[each.to] = key
+    assert assigned == expected
