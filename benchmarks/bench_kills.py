@@ -113,6 +113,11 @@ def _judge(role: str, name: str, phase: str, world: subprocess.Popen[bytes], fol
         if phase != "drawing":  # it goes on for ever: end it
             until(lambda: phase == "joining" or record.stat().st_size > 200_000, "the run goes on after the stop")
             os.kill(world.pid, signal.SIGINT)
+    elif name == "STOP" and role == "server" and phase != "drawing":
+        # A run whose robots are all forked needs the server no more.
+        until(lambda: world.poll() is not None or (record.exists() and record.stat().st_size > 200_000), "it goes on")
+        if world.poll() is None:
+            os.kill(world.pid, signal.SIGINT)
     elif name == "INT" and role == "robot" and phase != "drawing":
         os.kill(world.pid, signal.SIGINT)  # robots ignore it
     elif name == "INT" and role == "server" and phase != "drawing":
@@ -137,6 +142,8 @@ def _allowed(role: str, name: str, phase: str) -> set[int]:
         return {INTERRUPTED} if name == "STOP" and phase != "drawing" else ended
     if phase == "drawing":
         return {0}
+    if name == "STOP" and role == "server":
+        return {2, INTERRUPTED} if phase == "joining" else {INTERRUPTED}
     if name == "INT":  # the robot and its server ignore it, and the trial ends the world
         return {INTERRUPTED}
     return {1, 2} if phase == "joining" else {1}

@@ -193,7 +193,10 @@ class LocalSupervisor:
                 if not self.wait(TERMINATE_WAIT_S):
                     for process in self._alive():
                         process.kill()
-                    self.wait(LEAVE_WAIT_S)
+                    # Their end is reported by the server, and the end of this program waits for it.
+                    if not self.wait(LEAVE_WAIT_S):
+                        _kill_server()
+                        self.wait(LEAVE_WAIT_S)
             self._end_children(list(self._processes.values()))
 
     def _end_children(self, ended: Sequence[ForkServerProcess]) -> None:
@@ -219,7 +222,7 @@ class LocalSupervisor:
         reader, writer = self._context.Pipe(duplex=False)
         with reader, writer:
             while waiting or missing:
-                with interrupts_held(), main_module_hidden():
+                with interrupts_held(), main_module_hidden(), server_answers(deadline_s):
                     while waiting and len(missing) < JOINING_MAX:
                         credential = waiting.popleft()
                         process = self._start_process(credential, deadline_s, writer)
@@ -270,6 +273,31 @@ def interrupts_held() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
         if held:
             signal.raise_signal(signal.SIGINT)
+
+
+@contextlib.contextmanager
+def server_answers(deadline_s: float) -> Iterator[None]:
+    """Raise LinkError if the server that robots are forked from ends in the block, or does not answer in `deadline_s`.
+
+    Starting a process waits for its answer without a limit. So a server that hangs or is stopped is killed after that time; its
+    robots end with it, and `prepare` starts another one.
+    """
+    timer = threading.Timer(deadline_s, _kill_server)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    except (EOFError, ConnectionError) as error:
+        raise LinkError(f"the server that robots are forked from has ended or does not answer: {error}") from None
+    finally:
+        timer.cancel()
+
+
+def _kill_server() -> None:
+    server: int | None = vars(forkserver)["_forkserver"]._forkserver_pid  # it has no public name
+    if server is not None:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(server, signal.SIGKILL)
 
 
 @contextlib.contextmanager

@@ -10,6 +10,7 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from support import ROBOTS, ROOT, children_of, gone, until
 from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.identity import router_settings
 from zwerm.deploy.remote import run_robots
-from zwerm.deploy.supervisor import interrupts_held
+from zwerm.deploy.supervisor import interrupts_held, prepare
 from zwerm.deploy.swarm import Certificate, LocalSwarm, RemoteSwarm
 from zwerm.errors import LinkError
 from zwerm.link import Arrival
@@ -85,6 +86,28 @@ def test_an_exception_inside_a_swarm_ends_all_its_processes(nothing_left: None) 
 def test_the_error_names_the_node_that_does_not_join_in_time(nothing_left: None) -> None:
     with pytest.raises(LinkError, match=r"^node 0 did not join within 0.5 s$"):
         LocalSwarm("run", members(1, "small_controllers:NeverMade"), deadline_s=0.5).__enter__()
+
+
+def test_a_server_of_robots_that_does_not_answer_is_ended_and_named_and_another_one_starts(nothing_left: None) -> None:
+    prepare(1)
+    server: int = vars(forkserver)["_forkserver"]._forkserver_pid
+    os.kill(server, signal.SIGSTOP)
+    with pytest.raises(LinkError, match=r"^the server that robots are forked from has ended or does not answer: "):
+        LocalSwarm("run", members(2), deadline_s=1.0).__enter__()
+    with LocalSwarm("run", members(2)) as swarm:
+        assert swarm.link.joined == {0, 1}
+    assert gone({server})
+
+
+def test_a_swarm_whose_server_is_stopped_leaves_no_process(nothing_left: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("LEAVE_WAIT_S", "TERMINATE_WAIT_S"):
+        monkeypatch.setattr(f"zwerm.deploy.supervisor.{name}", 0.5)
+    with LocalSwarm("run", members(2)) as swarm:
+        robots = set(swarm.supervisor.pids.values())
+        server: int = vars(forkserver)["_forkserver"]._forkserver_pid
+        os.kill(server, signal.SIGSTOP)
+    assert gone({server, *robots})
+    assert sorted(swarm.supervisor.exit_codes) == [0, 1], "nothing waits for them when this program ends"
 
 
 def test_a_router_that_takes_no_more_sessions_is_named(nothing_left: None, monkeypatch: pytest.MonkeyPatch) -> None:
