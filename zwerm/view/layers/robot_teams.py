@@ -100,7 +100,8 @@ def _gate(one: Slice, other: Slice) -> tuple[float, float]:
 
 def _on_white(colour: str) -> str:
     """Return the colour of a slice on the white floor, which the palette of an animation needs too."""
-    return to_hex([1.0 - SLICE_OPACITY * (1.0 - each) for each in to_rgb(colour)])
+    red, green, blue = (1.0 - SLICE_OPACITY * (1.0 - each) for each in to_rgb(colour))
+    return to_hex((red, green, blue))
 
 
 class CellsLayer(Layer):
