@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Final, NamedTuple
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ Floats = NDArray[np.float64]
 TEAMS: Final = ("#1B7F5C", "#A3195B", "#2B6CB0", "#B7791F", "#6B46C1", "#C05621", "#2C7A7B", "#702459")
 CRITICAL: Final = "#111111"
 GRAPH: Final = "#4A5568"
+SLICE_OPACITY: Final = 0.75
 # Segments that are nearer to each other than this in x lie on one slice [m].
 SAME_M: Final = 0.05
 NOWHERE: Final = np.zeros((0, 2))
@@ -96,10 +98,16 @@ def _gate(one: Slice, other: Slice) -> tuple[float, float]:
     return (one[0] + other[0]) / 2.0, (low + high) / 2.0
 
 
+def _on_white(colour: str) -> str:
+    """Return the colour of a slice on the white floor, which the palette of an animation needs too."""
+    red, green, blue = (1.0 - SLICE_OPACITY * (1.0 - each) for each in to_rgb(colour))
+    return to_hex((red, green, blue))
+
+
 class CellsLayer(Layer):
     """The slices that were swept until a time, by the team that swept them, critical points, and adjacent cells."""
 
-    colours: ClassVar[Sequence[str]] = (*TEAMS, CRITICAL, GRAPH)
+    colours: ClassVar[Sequence[str]] = (*TEAMS, *map(_on_white, TEAMS), CRITICAL, GRAPH)
     legend_entries: ClassVar[int] = 10
     animation_s: ClassVar[float | None] = 20.0
 
@@ -108,7 +116,7 @@ class CellsLayer(Layer):
         known = [(time_s, snapshot) for time_s, snapshot in found if snapshot is not None]
         self._slices = [(time_s, line, each.team) for time_s, each in known for line in each.slices]
         self._points = [(time_s, point) for time_s, each in known for point in each.critical_points]
-        self._lines = LineCollection([], linewidths=2.2, capstyle="round", alpha=0.75, zorder=1.4)
+        self._lines = LineCollection([], linewidths=2.2, capstyle="round", alpha=SLICE_OPACITY, zorder=1.4)
         sheet.axes.add_collection(self._lines, autolim=False)
         self._edges = LineCollection([], linewidths=1.4, linestyles="dashed", color=GRAPH, zorder=3.2)
         sheet.axes.add_collection(self._edges, autolim=False)
