@@ -9,7 +9,7 @@ from virtual_network import LEASE_S
 from virtual_processes import NEVER, Fate, VirtualProcess, VirtualSystem
 
 from zwerm.agents.runtime.process import EXIT_LOST, EXIT_REFUSED
-from zwerm.deploy import remote, supervisor
+from zwerm.deploy import remote
 from zwerm.deploy.identity import issue, save, slice_of
 from zwerm.deploy.supervisor import JOINING_MAX, LEAVE_WAIT_S, TERMINATE_WAIT_S
 from zwerm.errors import LinkError
@@ -31,7 +31,7 @@ class VirtualWorld:
         self.system = VirtualSystem(self._start, monkeypatch)
         monkeypatch.setattr(remote, "prepare", lambda robots: None)
         monkeypatch.setattr(remote, "time", self.system)
-        monkeypatch.setattr(supervisor.multiprocessing, "get_context", lambda kind: self.system)
+        monkeypatch.setattr("zwerm.deploy.supervisor.multiprocessing.get_context", lambda kind: self.system)
         credentials = issue("run", range(self.draw.randint(2, 50)))
         self.own = sorted(self.draw.sample(range(len(credentials.nodes)), self.draw.randint(1, len(credentials.nodes))))
         self.admission = Admission({each.node: ExpectedNode(1, "", b"") for each in credentials.nodes})
