@@ -39,11 +39,13 @@ PROGRESS_RAD: Final = 0.1
 # A station's first robot follows a wall within the first length [m] for the second length [m], to learn its direction.
 AXIS_HOP_M: Final = 0.9
 AXIS_M: Final = 0.8
-# Directions in which it looks for a wall: parallel to a wall it meets none, so there are more than two at a right angle.
-AXIS_BEARINGS_RAD: Final = tuple(math.radians(each) for each in (180, 135, -135, 90, -90, 45, -45, 0))
-# So many waypoints, off a line by less than this [m] (root mean square), show the direction of a wall.
+# Directions in which it looks for a wall. Parallel to a wall it meets none at right angles, so there are more.
+AXIS_BEARINGS_RAD: Final = tuple(math.radians(each) for each in (180, -90, 90, 0, 135, -135, 45, -45))
+# So many waypoints show the direction of a wall, if they are off a line by less than this [m], and spread along it by
+# more than this [m] (both root mean squares).
 LINE_POINTS_MIN: Final = 4
 LINE_OFF_M: Final = 0.02
+LINE_ALONG_M: Final = 0.1
 # Longest way [m] of a station's first robot to a wall.
 FIRST_HOP_M: Final = 0.95
 # Rays to a robot that must differ by this [rad] to determine its distance.
@@ -131,13 +133,15 @@ class WallWalks:
             walked = yield from self._order(robot, ToWall(cycle, bearing, AXIS_HOP_M, 0.0, 0.0, 1))
             if walked is None:
                 break
-            way = walked.x_m, walked.y_m
             found = None
-            if walked.end == STRETCH:
-                walked = yield from self._order(robot, FollowWall(cycle, AXIS_M, 1, (), ()))
+            for hand in (1, -1) if walked.end == STRETCH else ():  # the station itself may be in the way
+                walked = yield from self._order(robot, FollowWall(cycle, AXIS_M, hand, (), ()))
                 if walked is None:
+                    return FIRST_BEARINGS_RAD
+                found = _line(walked.waypoints)
+                if found is not None or walked.end != STRETCH:
                     break
-                way, found = (walked.x_m, walked.y_m), _line(walked.waypoints)
+            way = walked.x_m, walked.y_m
             back = Move(cycle, math.atan2(-way[1], -way[0]), math.hypot(*way), ())
             self._mailbox.send(robot, back, drive=True)
             yield from self._mailbox.answers([robot], Arrived)
@@ -224,7 +228,7 @@ def _line(waypoints: Sequence[Waypoint]) -> float | None:
     yy = sum((y - my) ** 2 for _, y in touching)
     xy = sum((x - mx) * (y - my) for x, y in touching)
     middle, half = (xx + yy) / 2.0, math.hypot((xx - yy) / 2.0, xy)
-    if middle - half > len(touching) * LINE_OFF_M**2:
+    if middle - half > len(touching) * LINE_OFF_M**2 or middle + half < len(touching) * LINE_ALONG_M**2:
         return None
     return 0.5 * math.atan2(2.0 * xy, xx - yy)
 

@@ -106,7 +106,7 @@ def test_robots_without_a_coordinator_miss_the_door_by_the_rules_of_the_paper() 
     assert result.metrics["falsely_completed"] == 1.0
 
 
-@pytest.mark.parametrize("heading_deg", [71.2, 79.7, -146.4])
+@pytest.mark.parametrize("heading_deg", [16.1, 71.2, 79.7, -146.4])
 def test_the_first_robot_goes_away_from_a_wall_at_a_right_angle(heading_deg: float) -> None:
     """So the lattice is parallel to the wall, whatever the heading of the station."""
     pose = f"base.pose=[0.2,3.75,{math.radians(heading_deg)}]"
