@@ -65,7 +65,7 @@ def test_every_station_is_a_node_and_only_the_coordinator_gets_their_ids() -> No
         (("base.pose=[1,1,0]",), "base: expected at most one of pose, poses and count, got pose and poses"),
         (("base.count=2",), "base: expected at most one of pose, poses and count, got poses and count"),
         (("base.poses=[]",), "base.poses: expected 1 items at least, got []"),
-        (("base.poses=[[1,1]]",), "base.poses.0: expected 3 items, got [1, 1]"),
+        (("base.poses=[[1]]",), "base.poses.0: expected 2 items at least, got [1]"),
         (("base.poses=[[1,1,0],[0,1,0]]",), "base.poses.1: expected free space 0.07 m around, got (0, 1)"),
         (("base.poses=[[1,1,0],[1.1,1,0]]",), "base.poses.1: expected 0.14 m to robot 0, got 0.1 m"),
         (("robots.count=3",), "robots.count: expected more than the 3 base stations, got 3"),
