@@ -131,8 +131,21 @@ def test_with_two_stations_the_deployment_continues_if_one_dies() -> None:
     assert result.metrics["coverage_fraction"] >= 0.99
 
 
-def test_with_two_stations_the_deployment_continues_if_one_is_blocked() -> None:
+@pytest.mark.parametrize(
+    "walls",
+    [
+        "paper",
+        pytest.param(
+            "followed",
+            marks=pytest.mark.xfail(
+                reason="nobody has room to follow the wall beside a station in a closet of 0.4 m: unproven"
+            ),
+        ),
+    ],
+)
+def test_with_two_stations_the_deployment_continues_if_one_is_blocked(walls: str) -> None:
     box = "arena.walls=[[[3.85,1.1],[3.85,1.5]],[[3.85,1.1],[4.2,1.1]],[[3.85,1.5],[4.2,1.5]]]"
-    result = run("sensor-coverage-multi-source", runner="inline", overrides=[*STATIONS, box])
-    assert result.outcome == "completed"
+    rules = f'coordinator.parameters.walls="{walls}"'
+    result = run("sensor-coverage-multi-source", runner="inline", overrides=[*STATIONS, box, rules])
     assert result.metrics["coverage_fraction"] >= 0.99
+    assert result.outcome == "completed"
