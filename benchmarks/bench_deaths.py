@@ -19,12 +19,12 @@ import argparse
 import subprocess
 import time
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 import numpy as np
-from csv_rows import add_csv_option, append_row, read_rows, write_csv
+from campaign import add_campaign_options, carry_out
+from csv_rows import write_csv
 
 from zwerm import RunResult, run
 from zwerm.scenario.tables import Scenario
@@ -192,21 +192,9 @@ def main() -> None:
     parser.add_argument("--hall", choices=HALLS, nargs="+", default=["small"])
     parser.add_argument("--kind", choices=KINDS, nargs="+", default=list(KINDS))
     parser.add_argument("--loss", type=float, nargs="+", default=[0.0])
-    parser.add_argument("--seeds", type=int, nargs=2, default=[1, 3], metavar=("FIRST", "LAST"))
-    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="a setting of the scenario")
-    parser.add_argument("--rows", type=Path, metavar="FILE", help="store each run here, and skip runs that are stored")
-    parser.add_argument("--minutes", type=float, help="begin no run after this processor time [min]")
-    add_csv_option(parser)
+    add_campaign_options(parser, last_seed=3)
     asked = parser.parse_args()
-    rows = read_rows(asked.rows)
-    known = {tuple(row[each] for each in Case.__struct_fields__) for row in rows}
-    for case in cases(asked):
-        if asked.minutes is not None and time.process_time() > 60.0 * asked.minutes:
-            break
-        if msgspec.structs.astuple(case) not in known:
-            rows.append(one_run(case, asked.set))
-            append_row(asked.rows, rows[-1])
-            print(*rows[-1].values(), sep="\t", flush=True)
+    rows = carry_out(asked, cases(asked), lambda case: one_run(case, asked.set))
     counts = {each: sum(row["verdict"] == each for row in rows) for each in VERDICTS}
     print(f"{len(rows)} runs: " + ", ".join(f"{count} {word}" for word, count in counts.items()))
     write_csv(asked.csv, summary(rows))
