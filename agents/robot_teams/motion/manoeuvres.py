@@ -15,8 +15,12 @@ from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGH
 
 # A contact blocks a sweep if this much of its normal lies along the motion.
 BLOCKS: Final = 0.02
-# Distance that a sweep may leave its slice before the contact counts as the end of the segment [m].
-OFF_SLICE_M: Final = 0.006
+# Distance off its slice at which a sweep that touches a wall is over [m].
+OFF_SLICE_M: Final = 0.003
+# A robot nearer than this may make a sweep slow [m].
+NEAR_M: Final = 0.1
+# A sweep that is farther off its slice than a tick before by more than this is pushed off it [m].
+PUSHED_M: Final = 2e-5
 # Distance of the centre beyond a slice at which it has crossed the slice [m].
 CROSSED_M: Final = 0.002
 # Time after which a sweep that goes around other robots gives up [ticks].
@@ -26,6 +30,12 @@ AROUND_M: Final = 1.2
 # Ticks beside a wreck without coming nearer after which an approach gives up, and what counts as nearer [m].
 HIDDEN_TICKS: Final = 20
 NEARER_M: Final = 0.02
+# Distance along its slice within which a trace that begins without a touch looks for the wall [m].
+PRESS_M: Final = 0.4
+# A wall leans to a side if this much of its normal points there.
+LEANS: Final = 0.3
+# Two ends of a slice that are nearer may be taken for each other beside a wall that leans to no side [m].
+SHORT_M: Final = 0.1
 # Distance on the wrong side of its slice at which a trace may begin [m].
 SLACK_M: Final = 0.75
 # Largest distance between two touches of one boundary beside a body that stands there [m]: two bodies with their gaps.
@@ -113,7 +123,11 @@ class Approach:
 
 
 class SliceSweep:
-    """Move along a slice to the end of its segment on side `side`, or to the height `limit_mm` of a virtual frontier."""
+    """Move along a slice to the end of its segment on side `side`, or to the height `limit_mm` of a virtual frontier.
+
+    The end is where a wall stops the robot, or where a wall begins to push it off its slice. So robots with other headings
+    measure the same end at a wall that is almost parallel to the slice. `end` is None if the robot never was on its slice.
+    """
 
     def __init__(
         self, k: int, side: int, grid: SliceGrid, step_m: float, parked: Parked, limit_mm: int | None = None
@@ -125,6 +139,8 @@ class SliceSweep:
         self._x_m = grid.x_m(k)
         self._step_m = step_m
         self._last_y_m: float | None = None
+        self._last_off_m: float | None = None
+        self._on_slice_y_m: float | None = None
         self._around: Around | None = None
         self.around_ticks = 0
         self.wrecks: dict[Wreck, None] = {}
@@ -142,17 +158,25 @@ class SliceSweep:
             way = self._around.direction(senses, blocks, off)
             if way is not None:
                 return way
-            self._around, self._last_y_m = None, None
+            self._around, self._last_y_m, self._last_off_m = None, None, None
         if self._limit_mm is not None and (1000.0 * senses.y_m - self._limit_mm) * side >= 0.0:
             self.end, self.is_cut = End(self.slice, side, self._limit_mm), True
             return None
-        last, self._last_y_m = self._last_y_m, senses.y_m
-        if any(ny * side > BLOCKS for _, ny in senses.walls):
-            steep = max([ny * side for _, ny in senses.walls])
-            slow = last is not None and (senses.y_m - last) * side < 0.3 * self._step_m
-            if abs(off) > OFF_SLICE_M or slow or steep > 0.9:
-                self.end = End(self.slice, side, mm(senses.y_m))
-                return None
+        last_y_m, self._last_y_m = self._last_y_m, senses.y_m
+        last_off_m, self._last_off_m = self._last_off_m, off
+        slow = last_y_m is not None and (senses.y_m - last_y_m) * side < 0.3 * self._step_m
+        if _stops(senses, side, slow):
+            self.end = End(self.slice, side, mm(senses.y_m))
+            return None
+        if not senses.walls or abs(off) < CROSSED_M:
+            self._on_slice_y_m = senses.y_m
+        # The bearing of a touch has the resolution of the switches. It does not tell to which side a wall leans that is
+        # almost parallel to the slice. The motion does.
+        leaves = last_off_m is not None and abs(off) > max(OFF_SLICE_M, abs(last_off_m) + PUSHED_M)
+        if leaves and any(ny * side > BLOCKS or (not blocks and nx * off > 0.0) for nx, ny in senses.walls):
+            if self._on_slice_y_m is not None:
+                self.end = End(self.slice, side, mm(self._on_slice_y_m))
+            return None
         if any(ny * side > 0.2 for _, ny in blocks):
             for end in self._parked(senses):
                 if (end.slice, end.side) == (self.slice, side) and (end.y_mm / 1000.0 - senses.y_m) * side > 0.0:
@@ -162,6 +186,13 @@ class SliceSweep:
             return self._around.direction(senses, blocks, off)
         vx = max(-0.7, min(0.7, off / self._step_m))
         return vx, side * math.sqrt(1.0 - vx * vx)
+
+
+def _stops(senses: Senses, side: int, slow: bool) -> bool:
+    """Return whether a wall stops a sweep towards `side`. A robot near by may also make a sweep slow."""
+    steep = max([ny * side for _, ny in senses.walls], default=0.0)
+    near = any(other.gap_m < NEAR_M and other.wreck is None for other in senses.robots)
+    return steep > 0.9 or (slow and steep > (LEANS if near else BLOCKS))
 
 
 class BoundaryTrace:
@@ -176,7 +207,8 @@ class BoundaryTrace:
         self._parked = parked
         self._grid = grid
         self._follower = WallFollower(hand_of(start.side, direction), (float(direction), 0.0))
-        self._inside = False
+        self._inside = self._pressed = False
+        self._began_y_m = 0.0
         self._x_m = grid.x_m(start.slice)
         self._last: Vector | None = None
         self._length_m = 0.0
@@ -197,7 +229,9 @@ class BoundaryTrace:
             self._strayed = self._strayed or not (self._is_beside(x, y) or self._is_in_line(senses))
             self._wall_tick, self._touched_m, self._normals = senses.tick, (x, y), senses.walls
         last = self._last
-        if last is not None:
+        if last is None:
+            self._began_y_m = y
+        else:
             self._length_m += math.hypot(x - last[0], y - last[1])
         depth = (x - self._x_m) * d
         if depth > self._extreme[0]:
@@ -209,8 +243,7 @@ class BoundaryTrace:
             self._arrive(senses, self.start.slice + d, 1)
             return None
         if self._inside and depth < -CROSSED_M:
-            # The wall beside the other end is on the other side. Otherwise the robot was only pushed back.
-            if any(ny * self.start.side < INTO for _, ny in senses.walls):
+            if self._is_beyond(senses):
                 self._arrive(senses, self.start.slice, -1)
                 return None
             self._inside = False
@@ -223,7 +256,20 @@ class BoundaryTrace:
                     self._stop(end)
                     return None
         self._last = x, y
+        self._pressed = self._pressed or bool(senses.walls or blocks)
+        if not self._pressed and abs(y - self._began_y_m) < PRESS_M:
+            return 0.0, float(self.start.side)
         return self._follower.direction(senses.walls, blocks)
+
+    def _is_beyond(self, senses: Senses) -> bool:
+        """Return whether the robot came to the other end of its slice; otherwise it was only pushed back.
+
+        The wall beside the other end is on the other side. A wall almost parallel to the slice is on no side, and may also be
+        beside the end where the trace began.
+        """
+        side = self.start.side
+        lean = min([ny * side for _, ny in senses.walls], default=1.0)
+        return lean < -LEANS or (lean < INTO and abs(senses.y_m - self.start.y_mm / 1000.0) > SHORT_M)
 
     def _arrive(self, senses: Senses, k: int, way: int) -> None:
         x, y, side = senses.x_m, senses.y_m, self.start.side * way
