@@ -23,7 +23,7 @@ from csv_rows import add_csv_option, append_row, read_rows, write_csv
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from random_arenas import ORIGIN_M, random_arena, start_group
+from random_arenas import ORIGIN_M, leaning_arena, random_arena, start_group
 from shapely.geometry import Polygon, box
 
 from zwerm.agents.runtime.node import Node
@@ -55,6 +55,8 @@ HALLS: Final[dict[str, tuple[float, float, tuple[str, ...]]]] = {
     "one obstacle": (20.0, 12.0, ("five",)),
     "three obstacles": (28.0, 16.0, ("five", "low", "high")),
 }
+# The arenas that are drawn from the seed: any polygons, and walls almost parallel to the slices.
+DRAWN: Final = ("random", "leaning")
 # Settings that differ from the scenario `robot-teams`.
 SETTINGS: Final = (
     *("none", "loss", "bursts", "range", "death", "death of lead", "death in division", "death in merge"),
@@ -81,8 +83,8 @@ def scenario(arena: str, setting: str, robots: int, seed: int, event_s: float | 
     tables, _ = tables_of("robot-teams", ())
     tables["name"] = "drawn"
     origin_m = ORIGIN_M
-    if arena == "random":
-        tables["arena"], _ = random_arena(seed, 1)
+    if arena in DRAWN:
+        tables["arena"] = random_arena(seed, 1)[0] if arena == "random" else leaning_arena(seed)
         free = Polygon(tables["arena"]["polygon"], tables["arena"]["obstacles"])
     else:
         width, height, names = HALLS[arena]
@@ -246,7 +248,7 @@ def main() -> None:
     parser.add_argument("--runs", type=Path, required=True, metavar="FILE", help="where the runs are kept")
     parser.add_argument("--seeds", default="0-1", metavar="FIRST-LAST")
     parser.add_argument("--robots", type=int, nargs="+", default=[1, 2, 4])
-    parser.add_argument("--arenas", nargs="+", choices=["random", *HALLS], default=["random"])
+    parser.add_argument("--arenas", nargs="+", choices=[*DRAWN, *HALLS], default=["random"])
     parser.add_argument("--setting", nargs="+", choices=SETTINGS, default=["none"])
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further run after so many minutes")
     parser.add_argument("--summary", action="store_true", help="make no run; summarise those that are kept")

@@ -1,4 +1,4 @@
-"""Random polygonal arenas, keyed by a seed: a bent hall with some obstacles, and a place where a team can start in line."""
+"""Random polygonal arenas, keyed by a seed: bent halls, and walls almost parallel to slices; places for a team to start."""
 
 import math
 from typing import Any
@@ -12,6 +12,8 @@ from shapely.geometry import MultiPolygon, Point, Polygon
 OPENING_M = 0.3
 SPACING_M = 0.95
 ORIGIN_M = 0.37
+# The radius of the robots.
+BODY_M = 0.25
 # The distance of the rows in which robots start where there is no room for one row.
 ROW_M = 0.8
 
@@ -33,6 +35,32 @@ def random_arena(seed: int, robots: int) -> tuple[dict[str, Any], list[list[floa
         if poses is not None:
             rings = [np.round(np.asarray(ring.coords)[:-1], 3).tolist() for ring in (part.exterior, *part.interiors)]
             return {"polygon": rings[0], "obstacles": rings[1:]}, poses
+
+
+def leaning_arena(seed: int) -> dict[str, Any]:
+    """Return the `[arena]` table of a hall with an obstacle whose walls are almost parallel to the slices.
+
+    A body of `BODY_M` at such a wall is on a slice half-way up, and leaves it at an angle of 0.1 to 5 degrees.
+    """
+    random = np.random.default_rng([99, seed])
+    width, height = random.uniform(8.0, 12.0), random.uniform(5.0, 8.0)
+
+    def wall(k: int, side: int) -> tuple[float, float]:
+        """Return x at the foot and at the top of a wall with free space on its `side`, beside slice k."""
+        slope = random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-2.7, -1.1)
+        x, y = ORIGIN_M + SPACING_M * k - side * BODY_M, height * random.uniform(0.3, 0.7)
+        return float(x - slope * y), float(x + slope * (height - y))
+
+    last = int((width - ORIGIN_M) / SPACING_M)
+    left, right = wall(1, 1), wall(last, -1)
+    inner, outer = wall(last // 2, -1), wall(last // 2 + 2, 1)
+    hall = [[left[0], 0.0], [right[0], 0.0], [right[1], height], [left[1], height]]
+    low, high = 0.3, 0.7
+    block = [
+        [foot + (top - foot) * part, height * part]
+        for (foot, top), part in ((inner, low), (outer, low), (outer, high), (inner, high))
+    ]
+    return {"polygon": np.round(hall, 4).tolist(), "obstacles": [np.round(block, 4).tolist()]}
 
 
 def _hall(random: np.random.Generator, width: float, height: float) -> Polygon:
