@@ -38,7 +38,7 @@ LEANS: Final = 0.3
 SHORT_M: Final = 0.1
 # Distance on the wrong side of its slice at which a trace may begin [m].
 SLACK_M: Final = 0.75
-# Largest distance between two touches of one boundary beside a body that stands there [m]: two bodies with their gaps.
+# Largest distance between two touches of one boundary, and of a boundary from a body that stands there [m]: two bodies.
 BESIDE_BODY_M: Final = 1.1
 # Largest distance of two touches across a straight wall [m].
 IN_LINE_M: Final = 0.05
@@ -198,8 +198,8 @@ def _stops(senses: Senses, side: int, slow: bool) -> bool:
 class BoundaryTrace:
     """Follow the boundary from an end into the slab on the side `direction`, until it crosses a slice.
 
-    Bodies may lead the robot away from the boundary. A wall that it touches far from its last touch may belong to another
-    boundary, so the trace gives no arc then, unless both touches are in line with the wall.
+    Bodies may lead the robot to another boundary. A trace on which it went around a robot gives no arc, unless the last touch
+    before and the first after are in line with one wall.
     """
 
     def __init__(self, start: End, direction: int, grid: SliceGrid, parked: Parked) -> None:
@@ -216,7 +216,7 @@ class BoundaryTrace:
         self._wall_tick = -10
         self._touched_m: Vector = self._x_m, start.y_mm / 1000.0
         self._normals: tuple[Vector, ...] = ()
-        self._strayed = False
+        self._strayed = self._led = False
         self.wrecks: dict[Wreck, None] = {}
         self.arc: TracedArc | None = None
         self.end: End | None = None
@@ -225,8 +225,11 @@ class BoundaryTrace:
         """Return where to go, or None at a crossing: then `end` is where, and `arc` the fact unless it is uncertain."""
         x, y, d = senses.x_m, senses.y_m, self.direction
         self.wrecks.update(dict.fromkeys(senses.wrecks))
+        self._led = self._led or bool(blocks)
         if senses.walls:
-            self._strayed = self._strayed or not (self._is_beside(x, y) or self._is_in_line(senses))
+            certain = self._is_in_line(senses) or (self._is_beside(x, y) and not self._led)
+            self._strayed = self._strayed or not certain
+            self._led = False
             self._wall_tick, self._touched_m, self._normals = senses.tick, (x, y), senses.walls
         last = self._last
         if last is None:
@@ -250,9 +253,8 @@ class BoundaryTrace:
         if depth < -SLACK_M:
             return None
         if blocks and self._inside and senses.walls:
-            ahead = (self.start.slice + d, self.start.side), (self.start.slice, -self.start.side)
             for end in self._parked(senses):
-                if (end.slice, end.side) in ahead:
+                if (end.slice, end.side) == (self.start.slice + d, self.start.side):
                     self._stop(end)
                     return None
         self._last = x, y
@@ -287,7 +289,7 @@ class BoundaryTrace:
                 self._stop(end)
 
     def _is_beside(self, x_m: float, y_m: float) -> bool:
-        """Return whether a point of the boundary is not farther from the last touch than a body hides."""
+        """Return whether a point of the boundary is near enough to the last touch to be on the same one."""
         return math.hypot(x_m - self._touched_m[0], y_m - self._touched_m[1]) <= BESIDE_BODY_M
 
     def _is_in_line(self, senses: Senses) -> bool:

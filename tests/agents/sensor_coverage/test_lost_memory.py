@@ -183,11 +183,15 @@ def state_of(robot: LocalRobot) -> str:
 
 
 def test_a_robot_that_restarts_in_any_state_is_taken_in_again() -> None:
-    states = phases(HALL)
+    tiny = (*TINY, *PAPER)
+    states = {name: (HALL, *place) for name, place in phases(HALL).items()}
+    states |= {
+        name: (tiny, *place) for name, place in phases(tiny).items()
+    }  # the shorter run where it has the state too
     assert {"waiting", "link", "offering", "deploying", "out", "armed", "following", "telling", "claims"} <= set(states)
     wrong = {}
-    for name, (tick, robot) in states.items():
-        result = with_faults(HALL, f'{{kind="restart", nodes=[{robot}], at_s={tick * DT_S:.1f}}}')
+    for name, (hall, tick, robot) in states.items():
+        result = with_faults(hall, f'{{kind="restart", nodes=[{robot}], at_s={tick * DT_S:.1f}}}')
         if not is_covered(result):
             wrong[name] = tick, robot, result.outcome, result.reason, result.metrics["reachable_coverage_fraction"]
     assert not wrong
