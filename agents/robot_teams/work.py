@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator
 from typing import Final, Protocol
 
 from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, End, Fact, FrontierCut, SweptSegment
-from zwerm.agents.robot_teams.mapping.slice_map import ACROSS, SliceMap
+from zwerm.agents.robot_teams.mapping.slice_map import ACROSS, TOLERANCE_MM, SliceMap
 from zwerm.agents.robot_teams.motion.manoeuvres import (
     Approach,
     BoundaryTrace,
@@ -78,6 +78,7 @@ class Work:
         self.sweeping: int | None = None
         self.failures = 0
         self.found_facts: list[Fact] = []
+        self._uncertain: dict[tuple[End, int], End] = {}
         self._grid = grid
         self._step_m = step_m
         self._sense = sense
@@ -153,9 +154,14 @@ class Work:
         arc, end = trace.arc, trace.end
         if end is None:
             raise Lost
-        # If a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known.
+        # If a robot hid the end there is no fact: the arc stays open, and the robot goes on if the end is known. An arc that is
+        # not certain becomes a fact when it is traced again to the same end: a robot that stands there may stay for ever.
         if arc is not None and self._is_new(start, direction, end, bool(arc.wrecks)):
-            self._note(arc)
+            before = self._uncertain.pop((start, direction), None)
+            if trace.certain or (before is not None and _is_same(before, end)):
+                self._note(arc)
+            else:
+                self._uncertain[start, direction] = end
         self.at = self.map.end(end)
         if self.at is None:
             raise Lost
@@ -311,3 +317,7 @@ class Work:
                 self.found = True
             yield from self.sweep(frontier_mm)
         raise Lost
+
+
+def _is_same(one: End, other: End) -> bool:
+    return (one.slice, one.side) == (other.slice, other.side) and abs(one.y_mm - other.y_mm) <= TOLERANCE_MM

@@ -17,6 +17,8 @@ from zwerm.agents.robot_teams.motion.wall_following import INTO, LEFT_HAND, RIGH
 BLOCKS: Final = 0.02
 # Distance off its slice at which a sweep that touches a wall is over [m].
 OFF_SLICE_M: Final = 0.003
+# Distance off its slice up to which a sweep that a wall stops measures the end [m]. Other robots push it farther.
+BESIDE_SLICE_M: Final = 0.04
 # A robot nearer than this may make a sweep slow [m].
 NEAR_M: Final = 0.1
 # A sweep that is farther off its slice than a tick before by more than this is pushed off it [m].
@@ -126,7 +128,7 @@ class SliceSweep:
     """Move along a slice to the end of its segment on side `side`, or to the height `limit_mm` of a virtual frontier.
 
     The end is where a wall stops the robot, or where a wall begins to push it off its slice. So robots with other headings
-    measure the same end at a wall that is almost parallel to the slice. `end` is None if the robot never was on its slice.
+    measure the same end at a wall that is almost parallel to the slice. `end` is None if the robot was beside its slice.
     """
 
     def __init__(
@@ -166,9 +168,10 @@ class SliceSweep:
         last_off_m, self._last_off_m = self._last_off_m, off
         slow = last_y_m is not None and (senses.y_m - last_y_m) * side < 0.3 * self._step_m
         if _stops(senses, side, slow):
-            self.end = End(self.slice, side, mm(senses.y_m))
+            if abs(off) <= BESIDE_SLICE_M:
+                self.end = End(self.slice, side, mm(senses.y_m))
             return None
-        if not senses.walls or abs(off) < CROSSED_M:
+        if abs(off) < CROSSED_M:
             self._on_slice_y_m = senses.y_m
         # The bearing of a touch has the resolution of the switches. It does not tell to which side a wall leans that is
         # almost parallel to the slice. The motion does.
@@ -198,7 +201,7 @@ def _stops(senses: Senses, side: int, slow: bool) -> bool:
 class BoundaryTrace:
     """Follow the boundary from an end into the slab on the side `direction`, until it crosses a slice.
 
-    Bodies may lead the robot to another boundary. A trace on which it went around a robot gives no arc, unless the last touch
+    Bodies may lead the robot to another boundary. An arc on which it went around a robot is not certain, unless the last touch
     before and the first after are in line with one wall.
     """
 
@@ -217,12 +220,13 @@ class BoundaryTrace:
         self._touched_m: Vector = self._x_m, start.y_mm / 1000.0
         self._normals: tuple[Vector, ...] = ()
         self._strayed = self._led = False
+        self.certain = True
         self.wrecks: dict[Wreck, None] = {}
         self.arc: TracedArc | None = None
         self.end: End | None = None
 
     def step(self, senses: Senses, blocks: Sequence[Vector]) -> Vector | None:
-        """Return where to go, or None at a crossing: then `end` is where, and `arc` the fact unless it is uncertain."""
+        """Return where to go, or None at a crossing: then `end` is where, and `arc` the fact if it is `certain`."""
         x, y, d = senses.x_m, senses.y_m, self.direction
         self.wrecks.update(dict.fromkeys(senses.wrecks))
         self._led = self._led or bool(blocks)
@@ -305,8 +309,7 @@ class BoundaryTrace:
         depth, extreme_y = self._extreme
         extreme_x = self._x_m + self.direction * max(depth, 0.0)
         self.end = end
-        if self._strayed:
-            return
+        self.certain = not self._strayed
         self.arc = TracedArc(
             self.start, self.direction, end, mm(self._length_m), mm(extreme_x), mm(extreme_y), tuple(self.wrecks)
         )
