@@ -2,15 +2,17 @@
 
 `--only GROUP ...` carries out some groups of trials, and `--show` none. A trial is one run, inline on one core. All trials are
 kept as lines of JSON in `runs/landmark-numbers.jsonl`, with the commit of the code. Trials of other commits are left out,
-unless `--commit` names one. `--runs FILE` writes them as CSV.
+unless `--commit` names them: those whose runs are the same, trace by trace. `--runs FILE` writes all as CSV, and `--load FILE` reads
+such a file.
 The halls of the group `halls` are drawn: their size, obstacles, landmarks, robots and trouble.
 """
 
 import argparse
+import csv
 import json
 import subprocess
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from statistics import mean
 from typing import Any, Final
@@ -36,16 +38,17 @@ def robots(count: int) -> tuple[str, str]:
 # Group: scenario, settings, seeds.
 GROUPS: Final[dict[str, tuple[str, tuple[str, ...], int]]] = {
     "free": ("landmark-free", (LONG,), 10),
-    "free-gossip": ("landmark-free", (LONG, *GOSSIP), 10),
-    "free-gossip-loss": ("landmark-free", (LONG, *GOSSIP, "radio.loss=0.5"), 8),
-    "free-gossip-range": ("landmark-free", (LONG, *GOSSIP, "radio.range_m=0.7"), 10),
-    "simple": ("landmark-simple", (LONG,), 8),
+    "free-gossip": ("landmark-free", (LONG, *GOSSIP), 20),
+    "free-gossip-loss": ("landmark-free", (LONG, *GOSSIP, "radio.loss=0.5"), 10),
+    # Seeds 1 to 6 chose the rules for a short range: the others test them.
+    "free-gossip-range": ("landmark-free", (LONG, *GOSSIP, "radio.range_m=0.7"), 20),
+    "simple": ("landmark-simple", (LONG,), 10),
     # The first runs end by themselves, the others when completion is certain.
-    "complex-whole": ("landmark-complex", (LONG,), 2),
-    "complex": ("landmark-complex", ("time.duration_s=350",), 8),
-    "complex-gossip": ("landmark-complex", ("time.duration_s=200", *GOSSIP), 2),
-    "complex-20": ("landmark-complex", ("time.duration_s=400", *robots(20)), 3),
-    "complex-10": ("landmark-complex", ("time.duration_s=700", *robots(10)), 3),
+    "complex-whole": ("landmark-complex", (LONG,), 3),
+    "complex": ("landmark-complex", ("time.duration_s=350",), 10),
+    "complex-gossip": ("landmark-complex", ("time.duration_s=200", *GOSSIP), 3),
+    "complex-20": ("landmark-complex", ("time.duration_s=400", *robots(20)), 5),
+    "complex-10": ("landmark-complex", ("time.duration_s=700", *robots(10)), 5),
     "navigate": ("landmark-navigate", (), 1),
     "halls": ("landmark-free", GOSSIP, 100),
 }
@@ -108,16 +111,33 @@ def commit_now() -> str:
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
 
 
-def trials(commit: str) -> Iterator[dict[str, Any]]:
-    """Yield the trials that are kept of a commit."""
+def trials(commits: Collection[str]) -> Iterator[dict[str, Any]]:
+    """Yield the trials that are kept of some commits."""
     lines = TRIALS.read_text(encoding="utf-8").splitlines() if TRIALS.exists() else []
-    yield from (trial for trial in map(json.loads, lines) if trial["commit"] == commit)
+    yield from (trial for trial in map(json.loads, lines) if trial["commit"] in commits)
 
 
-def carry_out(group: str, commit: str) -> None:
+def keep(trial: dict[str, Any]) -> None:
+    """Add a trial to those that are kept."""
+    TRIALS.parent.mkdir(parents=True, exist_ok=True)
+    with TRIALS.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(trial) + "\n")
+
+
+def load_runs(path: Path) -> None:
+    """Keep the trials of a CSV file that `--runs` wrote."""
+    with path.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            kept = {name: value for name, value in row.items() if value != ""}
+            text = ("group", "commit", "outcome")
+            numbers = {name: float(value) for name, value in kept.items() if name not in text}
+            keep({name: int(numbers[name]) if name == "seed" else numbers.get(name, kept[name]) for name in kept})
+
+
+def carry_out(group: str, commit: str, commits: Collection[str]) -> None:
     """Run the trials of a group that are not kept yet, and keep each."""
     scenario, settings, seeds = GROUPS[group]
-    done = {trial["seed"] for trial in trials(commit) if trial["group"] == group}
+    done = {trial["seed"] for trial in trials(commits) if trial["group"] == group}
     for seed in range(1, seeds + 1):
         if seed in done:
             continue
@@ -132,17 +152,15 @@ def carry_out(group: str, commit: str) -> None:
             "processor_s": round(time.process_time() - began, 1),
             **{name: result.metrics[name] for name in KEPT if name in result.metrics},
         }
-        TRIALS.parent.mkdir(parents=True, exist_ok=True)
-        with TRIALS.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(trial) + "\n")
+        keep(trial)
         print(group, seed, trial["outcome"], int(result.ticks), trial["processor_s"], flush=True)
 
 
 class Group:
     """The trials of one group."""
 
-    def __init__(self, name: str, some: Sequence[dict[str, Any]]) -> None:
-        self.trials = [trial for trial in some if trial["group"] == name]
+    def __init__(self, name: str, some: Sequence[dict[str, Any]], above: int = 0) -> None:
+        self.trials = [trial for trial in some if trial["group"] == name and trial["seed"] > above]
 
     def __len__(self) -> int:
         return len(self.trials)
@@ -159,6 +177,8 @@ class Group:
 def summary(some: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return a row for each number that is asked for and of which there are trials."""
     groups = {name: Group(name, some) for name in GROUPS}
+    for name in ("free-gossip", "free-gossip-range"):
+        groups[f"{name}, fresh seeds"] = Group(name, some, above=10)
     rows: list[dict[str, Any]] = []
 
     def row(what: str, asked: str, measured: str, *names: str) -> None:
@@ -211,6 +231,7 @@ def summary(some: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         ("free-gossip", "free", 1.3),
         ("free-gossip-loss", "free-gossip", 2),
         ("free-gossip-range", "free-gossip", 2),
+        ("free-gossip-range, fresh seeds", "free-gossip, fresh seeds", 2),
     ):
         if groups[of] and groups[over]:
             ratio = groups[of].mean("iterations") / groups[over].mean("iterations")
@@ -242,14 +263,21 @@ def main() -> None:
         "--only", nargs="+", choices=GROUPS, default=list(GROUPS), metavar="GROUP", help=", ".join(GROUPS)
     )
     parser.add_argument("--show", action="store_true", help="run nothing: show what is kept")
-    parser.add_argument("--commit", help="count as this commit, whatever the code is")
+    parser.add_argument(
+        "--commit", nargs="+", default=[], help="count trials of these commits, too: their runs have the same traces"
+    )
+    parser.add_argument("--load", type=Path, metavar="FILE", help="keep the trials of this CSV file, too, and run nothing")
     parser.add_argument("--runs", type=Path, metavar="FILE", help="write all trials to this CSV file, too")
     add_csv_option(parser)
     options = parser.parse_args()
-    commit = options.commit or commit_now()
+    if options.load is not None:
+        load_runs(options.load)
+        return
+    commit = commit_now()
+    commits = {commit, *options.commit}
     for group in () if options.show else options.only:
-        carry_out(group, commit)
-    some = sorted(trials(commit), key=lambda trial: (list(GROUPS).index(trial["group"]), trial["seed"]))
+        carry_out(group, commit, commits)
+    some = sorted(trials(commits), key=lambda trial: (list(GROUPS).index(trial["group"]), trial["seed"]))
     if options.runs is not None:
         write_csv(options.runs, [{name: trial.get(name, "") for name in COLUMNS} for trial in some])
     rows = summary(some)
