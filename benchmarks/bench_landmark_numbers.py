@@ -2,8 +2,8 @@
 
 `--only GROUP ...` carries out some groups of trials, and `--show` none. A trial is one run, inline on one core. All trials are
 kept as lines of JSON in `runs/landmark-numbers.jsonl`, with the commit of the code. Trials of other commits are left out,
-unless `--commit` names them: those whose runs are the same, trace by trace. `--runs FILE` writes all as CSV, and `--load FILE` reads
-such a file.
+unless `--commit` names them: those whose runs are the same, trace by trace. `--runs FILE` writes all as CSV, and
+`--load FILE` reads such a file.
 The halls of the group `halls` are drawn: their size, obstacles, landmarks, robots and trouble.
 """
 
@@ -266,7 +266,9 @@ def main() -> None:
     parser.add_argument(
         "--commit", nargs="+", default=[], help="count trials of these commits, too: their runs have the same traces"
     )
-    parser.add_argument("--load", type=Path, metavar="FILE", help="keep the trials of this CSV file, too, and run nothing")
+    parser.add_argument(
+        "--load", type=Path, metavar="FILE", help="keep the trials of this CSV file, too, and run nothing"
+    )
     parser.add_argument("--runs", type=Path, metavar="FILE", help="write all trials to this CSV file, too")
     add_csv_option(parser)
     options = parser.parse_args()

@@ -84,6 +84,7 @@ class LandmarkCoordinatorSetup(Protocol):
     def incarnation(self) -> int:
         """Number of its starts."""
 
+
 # A free robot: the negative of its gain or of a bound of that, its id, the number of frontiers given away when that was
 # worked out, and its choice; None where its gain is only bounded.
 Candidate = tuple[float, int, int, Choice | None]

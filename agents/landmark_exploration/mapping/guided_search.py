@@ -186,10 +186,12 @@ class GuidedSearch:
                     if beta * farther - gains[other] <= _ROUNDING - best[0]:
                         cost[other], before[other] = farther, vertex
                         heappush(queue, (beta * farther - gains[other], farther, other))
-                elif farther == known and before[other] != HERE:
-                    # Of equal paths that over the nearest vertex, as in a search without a guide.
-                    if (here, vertex) < (cost[before[other]], before[other]):
-                        before[other] = vertex
+                elif (
+                    farther == known and before[other] != HERE and (here, vertex) < (cost[before[other]], before[other])
+                ):
+                    before[other] = (
+                        vertex  # of equal paths that over the nearest vertex, as in a search without a guide
+                    )
         if best[0] == -math.inf:
             return None
         gain, negative_key, _, negative_vertex = best
