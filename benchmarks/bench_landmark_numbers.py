@@ -13,20 +13,27 @@ import json
 import subprocess
 import time
 from collections.abc import Collection, Iterator, Sequence
+from itertools import combinations
 from pathlib import Path
 from statistics import mean
 from typing import Any, Final
 
+import gudhi
 import numpy as np
 from csv_rows import add_csv_option, write_csv
 
-from zwerm import run
+from zwerm import RunResult, run
+from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
+from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, read_report
+from zwerm.agents.landmark_exploration.sharing.log_entries import snapshot_of
+from zwerm.world.metrics.landmark_exploration import maximal
 
 ROOT: Final = Path(__file__).parents[1]
 TRIALS: Final = ROOT / "runs" / "landmark-numbers.jsonl"
 CODE: Final = ("zwerm", "agents", "coordinator", "world", "scenarios")
 
 GOSSIP: Final = ("services.map=gossip", "services.assignment=claims")
+SMALL: Final = ("robots.parameters.message_bytes_max=64",)
 LONG: Final = "time.duration_s=1200"
 
 
@@ -49,7 +56,20 @@ GROUPS: Final[dict[str, tuple[str, tuple[str, ...], int]]] = {
     "complex-gossip": ("landmark-complex", ("time.duration_s=200", *GOSSIP), 3),
     "complex-20": ("landmark-complex", ("time.duration_s=400", *robots(20)), 5),
     "complex-10": ("landmark-complex", ("time.duration_s=700", *robots(10)), 5),
+    "complex-processes": ("landmark-complex", ("time.duration_s=20",), 1),
+    # More than 1,000 landmarks.
+    "complex-updates": ("landmark-complex", ("time.duration_s=250", "arena.scale=1.08"), 1),
+    "free-64-bytes": ("landmark-free", (LONG, *SMALL, "coordinator.parameters.message_bytes_max=64"), 10),
+    "free-gossip-64-bytes": ("landmark-free", (LONG, *GOSSIP, *SMALL), 10),
+    "presence": ("landmark-presence", (LONG,), 10),
+    "free-nearest-frontier": ("landmark-free", (LONG, "coordinator.parameters.strategy=nearest-frontier"), 10),
+    "free-min-pos": ("landmark-free", (LONG, "coordinator.parameters.strategy=min-pos"), 10),
     "navigate": ("landmark-navigate", (), 1),
+    "navigate-presence": (
+        "landmark-navigate",
+        ("robots.parameters.presence_only=true", "robots.sensors.0.presence_only=true"),
+        1,
+    ),
     "halls": ("landmark-free", GOSSIP, 100),
 }
 
@@ -67,9 +87,11 @@ KEPT: Final = (
     "navigation_goals",
     "navigation_success_fraction",
     "navigation_iterations_mean",
+    "messages_per_robot_mean",
     "bytes_per_robot_mean",
 )
-COLUMNS: Final = ("group", "seed", "commit", "outcome", "problems", "processor_s", *KEPT)
+EXTRA: Final = ("gudhi_agrees", "processes_agree", "update_mean_ms", "update_most_ms")
+COLUMNS: Final = ("group", "seed", "commit", "outcome", "problems", "processor_s", *KEPT, *EXTRA)
 
 
 def hall(seed: int) -> tuple[str, ...]:
@@ -134,6 +156,38 @@ def load_runs(path: Path) -> None:
             keep({name: int(numbers[name]) if name == "seed" else numbers.get(name, kept[name]) for name in kept})
 
 
+def reports_of(result: RunResult) -> list[MapReport]:
+    """Return what the nodes of a run reported about their maps."""
+    found = [read_report(each.snapshot) for each in result.snapshots if each.snapshot]
+    return [each for each in found if isinstance(each, MapReport)]
+
+
+def gudhi_agrees(result: RunResult) -> dict[str, float]:
+    """Return 1 if gudhi finds the same Betti numbers of the final complex, else 0; nothing without a complex."""
+    metrics = result.metrics
+    if "landmark_complex_holes" not in metrics:
+        return {}
+    tree = gudhi.SimplexTree()
+    for simplex in maximal(each for report in reports_of(result) for each in report.simplices):
+        for face in combinations(simplex, min(len(simplex), 3)):
+            tree.insert(list(face))
+    tree.compute_persistence(homology_coeff_field=2, min_persistence=-1, persistence_dim_max=True)
+    found = [*tree.betti_numbers(), 0, 0][:2]
+    return {"gudhi_agrees": float(found == [metrics["landmark_complex_pieces"], metrics["landmark_complex_holes"]])}
+
+
+def update_times(result: RunResult) -> dict[str, float]:
+    """Return the processor time [ms] that a map takes for one observation of a run, on average and at most."""
+    map_, times = LandmarkMap(), []
+    for report in reports_of(result):
+        for landmarks, bearings in zip(report.simplices, report.bearings, strict=True):
+            snapshot = snapshot_of(zip(landmarks, bearings, strict=True))
+            began = time.process_time()
+            map_.observe(snapshot)
+            times.append(1e3 * (time.process_time() - began))
+    return {"update_mean_ms": round(mean(times), 4), "update_most_ms": round(max(times), 3)}
+
+
 def carry_out(group: str, commit: str, commits: Collection[str]) -> None:
     """Run the trials of a group that are not kept yet, and keep each."""
     scenario, settings, seeds = GROUPS[group]
@@ -143,15 +197,21 @@ def carry_out(group: str, commit: str, commits: Collection[str]) -> None:
             continue
         began = time.process_time()
         result = run(scenario, seed, "inline", [*settings, *(hall(seed) if group == "halls" else ())])
+        ended = time.process_time()
         trial = {
             "group": group,
             "seed": seed,
             "commit": commit,
             "outcome": result.outcome,
             "problems": len(result.problems),
-            "processor_s": round(time.process_time() - began, 1),
+            "processor_s": round(ended - began, 1),
             **{name: result.metrics[name] for name in KEPT if name in result.metrics},
+            **gudhi_agrees(result),
         }
+        if group == "complex-processes":
+            trial["processes_agree"] = float(run(scenario, seed, "processes", list(settings)).trace == result.trace)
+        if group == "complex-updates":
+            trial |= update_times(result)
         keep(trial)
         print(group, seed, trial["outcome"], int(result.ticks), trial["processor_s"], flush=True)
 
@@ -185,6 +245,20 @@ def summary(some: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         counts = sorted({len(groups[name]) for name in names})
         rows.append({"what": what, "asked": asked, "measured": measured, "n": " and ".join(map(str, counts))})
 
+    def overall(what: str, asked: str, measured: str, n: int) -> None:
+        rows.append({"what": what, "asked": asked, "measured": measured, "n": str(n)})
+
+    def compared(of: str, over: str) -> None:
+        if not groups[of] or not groups[over]:
+            return
+        completed = sum(each["outcome"] == "completed" for each in groups[of].trials)
+        row(f"runs completed, {of}", "", f"{completed} of {len(groups[of])}", of)
+        row(f"completion, {of}", "", spread(groups[of], "completion_fraction", 3), of)
+        ratio = groups[of].mean("iterations") / groups[over].mean("iterations")
+        row(f"iterations, {of} over {over}", "", f"{ratio:.2f}", of, over)
+        sent = groups[of].mean("bytes_per_robot_mean") / groups[over].mean("bytes_per_robot_mean")
+        row(f"bytes of a robot, {of} over {over}", "", f"{sent:.2f}", of, over)
+
     def spread(group: Group, metric: str, digits: int) -> str:
         values = group.values(metric)
         return f"{mean(values):.{digits}f} ({min(values):.{digits}f} to {max(values):.{digits}f})"
@@ -207,14 +281,7 @@ def summary(some: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     whole = [each for name in ("free", "simple", "complex", "complex-whole") for each in groups[name].trials]
     if whole:
         equal = sum(each["landmark_complex_holes"] == each["obstacles"] for each in whole)
-        rows.append(
-            {
-                "what": "holes equal obstacles",
-                "asked": "in at least 95 %",
-                "measured": f"{equal} of {len(whole)}",
-                "n": str(len(whole)),
-            }
-        )
+        overall("holes equal obstacles", "in at least 95 %", f"{equal} of {len(whole)}", len(whole))
     name = "iterations_to_91_5_percent_completion"
     if groups["complex"]:
         row("iterations to 91.5 %, complex", "at most 2373", spread(groups["complex"], name, 0), "complex")
@@ -238,22 +305,35 @@ def summary(some: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             row(f"iterations, {of} over {over}", f"at most {asked}", f"{ratio:.2f}", of, over)
             apart = groups[of].mean("completion_fraction") - groups[over].mean("completion_fraction")
             row(f"completion, {of} less {over}", "at least -0.010", f"{apart:+.3f}", of, over)
-    if groups["navigate"]:
-        goals = sum(groups["navigate"].values("navigation_goals"))
-        reached = round(goals * groups["navigate"].mean("navigation_success_fraction"))
-        row("goals reached", "100 of 100", f"{reached} of {goals:.0f}", "navigate")
+    for of, over in (("free-64-bytes", "free"), ("free-gossip-64-bytes", "free-gossip"), ("presence", "free-gossip")):
+        compared(of, over)
+    for name in ("free-nearest-frontier", "free-min-pos"):
+        compared(name, "free")
+    for name in ("navigate", "navigate-presence"):
+        if groups[name]:
+            goals = sum(groups[name].values("navigation_goals"))
+            reached = round(goals * groups[name].mean("navigation_success_fraction"))
+            row(f"goals reached, {name}", "100 of 100", f"{reached} of {goals:.0f}", name)
+            row(f"iterations to a goal, {name}", "", f"{groups[name].mean('navigation_iterations_mean'):.0f}", name)
+    judged = [each for each in some if "gudhi_agrees" in each]
+    if judged:
+        agree = sum(each["gudhi_agrees"] for each in judged)
+        overall("gudhi agrees on the final complex", "all", f"{agree:.0f} of {len(judged)}", len(judged))
+    if groups["complex-updates"]:
+        group = groups["complex-updates"]
+        times = f"{group.mean('update_mean_ms'):.3f}; at most {group.mean('update_most_ms'):.1f}"
+        row(f"update of a map of {group.mean('landmarks'):.0f} landmarks [ms]", "at most 5", times, "complex-updates")
+    if groups["complex-processes"]:
+        equal = sum(groups["complex-processes"].values("processes_agree"))
+        row("traces of 30 processes equal inline", "all", f"{equal:.0f}", "complex-processes")
+    if groups["complex"]:
+        pace = mean(0.1 * each["iterations"] / each["processor_s"] for each in groups["complex"].trials)
+        row("inline faster than real time, complex", "at least 10", f"{pace:.0f}", "complex")
     ended = [each for each in some if "concluded_early" in each]
     if ended:
         early = sum(each["concluded_early"] for each in ended)
         completed = sum(each["outcome"] == "completed" for each in ended)
-        rows.append(
-            {
-                "what": "runs that concluded early",
-                "asked": "0 in 100",
-                "measured": f"{early:.0f}; {completed} completed",
-                "n": str(len(ended)),
-            }
-        )
+        overall("runs that concluded early", "0 in 100", f"{early:.0f}; {completed} completed", len(ended))
     return rows
 
 

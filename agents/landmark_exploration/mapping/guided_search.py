@@ -115,7 +115,8 @@ class PivotCosts:
         low, high = there.min(axis=1)[:, None], there.max(axis=1)[:, None]
         with np.errstate(invalid="ignore"):  # infinite less infinite: this pivot tells nothing
             apart = np.fmax(low - self.costs, self.costs - high)
-        return np.fmax.reduce(apart, axis=0, initial=0.0)
+        least: Floats = np.fmax.reduce(apart, axis=0, initial=0.0)
+        return least
 
 
 class GuidedSearch:
