@@ -9,7 +9,6 @@ halted robot adds nothing to its log. A robot that is silent for `dead_ticks` is
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from heapq import heappop, heappush
 from typing import Any, Final, Protocol
 
 import msgspec
@@ -20,13 +19,11 @@ from zwerm.agents.landmark_exploration.mapping.cost_utility import (
     Choice,
     Costs,
     Offer,
-    cost_utility,
     frontier_costs,
     min_pos,
     nearest_frontier,
 )
 from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, REOPENED, TIMED_OUT, pair_of
-from zwerm.agents.landmark_exploration.mapping.guided_search import GuidedSearch, PivotCosts
 from zwerm.agents.landmark_exploration.mapping.landmark_map import FAILURES_MAX, LandmarkMap
 from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, columns, write_report
 from zwerm.agents.landmark_exploration.parameters import CentralStrategy, NonNegative, Ticks
@@ -36,6 +33,7 @@ from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BY
 from zwerm.agents.landmark_exploration.sharing.log_gossip import AddressedMessage, Gossip
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
+from zwerm.coordinator.landmark_exploration.greedy_assignment import GreedyAssignment
 from zwerm.wire.messages import Command, Observation, Transmission
 
 # Ticks after which a robot without a frontier is considered again: the first time, and at most.
@@ -43,8 +41,6 @@ RETRY_TICKS: Final = 10
 RETRY_TICKS_MAX: Final = 80
 # Largest age [ticks] of the costs by which min-pos ranks the other robots.
 RANK_TICKS: Final = 20
-# Up to this many free frontiers the search for one is guided. With more, the nearest one is near.
-GUIDED_MAX: Final = 48
 # Ticks between two transmissions of the same task.
 RESEND_TICKS: Final = 4
 # Ticks between two snapshots of the map for the observers of the run.
@@ -85,11 +81,6 @@ class LandmarkCoordinatorSetup(Protocol):
         """Number of its starts."""
 
 
-# A free robot: the negative of its gain or of a bound of that, its id, the number of frontiers given away when that was
-# worked out, and its choice; None where its gain is only bounded.
-Candidate = tuple[float, int, int, Choice | None]
-
-
 @dataclass
 class _Robot:
     """The known state of one robot. `task_number` is the number of its last task, `task`; None before the first."""
@@ -120,7 +111,7 @@ class LandmarkCoordinator:
         self._origin = origin_of(setup.node, setup.incarnation)
         self._tick = 0
         self._robots = {node: _Robot() for node in range(setup.node)}
-        self._pivot_costs = PivotCosts(self.map.complex)
+        self._greedy = GreedyAssignment(self.map.complex, rules.beta)
         self._costs: dict[int, tuple[int, Costs]] = {}
         self._failures: dict[int, int] = {}
         self._outbox: list[Transmission] = []
@@ -244,43 +235,13 @@ class LandmarkCoordinator:
         if not frontiers.open:
             pass
         elif self._rules.strategy == "cost-utility":
-            self._greedy(free, offer)
+            seen = {node: self._robots[node].landmarks for node in free}
+            for node, choice in self._greedy.assigned(seen, offer):
+                self._give(node, choice, cut_off=choice is None and not offer.is_empty())
         else:
             for node in free:
                 self._give(node, self._uncoordinated(node, living), cut_off=True)
         return not frontiers.open and self._finish(living)
-
-    def _greedy(self, free: Sequence[int], offer: Offer) -> None:
-        """Assign the best pair of a free robot and a frontier, then the best pair of the rest, and so on.
-
-        A robot's best gain never rises while frontiers are assigned. So only the robot with the best gain is examined again,
-        and one whose gain is only bounded is examined when no other can be better.
-        """
-        if not free:
-            return
-        keys = offer.free_keys(GUIDED_MAX) if self._rules.beta > 0.0 else None
-        guide = GuidedSearch(self.map.complex, self._pivot_costs, offer, keys, self._rules.beta) if keys else None
-        given = 0
-        given_at: dict[int, int] = {}  # landmark: the number of the last frontier with it that was given away
-        queue: list[Candidate] = []
-        for node in free:
-            bound = guide.bound(self._robots[node].landmarks) if guide else None
-            if bound is None:
-                self._consider(node, offer, guide, given, queue)
-            else:
-                heappush(queue, (-bound, node, given, None))
-        while queue:
-            _, node, at, choice = heappop(queue)
-            # Frontiers without a landmark of this one change nothing: all others are worth the same as before, or less.
-            if choice is None or any(given_at.get(landmark, 0) > at for landmark in pair_of(choice.key)):
-                self._consider(node, offer, guide, given, queue)
-                continue
-            given += 1
-            given_at.update(dict.fromkeys(pair_of(choice.key), given))
-            offer.take(choice.key)
-            if guide is not None:
-                guide.take(choice.key)
-            self._give(node, choice)
 
     def _give(self, node: int, choice: Choice | None, cut_off: bool = False) -> None:
         """Assign a frontier to a robot; without a `choice`, consider the robot again later.
@@ -313,20 +274,6 @@ class LandmarkCoordinator:
             costs = frontier_costs(self.map.complex, self._robots[node].landmarks, self.map.frontiers)
             self._costs[node] = self._tick, costs
         return costs
-
-    def _consider(
-        self, node: int, offer: Offer, guide: GuidedSearch | None, given: int, queue: list[Candidate]
-    ) -> None:
-        """Queue the best frontier of a robot, or consider the robot again later if no free one can be reached."""
-        landmarks = self._robots[node].landmarks
-        if guide is not None:
-            choice = guide.best(landmarks)
-        else:
-            choice = cost_utility(self._rules.beta)(self.map.complex, landmarks, offer)
-        if choice is not None:
-            heappush(queue, (-choice.gain, node, given, choice))
-        else:
-            self._give(node, None, cut_off=not offer.is_empty())
 
     def _finish(self, living: Sequence[int]) -> bool:
         """Halt all robots, and return whether exploration is complete: no frontier is open, and no missing entry can
