@@ -53,10 +53,14 @@ OUTBOX_BYTES_MAX: Final = 20_000
 
 
 class CoordinatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
-    """`beta` weighs the cost against the utility; `strategy` chooses frontiers; a robot silent for `dead_ticks` is dead."""
+    """`beta` weighs the cost against the utility; `strategy` chooses frontiers; a robot silent for `dead_ticks` is dead.
+
+    With `walk_if_cut_off` a robot from which no path leads to a free frontier does a random walk, and looks; else it waits.
+    """
 
     beta: NonNegative = 10.0
     strategy: CentralStrategy = "cost-utility"
+    walk_if_cut_off: bool = True
     dead_ticks: Ticks = 600
     message_bytes_max: int = LARGE_BYTES
 
@@ -237,10 +241,12 @@ class LandmarkCoordinator:
         elif self._rules.strategy == "cost-utility":
             seen = {node: self._robots[node].landmarks for node in free}
             for node, choice in self._greedy.assigned(seen, offer):
-                self._give(node, choice, cut_off=choice is None and not offer.is_empty())
+                self._give(
+                    node, choice, cut_off=choice is None and self._rules.walk_if_cut_off and not offer.is_empty()
+                )
         else:
             for node in free:
-                self._give(node, self._uncoordinated(node, living), cut_off=True)
+                self._give(node, self._uncoordinated(node, living), cut_off=self._rules.walk_if_cut_off)
         return not frontiers.open and self._finish(living)
 
     def _give(self, node: int, choice: Choice | None, cut_off: bool = False) -> None:

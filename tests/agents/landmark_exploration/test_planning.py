@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
@@ -42,6 +42,7 @@ def costs(complex_: LandmarkComplex, here: frozenset[int]) -> dict[int, float]:
     return cost
 
 
+@settings(deadline=None)
 @given(observed, pairs, pairs, st.frozensets(st.integers(0, LANDMARKS), min_size=1, max_size=4), st.floats(0.0, 20.0))
 def test_the_choice_is_the_best_of_all(
     some: list[frozenset[int]],
@@ -76,6 +77,7 @@ def test_the_choice_is_the_best_of_all(
     assert set(pair_of(choice.key)) <= seen
 
 
+@settings(deadline=None)
 @given(observed, st.frozensets(st.integers(0, LANDMARKS), max_size=4))
 def test_reach_yields_every_cost_in_order(some: list[frozenset[int]], here: frozenset[int]) -> None:
     complex_, _ = made(some, [])
@@ -105,6 +107,7 @@ def test_avoided_frontiers_are_not_chosen() -> None:
     assert cost_utility(1.0)(complex_, (1, 2), Offer(frontiers, [], {key_of(1, 2): None})) is None
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.frozensets(st.integers(0, 14), min_size=1, max_size=5), min_size=1, max_size=24),
     st.integers(0, 24),
@@ -149,6 +152,7 @@ def test_a_guided_search_makes_the_same_choices(
         keys.remove(chosen.key)
 
 
+@settings(deadline=None)
 @given(st.lists(st.frozensets(st.integers(0, 20), min_size=2, max_size=5), min_size=2, max_size=30))
 def test_costs_from_pivots_are_exact_while_the_map_grows(some: list[frozenset[int]]) -> None:
     complex_, _ = made(some[:1], [])
