@@ -51,17 +51,17 @@ GROUPS: Final[dict[str, tuple[str, tuple[str, ...], int]]] = {
     "free-gossip-range": ("landmark-free", (LONG, *GOSSIP, "radio.range_m=0.7"), 20),
     "simple": ("landmark-simple", (LONG,), 10),
     # The first runs end by themselves, the others when completion is certain.
-    "complex-whole": ("landmark-complex", (LONG,), 3),
+    "complex-whole": ("landmark-complex", (LONG,), 2),
     "complex": ("landmark-complex", ("time.duration_s=350",), 10),
-    "complex-gossip": ("landmark-complex", ("time.duration_s=200", *GOSSIP), 3),
+    "complex-gossip": ("landmark-complex", ("time.duration_s=200", *GOSSIP), 2),
     "complex-20": ("landmark-complex", ("time.duration_s=400", *robots(20)), 5),
     "complex-10": ("landmark-complex", ("time.duration_s=700", *robots(10)), 5),
     "complex-processes": ("landmark-complex", ("time.duration_s=20",), 1),
     # Fig. 9 of the paper.
-    "free-20": ("landmark-free", (LONG, *robots(20)), 5),
-    "free-30": ("landmark-free", (LONG, *robots(30)), 5),
-    "simple-10": ("landmark-simple", (LONG, *robots(10)), 5),
-    "simple-30": ("landmark-simple", (LONG, *robots(30)), 5),
+    "free-20": ("landmark-free", (LONG, *robots(20)), 3),
+    "free-30": ("landmark-free", (LONG, *robots(30)), 3),
+    "simple-10": ("landmark-simple", (LONG, *robots(10)), 3),
+    "simple-30": ("landmark-simple", (LONG, *robots(30)), 3),
     # More than 1,000 landmarks.
     "complex-updates": ("landmark-complex", ("time.duration_s=250", "arena.scale=1.08"), 1),
     "free-64-bytes": ("landmark-free", (LONG, *SMALL, "coordinator.parameters.message_bytes_max=64"), 10),
