@@ -53,7 +53,7 @@ GROUPS: Final[dict[str, tuple[str, tuple[str, ...], int]]] = {
     # The first runs end by themselves, the others when completion is certain.
     "complex-whole": ("landmark-complex", (LONG,), 2),
     "complex": ("landmark-complex", ("time.duration_s=350",), 10),
-    "complex-gossip": ("landmark-complex", ("time.duration_s=200", *GOSSIP), 2),
+    "complex-gossip": ("landmark-complex", ("time.duration_s=200", *GOSSIP), 1),
     "complex-20": ("landmark-complex", ("time.duration_s=400", *robots(20)), 5),
     "complex-10": ("landmark-complex", ("time.duration_s=700", *robots(10)), 5),
     "complex-processes": ("landmark-complex", ("time.duration_s=20",), 1),
