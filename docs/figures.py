@@ -1,4 +1,4 @@
-"""Draw the figures of stored measurements: `python docs/figures.py`, or only those that are named, as `soak.png`.
+"""Draw the figures of stored measurements: `python docs/figures.py`.
 
 Each figure shows rows of a CSV file in `measurements/` or beside the figure, so it is drawn again from the same file.
 """
@@ -24,18 +24,6 @@ SOAK_PANELS: Final = {
     "memory of a robot [MB]": {"old_robot_mb_mean": "mean of those that live on", "robot_mb_max": "largest"},
     "open descriptors": {"world_descriptors": "world", "robot_descriptors_max": "a robot, most"},
 }
-# Environment: the group of runs by the number of robots.
-ENVIRONMENTS: Final = {
-    "free": {10: "free", 20: "free-20", 30: "free-30"},
-    "simple": {10: "simple-10", 20: "simple", 30: "simple-30"},
-    "complex": {10: "complex-10", 20: "complex-20", 30: "complex"},
-}
-# Table, its axis, the label of the axis, and whether its scale is logarithmic.
-RADIO: Final = (
-    ("landmark-loss", AXIS, "fraction of messages lost", False),
-    ("landmark-bursts", "packets", "messages of a burst; 0.3 of all are lost", True),
-    ("landmark-range", "radio.range_m", "range of the radio between robots [r]", True),
-)
 METRICS: Final = {
     "coverage_fraction": "coverage",
     "robots_deployed": "robots deployed",
@@ -91,134 +79,17 @@ def soak_figure() -> Figure:
     return figure
 
 
-def _single_runs(name: str) -> list[dict[str, str]]:
-    with (_measured.STORE / "single-runs" / f"{name}.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def robots_figure() -> Figure:
-    """Return the iterations of landmark exploration by the number of robots, in three environments (Fig. 9 of its paper)."""
-    rows = _single_runs("landmark-numbers")
-    figure = Figure(figsize=(8.6, 3.6), layout="constrained")
-    panels = {"iterations_to_91_5_percent_completion": "iterations to 91.5 %", "iterations": "iterations to the end"}
-    for axes, (metric, title) in zip(figure.subplots(1, 2), panels.items(), strict=True):
-        for number, (label, groups) in enumerate(ENVIRONMENTS.items()):
-            found = {
-                count: [float(row[metric]) for row in rows if row["group"] == group and row["outcome"] in wanted]
-                for count, group in groups.items()
-                for wanted in [("completed",) if metric == "iterations" else ("completed", "time-limit")]
-            }
-            found = {count: values for count, values in found.items() if values}
-            if len(found) < 2:
-                continue
-            colour, marker = f"C{number}", "os^"[number]
-            mean = {count: sum(values) / len(values) for count, values in found.items()}
-            spread = [[mean[c] - min(v) for c, v in found.items()], [max(v) - mean[c] for c, v in found.items()]]
-            axes.errorbar(
-                list(mean), list(mean.values()), yerr=spread, label=label, color=colour, marker=marker, capsize=3
-            )
-            first = min(mean)
-            axes.plot(list(mean), [mean[first] * first / count for count in mean], color=colour, ls=":", lw=1)
-        axes.set_title(title, loc="left", fontsize=10)
-        axes.set_xlabel("robots")
-        axes.set_xticks([10, 20, 30])
-        axes.set_ylim(bottom=0.0)
-        axes.grid(alpha=0.3)
-    figure.axes[0].legend(frameon=False)
-    figure.suptitle(
-        "bars: least to most of all runs; dotted: in proportion to the first", x=0.01, ha="left", fontsize=10
-    )
-    return figure
-
-
-def dispersion_figure() -> Figure:
-    """Return the completion with minimal effort by the dispersion of landmarks, as boxes (Fig. 14 of the paper)."""
-    rows = _single_runs("landmark-dispersion")
-    paper = {
-        row["scatter.dispersion_m"]: float(row["paper"])
-        for row in _measured.load("landmark-dispersion").rows
-        if row["metric"] == "completion_fraction" and row["paper"]
-    }
-    figure = Figure(figsize=(5.6, 3.6), layout="constrained")
-    axes = figure.subplots()
-    levels = sorted({row["dispersion_m"] for row in rows}, key=float)
-    axes.boxplot(
-        [[float(row["completion_fraction"]) for row in rows if row["dispersion_m"] == level] for level in levels],
-        tick_labels=[f"{float(level):.2f} r" for level in levels],
-        medianprops={"color": "#D55E00"},
-    )
-    means = [
-        next((mean for at, mean in paper.items() if abs(float(at) - float(level)) < 1e-3), None) for level in levels
-    ]
-    axes.plot(range(1, len(levels) + 1), means, "x", color="#0072B2", label="mean of the paper", markersize=7)
-    axes.set_xlabel("dispersion of the landmarks")
-    axes.set_ylabel("completion")
-    axes.set_ylim(0.0, 1.02)
-    axes.grid(alpha=0.3, axis="y")
-    axes.legend(frameon=False, loc="lower left")
-    each = len(rows) // len(levels)
-    axes.set_title(f"minimal effort, {each} runs a box", loc="left", fontsize=10)
-    return figure
-
-
-def radio_figure() -> Figure:
-    """Return completion and iterations of landmark exploration over loss, bursts and radio range."""
-    figure = Figure(figsize=(10.5, 5.6), layout="constrained")
-    panels = figure.subplots(2, 3, sharey="row", sharex="col")
-    for column, (name, axis, label, log) in enumerate(RADIO):
-        found = _measured.load(name)
-        for row, (metric, title) in enumerate(
-            {"completion_fraction": "completion", "iterations": "iterations"}.items()
-        ):
-            axes = panels[row][column]
-            for variant, (colour, marker) in STYLES.items():
-                some = [
-                    each
-                    for each in found.rows
-                    if each["metric"] == metric and (each["variant"] or "decentralised") == variant
-                ]
-                if some:
-                    _draw(axes, some, variant, colour, marker, axis)
-            axes.grid(alpha=0.3)
-            if log:
-                axes.set_xscale("log")
-                ticks = sorted({float(each[axis]) for each in found.rows})
-                axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks], minor=False)
-                axes.minorticks_off()
-            if row == 0:
-                axes.set_title(f"{found.origin['trials']} runs a point", loc="left", fontsize=10)
-                axes.set_ylim(0.9, 1.0)
-            else:
-                axes.set_ylim(bottom=0.0)
-                axes.set_xlabel(label)
-            if column == 0:
-                axes.set_ylabel(title)
-    panels[1][0].legend(frameon=False)
-    figure.suptitle("landmark-free; bars: 95 % interval of the mean", x=0.01, ha="left", fontsize=10)
-    return figure
-
-
-def _draw(axes: Any, rows: list[dict[str, str]], variant: str, colour: str, marker: str, axis: str = AXIS) -> None:
-    x = [float(row[axis]) for row in rows]
+def _draw(axes: Any, rows: list[dict[str, str]], variant: str, colour: str, marker: str) -> None:
+    x = [float(row[AXIS]) for row in rows]
     mean = [float(row["mean"]) for row in rows]
     half = [float(row["half_width"] or 0.0) for row in rows]
     axes.errorbar(x, mean, yerr=half, label=variant, color=colour, marker=marker, markersize=5, capsize=3)
 
 
 def main() -> None:
-    images = FOLDER / "images"
-    figures = {
-        FOLDER / "compare-loss.png": loss_figure,
-        images / "soak.png": soak_figure,
-        images / "landmark-robots.png": robots_figure,
-        images / "landmark-dispersion.png": dispersion_figure,
-        images / "landmark-radio.png": radio_figure,
-    }
-    asked = sys.argv[1:]
-    for path, figure in figures.items():
-        if not asked or path.name in asked:
-            figure().savefig(path, dpi=110)
-            print(path.relative_to(FOLDER.parent))
+    for path, figure in ((FOLDER / "compare-loss.png", loss_figure), (FOLDER / "images" / "soak.png", soak_figure)):
+        figure().savefig(path, dpi=110)
+        print(path.relative_to(FOLDER.parent))
 
 
 if __name__ == "__main__":
