@@ -21,6 +21,7 @@ from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
 from zwerm.run.assembly import assemble_run, observers_of
 from zwerm.run.hang_guard import hang_guard
+from zwerm.run.kept_result import KeptResult
 from zwerm.run.measurement import measure, truth_of
 from zwerm.run.progress import NullProgress, ProgressListener
 from zwerm.run.result import RunResult
@@ -103,6 +104,7 @@ def run(
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
     with (
+        KeptResult() as kept,
         _security(security_log) as security,
         LocalSwarm(
             new_run_id(),
@@ -115,7 +117,8 @@ def run(
             confinement=confinement,
         ) as swarm,
     ):
-        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)
+        kept.result = drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)
+    return kept.end()
 
 
 def _security(path: Path | None, router: bool = True) -> "AbstractContextManager[SecurityLog | None]":
@@ -181,6 +184,7 @@ def serve(
 
     watcher = watcher or NullProgress()
     with (
+        KeptResult() as kept,
         _security(security_log) as security,
         RemoteSwarm(
             new_run_id(),
@@ -196,7 +200,8 @@ def serve(
             on_refusal=None if security is None else security.note,
         ) as swarm,
     ):
-        return drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, security)
+        kept.result = drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, security)
+    return kept.end()
 
 
 def new_run_id() -> str:
