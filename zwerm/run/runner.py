@@ -103,10 +103,8 @@ def run(
     _try_controllers(members)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
-    with (
-        KeptResult() as kept,
-        _security(security_log) as security,
-        LocalSwarm(
+    with _security(security_log) as security:
+        swarm = LocalSwarm(
             new_run_id(),
             members,
             progress=watcher.joined,
@@ -115,10 +113,10 @@ def run(
             restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
             on_refusal=None if security is None else security.note,
             confinement=confinement,
-        ) as swarm,
-    ):
-        kept.result = drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)
-    return kept.end()
+        )
+        with KeptResult(swarm.close) as kept, swarm:
+            kept.result = drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)
+        return kept.end()
 
 
 def _security(path: Path | None, router: bool = True) -> "AbstractContextManager[SecurityLog | None]":
@@ -183,10 +181,8 @@ def serve(
         raise ScenarioError(["credentials: expected either a file to write them to, or the keys of a world"])
 
     watcher = watcher or NullProgress()
-    with (
-        KeptResult() as kept,
-        _security(security_log) as security,
-        RemoteSwarm(
+    with _security(security_log) as security:
+        swarm = RemoteSwarm(
             new_run_id(),
             node_specs(scenario, seed),
             listen=listen,
@@ -198,10 +194,10 @@ def serve(
             deadline_s=deadline_s,
             paced=realtime is not None,
             on_refusal=None if security is None else security.note,
-        ) as swarm,
-    ):
-        kept.result = drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, security)
-    return kept.end()
+        )
+        with KeptResult(swarm.close) as kept, swarm:
+            kept.result = drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, security)
+        return kept.end()
 
 
 def new_run_id() -> str:
