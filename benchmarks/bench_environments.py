@@ -412,23 +412,27 @@ def pair(command: str) -> tuple[str, str]:
 
 
 def hosts_at_once(role: str) -> tuple[str, str]:
-    """Start two worlds at once in one folder, or the same robots twice: one succeeds, the other is refused."""
+    """Start two worlds at once in one folder, or the same robots twice: the second is refused, the first is interrupted."""
     with places() as place, places() as other, exchange() as keys:
-        world, endpoint = start_world(place, keys)
+        world, endpoint = start_world(place, keys, "--set", "time.duration_s=1e6")
         robots = start_robots(other, keys, endpoint)
         until(lambda: world.poll() is not None or (place.here / "run.mcap").exists(), "the run begins")
         if role == "world":
             names, where = "another run is writing to it", place
             second, _ = start_world(place, keys.with_name("second.key"))
         else:
-            names, where = "ended with exit code 2 before it joined", other
+            names, where = "did not join within|before it joined", other
             second = start_robots(other, keys, endpoint)
-        ends = [(each, *each.communicate(timeout=DEADLINE_S)) for each in (second, robots, world)]
-        wrong = [f"exit status {each.returncode}: {said[-300:]}" for each, _, said in ends[1:] if each.returncode]
-        status, refused = judged(where, *ends[0], {2}, names)
-        return f"{world.returncode if role == 'world' else robots.returncode}, {status}", "; ".join(
-            [*wrong, refused][:2]
-        ).strip("; ")
+        refused = second.communicate(timeout=DEADLINE_S)
+        world.send_signal(signal.SIGINT)
+        ends = [(each, each.communicate(timeout=DEADLINE_S)[1]) for each in (robots, world)]
+        expected = {robots: 0, world: INTERRUPTED}
+        wrong = [
+            f"exit status {each.returncode}: {said[-300:]}" for each, said in ends if each.returncode != expected[each]
+        ]
+        status, judgement = judged(where, second, *refused, {2}, names)
+        first = world if role == "world" else robots
+        return f"{first.returncode}, {status}", "; ".join(filter(None, [*wrong, judgement]))
 
 
 def main() -> None:
