@@ -35,6 +35,7 @@ ROOT: Final = Path(__file__).parents[1]
 ROBOTS: Final = 4
 SETTINGS: Final = ("computation-free", "--set", f"robots.count={ROBOTS}", "--set", "time.straggler_s=120.0", "--json")
 PROGRAM: Final = (sys.executable, "-c", "from zwerm.cli.app import main; main()")
+_PATIENCE: Final = "transport/link/tx/queue/congestion_control/block/wait_before_close"  # [us]
 READS: Final = ("**", "@/**", "@/*/router/**", "@/*/router/config/**")
 WRONG_PASSWORDS: Final = 20
 GUESS_MS: Final = 200
@@ -54,7 +55,9 @@ def session(endpoint: str, credential: Credential | None, timeout_ms: int = 1_00
         }
     )
     settings: dict[str, Any] = {"mode": "client", "connect/endpoints": [endpoint], "connect/timeout_ms": timeout_ms}
-    return open_session(settings | {"connect/exit_on_failure": True} | identity, "refused")
+    # An attacker waits as long as a busy router needs, so that everything it sends arrives.
+    settings |= {"connect/exit_on_failure": True, _PATIENCE: round(1e6 * LONG_S)}
+    return open_session(settings | identity, "refused")
 
 
 def read_all(intruder: zenoh.Session, run: str) -> int:

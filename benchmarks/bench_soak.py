@@ -244,7 +244,8 @@ def main() -> None:
         "old_robot_mb_mean": ROBOT_MB_PER_H_MAX,
         "world_descriptors": DESCRIPTORS_PER_H_MAX,
     }
-    grown = [name for name, most in bounds.items() if trend_per_h(sampler.samples, name)[0] > most]
+    trends = {name: trend_per_h(sampler.samples, name) for name in bounds}
+    grown = [name for name, (trend, interval) in trends.items() if trend - interval > bounds[name]]
     print(f"outcome {result.outcome} {result.reason}; robots left {len(left)}; grown {grown}")
     if not result.ok or result.middleware_lost or left or grown:
         raise SystemExit(1)
