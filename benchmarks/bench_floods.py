@@ -38,7 +38,7 @@ PROGRAM: Final = (sys.executable, "-c", "from zwerm.cli.app import main; main()"
 _PATIENCE: Final = "transport/link/tx/queue/congestion_control/block/wait_before_close"  # [us]
 READS: Final = ("**", "@/**", "@/*/router/**", "@/*/router/config/**")
 WRONG_PASSWORDS: Final = 20
-GUESS_MS: Final = 200
+GUESS_MS: Final = 1_000
 LONG_S: Final = 400.0
 JUNK_BYTES: Final = 64
 JUNK_FRAMES: Final = 10
@@ -188,7 +188,7 @@ def main() -> None:
                 insider.put(command_key(run, 1), big, congestion_control=zenoh.CongestionControl.BLOCK)
                 tried[f"messages of {options.mebibytes} MiB with a right credential"] = number + 1
             # The router answers in order: after the answer it has seen the whole flood.
-            list(insider.get(hello_key(run, 1), zenoh.handlers.FifoChannel(1), payload=b"junk", timeout=DEADLINE_S))
+            list(insider.get(hello_key(run, 1), zenoh.handlers.FifoChannel(1), payload=b"junk", timeout=LONG_S))
         thief = stack.enter_context(session(endpoint, msgspec.structs.replace(own, zid="abc")))
         thief.declare_subscriber("**", hear, allowed_origin=zenoh.Locality.REMOTE)
         idle = listed(port, options.idle)
