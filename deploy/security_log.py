@@ -73,6 +73,11 @@ class SecurityLog:
                 known = None if node == UNKNOWN_NODE else node
                 self._write({"node": known, "reason": reason, "detail": detail})
 
+    def denied_nodes(self, count: int) -> list[int]:
+        """Return the nodes of which the router has refused at least `count` operations so far, ascending."""
+        known = self._router_refusals.by_node
+        return [node for node in known if node != UNKNOWN_NODE and sum(known[node].values()) >= count]
+
     def router_refusals(self) -> Refusals:
         """Return the counts of all that the router has refused so far."""
         if self._router is not None:

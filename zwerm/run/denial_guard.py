@@ -1,0 +1,18 @@
+"""Ends robots that flood the router with operations that it denies. It reports these in the security log only."""
+
+from zwerm.deploy.security_log import SecurityLog
+from zwerm.world.world import FLOOD, World
+
+
+class DenialGuard:
+    """An observer of ticks. A node with FLOOD denied operations has crashed, and its program on this machine is ended."""
+
+    def __init__(self, security: SecurityLog) -> None:
+        self._security = security
+
+    def __call__(self, world: World) -> None:
+        """Look at the router's counts before the next tick."""
+        for node in self._security.denied_nodes(FLOOD):
+            if node not in world.status.crashed:
+                world.crash(node, f"flood: {FLOOD} of its operations were denied by the router")
+                world.on_flood(node)
