@@ -4,15 +4,20 @@ Roles: the world, the server that robots are forked from, and a robot. Phases: w
 while robots leave, and while the picture is drawn, when no robot is left. Signals: interrupt, terminate, hang-up, kill, and
 stop; after a stop the world is continued, the others are not. Each run is a command of its own, with a folder of its own for
 temporary files. Its robots take 2 s to leave.
+
+Two further roles are `zwerm world` and `zwerm robot`, connected over TCP, while the run goes on.
 """
 
 import argparse
 import contextlib
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
@@ -26,7 +31,8 @@ ROOT: Final = Path(__file__).parents[1]
 ROBOTS: Final = 6
 SIGNALS: Final = ("INT", "TERM", "HUP", "KILL", "STOP")
 PHASES: Final = ("joining", "running", "leaving", "drawing")
-ROLES: Final = ("world", "server", "robot")
+ROLES: Final = ("world", "server", "robot", "zwerm world", "zwerm robot")
+APART: Final = ("zwerm world", "zwerm robot")
 NOBODY: Final = "no robot is left"
 RECORDING_END: Final = b"\x89MCAP0\r\n"
 LEAVERS: Final = """
@@ -56,6 +62,17 @@ ALLOWED: Final = {
     ("world", "HUP"): {INTERRUPTED},
     ("world", "KILL"): {-signal.SIGKILL},
     ("world", "STOP"): {0},
+}
+
+
+# The exit statuses of `zwerm world` and `zwerm robot` after a signal to one. Robots that lose their world exit with 3, and
+# their command names one of them and exits with 1.
+ALLOWED_APART: Final = {
+    **{("zwerm world", name): (INTERRUPTED, 0) for name in ("INT", "TERM", "HUP", "STOP")},
+    **{("zwerm robot", name): (1, INTERRUPTED) for name in ("INT", "TERM", "HUP")},
+    ("zwerm world", "KILL"): (-signal.SIGKILL, 1),
+    ("zwerm robot", "KILL"): (1, -signal.SIGKILL),
+    ("zwerm robot", "STOP"): (INTERRUPTED, 0),
 }
 
 
@@ -172,6 +189,80 @@ def _judge(role: str, name: str, phase: str, world: subprocess.Popen[bytes], fol
     return f"left: {left}" if left else ""
 
 
+def apart(role: str, name: str) -> str:
+    """Carry out one trial with robots that are connected over TCP, and return what went wrong, or ""."""
+    with TemporaryDirectory(prefix="k-") as made, socket.create_server(("127.0.0.1", 0)) as probe:
+        folder, endpoint = Path(made), f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        probe.close()
+        started: list[subprocess.Popen[bytes]] = []
+
+        def start(*arguments: str) -> subprocess.Popen[bytes]:
+            environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": made, "COLUMNS": "120"}
+            with (folder / "printed").open("ab") as printed:
+                started.append(
+                    subprocess.Popen(
+                        [sys.executable, "-c", "from zwerm.cli.app import main; main()", *arguments],
+                        cwd=folder,
+                        env=environment,
+                        stdout=printed,
+                        stderr=printed,
+                        start_new_session=True,
+                    )
+                )
+            return started[-1]
+
+        try:
+            return _judge_apart(role, name, start, endpoint, folder)
+        except TimeoutError as error:
+            return str(error)
+        finally:
+            for each in started:
+                for pid in [*processes(each.pid), each.pid]:
+                    with contextlib.suppress(OSError):
+                        os.kill(pid, signal.SIGKILL)
+                each.wait()
+
+
+def _judge_apart(
+    role: str, name: str, start: Callable[..., subprocess.Popen[bytes]], endpoint: str, folder: Path
+) -> str:
+    keys, record = folder / "keys", folder / "run.mcap"
+    world = start(
+        *("world", "computation-free", "--quiet", "--set", f"robots.count={ROBOTS}", "--record", "run.mcap"),
+        *("--set", f"time.duration_s={ENDLESS_S}", "--listen", endpoint, "--credentials", "keys"),
+    )
+    until(lambda: world.poll() is not None or (keys.exists() and keys.stat().st_size), "the world listens")
+    host = start("robot", "--connect", endpoint, "--credentials", "keys")
+
+    def grown(by: int) -> bool:
+        return world.poll() is not None or (record.exists() and record.stat().st_size > by)
+
+    until(lambda: host.poll() is not None or grown(100_000), "the run goes on")
+    everybody = set(processes(world.pid)) | set(processes(host.pid))
+    target = world if role == "zwerm world" else host
+    target.send_signal(getattr(signal, f"SIG{name}"))
+    if name == "STOP":
+        time.sleep(0.5)
+        target.send_signal(signal.SIGCONT)
+        size = record.stat().st_size
+        until(lambda: grown(size + 50_000), "the run goes on after the stop")
+        world.send_signal(signal.SIGINT)
+    until(lambda: None not in (world.poll(), host.poll()), "both commands end")
+    until(lambda: not any(_alive(pid) for pid in everybody), "all processes end")
+    if name == "KILL":
+        sweep(folder)  # as the next run does
+        if role == "zwerm world":
+            keys.unlink()  # stays, for its owner only
+    text = (folder / "printed").read_text(errors="replace")
+    left = [each.name for each in folder.iterdir() if each.name.startswith(("zwerm-", "pymp-", "keys"))]
+    found = (world.returncode, host.returncode)
+    if found != ALLOWED_APART[role, name]:
+        return f"exit statuses {found}, expected {ALLOWED_APART[role, name]}: {text[-300:]}"
+    if "Traceback" in text:
+        return f"a traceback: {text[-300:]}"
+    return f"left: {left}" if left else ""
+
+
 def _allowed(role: str, name: str, phase: str) -> set[int]:
     if role == "world":
         ended = ALLOWED[role, name]
@@ -211,11 +302,15 @@ def main() -> None:
                 if role == "robot" and phase == "drawing":
                     row[f"SIG{name}"] = NOBODY  # the trials of the world and the server show it
                     continue
-                wrongs = [wrong for _ in range(options.repeats) if (wrong := one(role, name, phase))]
+                if role in APART and phase != "running":
+                    row[f"SIG{name}"] = ""
+                    continue
+                trial = partial(apart, role, name) if role in APART else partial(one, role, name, phase)
+                wrongs = [wrong for _ in range(options.repeats) if (wrong := trial())]
                 failures += len(wrongs)
                 row[f"SIG{name}"] = f"{len(wrongs)} of {options.repeats} wrong" if wrongs else "as documented"
                 print(role, name, phase, "; ".join(wrongs) or "right", sep="\t", flush=True)
-    rows = [found[role, phase] for role in options.role for phase in options.phase]
+    rows = [row for (role, phase), row in found.items() if role not in APART or phase == "running"]
     write_csv(options.csv, rows)
     if failures:
         raise SystemExit(1)

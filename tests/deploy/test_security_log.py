@@ -13,7 +13,7 @@ import msgspec
 import pytest
 from command_line import zwerm
 from network import free_port
-from support import ROOT, ZWERM, scenario, until
+from support import ROBOTS, ROOT, ZWERM, scenario, until
 
 from zwerm.deploy.identity import load
 from zwerm.deploy.router_messages import RefusalParser, RouterEvent
@@ -169,3 +169,15 @@ def test_intruders_are_counted_by_reason_and_node_in_the_result_and_the_log(tmp_
     assert last["counts"]["1"] == {"denied": 2, "not-joined": 1}
     denied = [line["detail"] for line in lines if line["reason"] == "denied"]
     assert denied == [f"session {own.zid.lstrip('0')}: Put on {command_key(run_id, 0)}"] * 2
+
+
+def test_a_robot_that_floods_the_keys_of_another_is_ended_and_the_others_go_on(tmp_path: Path) -> None:
+    (tmp_path / "malicious.py").write_text((ROBOTS / "malicious.py").read_text())
+    more = ("--set", "robots.controller=malicious:Trespasses", "--set", "robots.on_crash=continue")
+    command = ("run", "computation-free", "--json", "--set", "robots.count=3", "--set", "time.duration_s=60", *more)
+    ran = zwerm(*command, "--security-log", "log", cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    found = json.loads(ran.stdout)
+    assert (found["outcome"], found["ticks"], found["nodes"]["crashed"]) == ("time-limit", 600, [1])
+    assert "flood: 1000 of its operations were denied by the router" in found["nodes"]["reasons"]["1"]
+    assert found["refused"]["nodes"]["1"]["denied"] >= 1_000

@@ -118,7 +118,7 @@ def test_a_router_that_takes_no_more_sessions_is_named(nothing_left: None, monke
         patched.setattr("zwerm.deploy.swarm.router_settings", full)
         patched.setattr("zwerm.deploy.swarm.PROBE_S_MAX", 1.0)
         with pytest.raises(LinkError, match=r"^node [01] .*; the router takes no more sessions$"):
-            LocalSwarm("run", members(2), deadline_s=2.0).__enter__()
+            LocalSwarm("run", members(2), deadline_s=4.0).__enter__()
     with LocalSwarm("run", members(2)) as swarm:
         assert swarm.takes_sessions()
         assert set(tick(swarm.link, range(2), 0)) == {0, 1}

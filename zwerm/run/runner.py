@@ -238,7 +238,10 @@ def drive(
             observers.append(ExchangeObserver(world, recording))
         observers.append(sampling)
         if security is not None:
+            from zwerm.run.denial_guard import DenialGuard
+
             world.intake.refusals.listener = security.note
+            observers.append(DenialGuard(security))
         driver = (
             LockStep(world, link, observers, programs)
             if realtime is None
