@@ -2,7 +2,8 @@
 
 Faults: a full disk below the working directory or below the folder for temporary files, a read-only file system, no HOME, a
 temporary folder with a path of 90 characters, 256 descriptors, another user, two runs at once, and a working directory that
-is deleted before or in a run. Commands: a run with processes, a run inline, and a study.
+is deleted before or in a run. Commands: a run with processes, a run inline, a study, a comparison, a world whose robots are
+on another host without the fault, and robots whose world is on another host without the fault.
 
 A trial is as documented if its exit status is one of those expected, its failure is told in lines that begin with `zwerm: `,
 nothing is a traceback, and no process, socket or temporary file is left. Needs Linux and root.
@@ -13,6 +14,8 @@ import contextlib
 import os
 import re
 import shutil
+import signal
+import socket
 import subprocess
 import sys
 import sysconfig
@@ -40,13 +43,22 @@ seeds = 4
 set = ["time.duration_s=1.0", "robots.count=3"]
 metrics = ["cell_coverage_fraction"]
 """
+TWICE: Final = "two at once"
+INTERRUPTED: Final = 130
 SHORT: Final = ("computation-free", "--set", "robots.count=3", "--set", "time.duration_s=1.0")
+LONGER: Final = ("computation-free", "--set", "robots.count=3", "--set", "time.duration_s=100.0")
 FILES: Final = ("--record", "run.mcap", "--picture", "run.png", "--security-log", "log.jsonl")
 COMMANDS: Final = {
     "run": ("run", *SHORT, *FILES),
     "run --inline": ("run", *SHORT, *FILES, "--inline"),
     "study": ("study", "study.toml", "--jobs", "2", "--out", "rows.parquet"),
+    "compare": (
+        *("compare", "computation-free", "--variant", "two:robots.count=2", "--variant", "three:robots.count=3"),
+        *("--set", "time.duration_s=1.0", "--metrics", "cell_coverage_fraction", "--seeds", "2", "--jobs", "2"),
+        *("--out", "rows.parquet"),
+    ),
 }
+HOSTS: Final = ("world", "robot")  # commands that need each other
 
 
 @dataclass(frozen=True)
@@ -54,7 +66,8 @@ class Place:
     """Where and how a command runs.
 
     Its working directory, its folder for temporary files, changes of its environment ("" removes a variable), and the words
-    before the command, and more after it. `begin` is called once the command runs.
+    before the command, and more after it. `begin` is called once the command runs, with a function that tells whether a run
+    has begun elsewhere.
     """
 
     here: Path
@@ -62,7 +75,7 @@ class Place:
     changes: dict[str, str] = field(default_factory=dict)
     before: tuple[str, ...] = ()
     more: tuple[str, ...] = ()
-    begin: Callable[[], object] = bool
+    begin: Callable[[Callable[[], bool]], object] = bool
 
     @property
     def environment(self) -> dict[str, str]:
@@ -224,16 +237,16 @@ def deleted_before(place: Place) -> Iterator[Place]:
 def deleted_later(place: Place) -> Iterator[Place]:
     """Delete the working directory as soon as the command has made a file in it."""
 
-    def delete() -> None:
+    def delete(begun: Callable[[], bool]) -> None:
         known = set(place.here.iterdir())
-        until(lambda: set(place.here.iterdir()) - known, "the command makes a file")
+        until(lambda: begun() or set(place.here.iterdir()) - known, "the command makes a file")
         shutil.rmtree(place.here, ignore_errors=True)
 
     yield replace(place, begin=delete)
 
 
-RAN: Final = {"run": {0}, "run --inline": {0}, "study": {0}}
-NOT_WRITTEN: Final = {"run": {2}, "run --inline": {2}, "study": {2}}
+RAN: Final = {command: {0} for command in (*COMMANDS, *HOSTS)}
+NOT_WRITTEN: Final = {command: {2} for command in RAN} | {"robot": {0}}  # robots write nothing
 # For each fault: how it is made, the exit statuses that are expected of the commands, and what a failure must name.
 FAULTS: Final = {
     "none": (no_fault, RAN, ""),
@@ -245,10 +258,18 @@ FAULTS: Final = {
     "HOME that does not exist": (missing_home, RAN, ""),
     f"temporary path of {LONG_CHARS} characters": (long_path, RAN, ""),
     f"{DESCRIPTORS} descriptors": (few_descriptors, RAN, ""),
-    f"{DESCRIPTORS} descriptors, {MANY} robots": (too_few_descriptors, RAN | {"run": {2}}, "open files, the limit is"),
+    f"{DESCRIPTORS} descriptors, {MANY} robots": (
+        too_few_descriptors,
+        RAN | {"run": {2}, "robot": {2}},
+        "open files, the limit is",
+    ),
     "another user": (other_user, RAN, ""),
     "another user, in a folder of root": (folder_of_another, NOT_WRITTEN, "no permission to write|Permission denied"),
-    "working directory deleted before": (deleted_before, NOT_WRITTEN, "the working directory was deleted"),
+    "working directory deleted before": (
+        deleted_before,
+        NOT_WRITTEN | {"robot": {2}},
+        "the working directory was deleted",
+    ),
     "working directory deleted in the run": (
         deleted_later,
         NOT_WRITTEN,
@@ -276,9 +297,67 @@ def one(fault: str, command: str) -> tuple[str, str]:
     make, expected, names = FAULTS[fault]
     with places() as first, make(first) as place:
         ran = place.start(*COMMANDS[command])
-        place.begin()
+        place.begin(lambda: False)
         printed, said = ran.communicate(timeout=DEADLINE_S)
         return judged(place, ran, printed, said, expected[command], names)
+
+
+def apart(fault: str, role: str) -> tuple[str, str]:
+    """Carry out a trial in which the world or the robots meet the fault, and the others, on another host, do not.
+
+    Returns the exit status of the command with the fault, and what is wrong or "".
+    """
+    make, expected, names = FAULTS[fault]
+    with places() as healthy, places() as first, make(first) as place, exchange() as keys:
+        at = {"world": healthy, "robot": healthy} | {role: replace(place, more=())}
+        record = at["world"].here / "run.mcap"
+        world, endpoint = start_world(at["world"], keys, *place.more)
+        robots = None
+        if world.poll() is None:
+            robots = start_robots(at["robot"], keys, endpoint)
+            place.begin(record.exists)
+        ends = {}
+        if robots is not None:
+            ends["robot"] = robots.communicate(timeout=DEADLINE_S)
+            if robots.returncode and role == "robot":
+                world.send_signal(signal.SIGINT)  # it would wait for other robots
+        ends["world"] = world.communicate(timeout=DEADLINE_S)
+        ran = world if robots is None or role == "world" else robots
+        status, wrong = judged(place, ran, *ends[role], expected[role], names)
+        if role == "world" and robots is not None and robots.returncode:
+            wrong = "; ".join(
+                filter(None, (wrong, f"the robots exit with {robots.returncode}: {ends['robot'][1][-300:]}"))
+            )
+        if role == "robot" and world.returncode != (INTERRUPTED if ran.returncode else 0):
+            wrong = "; ".join(
+                filter(None, (wrong, f"the world exits with {world.returncode}: {ends['world'][1][-300:]}"))
+            )
+        return status, wrong
+
+
+@contextlib.contextmanager
+def exchange() -> Iterator[Path]:
+    """Make a folder that every user may write, and yield the path of a file of credentials in it."""
+    with TemporaryDirectory(prefix="x-") as name:
+        Path(name).chmod(0o777)
+        yield Path(name, "robots.key")
+
+
+def start_world(place: Place, keys: Path, *more: str) -> tuple["subprocess.Popen[str]", str]:
+    """Start a world, and return it and its endpoint once it has written its credentials, or has ended."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    world = place.start("world", *LONGER, *FILES, *more, "--listen", endpoint, "--credentials", str(keys))
+    until(lambda: world.poll() is not None or (keys.exists() and keys.stat().st_size), "the world listens")
+    return world, endpoint
+
+
+def start_robots(place: Place, keys: Path, endpoint: str) -> "subprocess.Popen[str]":
+    """Start the robots of a world; the file of credentials goes to the user of the place."""
+    user = int(OTHER_USER) if "python" in place.changes else 0
+    os.chown(keys, user, user)
+    return place.start("robot", "--connect", endpoint, "--credentials", str(keys))
 
 
 def judged(
@@ -324,7 +403,7 @@ def pair(command: str) -> tuple[str, str]:
     with places() as place:
         both = [place.start(*COMMANDS[command]) for _ in range(2)]
         ends = [(each, *each.communicate(timeout=DEADLINE_S)) for each in both]
-        judgements = [judged(place, *each, {0, 2}, "another (study|run) is writing to it") for each in ends]
+        judgements = [judged(place, *each, {0, 2}, "another (study|comparison|run) is writing to it") for each in ends]
         statuses = sorted(status for status, _ in judgements)
         wrong = [each for _, each in judgements if each]
         if statuses[0] != "0":
@@ -332,11 +411,35 @@ def pair(command: str) -> tuple[str, str]:
         return ", ".join(statuses), "; ".join(wrong)
 
 
+def hosts_at_once(role: str) -> tuple[str, str]:
+    """Start two worlds at once in one folder, or the same robots twice: the second is refused, the first is interrupted."""
+    with places() as place, places() as other, exchange() as keys:
+        world, endpoint = start_world(place, keys, "--set", "time.duration_s=1e6")
+        robots = start_robots(other, keys, endpoint)
+        until(lambda: world.poll() is not None or (place.here / "run.mcap").exists(), "the run begins")
+        if role == "world":
+            names, where = "another run is writing to it", place
+            second, _ = start_world(place, keys.with_name("second.key"))
+        else:
+            names, where = "did not join within|before it joined", other
+            second = start_robots(other, keys, endpoint)
+        refused = second.communicate(timeout=DEADLINE_S)
+        world.send_signal(signal.SIGINT)
+        ends = [(each, each.communicate(timeout=DEADLINE_S)[1]) for each in (robots, world)]
+        expected = {robots: 0, world: INTERRUPTED}
+        wrong = [
+            f"exit status {each.returncode}: {said[-300:]}" for each, said in ends if each.returncode != expected[each]
+        ]
+        status, judgement = judged(where, second, *refused, {2}, names)
+        first = world if role == "world" else robots
+        return f"{first.returncode}, {status}", "; ".join(filter(None, [*wrong, judgement]))
+
+
 def main() -> None:
     """Carry out all trials, print each, and exit with status 1 where one was not as documented."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--fault", nargs="+", choices=[*FAULTS, "two at once"], default=[*FAULTS, "two at once"])
-    parser.add_argument("--command", nargs="+", choices=list(COMMANDS), default=list(COMMANDS))
+    parser.add_argument("--fault", nargs="+", choices=[*FAULTS, TWICE], default=[*FAULTS, TWICE])
+    parser.add_argument("--command", nargs="+", choices=[*COMMANDS, *HOSTS], default=[*COMMANDS, *HOSTS])
     add_csv_option(parser)
     options = parser.parse_args()
     rows, failures = [], 0
@@ -344,7 +447,10 @@ def main() -> None:
         row = {"fault": fault} | dict.fromkeys(options.command, "")
         wrongs = []
         for command in options.command:
-            status, wrong = pair(command) if fault == "two at once" else one(fault, command)
+            if command in HOSTS:
+                status, wrong = hosts_at_once(command) if fault == TWICE else apart(fault, command)
+            else:
+                status, wrong = pair(command) if fault == TWICE else one(fault, command)
             print(fault, command, status, wrong or "as documented", sep="\t", flush=True)
             row[command] = status
             wrongs += [wrong] if wrong else []

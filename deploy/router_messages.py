@@ -1,4 +1,5 @@
-"""The router's own messages about what it refused: denied operations, wrong passwords, messages that are too long.
+"""The router's own messages about what it refused: denied operations, wrong passwords, messages that are too long,
+connections that speak another protocol.
 
 Zenoh reports these only in its log, which it writes to descriptor 1. `capture` moves the standard output of this process to
 another descriptor, and reads Zenoh's log in a thread. This holds until the process ends, because Zenoh's log cannot be
@@ -31,6 +32,7 @@ PASSWORD: Final = "password"
 OVERSIZED: Final = "oversized"
 SILENT: Final = "silent"
 FULL: Final = "full"
+HANDSHAKE: Final = "handshake"
 
 # A text in a line of the log, and the reason of the refusal that it reports.
 _TEXTS: Final = (
@@ -40,6 +42,9 @@ _TEXTS: Final = (
     (b"did not match any configured ACL subject", FOREIGN),
     (b"Defragmentation buffer full", OVERSIZED),
     (b"Failed to accept link before deadline", SILENT),
+    (b"Decode error on link", HANDSHAKE),
+    (b"Received invalid message instead of an ", HANDSHAKE),
+    (b"Rejecting InitSyn on ", HANDSHAKE),
     (b"Max transports reached", FULL),
     (b"Closing link for preventing potential DoS", FULL),
 )

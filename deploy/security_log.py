@@ -16,7 +16,7 @@ from typing import Any, Final, Self
 
 import msgspec
 
-from zwerm.deploy.router_messages import RouterEvent, RouterMessages, capture
+from zwerm.deploy.router_messages import DENIED, RouterEvent, RouterMessages, capture
 from zwerm.errors import ScenarioError
 from zwerm.wire.refusals import Refusals
 
@@ -72,6 +72,11 @@ class SecurityLog:
             if counts[reason] <= LINES_MAX:
                 known = None if node == UNKNOWN_NODE else node
                 self._write({"node": known, "reason": reason, "detail": detail})
+
+    def denials(self) -> dict[int, int]:
+        """Return the number of operations that the router has denied to each known node so far."""
+        known = self._router_refusals.by_node
+        return {node: reasons.get(DENIED, 0) for node, reasons in known.items() if node != UNKNOWN_NODE}
 
     def router_refusals(self) -> Refusals:
         """Return the counts of all that the router has refused so far."""

@@ -45,6 +45,8 @@ _FILES_MIN: Final = 16_384
 READ_BYTES: Final = 65_536
 PASSWORD_BYTES_MAX: Final = 128
 
+_INTERRUPTS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
 # The place of the session id in /proc/PID/stat, after the name.
 _SESSION: Final = 3
 
@@ -261,18 +263,21 @@ class LocalSupervisor:
 
 @contextlib.contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Defer SIGINT to the end of the block."""
+    """Defer the signals that interrupt this program, and that it handles, to the end of the block."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     held: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
+    before = {number: signal.getsignal(number) for number in _INTERRUPTS if callable(signal.getsignal(number))}
+    for number in before:
+        signal.signal(number, lambda number, frame: held.append(number))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
         if held:
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(held[0])
 
 
 @contextlib.contextmanager

@@ -24,6 +24,7 @@ from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import code_of
 from zwerm.deploy.authority import certify
 from zwerm.deploy.endpoints import host_of, is_encrypted
+from zwerm.deploy.heap_memory import return_freed, share_heaps
 from zwerm.deploy.identity import (
     PROBE,
     SECRET_BYTES,
@@ -128,6 +129,7 @@ class _Swarm(ABC):
 
     def _listen(self, directory: Path, endpoints: list[str], identity: WorldIdentity | None = None) -> None:
         """Open the world's end of the link on `endpoints`, for the nodes in `self.credentials`."""
+        share_heaps()  # before the session starts its threads
         members = {credential.node: self._member(credential) for credential in self.credentials.nodes}
         passwords = directory / "passwords"
         settings = router_settings(self.credentials, endpoints, passwords, identity, self._probe_password)
@@ -250,6 +252,7 @@ class LocalSwarm(_Swarm):
         self._current[node] = credential
         with self._joining():
             self.supervisor.restart(credential, self._deadline_s)
+        return_freed()
 
     @contextlib.contextmanager
     def _joining(self) -> Iterator[None]:

@@ -56,9 +56,10 @@ class VirtualProcess:
 
     def start(self) -> None:
         """Start: from now on its fate happens."""
-        system, fate = self._system, self._system.fate_of(self._credential)
+        system = self._system
         self.pid = next(system.pids)
         system.started.append(self)
+        fate = system.fate_of(self._credential)
         system.starting_max = max(system.starting_max, sum(not each.has_joined for each in system.living()))
         self._fate, self._joined = fate, os.dup(self._joined.fileno())
         if fate.junk:
@@ -148,10 +149,14 @@ class VirtualSystem:
                 self.interrupt_at_s = NEVER
                 signal.raise_signal(signal.SIGINT)
             if next_s <= end_s:
-                heapq.heappop(self._events)[2]()
+                self._pop()
             elif self.now >= end_s:
                 return []
         return ready
+
+    def _pop(self) -> None:
+        """Let the next event happen."""
+        heapq.heappop(self._events)[2]()
 
     def _ready(self, things: Sequence[Any]) -> list[Any]:
         pipes = [each for each in things if isinstance(each, Connection)]

@@ -10,7 +10,10 @@ def main() -> None:
         from zwerm.cli.app import main as command_line
 
         command_line()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, RuntimeError) as error:
+        # Python 3.11 makes a RuntimeError of an interrupt in the middle of a class statement.
+        if not any(isinstance(each, KeyboardInterrupt) for each in (error, error.__cause__)):
+            raise
         sys.stderr.write("zwerm: interrupted\n")
         sys.exit(130)
 

@@ -9,7 +9,6 @@ halted robot adds nothing to its log. A robot that is silent for `dead_ticks` is
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from heapq import heappop, heappush
 from typing import Any, Final, Protocol
 
 import msgspec
@@ -20,8 +19,6 @@ from zwerm.agents.landmark_exploration.mapping.cost_utility import (
     Choice,
     Costs,
     Offer,
-    Policy,
-    cost_utility,
     frontier_costs,
     min_pos,
     nearest_frontier,
@@ -36,6 +33,7 @@ from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BY
 from zwerm.agents.landmark_exploration.sharing.log_gossip import AddressedMessage, Gossip
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
+from zwerm.coordinator.landmark_exploration.greedy_assignment import GreedyAssignment
 from zwerm.wire.messages import Command, Observation, Transmission
 
 # Ticks after which a robot without a frontier is considered again: the first time, and at most.
@@ -55,10 +53,14 @@ OUTBOX_BYTES_MAX: Final = 20_000
 
 
 class CoordinatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
-    """`beta` weighs the cost against the utility; `strategy` chooses frontiers; a robot silent for `dead_ticks` is dead."""
+    """`beta` weighs the cost against the utility; `strategy` chooses frontiers; a robot silent for `dead_ticks` is dead.
+
+    With `walk_if_cut_off` a robot from which no path leads to a free frontier does a random walk, and looks; else it waits.
+    """
 
     beta: NonNegative = 10.0
     strategy: CentralStrategy = "cost-utility"
+    walk_if_cut_off: bool = True
     dead_ticks: Ticks = 600
     message_bytes_max: int = LARGE_BYTES
 
@@ -113,7 +115,7 @@ class LandmarkCoordinator:
         self._origin = origin_of(setup.node, setup.incarnation)
         self._tick = 0
         self._robots = {node: _Robot() for node in range(setup.node)}
-        self._policy: Policy = cost_utility(rules.beta)
+        self._greedy = GreedyAssignment(self.map.complex, rules.beta)
         self._costs: dict[int, tuple[int, Costs]] = {}
         self._failures: dict[int, int] = {}
         self._outbox: list[Transmission] = []
@@ -237,32 +239,15 @@ class LandmarkCoordinator:
         if not frontiers.open:
             pass
         elif self._rules.strategy == "cost-utility":
-            self._greedy(free, offer)
+            seen = {node: self._robots[node].landmarks for node in free}
+            for node, choice in self._greedy.assigned(seen, offer):
+                self._give(
+                    node, choice, cut_off=choice is None and self._rules.walk_if_cut_off and not offer.is_empty()
+                )
         else:
             for node in free:
-                self._give(node, self._uncoordinated(node, living), cut_off=True)
+                self._give(node, self._uncoordinated(node, living), cut_off=self._rules.walk_if_cut_off)
         return not frontiers.open and self._finish(living)
-
-    def _greedy(self, free: Sequence[int], offer: Offer) -> None:
-        """Assign the best pair of a free robot and a frontier, then the best pair of the rest, and so on.
-
-        A robot's best gain never rises while frontiers are assigned. So only the robot with the best gain is examined again.
-        """
-        given = 0
-        given_at: dict[int, int] = {}  # landmark: the number of the last frontier with it that was given away
-        queue: list[tuple[float, int, int, Choice]] = []
-        for node in free:
-            self._consider(node, offer, given, queue)
-        while queue:
-            _, node, at, choice = heappop(queue)
-            # Frontiers without a landmark of this one change nothing: all others are worth the same as before, or less.
-            if any(given_at.get(landmark, 0) > at for landmark in pair_of(choice.key)):
-                self._consider(node, offer, given, queue)
-                continue
-            given += 1
-            given_at.update(dict.fromkeys(pair_of(choice.key), given))
-            offer.take(choice.key)
-            self._give(node, choice)
 
     def _give(self, node: int, choice: Choice | None, cut_off: bool = False) -> None:
         """Assign a frontier to a robot; without a `choice`, consider the robot again later.
@@ -295,13 +280,6 @@ class LandmarkCoordinator:
             costs = frontier_costs(self.map.complex, self._robots[node].landmarks, self.map.frontiers)
             self._costs[node] = self._tick, costs
         return costs
-
-    def _consider(self, node: int, offer: Offer, given: int, queue: list[tuple[float, int, int, Choice]]) -> None:
-        choice = self._policy(self.map.complex, self._robots[node].landmarks, offer)
-        if choice is not None:
-            heappush(queue, (-choice.gain, node, given, choice))
-        else:
-            self._give(node, None, cut_off=not offer.is_empty())
 
     def _finish(self, living: Sequence[int]) -> bool:
         """Halt all robots, and return whether exploration is complete: no frontier is open, and no missing entry can

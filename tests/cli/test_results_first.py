@@ -1,13 +1,17 @@
 """The result of a run is printed complete and alone, also when a file cannot be written."""
 
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from command_line import zwerm
-from support import ROBOTS
+from support import ROBOTS, ZWERM, until
 
 SHORT = ("--set", "time.duration_s=1", "--set", "robots.count=3")
+MCAP_END = b"\x89MCAP0\r\n"
 
 
 def test_the_json_object_is_printed_although_the_disk_is_full(tmp_path: Path) -> None:
@@ -42,6 +46,26 @@ def test_the_output_of_a_controller_does_not_change_the_json_object(tmp_path: Pa
     assert json.loads(ran.stdout)["outcome"] == "time-limit"
     prefix = "" if runner == "--inline" else "node 2: "
     assert f"{prefix}I am 2" in ran.stderr.splitlines()
+
+
+def test_the_result_is_printed_although_a_hang_up_comes_while_robots_leave(tmp_path: Path) -> None:
+    (tmp_path / "ends.py").write_text((ROBOTS / "ends.py").read_text())
+    record = tmp_path / "run.mcap"
+    arguments = ["run", "computation-free", "--json", *SHORT, "--set", "robots.controller=ends:Lingers"]
+    with subprocess.Popen(
+        [sys.executable, *ZWERM, *arguments, "--record", str(record)],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as running:
+        until(lambda: record.exists() and record.read_bytes()[99:].endswith(MCAP_END), "the run ends")
+        running.send_signal(signal.SIGHUP)
+        out, said = running.communicate(timeout=30.0)
+    assert running.returncode == 130
+    found = json.loads(out)
+    assert (found["outcome"], found["ticks"], len(found["trace"])) == ("interrupted", 10, 32)
+    assert "interrupted while the robots left, after tick 10" in said
 
 
 def test_the_credentials_never_replace_a_file_that_exists(tmp_path: Path) -> None:

@@ -34,6 +34,16 @@ def leave() -> None:
 
 def refuse() -> None:
     raise ScenarioError(["my.toml: robots.count: expected >= 1, got 0"])
+
+
+class Interrupting:
+    def __set_name__(self, owner, name):
+        raise KeyboardInterrupt
+
+
+def load() -> None:
+    class Loaded:
+        attribute = Interrupting()
 '''
 
 
@@ -117,3 +127,8 @@ def loaded_by(*arguments: str) -> list[str]:
 def test_help_imports_no_other_room_and_a_command_imports_what_it_needs() -> None:
     assert loaded_by("--help") == []
     assert "numpy" in loaded_by("check", "computation-free")
+
+
+def test_an_interrupt_in_the_middle_of_a_class_statement_is_an_interrupt(folder: Path) -> None:
+    ran = zwerm("my_commands:load", cwd=folder)
+    assert (ran.returncode, ran.stderr) == (130, "zwerm: interrupted\n")

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -105,6 +106,19 @@ def test_compose_and_kubernetes_run_the_same_commands() -> None:
     found = {kind: [words for each, words in commands() if each == kind] for kind in ("compose", "kubernetes")}
     renamed = [[word.replace("tls/zwerm-world:", "tls/world:") for word in words] for words in found["kubernetes"]]
     assert found["compose"] == renamed
+
+
+@pytest.mark.skipif(
+    subprocess.run(["docker", "compose", "version"], capture_output=True, check=False).returncode != 0
+    if shutil.which("docker")
+    else True,
+    reason="Docker Compose is not installed",
+)
+@pytest.mark.parametrize("name", ["run-compose.yaml", "cluster-compose.yaml"])
+def test_compose_takes_the_manifest(name: str) -> None:
+    command = ["docker", "compose", "-f", str(MANIFESTS / name), "--project-directory", str(ROOT), "config", "--quiet"]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
 
 
 def test_kubernetes_takes_the_manifest_by_the_schema_of_its_api() -> None:

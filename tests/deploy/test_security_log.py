@@ -2,6 +2,7 @@
 
 import json
 import os
+import socket
 import stat
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import msgspec
 import pytest
 from command_line import zwerm
 from network import free_port
-from support import ROOT, ZWERM, scenario, until
+from support import ROBOTS, ROOT, ZWERM, scenario, until
 
 from zwerm.deploy.identity import load
 from zwerm.deploy.router_messages import RefusalParser, RouterEvent
@@ -109,7 +110,8 @@ def test_the_log_changes_no_result_and_an_honest_run_has_no_refusals(tmp_path: P
 
 
 def test_intruders_are_counted_by_reason_and_node_in_the_result_and_the_log(tmp_path: Path) -> None:
-    endpoint, keys = f"tcp/127.0.0.1:{free_port()}", tmp_path / "keys"
+    endpoint_address = ("127.0.0.1", free_port())
+    endpoint, keys = f"tcp/127.0.0.1:{endpoint_address[1]}", tmp_path / "keys"
     settings = ("--set", "robots.count=3", "--set", "time.duration_s=1", "--json", "--security-log", "log")
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     world = subprocess.Popen(
@@ -138,6 +140,11 @@ def test_intruders_are_counted_by_reason_and_node_in_the_result_and_the_log(tmp_
         until(lambda: world.poll() is not None or (keys.exists() and keys.stat().st_size), "credentials written")
         credentials = load(keys)
         own, run_id = credentials.nodes[1], credentials.run
+        for junk in (b"\xff" * 64, bytes(64), b"\x41" + b"\x31" * 63):  # no message, no handshake, another version
+            with socket.create_connection(endpoint_address) as raw:
+                raw.sendall(len(junk).to_bytes(2, "little") + junk)
+                while raw.recv(64):  # until the router closes the connection
+                    pass
         with pytest.raises(LinkError, match=r"^no session: "):
             session(msgspec.structs.replace(own, password="guess"))
         with session(msgspec.structs.replace(own, zid="abc")) as stolen:
@@ -157,8 +164,20 @@ def test_intruders_are_counted_by_reason_and_node_in_the_result_and_the_log(tmp_
     assert refused["nodes"]["1"] == {"denied": 2, "not-joined": 1}
     unknown = refused["nodes"].pop("unknown")
     assert unknown.pop("password") >= 1  # Zenoh tries again within the timeout of the session
-    assert unknown == {"foreign-session": 1, "oversized": 1}
+    assert unknown == {"foreign-session": 1, "handshake": 3, "oversized": 1}
     *lines, last = lines_of(tmp_path / "log")
     assert last["counts"]["1"] == {"denied": 2, "not-joined": 1}
     denied = [line["detail"] for line in lines if line["reason"] == "denied"]
     assert denied == [f"session {own.zid.lstrip('0')}: Put on {command_key(run_id, 0)}"] * 2
+
+
+def test_a_robot_that_floods_the_keys_of_another_is_ended_and_the_others_go_on(tmp_path: Path) -> None:
+    (tmp_path / "malicious.py").write_text((ROBOTS / "malicious.py").read_text())
+    more = ("--set", "robots.controller=malicious:Trespasses", "--set", "robots.on_crash=continue")
+    command = ("run", "computation-free", "--json", "--set", "robots.count=3", "--set", "time.duration_s=60", *more)
+    ran = zwerm(*command, "--security-log", "log", cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    found = json.loads(ran.stdout)
+    assert (found["outcome"], found["ticks"], found["nodes"]["crashed"]) == ("time-limit", 600, [1])
+    assert "flood: 1000 of its operations were denied by the router" in found["nodes"]["reasons"]["1"]
+    assert found["refused"]["nodes"]["1"]["denied"] >= 1_000

@@ -1,87 +1,21 @@
 """Hosts that are late, vanish, return or are interrupted, in virtual time: `run_robots`, the supervisor and the admission of
 nodes are the real ones. Seed N of a schedule is seed N here."""
 
-import random
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
+from virtual_hosts import DEADLINE_S, LATENCY_S, ManyHosts, VirtualWorld
 from virtual_network import LEASE_S
-from virtual_processes import NEVER, Fate, VirtualProcess, VirtualSystem
+from virtual_processes import NEVER, VirtualSystem
 
 from zwerm.agents.runtime.process import EXIT_LOST, EXIT_REFUSED
-from zwerm.deploy import remote
-from zwerm.deploy.identity import issue, save, slice_of
 from zwerm.deploy.supervisor import JOINING_MAX, LEAVE_WAIT_S, TERMINATE_WAIT_S
 from zwerm.errors import LinkError
-from zwerm.link.admission import Admission, ExpectedNode
-from zwerm.link.session import Credential
-from zwerm.wire.messages import Hello
 
-SEEDS = range(200)
-DEADLINE_S = 60.0
-LATENCY_S = 2.0
+SEEDS = range(100)
 END_S = LEAVE_WAIT_S + TERMINATE_WAIT_S + LATENCY_S
-
-
-class VirtualWorld:
-    """A world that listens from `opens_s` to `closes_s`, and cannot be reached by this host from `cut_s` to `mended_s`."""
-
-    def __init__(self, seed: int, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.draw = random.Random(seed)
-        self.system = VirtualSystem(self._start, monkeypatch)
-        monkeypatch.setattr(remote, "prepare", lambda robots: None)
-        monkeypatch.setattr(remote, "time", self.system)
-        monkeypatch.setattr("zwerm.deploy.supervisor.multiprocessing.get_context", lambda kind: self.system)
-        credentials = issue("run", range(self.draw.randint(2, 50)))
-        self.own = sorted(self.draw.sample(range(len(credentials.nodes)), self.draw.randint(1, len(credentials.nodes))))
-        self.admission = Admission({each.node: ExpectedNode(1, "", b"") for each in credentials.nodes})
-        self.opens_s, self.closes_s, self.cut_s, self.mended_s = 0.0, NEVER, NEVER, NEVER
-        self._keys = folder / f"{seed}.key"
-        save(slice_of(credentials, self.own), self._keys)
-
-    def run_host(self) -> dict[int, int]:
-        """Run the robots of this host, as `zwerm robot` does."""
-        return remote.run_robots("tcp/127.0.0.1:1", self._keys, deadline_s=DEADLINE_S)
-
-    def _start(self, credential: Credential) -> Fate:
-        """Let a robot join as soon as the world can be reached, be refused by it, or give up after its deadline."""
-        system = self.system
-        reached_s = max(system.now, self.opens_s) + self.draw.uniform(0.1, LATENCY_S)
-        if self.cut_s < reached_s < self.mended_s:
-            reached_s = self.mended_s + self.draw.uniform(0.1, LATENCY_S)
-        if reached_s > system.now + DEADLINE_S:
-            return Fate(ends_s=DEADLINE_S, exit_code=EXIT_REFUSED)
-        system.at(reached_s, lambda: self._greet(credential))
-        return Fate()
-
-    def _process(self, node: int) -> VirtualProcess:
-        return next(each for each in reversed(self.system.started) if each.node == node)
-
-    def _greet(self, credential: Credential) -> None:
-        process = self._process(credential.node)
-        if process.exitcode is not None:
-            return
-        if self.admission.greet(credential.node, Hello(credential.node, credential.incarnation)):
-            process._end(EXIT_REFUSED)
-            return
-        process._join()
-        lost_s = max(self.cut_s, self.system.now) + LEASE_S
-        if self.cut_s < NEVER and self.mended_s > lost_s:
-            self.system.at(lost_s, lambda: self._lose(process))
-        if self.closes_s < NEVER:
-            self.system.at(max(self.closes_s, self.system.now), lambda: process._end(0))
-
-    def _lose(self, process: VirtualProcess) -> None:
-        self.admission.lose(process.node)
-        process._end(EXIT_LOST)
-
-
-def attempt(world: VirtualWorld) -> tuple[dict[int, int], str]:
-    """Run the robots of a host, and return their exit codes, or why they did not join."""
-    try:
-        return world.run_host(), ""
-    except LinkError as error:
-        return {}, str(error)
 
 
 def test_a_host_ends_with_its_world_or_says_which_robot_did_not_join(
@@ -89,13 +23,13 @@ def test_a_host_ends_with_its_world_or_says_which_robot_did_not_join(
 ) -> None:
     outcomes = dict.fromkeys(("joined", "late", "outage"), 0)
     for seed in SEEDS:
-        world = VirtualWorld(seed, tmp_path, monkeypatch)
+        world = VirtualWorld(seed, tmp_path, monkeypatch, VirtualSystem)
         world.opens_s = world.draw.choice((0.0, world.draw.uniform(0.0, 2 * DEADLINE_S)))
         world.closes_s = world.opens_s + 200.0
         if world.draw.random() < 0.5:  # an outage that heals before anybody gives up
             world.cut_s = world.opens_s + 100.0
             world.mended_s = world.cut_s + world.draw.uniform(0.1, LEASE_S - 0.1)
-        codes, said = attempt(world)
+        codes, said = world.attempt()
         if said:
             assert world.opens_s + LATENCY_S > DEADLINE_S, (seed, said)
             assert int(said.split()[1]) in set(world.own) - set(world.admission.joined), (seed, said)
@@ -116,7 +50,7 @@ def test_a_host_that_vanished_ends_within_the_lease_and_is_refused_when_it_retur
 ) -> None:
     refused = 0
     for seed in SEEDS:
-        world = VirtualWorld(seed, tmp_path, monkeypatch)
+        world = VirtualWorld(seed, tmp_path, monkeypatch, VirtualSystem)
         world.cut_s = world.draw.uniform(20.0, 100.0)
         world.mended_s = world.cut_s + world.draw.uniform(LEASE_S + 0.1, 40.0)
         assert world.run_host() == dict.fromkeys(world.own, EXIT_LOST), seed
@@ -135,7 +69,7 @@ def test_a_host_that_vanished_ends_within_the_lease_and_is_refused_when_it_retur
 def test_an_interrupted_host_leaves_no_robot_at_any_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     interrupted = 0
     for seed in SEEDS:
-        world = VirtualWorld(seed, tmp_path, monkeypatch)
+        world = VirtualWorld(seed, tmp_path, monkeypatch, VirtualSystem)
         world.opens_s, world.closes_s = world.draw.uniform(0.0, 30.0), 60.0
         world.system.interrupt_at_s = world.draw.uniform(0.0, 80.0)
         try:
@@ -145,3 +79,47 @@ def test_an_interrupted_host_leaves_no_robot_at_any_time(tmp_path: Path, monkeyp
         world.system.interrupt_at_s = NEVER
         assert world.system.living() == [], seed
     assert interrupted > len(SEEDS) // 2
+
+
+def test_hosts_at_once_do_not_disturb_each_other_whatever_becomes_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kinds = dict.fromkeys(("cut", "short", "thief", "late"), 0)
+    for seed in SEEDS:
+        world = VirtualWorld(seed, tmp_path, monkeypatch, ManyHosts)
+        system, draw = world.system, world.draw
+        assert isinstance(system, ManyHosts)
+        nodes = [each.node for each in world.credentials.nodes]
+        world.closes_s, world.cut_s = 300.0, draw.uniform(70.0, 150.0)
+        short = draw.random() < 0.3
+        world.mended_s = world.cut_s + (
+            draw.uniform(0.1, LEASE_S - 0.1) if short else draw.uniform(LEASE_S + 0.1, 40.0)
+        )
+        others = [node for node in nodes if node not in world.own]
+        slices = [others[number::3] for number in range(3) if others[number::3]]
+        starts = [draw.choice((0.0, draw.uniform(0.0, 250.0))) for _ in slices]
+        hosts: list[tuple[float, Callable[[], tuple[dict[int, int], str]]]] = [
+            (0.0, world.attempt),
+            *((at, partial(world.attempt, own)) for at, own in zip(starts, slices, strict=True)),
+        ]
+        stolen = draw.choice([world.own, *slices])
+        hosts.append((draw.uniform(60.0, 65.0) if stolen is world.own else 290.0, partial(world.attempt, stolen)))
+        hosts.append((200.0, world.attempt))  # the host that was cut off returns, or a second one has its keys
+        (first, *rest, thief, returned) = system.run(hosts)
+        lost = dict.fromkeys(world.own, 0 if short else EXIT_LOST)
+        assert first == (lost, ""), seed
+        for own, ended in zip(slices, rest, strict=True):
+            assert ended == (dict.fromkeys(own, 0), ""), (seed, "another host has disturbed this one")
+        for codes, said in (thief, returned):
+            assert not codes, (seed, "one node has joined twice")
+            assert f"ended with exit code {EXIT_REFUSED} before it joined" in said, (seed, said)
+        assert set(world.admission.joined) == set(nodes if short else others), seed
+        assert system.living() == [], seed
+        for kind, was in (
+            ("cut", not short),
+            ("short", short),
+            ("thief", stolen is world.own),
+            ("late", max(starts, default=0.0) > 100.0),
+        ):
+            kinds[kind] += was
+    assert min(kinds.values()) > 10, kinds

@@ -10,7 +10,7 @@ from zwerm.deploy.supervisor import JOINING_MAX, LEAVE_WAIT_S, TERMINATE_WAIT_S,
 from zwerm.errors import LinkError
 from zwerm.link.session import Credential
 
-SEEDS = range(200)
+SEEDS = range(100)
 DEADLINE_S = 60.0
 
 

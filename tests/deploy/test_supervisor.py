@@ -118,7 +118,7 @@ def test_a_router_that_takes_no_more_sessions_is_named(nothing_left: None, monke
         patched.setattr("zwerm.deploy.swarm.router_settings", full)
         patched.setattr("zwerm.deploy.swarm.PROBE_S_MAX", 1.0)
         with pytest.raises(LinkError, match=r"^node [01] .*; the router takes no more sessions$"):
-            LocalSwarm("run", members(2), deadline_s=2.0).__enter__()
+            LocalSwarm("run", members(2), deadline_s=4.0).__enter__()
     with LocalSwarm("run", members(2)) as swarm:
         assert swarm.takes_sessions()
         assert set(tick(swarm.link, range(2), 0)) == {0, 1}
@@ -214,18 +214,23 @@ def test_hanging_and_paused_robots_are_killed_at_the_end_of_a_run(nothing_left: 
         assert swarm.supervisor.exit_codes == {0: 0, 1: -signal.SIGKILL, 2: -signal.SIGKILL}
 
 
-def test_ctrl_c_is_deferred_to_the_end_of_a_protected_block() -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_an_interrupt_is_deferred_to_the_end_of_a_protected_block(number: signal.Signals) -> None:
     steps = []
 
     def start_something() -> None:
         with interrupts_held():
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(number)
             steps.append("went on")
 
-    with pytest.raises(KeyboardInterrupt):
-        start_something()
-    assert steps == ["went on"]
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            start_something()
+        assert steps == ["went on"]
+        assert signal.getsignal(number) is signal.default_int_handler
+    finally:
+        signal.signal(number, before)
 
 
 # --- a program of its own, ended from outside -----------------------------------------------------------------------

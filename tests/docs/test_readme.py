@@ -48,8 +48,8 @@ def test_a_command_of_the_readme_does_what_it_says(command: str, desk: Path) -> 
     assert ran.returncode == (2 if mistaken else 0), ran.stderr
     if mistaken:
         assert "robots.count: expected >= 1, got -1" in ran.stderr
-    if "--picture-at 60" in command:
-        assert (desk / "runs/sensor-coverage-seed1-cycle60.png").stat().st_size > 10_000
+    if "--picture-at 20s" in command:
+        assert (desk / "runs/computation-free-seed1-20s.png").stat().st_size > 10_000
     if "--animate" in command:
         assert (desk / "swarm.gif").read_bytes().startswith(b"GIF8")
 

@@ -1,5 +1,6 @@
 """The history keeps an even, bounded record of a run."""
 
+import tracemalloc
 from types import SimpleNamespace
 
 import numpy as np
@@ -39,6 +40,19 @@ def test_a_sample_is_a_copy_with_all_its_rows() -> None:
     assert (tracks.position == 3.0).all()
     assert (tracks.heading == -3.0).all()
     assert tracks.present.tolist() == [[True, False, False, False]]
+
+
+def test_samples_lie_in_a_few_blocks_so_that_thinning_leaves_no_holes_in_the_memory() -> None:
+    history = History(held_max=100)
+    history.append(moment(0.0, robots=50))
+    tracemalloc.start()
+    try:
+        for time in range(1, 1_000):
+            history.append(moment(float(time), robots=50))
+        found = tracemalloc.take_snapshot().statistics("filename")
+    finally:
+        tracemalloc.stop()
+    assert sum(each.count for each in found if each.traceback[0].filename.endswith("/history.py")) < 40
 
 
 def test_an_empty_history_is_reported_as_empty() -> None:

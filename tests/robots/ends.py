@@ -3,9 +3,11 @@
 import os
 import signal
 import subprocess
+import time
+from multiprocessing.util import Finalize
 from pathlib import Path
 
-from zwerm.agents.runtime.contract import Controller
+from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.wire.messages import Command, Observation, WheelSpeeds
 
 
@@ -64,4 +66,16 @@ class Forks(Controller):
                 signal.pause()
             command = subprocess.Popen(["sleep", "3600"])
             Path(os.environ["FORKED"]).write_text(f"{forked} {command.pid}")
+        return Command()
+
+
+class Lingers(Controller):
+    """The process of robot 1 sleeps for 1 s when it exits."""
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        if setup.node == 1:
+            Finalize(None, time.sleep, (1.0,), exitpriority=1)
+
+    def step(self, observation: Observation) -> Command:
         return Command()

@@ -1,15 +1,19 @@
 """Controllers that attack the run from inside a robot's process. Robot 1 attacks at tick 3; the others drive on."""
 
+import contextlib
 import gc
 import os
 import signal
 import socket
+import threading
 from pathlib import Path
 
+import zenoh
 from msgspec import Struct
 
 from zwerm.agents.runtime.contract import Controller
 from zwerm.link.node_link import ZenohNodeLink
+from zwerm.wire.keys import command_key
 from zwerm.wire.messages import Command, Observation, Transmission, WheelSpeeds, encode
 
 ATTACKER = 1
@@ -65,6 +69,21 @@ class Twice(Attacker):
             for _ in range(BURST):
                 send(answer)
         return Command(drive=WheelSpeeds(0.05, 0.04))
+
+
+class Trespasses(Attacker):
+    """Writes to the key of another robot without end, in a thread of its own."""
+
+    def attack(self, observation: Observation) -> None:
+        link = own_link()
+        publisher = link._session.declare_publisher(command_key(link._run, 0))
+
+        def flood() -> None:
+            with contextlib.suppress(zenoh.ZError):  # the session is closed
+                while True:
+                    publisher.put(b"forged")
+
+        threading.Thread(target=flood, daemon=True).start()
 
 
 class Crowded(Attacker):

@@ -114,8 +114,11 @@ def main() -> None:
                 reserve_stdout()
             app()
     except KeyboardInterrupt:
-        err.print("zwerm: interrupted", style="red")
-        sys.exit(EXIT_INTERRUPTED)
+        _exit_interrupted()
+    except RuntimeError as error:
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        _exit_interrupted()  # in the middle of a class statement, while a module is imported
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(EXIT_FAILED)
@@ -127,6 +130,11 @@ def main() -> None:
         place = f"{error.filename}: " if error.filename else ""
         err.print(f"zwerm: {place}{error.strerror}", style="red", markup=False, highlight=False, soft_wrap=True)
         sys.exit(EXIT_USER_ERROR)
+
+
+def _exit_interrupted() -> NoReturn:
+    err.print("zwerm: interrupted", style="red")
+    sys.exit(EXIT_INTERRUPTED)
 
 
 def _has_directory() -> bool:

@@ -21,6 +21,7 @@ from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
 from zwerm.run.assembly import assemble_run, observers_of
 from zwerm.run.hang_guard import hang_guard
+from zwerm.run.kept_result import KeptResult
 from zwerm.run.measurement import measure, truth_of
 from zwerm.run.progress import NullProgress, ProgressListener
 from zwerm.run.result import RunResult
@@ -102,9 +103,8 @@ def run(
     _try_controllers(members)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
-    with (
-        _security(security_log) as security,
-        LocalSwarm(
+    with _security(security_log) as security:
+        swarm = LocalSwarm(
             new_run_id(),
             members,
             progress=watcher.joined,
@@ -113,9 +113,10 @@ def run(
             restart=lambda node, incarnation: restart_spec(scenario, seed, node, incarnation),
             on_refusal=None if security is None else security.note,
             confinement=confinement,
-        ) as swarm,
-    ):
-        return drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)
+        )
+        with KeptResult(swarm.close) as kept, swarm:
+            kept.result = drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)
+        return kept.end()
 
 
 def _security(path: Path | None, router: bool = True) -> "AbstractContextManager[SecurityLog | None]":
@@ -180,9 +181,8 @@ def serve(
         raise ScenarioError(["credentials: expected either a file to write them to, or the keys of a world"])
 
     watcher = watcher or NullProgress()
-    with (
-        _security(security_log) as security,
-        RemoteSwarm(
+    with _security(security_log) as security:
+        swarm = RemoteSwarm(
             new_run_id(),
             node_specs(scenario, seed),
             listen=listen,
@@ -194,9 +194,10 @@ def serve(
             deadline_s=deadline_s,
             paced=realtime is not None,
             on_refusal=None if security is None else security.note,
-        ) as swarm,
-    ):
-        return drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, security)
+        )
+        with KeptResult(swarm.close) as kept, swarm:
+            kept.result = drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, security)
+        return kept.end()
 
 
 def new_run_id() -> str:
@@ -237,7 +238,10 @@ def drive(
             observers.append(ExchangeObserver(world, recording))
         observers.append(sampling)
         if security is not None:
+            from zwerm.run.denial_guard import DenialGuard
+
             world.intake.refusals.listener = security.note
+            observers.append(DenialGuard(security))
         driver = (
             LockStep(world, link, observers, programs)
             if realtime is None

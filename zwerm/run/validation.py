@@ -6,6 +6,8 @@ them.
 """
 
 import copy
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 from pydantic import ValidationError
@@ -38,7 +40,7 @@ def scenario_mistakes(name: str, overrides: tuple[str, ...] = ()) -> list[str]:
 
 
 def own_controller_mistakes(scenario: Scenario) -> list[str]:
-    """Return how the scenario's own controllers, `module:Class`, break the contract; one line for each violation.
+    """Return how the scenario's own controllers, `module:Class`, break the contract; one line for each rule that is broken.
 
     The conformance kit makes and steps one controller of each role in this process, with the node's Setup of the
     scenario.
@@ -50,9 +52,23 @@ def own_controller_mistakes(scenario: Scenario) -> list[str]:
             continue
         tried.add(controller)
         if all(hasattr(sensor_class(sensor), "stimulus") for sensor in setup.sensors):
-            for violation in setup_violations(find(controller), setup):
+            for violation in _each_once(setup_violations(find(controller), setup)):
                 found[f"{scenario.place}: {setup.role}: {controller}: {violation}"] = None
     return list(found)
+
+
+def _each_once(violations: Sequence[str]) -> list[str]:
+    """Return the first of the violations that differ only in the observation that shows them, with the number of others."""
+    counts = Counter(_without_observation(each) for each in violations)
+    firsts = {_without_observation(each): each for each in reversed(violations)}
+    return [
+        firsts[rule] + (f", and on {count - 1} more observations" if count > 1 else "")
+        for rule, count in counts.items()
+    ]
+
+
+def _without_observation(violation: str) -> str:
+    return violation.rpartition(", on ")[0] or violation
 
 
 def _is_built_in(controller: str) -> bool:

@@ -130,6 +130,14 @@ class Offer:
         """Return whether no frontier is free."""
         return not any(self.is_free(key) for key in self._frontiers.open)
 
+    def free_keys(self, most: int) -> list[int] | None:
+        """Return all free frontiers, ascending; None where there are more than `most`."""
+        open_ = self._frontiers.open
+        if len(open_) - len(self._taken) - len(self._avoided) > most:
+            return None
+        found = sorted(key for key in open_ if self.is_free(key))
+        return found if len(found) <= most else None
+
     def is_free(self, key: int) -> bool:
         """Return whether a frontier is open and may be chosen."""
         return key in self._frontiers.open and key not in self._taken and key not in self._avoided

@@ -75,6 +75,10 @@ class LandmarkComplex:
                 return False
         return True
 
+    def containing(self, a: int, b: int) -> set[int]:
+        """Return the vertices that contain two landmarks."""
+        return self._holders.get(a, set()) & self._holders.get(b, set())
+
     def update(self, snapshot: BearingSnapshot, rank: Rank = (0, 0)) -> bool:
         """Add an observation (algorithm 2); return whether the complex has a new simplex."""
         simplex = snapshot.landmarks

@@ -83,6 +83,17 @@ def test_packets_of_64_bytes_are_enough(services: dict[str, str] | None, monkeyp
     assert 40 < max(sizes) <= 64
 
 
+def test_without_bearings_the_hall_is_mapped_and_its_pillar_found() -> None:
+    base = read(load("landmark-presence").folder / "landmark-presence.toml")
+    base |= {"name": "hall", "arena": HALL, "time": {"dt_s": 0.1, "duration_s": 400.0}}
+    base["robots"] |= {"count": 4, "parameters": {"robots_expected": 4, "dead_ticks": 600, "presence_only": True}}
+    result = ran(validate(base, "hall.toml", load("landmark-presence").folder))
+    assert result.outcome == "completed"
+    assert result.metrics["completion_fraction"] > 0.8
+    assert result.metrics["landmark_complex_holes"] == result.metrics["obstacles"] == 1
+    assert result.metrics["concluded_early"] == 0.0
+
+
 CRASHES = {
     "for good": [{"kind": "crash", "nodes": [1], "at_s": 8.0}],
     "without memory": [{"kind": "crash", "nodes": [1, 2], "at_s": 8.0, "until_s": 18.0}],

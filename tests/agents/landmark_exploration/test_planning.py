@@ -3,12 +3,13 @@
 import math
 from collections.abc import Sequence
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.cost_utility import Offer, cost_utility, nearest_frontier, reach
 from zwerm.agents.landmark_exploration.mapping.frontier_status import UNEXPLORED, Frontiers, key_of, pair_of
+from zwerm.agents.landmark_exploration.mapping.guided_search import GuidedSearch, PivotCosts
 from zwerm.agents.landmark_exploration.mapping.landmark_complex import LandmarkComplex
 
 LANDMARKS = 9
@@ -41,6 +42,7 @@ def costs(complex_: LandmarkComplex, here: frozenset[int]) -> dict[int, float]:
     return cost
 
 
+@settings(deadline=None)
 @given(observed, pairs, pairs, st.frozensets(st.integers(0, LANDMARKS), min_size=1, max_size=4), st.floats(0.0, 20.0))
 def test_the_choice_is_the_best_of_all(
     some: list[frozenset[int]],
@@ -75,6 +77,7 @@ def test_the_choice_is_the_best_of_all(
     assert set(pair_of(choice.key)) <= seen
 
 
+@settings(deadline=None)
 @given(observed, st.frozensets(st.integers(0, LANDMARKS), max_size=4))
 def test_reach_yields_every_cost_in_order(some: list[frozenset[int]], here: frozenset[int]) -> None:
     complex_, _ = made(some, [])
@@ -102,3 +105,63 @@ def test_the_nearest_frontier_is_preferred_to_the_most_useful_one() -> None:
 def test_avoided_frontiers_are_not_chosen() -> None:
     complex_, frontiers = made([frozenset({1, 2})], [(1, 2)])
     assert cost_utility(1.0)(complex_, (1, 2), Offer(frontiers, [], {key_of(1, 2): None})) is None
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.frozensets(st.integers(0, 14), min_size=1, max_size=5), min_size=1, max_size=24),
+    st.integers(0, 24),
+    pairs,
+    pairs,
+    st.lists(st.frozensets(st.integers(0, 14), max_size=4), min_size=1, max_size=3),
+    st.floats(0.01, 20.0),
+)
+def test_a_guided_search_makes_the_same_choices(
+    some: list[frozenset[int]],
+    before: int,
+    open_: list[tuple[int, int]],
+    taken: list[tuple[int, int]],
+    places: list[frozenset[int]],
+    beta: float,
+) -> None:
+    complex_, frontiers = made(some[:before], open_)
+    costs = PivotCosts(complex_)
+    costs.update()
+    for number, each in enumerate(some[before:]):  # pivots are chosen for a part of the map, which then grows
+        complex_.update(BearingSnapshot(tuple(sorted(each)), (0,) * len(each)))
+        if number % 3 == 0:
+            costs.update()
+    offer = Offer(frontiers, [key_of(*pair) for pair in taken])
+    keys = offer.free_keys(len(open_))
+    assert keys == sorted({key_of(*pair) for pair in open_} - {key_of(*pair) for pair in taken})
+    guide = GuidedSearch(complex_, costs, offer, keys, beta)
+    while keys:
+        chosen = None
+        for place in places:
+            here = tuple(sorted(place))
+            choice = cost_utility(beta)(complex_, here, offer)
+            assert guide.best(here) == choice
+            bound = guide.bound(here)
+            if bound is not None and choice is not None:
+                assert choice.gain <= bound
+            chosen = choice or chosen
+        if chosen is None:
+            break
+        offer.take(chosen.key)
+        guide.take(chosen.key)
+        keys.remove(chosen.key)
+
+
+@settings(deadline=None)
+@given(st.lists(st.frozensets(st.integers(0, 20), min_size=2, max_size=5), min_size=2, max_size=30))
+def test_costs_from_pivots_are_exact_while_the_map_grows(some: list[frozenset[int]]) -> None:
+    complex_, _ = made(some[:1], [])
+    grown = PivotCosts(complex_)
+    grown.update()
+    for each in some[1:]:
+        complex_.update(BearingSnapshot(tuple(sorted(each)), (0,) * len(each)))
+        grown.update()
+    for pivot, known in zip(grown.pivots, grown.costs, strict=True):
+        exact = {each.vertex: each.cost for each in reach(complex_, pivot)}
+        for vertex in complex_.simplices:
+            assert math.isclose(known[vertex], exact.get(vertex, math.inf))

@@ -1,14 +1,19 @@
 """Following walls: the heading that contacts allow, and whole runs in buildings whose doors the paper's rules do not find."""
 
 import math
+from typing import cast
 
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.walks import Arc
 from zwerm.agents.sensor_coverage.frontier.wall_proof import united
-from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
-from zwerm.agents.sensor_coverage.motion.wall_walk import NearPoint, arcs_around, swept
+from zwerm.agents.sensor_coverage.messages.commands import SHUT
+from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
+from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
+from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
+from zwerm.agents.sensor_coverage.motion.wall_walk import WEDGED_TICKS, NearPoint, WallWalk, arcs_around, swept
 from zwerm.run.runner import run
+from zwerm.wire.messages import BodyVelocity
 
 PRESS_DEG = 20
 
@@ -57,6 +62,32 @@ def test_walls_in_different_directions_close_no_arc_between_them() -> None:
     """The robot drives from one wall to another: what is between is not followed."""
     apart = [NearPoint((0.2, 0.0), True, (0.0,)), NearPoint((0.0, 0.2), True, (math.pi / 2.0,))]
     assert arcs_around((0.0, 0.0), apart, 1, 0.07) == ()
+
+
+class Wedged:
+    """A robot in touch with two walls, of which no velocity moves it."""
+
+    step_m = 0.05
+    radius_m = 0.07
+    position = (0.0, 0.0)
+    parameters = RobotParameters()
+
+    def __init__(self) -> None:
+        self.frame = OdometryFrame()
+        self.frame.contacts = Touched(0.0, None), Touched(math.pi, None)
+        self.frame.seen = {9: 1.0}
+
+    def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        return BodyVelocity(x_m, y_m)
+
+
+def test_a_walk_ends_where_the_robot_is_wedged() -> None:
+    walk = WallWalk(cast(Locomotion, Wedged())).along(1, 3.0, (), (), 0.05)
+    for _ in range(WEDGED_TICKS + 1):
+        next(walk)
+    with pytest.raises(StopIteration) as ended:
+        next(walk)
+    assert ended.value.value.end == SHUT
 
 
 # --- whole runs -----------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -88,3 +89,14 @@ def test_assignment_takes_the_best_pair_of_a_robot_and_a_frontier_again_and_agai
         if isinstance(part, TaskPart) and each.to is not None and (key := read_task(part.bytes_).key) is not None:
             assigned[each.to] = key
     assert assigned == expected
+
+
+@pytest.mark.parametrize("walks", [True, False])
+def test_a_robot_that_no_path_leads_to_a_frontier_walks_or_waits(walks: bool) -> None:
+    parameters = {"walk_if_cut_off": walks}
+    node = LandmarkCoordinator(Setup(1, "coordinator", 0.1, (), bytes(16), channels=("uplink",), parameters=parameters))
+    node.map.observe(BearingSnapshot((1, 2, 3), (0, 20, 40)))
+    report = TaskReport(1, 0, 0, True, True, 0, landmark_bytes((7, 8)))
+    outbox = node.step(Observation(0, 0.0, (Packet("uplink", messages.write(report), 0),))).outbox
+    parts = [part for part in map(messages.read, [each.payload for each in outbox]) if isinstance(part, TaskPart)]
+    assert [read_task(part.bytes_).walk for part in parts] == [True] * walks

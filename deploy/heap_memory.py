@@ -1,0 +1,26 @@
+"""The heap of a world that runs for hours: what programs leave behind when they end goes back to the system.
+
+A session that begins or ends allocates and frees memory in several threads. The C library keeps a heap for each thread,
+and keeps what is freed. So the memory of a world grew by 50 kB for each robot that restarted (measured, 100 robots),
+although no more of it was in use.
+"""
+
+import contextlib
+import ctypes
+from typing import Final
+
+# Heaps that all threads share; the default is eight a core.
+_HEAPS: Final = 2
+_M_ARENA_MAX: Final = -8
+
+
+def share_heaps() -> None:
+    """Let the threads that start from now on share few heaps (Linux with the GNU C library)."""
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).mallopt(_M_ARENA_MAX, _HEAPS)
+
+
+def return_freed() -> None:
+    """Return freed memory to the system (Linux with the GNU C library)."""
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
