@@ -5,10 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from zwerm.agents.robot_teams.mapping.facts import BOTTOM, RIGHT, TOP, End
+from zwerm.agents.robot_teams.mapping.facts import BOTTOM, RIGHT, TOP, End, SweptSegment, TracedArc
+from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.motion.manoeuvres import BoundaryTrace, SliceGrid
 from zwerm.agents.robot_teams.motion.pilot import CIRCLE_S, DONE, FAILED, Headway, Pilot
 from zwerm.agents.robot_teams.motion.senses import GAP_M, Beside, Senses
+from zwerm.agents.robot_teams.work import Work
 
 DT_S, SPEED_M_S, RADIUS_M = 0.05, 1.0, 0.25
 GRID = SliceGrid(0.0, 0.95)
@@ -56,26 +58,51 @@ def test_small_circles_beside_robots_are_no_headway() -> None:
     assert not circling(10.0 * CIRCLE_S, 3.0, True).circles
 
 
-def traced(away_m: float) -> BoundaryTrace:
-    """Follow a wall along y = 5 from slice 0, then one `away_m` below it, to slice 1. Bodies lead from one to the other."""
+def traced(away_m: float, robot: bool) -> BoundaryTrace:
+    """Follow a wall along y = 5 from slice 0, then one `away_m` below it, to slice 1; a `robot` may be in the way between."""
     trace = BoundaryTrace(End(0, TOP, 5_000), RIGHT, GRID, lambda senses: [])
     path = [(x, 5.0, True) for x in np.arange(0.0, 0.5, 0.05)]
     path += [(0.5, 5.0 - y, False) for y in np.linspace(0.0, away_m, 20)]
     path += [(x, 5.0 - away_m, True) for x in np.arange(0.5, 1.1, 0.05)]
     for tick, (x, y, touches) in enumerate(path):
         walls = ((0.0, 1.0),) if touches else ()
-        if trace.step(Senses(tick, float(x), float(y), walls, ()), ()) is None:
+        if (
+            trace.step(Senses(tick, float(x), float(y), walls, ()), [(1.0, 0.0)] if robot and not touches else [])
+            is None
+        ):
             break
     return trace
 
 
-def test_a_wall_far_from_the_last_touch_gives_no_arc() -> None:
-    near = traced(0.8)
-    assert near.arc is not None
-    assert near.arc.stop == near.end == End(1, TOP, 4_200)
-    far = traced(3.0)
-    assert far.arc is None
-    assert far.end == End(1, TOP, 2_000)
+@pytest.mark.parametrize(("away_m", "robot", "certain"), [(0.8, False, True), (0.8, True, False), (3.0, False, False)])
+def test_an_arc_is_certain_only_if_no_body_led_the_robot_to_another_wall(
+    away_m: float, robot: bool, certain: bool
+) -> None:
+    trace = traced(away_m, robot)
+    assert trace.end == End(1, TOP, round(5_000 - 1_000 * away_m))
+    assert trace.arc is not None
+    assert trace.arc.stop == trace.end
+    assert trace.certain == certain
+
+
+def test_an_arc_that_is_not_certain_is_a_fact_once_it_is_traced_twice() -> None:
+    start, stop, other = End(0, TOP, 5_000), End(1, TOP, 4_200), End(1, TOP, 3_000)
+    work = Work(SliceMap(), GRID, SPEED_M_S * DT_S, lambda: Senses(0, 0.0, 5.0, (), ()), lambda senses: [])
+    for end in (start, stop, other):
+        work.map.add(SweptSegment(end.slice, end.y_mm - 500, end.y_mm, ()))
+
+    def trace(end: End) -> int:
+        work.at = start
+        activity = work.trace(RIGHT)
+        manoeuvre = next(activity)
+        assert isinstance(manoeuvre, BoundaryTrace)
+        manoeuvre.end, manoeuvre.certain = end, False
+        manoeuvre.arc = TracedArc(start, RIGHT, end, 1_000, 900, 5_000, ())
+        assert next(activity, None) is None
+        return len(work.map.facts.arcs)
+
+    assert [trace(stop), trace(other), trace(stop)] == [0, 0, 0], "each led elsewhere than the one before"
+    assert trace(stop) == 1
 
 
 def test_a_wall_in_line_with_the_last_touch_is_the_same_wall() -> None:
@@ -89,11 +116,11 @@ def test_a_wall_in_line_with_the_last_touch_is_the_same_wall() -> None:
     assert trace.arc.stop == End(0, BOTTOM, 1_500)
 
 
-def test_a_robot_at_an_end_proves_nothing_to_a_robot_without_a_wall() -> None:
-    parked = End(0, BOTTOM, 4_500)
+@pytest.mark.parametrize(("parked", "proves"), [(End(1, TOP, 5_000), True), (End(0, BOTTOM, 4_500), False)])
+def test_only_a_robot_at_the_next_end_tells_a_robot_at_a_wall_where_it_leads(parked: End, proves: bool) -> None:
     for walls in ((), ((0.0, 1.0),)):
         trace = BoundaryTrace(End(0, TOP, 5_000), RIGHT, GRID, lambda senses: [parked])
         trace.step(Senses(0, 0.0, 5.0, ((0.0, 1.0),), ()), ())
         trace.step(Senses(1, 0.05, 5.0, ((0.0, 1.0),), ()), ())
         trace.step(Senses(2, 0.1, 4.98, walls, ()), [(0.0, -1.0)])
-        assert (trace.end == parked) == bool(walls)
+        assert (trace.end == parked) == (proves and bool(walls))
