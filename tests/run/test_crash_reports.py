@@ -16,7 +16,7 @@ def test_a_process_that_ends_is_reported_with_its_exit_code(nothing_left: None) 
 @pytest.mark.parametrize("runner", ["inline", "processes"])
 def test_of_several_crashes_at_one_tick_the_lowest_node_is_named(runner: Runner, nothing_left: None) -> None:
     result = run(scenario(robots={"controller": "ends:AllRaise"}), runner=runner)
-    assert result.reason == "node 0 crashed at tick 4: ValueError: no way (ends.py:34, in step)"
+    assert result.reason == "node 0 crashed at tick 4: ValueError: no way (ends.py:36, in step)"
     assert result.crashed == [0, 1, 2, 3]
 
 
