@@ -51,6 +51,7 @@ class Lingers(Controller):
         return Command()
 """
 ENDLESS_S: Final = 1e6
+STOPPED_S: Final = 0.5  # between the signals STOP and CONT
 ENDED: Final = ("leaving", "drawing")  # phases after the run
 INTERRUPTED: Final = 130
 
@@ -161,7 +162,7 @@ def _judge(role: str, name: str, phase: str, world: subprocess.Popen[bytes], fol
     everybody = set(processes(world.pid))
     os.kill(target, getattr(signal, f"SIG{name}"))
     if name == "STOP" and role == "world":
-        time.sleep(0.5)
+        time.sleep(STOPPED_S)
         os.kill(world.pid, signal.SIGCONT)
         if phase not in ENDED:  # it goes on for ever: end it
             until(lambda: phase == "joining" or record.stat().st_size > 200_000, "the run goes on after the stop")
@@ -242,7 +243,7 @@ def _judge_apart(
     target = world if role == "zwerm world" else host
     target.send_signal(getattr(signal, f"SIG{name}"))
     if name == "STOP":
-        time.sleep(0.5)
+        time.sleep(STOPPED_S)
         target.send_signal(signal.SIGCONT)
         size = record.stat().st_size
         until(lambda: grown(size + 50_000), "the run goes on after the stop")

@@ -7,13 +7,12 @@ An arc is right if the boundary of the body's free space leads from its one end 
 """
 
 import argparse
-from pathlib import Path
 from typing import Final
 
 import shapely
 from bench_robot_teams import DRAWN, scenario
-from campaign import carry_out
-from csv_rows import add_csv_option, write_csv
+from campaign import add_campaign_options, carry_out
+from csv_rows import write_csv
 from msgspec import Struct
 from random_arenas import BODY_M, ORIGIN_M, SPACING_M
 from shapely.geometry import Point, Polygon, box
@@ -77,10 +76,7 @@ def main() -> None:
     )
     parser.add_argument("--arenas", nargs="+", choices=DRAWN, default=list(DRAWN))
     parser.add_argument("--robots", nargs="+", default=["4"])
-    parser.add_argument("--seeds", type=int, nargs=2, default=[1, 20], metavar=("FIRST", "LAST"))
-    parser.add_argument("--rows", type=Path, metavar="FILE", help="store each run here, and skip runs that are stored")
-    parser.add_argument("--minutes", type=float, help="begin no run after this processor time [min]")
-    add_csv_option(parser)
+    add_campaign_options(parser, 20, settings=False)
     asked = parser.parse_args()
     seeds = range(asked.seeds[0], asked.seeds[1] + 1)
     cases = [Case(arena, robots, str(seed)) for arena in asked.arenas for robots in asked.robots for seed in seeds]

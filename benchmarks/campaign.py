@@ -12,10 +12,11 @@ from csv_rows import add_csv_option, append_row, read_rows
 CaseT = TypeVar("CaseT", bound=msgspec.Struct)
 
 
-def add_campaign_options(parser: argparse.ArgumentParser, last_seed: int) -> None:
-    """Add the options of every campaign; its seeds are 1 to `last_seed` by default."""
+def add_campaign_options(parser: argparse.ArgumentParser, last_seed: int, settings: bool = True) -> None:
+    """Add the options of every campaign; its seeds are 1 to `last_seed` by default. `settings` allows those of a scenario."""
     parser.add_argument("--seeds", type=int, nargs=2, default=[1, last_seed], metavar=("FIRST", "LAST"))
-    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="a setting of the scenario")
+    if settings:
+        parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="a setting of the scenario")
     parser.add_argument("--rows", type=Path, metavar="FILE", help="store each run here, and skip runs that are stored")
     parser.add_argument("--minutes", type=float, help="begin no run after this processor time [min]")
     add_csv_option(parser)

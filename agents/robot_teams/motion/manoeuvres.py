@@ -219,7 +219,7 @@ class BoundaryTrace:
         self._wall_tick = -10
         self._touched_m: Vector = self._x_m, start.y_mm / 1000.0
         self._normals: tuple[Vector, ...] = ()
-        self._strayed = self._led = False
+        self._led = False
         self.certain = True
         self.wrecks: dict[Wreck, None] = {}
         self.arc: TracedArc | None = None
@@ -231,8 +231,8 @@ class BoundaryTrace:
         self.wrecks.update(dict.fromkeys(senses.wrecks))
         self._led = self._led or bool(blocks)
         if senses.walls:
-            certain = self._is_in_line(senses) or (self._is_beside(x, y) and not self._led)
-            self._strayed = self._strayed or not certain
+            same = self._is_in_line(senses) or (self._is_beside(x, y) and not self._led)
+            self.certain = self.certain and same
             self._led = False
             self._wall_tick, self._touched_m, self._normals = senses.tick, (x, y), senses.walls
         last = self._last
@@ -309,7 +309,6 @@ class BoundaryTrace:
         depth, extreme_y = self._extreme
         extreme_x = self._x_m + self.direction * max(depth, 0.0)
         self.end = end
-        self.certain = not self._strayed
         self.arc = TracedArc(
             self.start, self.direction, end, mm(self._length_m), mm(extreme_x), mm(extreme_y), tuple(self.wrecks)
         )
