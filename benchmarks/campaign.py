@@ -16,7 +16,9 @@ def add_campaign_options(parser: argparse.ArgumentParser, last_seed: int, settin
     """Add the options of every campaign; its seeds are 1 to `last_seed` by default. `settings` allows those of a scenario."""
     parser.add_argument("--seeds", type=int, nargs=2, default=[1, last_seed], metavar=("FIRST", "LAST"))
     if settings:
-        parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="a setting of the scenario")
+        parser.add_argument(
+            "--set", action="append", default=[], metavar="PATH=VALUE", help="a setting of the scenario"
+        )
     parser.add_argument("--rows", type=Path, metavar="FILE", help="store each run here, and skip runs that are stored")
     parser.add_argument("--minutes", type=float, help="begin no run after this processor time [min]")
     add_csv_option(parser)
