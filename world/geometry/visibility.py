@@ -117,15 +117,16 @@ class NearPairs:
 class FewObservers:
     """The robots within a range of a few observers, for any range and one scene, which is measured once.
 
-    The cost grows with observers times robots, and no work is done for the pairs of other robots. Candidates are found
-    within the range and a margin. They are those of the next scenes, too, until a robot has moved half the margin.
+    `robots` are the observers, as bytes. The cost grows with observers times robots, and no work is done for the pairs of
+    other robots. Candidates are found within the range and a margin. They are those of the next scenes, too, until a robot
+    has moved half the margin.
     """
 
     def __init__(self) -> None:
         self._searched: Floats = np.empty((0, 2))  # the positions at which the candidates were found
         self._position: Floats = np.empty((0, 2))  # the positions at which they were measured
         self._present: Bools = np.empty(0, dtype=np.bool_)
-        self._robots = b""  # the observers
+        self.robots = b""
         self._reach_m = -1.0
         self._row: Ints = np.empty(0, dtype=np.int64)
         self._observer: Ints = np.empty(0, dtype=np.int64)
@@ -134,7 +135,7 @@ class FewObservers:
 
     def within(self, scene: Scene, robots: Ints, range_m: float) -> tuple[Ints, Ints]:
         """Return pairs (k,), (k,) of a row of `robots` and a present robot at most range_m from it, sorted."""
-        known = scene.present is self._present and range_m <= self._reach_m and robots.tobytes() == self._robots
+        known = scene.present is self._present and range_m <= self._reach_m and robots.tobytes() == self.robots
         if not known or not self._measured_again(scene.position):
             self._search(scene, robots, max(range_m, self._reach_m))
         near = self._apart2 <= range_m**2
@@ -168,7 +169,7 @@ class FewObservers:
         self._observer = robots[self._row]
         self._apart2 = apart2[self._row, self._seen]
         self._searched = self._position = scene.position
-        self._present, self._robots, self._reach_m = scene.present, robots.tobytes(), reach_m
+        self._present, self.robots, self._reach_m = scene.present, robots.tobytes(), reach_m
 
 
 class Visibility:
@@ -179,7 +180,8 @@ class Visibility:
         self._present: Bools = np.empty(0, dtype=np.bool_)
         self._verdicts = WallVerdicts()
         self._near = NearPairs()
-        self._few = FewObservers()
+        # One for the robots that are awake, one for the sleepers that watch.
+        self._few = [FewObservers(), FewObservers()]
         self._pairs: dict[tuple[float | None, bool, bool], Ints] = {}
         self._sightings: dict[tuple[float | None, bool, bool], tuple[Ints, Ints]] = {}
 
@@ -232,7 +234,9 @@ class Visibility:
 
     def _few_sightings(self, scene: Scene, robots: Ints, range_m: float, through_walls: bool) -> VisiblePairs:
         """Return the sightings of a few robots without those of all others; a range and walls are all that limits them."""
-        row, seen = self._few.within(scene, robots, range_m)
+        if robots.tobytes() != self._few[0].robots:
+            self._few.reverse()
+        row, seen = self._few[0].within(scene, robots, range_m)
         if not len(row):
             return VisiblePairs(row, seen, np.zeros(len(robots), dtype=np.int64))
         if not (through_walls or scene.arena.is_convex):
