@@ -25,7 +25,7 @@ _OVERLAP_LEFT_FRACTION: Final = 0.1
 _OVERLAP_IGNORED_M: Final = 1e-5
 
 _FORCE: Final = batch.BodyFields.FORCE | batch.BodyFields.TORQUE
-_VELOCITY: Final = batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+_VELOCITY_AND_FORCE: Final = batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY | _FORCE
 _POSE: Final = batch.BodyFields.BODY_ID | batch.BodyFields.POSITION | batch.BodyFields.ANGLE
 
 
@@ -96,8 +96,8 @@ class Physics:
         self._rows = _plain([row for row, _ in rows], len(rows))
         self._ids = _plain([robot for _, robot in rows], len(self.position))
         self._pushes: Floats = np.zeros((self._table.substeps, len(ids), 3))
-        self._start: Floats = np.zeros((len(ids), 3))
-        self._push_buffers = [_buffer(pushes) for pushes in self._pushes]
+        self._start: Floats = np.zeros((len(ids), 6))  # the velocity, and the force of the first substep
+        self._push_buffers = [_buffer(pushes) for pushes in self._pushes[1:]]
         self._start_buffer = _buffer(self._start)
         self._resting = False
         self._arranged = True
@@ -164,12 +164,14 @@ class Physics:
             pushes[:, rows, 0] = forward
             pushes[:, rows, 1] = 0.0 if left is None else left
         pushes[:, rows, 2] = turn
-        self._start[:] = pushes[0]
+        self._start[:, :3] = pushes[0]
         # The force of substep s acts on the velocity that substep s + 1 integrates.
         pushes[:-1] = pushes[1:]
         pushes *= self._inertia
         space = self._space
-        batch.set_space_bodies(space, _VELOCITY, self._start_buffer)
+        self._start[:, 3:] = pushes[0]
+        batch.set_space_bodies(space, _VELOCITY_AND_FORCE, self._start_buffer)
+        space.step(self._substep_s)
         for buffer in self._push_buffers:
             batch.set_space_bodies(space, _FORCE, buffer)
             space.step(self._substep_s)
