@@ -39,6 +39,10 @@ from zwerm.wire.messages import Command, Observation, Wake
 # Cost to start a path at a redundant robot: it is preferred to any station.
 REDUNDANT_COST: Final = -100.0
 
+import os
+
+SPARE = int(os.environ.get("SPARE", "1"))
+SKIP = int(os.environ.get("SKIP", "3"))
 # Pause [ticks] between scans while the coordinator watches a covered space.
 WATCH_TICKS: Final = 50
 
@@ -108,6 +112,7 @@ class SensorCoverageCoordinator:
         self.redundant: tuple[int, ...] = ()
         self.outcome = ""
         self.cycle = 0
+        self.unscanned = 0
         self._restarted = setup.incarnation > 1
         self._leave_requests = LeaveRequests(parameters.corner_margin_rad, self.slots, self.mailbox)
         self._redundancy = setup.services.get("redundancy", "coordinator")
@@ -152,7 +157,10 @@ class SensorCoverageCoordinator:
         moved: Moved = ()
         while self.cycle < self.parameters.cycles_max and not self.outcome:  # 2: do
             self.cycle += 1
-            scan = yield from self._scan_swarm(moved)  # 3: R := ComputeRipsComplex({N_i})
+            if self.unscanned:
+                scan = self.pushing.scan
+            else:
+                scan = yield from self._scan_swarm(moved)  # 3: R := ComputeRipsComplex({N_i})
             self._update_fence(scan)  # 4: [F, O] := FenceSubcomplex(R, {theta})
             plans: Sequence[Plan] = ()
             if stations := self._stations_without_robots():
@@ -162,9 +170,18 @@ class SensorCoverageCoordinator:
                     yield from self._find_redundant()  # 5: (periodically) identify redundant robots
                 plans = yield from self._find_paths()  # 6: find path in the 1-skeleton
                 pushes = [self._carry_out(plan) for plan in plans]  # 7 and 8: push robots in path, deploy robot n + 1
+            if self.unscanned and not pushes:
+                self.unscanned = 0
+                continue
             self._report_complex(plans)
             self.outcome = self._judge(bool(pushes))  # 9: while F is not empty
-            moved = [robot for each in (yield from run_concurrently(pushes)) for robot in each]
+            if not self.unscanned:
+                moved = []
+            self.pushing.stopped = 0
+            moved = [*moved, *(robot for each in (yield from run_concurrently(pushes)) for robot in each)]
+            self.unscanned = (
+                self.unscanned + 1 if pushes and self.pushing.stopped == len(pushes) and self.unscanned < SKIP else 0
+            )
             yield from self._reconsider_outcome()
 
     def _carry_out(self, plan: Plan) -> Routine[Moved]:
@@ -285,6 +302,8 @@ class SensorCoverageCoordinator:
         self.walking.idle = {slot: None for slot in self.walking.idle if slot in self.slots.occupant}
         if self.walking.idle:
             self.scan = scan = scan._replace(complex_=scan.complex_.without(self.walking.idle))
+        if SPARE and self.walking.find_spare(scan):
+            self.scan = scan = scan._replace(complex_=self.pushing.scan.complex_.without(self.walking.idle))
         if self._redundancy == "link":
             self.redundant = self._leave_requests.redundant_slots(scan)
             if self.redundant:

@@ -45,6 +45,7 @@ class PushExecution:
         frontier: FrontierService,
     ) -> None:
         self.pushes = 0
+        self.stopped = 0
         self.lost: dict[int, None] = {}
         self.cycle = 0
         self.scan = ScanResult({}, FlagComplex({}), ())
@@ -116,6 +117,7 @@ class PushExecution:
         self._mailbox.send(robot, command, drive=True)
         arrived = yield from self._arrivals([robot])
         if robot in arrived and not arrived[robot].ok:  # it goes on waiting
+            self.stopped += 1
             self._frontier.note_failure(plan, arrived[robot].driven_m)
             return (robot,)
         del self._sources.waiting[base]
@@ -175,6 +177,7 @@ class PushExecution:
         if not isinstance(answer, Arrived):
             return {}
         if not answer.ok:
+            self.stopped += 1
             self._frontier.note_failure(plan, answer.driven_m)
             return None
         return {leader: answer}

@@ -66,6 +66,8 @@ class WallWalks:
     ) -> None:
         self.idle: dict[int, None] = {}
         self.walks = 0
+        self._searched = 0  # number of walks when spare robots were last searched
+        self._known: dict[int, None] = {}  # slots at that time
         self._slots = slots
         self._mailbox = mailbox
         self._sources = sources
@@ -97,6 +99,7 @@ class WallWalks:
         if walked.end == SHUT:
             for each in walked.touched:
                 self._walls.note_wall(plan.mover, each + heading)
+            pushing.stopped += 1
             return (leader,)
         followers: Sequence[int] = ()
         if station:
@@ -118,6 +121,21 @@ class WallWalks:
         meet = tuple(slots.occupant[each] for each in plan.meet if each in slots.occupant)
         yield from self._legs(leader, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
         return (*followers, leader)
+
+    def find_spare(self, scan: ScanResult) -> bool:
+        """After a walk, let those robots be idle that the proof of coverage does not need; return whether there are any.
+
+        A slot that did not exist when the walk began is kept: the next walk may need it.
+        """
+        if self.walks == self._searched:
+            return False
+        self._searched = self.walks
+        vertices = scan.complex_.vertices
+        candidates = [each for each in reversed(vertices) if each in self._known and each not in scan.bases]
+        found = self._walls.spare(scan, candidates)
+        self._known = dict.fromkeys(vertices)
+        self.idle |= dict.fromkeys(found)
+        return bool(found)
 
     def axis(self, base: int) -> Routine[Sequence[float]]:
         """Return bearings [rad] for a station's first robot, parallel to a wall nearby: lattices along walls need fewer robots.

@@ -5,7 +5,7 @@ and side. The planner moves no robot.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
@@ -16,6 +16,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
 # Directions to try into a wide gap around one robot, as offsets from the bisector of the gap.
@@ -31,6 +32,11 @@ BRIDGE: Final = 100
 LAST: Final = 200
 # A drive that a wall stopped also rules out directions within this angle.
 BLOCKED_RAD: Final = math.radians(20.0)
+import os
+
+CLEAR = float(os.environ.get("CLEAR", ".98"))
+VERT = int(os.environ.get("VERT", "1"))
+FILT = int(os.environ.get("FILT", "1"))
 
 
 class Planner:
@@ -44,12 +50,22 @@ class Planner:
         self._parameters = parameters
         self.walls = WallPlans(parameters, slots)
         self._slots = slots
+        self._follows_walls = parameters.walls == "followed"
+        self._opened: Mapping[int, Sequence[Arc]] | None = None
         self._views, self._complex, self._bases = ScanResult({}, FlagComplex({}), ())
         self._plans: list[Plan] = []
 
-    def update(self, scan: ScanResult, edges: Iterable[Edge] | None = None) -> None:
-        """Take a new scan, and find the fence, or the part of it on `edges`. Algorithm 3."""
+    def update(
+        self,
+        scan: ScanResult,
+        edges: Iterable[Edge] | None = None,
+    ) -> None:
+        """Take a new scan, and find the fence, or the part of it on `edges`. Algorithm 3.
+
+        Where the proof of coverage of all slots is known, no robot drives into a direction in which it is closed.
+        """
         self._views, self._complex, self._bases = scan
+        self._opened = self.walls.open_arcs(scan) if self._follows_walls and edges is None else None
         found = self.fence = fence(self._views, self._complex, self._parameters.corner_margin_rad, edges)
         obstacle = dict.fromkeys(found.corners)
         self._plans = []
@@ -72,7 +88,7 @@ class Planner:
         self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in into_holes}))
         yield into_holes
         yield list(self._last_plans())
-        if self._parameters.walls == "followed":
+        if self._follows_walls:
             along_walls = list(self.walls.plans(ScanResult(self._views, self._complex, self._bases)))
             self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in along_walls}))
             yield along_walls
@@ -126,7 +142,11 @@ class Planner:
                 continue
             if walls_matter and self._walled(mover, self._views[mover][other] + sign * near):
                 continue
+            if self._is_closed(mover, direction):
+                continue
             clear = min(self._parameters.clear_m, 0.85 * length)
+            if self._opened is not None:
+                clear = CLEAR * length
             plans.append(Plan(key, mover, direction, length, clear, anchors))
         return plans
 
@@ -148,10 +168,14 @@ class Planner:
         for i, a, _, gap in wedges(self._views, self._complex, movers):
             end = gap > END_RAD
             for number, turn in enumerate(END_TURNS_RAD if end else VERTEX_TURNS_RAD):
+                if self._opened is not None and number and VERT:
+                    break
                 direction = self._views[i][a] + gap / 2.0 + turn
                 key = (i, a, 0, END_FIRST + number if end else number)
                 narrow = gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD
                 if narrow or key in self.attempt_log.closed or self._walled(i, direction):
+                    continue
+                if self._is_closed(i, direction):
                     continue
                 if any(angle_between(each, direction) < BLOCKED_RAD for each in self.attempt_log.blocked.get(i, ())):
                     continue
@@ -167,6 +191,8 @@ class Planner:
     def _last_plans(self) -> Iterator[Plan]:
         """Yield plans of the lowest priority: from stations, and around corners from the ends of single files."""
         hop = self._parameters.hop_m
+        if self._opened is not None and VERT:
+            return
         for i, a, _, gap in wedges(self._views, self._complex):
             station = i in self._bases
             if not station and len(self._complex.neighbours[i]) > 1:
@@ -176,6 +202,8 @@ class Planner:
                 direction = self._views[i][a] + gap / 2.0 + turn
                 key = (i, a, 0, LAST + number)
                 narrow = gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD
+                if self._is_closed(i, direction):
+                    continue
                 if not narrow and key not in self.attempt_log.closed and not self._walled(i, direction):
                     yield Plan(key, i, direction, hop, clear, (i,))
 
@@ -188,3 +216,9 @@ class Planner:
 
     def _walled(self, slot: int, direction: float) -> bool:
         return any(angle_between(each, direction) < SIXTY_RAD for each in self._slots.walls.get(slot, ()))
+
+    def _is_closed(self, slot: int, direction: float) -> bool:
+        """Return whether the proof of coverage is closed in a direction from a slot."""
+        if self._opened is None or not FILT:
+            return False
+        return not any((direction - arc.start_rad) % math.tau < arc.width_rad for arc in self._opened.get(slot, ()))
