@@ -32,7 +32,7 @@ Moved = Sequence[int]
 class PushExecution:
     """The pushes of one cycle.
 
-    `pushes` counts the successful ones. `lost` are robots that did not reach their slots. `scan` and `cycle` are those
+    `pushes` counts the successful ones, and `stopped` those whose leader is back at its slot after a wall stopped it. `lost` are robots that did not reach their slots. `scan` and `cycle` are those
     of the present cycle.
     """
 

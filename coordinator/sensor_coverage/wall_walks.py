@@ -117,10 +117,18 @@ class WallWalks:
                 back = plan.direction + math.pi - heading
                 yield from pushing.correct(leader, [(slots.occupant[plan.mover], back)])
             return (*followers, leader)
-        keep = (slots.occupant[plan.mover],) if plan.beside and plan.mover in slots.occupant else ()
+        keep = self._keep(plan, scan)
         meet = tuple(slots.occupant[each] for each in plan.meet if each in slots.occupant)
         yield from self._legs(leader, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
         return (*followers, leader)
+
+    def _keep(self, plan: Plan, scan: ScanResult) -> tuple[int, ...]:
+        """Return the robots of which the walking robot must see one; empty if any robot is enough."""
+        occupant = self._slots.occupant
+        if plan.beside and plan.mover in occupant:
+            return (occupant[plan.mover],)
+        # Idle robots may leave, and then nobody would see the walking robot at its end.
+        return tuple(occupant[each] for each in scan.complex_.vertices if each in occupant) if self.idle else ()
 
     def find_spare(self, scan: ScanResult) -> bool:
         """After a walk, let those robots be idle that the proof of coverage does not need; return whether there are any.

@@ -32,11 +32,9 @@ BRIDGE: Final = 100
 LAST: Final = 200
 # A drive that a wall stopped also rules out directions within this angle.
 BLOCKED_RAD: Final = math.radians(20.0)
-import os
-
-CLEAR = float(os.environ.get("CLEAR", ".98"))
-VERT = int(os.environ.get("VERT", "1"))
-FILT = int(os.environ.get("FILT", "1"))
+# Where walls are followed, a robot beside an edge stays only if it has driven this fraction of its hop: a followed wall
+# needs no robot between it and the lattice.
+WHOLE_HOP: Final = 0.98
 
 
 class Planner:
@@ -80,14 +78,15 @@ class Planner:
     def plans(self) -> Iterator[list[Plan]]:
         """Yield groups of possible deployments by falling priority.
 
-        Edges come first, because a robot between two others covers more than a robot at a gap.
+        Edges come first, because a robot between two others covers more than a robot at a gap. Where the proof of coverage
+        of all slots is known, a walk does what other directions into a gap and the last attempts do.
         """
         yield [*self._bridges(), *self._plans]
         yield list(self._vertex_plans())
         into_holes = list(self._hole_plans())
         self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in into_holes}))
         yield into_holes
-        yield list(self._last_plans())
+        yield list(self._last_plans()) if self._opened is None else []
         if self._follows_walls:
             along_walls = list(self.walls.plans(ScanResult(self._views, self._complex, self._bases)))
             self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in along_walls}))
@@ -146,7 +145,7 @@ class Planner:
                 continue
             clear = min(self._parameters.clear_m, 0.85 * length)
             if self._opened is not None:
-                clear = CLEAR * length
+                clear = WHOLE_HOP * length
             plans.append(Plan(key, mover, direction, length, clear, anchors))
         return plans
 
@@ -167,9 +166,8 @@ class Planner:
         movers = [each for each in self._complex.vertices if each not in self._bases]
         for i, a, _, gap in wedges(self._views, self._complex, movers):
             end = gap > END_RAD
-            for number, turn in enumerate(END_TURNS_RAD if end else VERTEX_TURNS_RAD):
-                if self._opened is not None and number and VERT:
-                    break
+            turns = END_TURNS_RAD if end else VERTEX_TURNS_RAD
+            for number, turn in enumerate(turns if self._opened is None else turns[:1]):
                 direction = self._views[i][a] + gap / 2.0 + turn
                 key = (i, a, 0, END_FIRST + number if end else number)
                 narrow = gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD
@@ -191,8 +189,6 @@ class Planner:
     def _last_plans(self) -> Iterator[Plan]:
         """Yield plans of the lowest priority: from stations, and around corners from the ends of single files."""
         hop = self._parameters.hop_m
-        if self._opened is not None and VERT:
-            return
         for i, a, _, gap in wedges(self._views, self._complex):
             station = i in self._bases
             if not station and len(self._complex.neighbours[i]) > 1:
@@ -202,8 +198,6 @@ class Planner:
                 direction = self._views[i][a] + gap / 2.0 + turn
                 key = (i, a, 0, LAST + number)
                 narrow = gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD
-                if self._is_closed(i, direction):
-                    continue
                 if not narrow and key not in self.attempt_log.closed and not self._walled(i, direction):
                     yield Plan(key, i, direction, hop, clear, (i,))
 
@@ -219,6 +213,6 @@ class Planner:
 
     def _is_closed(self, slot: int, direction: float) -> bool:
         """Return whether the proof of coverage is closed in a direction from a slot."""
-        if self._opened is None or not FILT:
+        if self._opened is None:
             return False
         return not any((direction - arc.start_rad) % math.tau < arc.width_rad for arc in self._opened.get(slot, ()))

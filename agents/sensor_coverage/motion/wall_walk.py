@@ -28,6 +28,8 @@ AHEAD_RAD: Final = math.radians(40.0)
 # The way to a wall ends after this many ticks with less than this fraction of a full step.
 STUCK_TICKS: Final = 5
 STUCK_FRACTION: Final = 0.2
+# A walk ends after this many ticks in a row with less than that: the robot is wedged between others.
+WEDGED_TICKS: Final = 30
 # Distance [m] between waypoints while nothing else changes.
 SPACING_M: Final = 0.1
 # Distance [m] within which a robot must get clear of its start.
@@ -122,13 +124,16 @@ class WallWalk:
         self._wall_rad, self._blind_rad = bearing_rad, 0.0
         way = 0.0
         near = [self._near_point()]
+        stuck = 0
         while math.hypot(frame.x_m - start[0], frame.y_m - start[1]) < clear_m:
-            if way > CLEARING_M_MAX or self._blind_rad > TURNS_RAD_MAX:
+            if way > CLEARING_M_MAX or self._blind_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
                 yield from motion.drive_to(start)
                 return WalkResult(SHUT, done, touched, near=arcs_around(start, near, hand, motion.radius_m))
             before = motion.position
             yield self._step(hand)
-            way += math.dist(before, motion.position)
+            step_m = math.dist(before, motion.position)
+            way += step_m
+            stuck = stuck + 1 if step_m < STUCK_FRACTION * motion.step_m else 0
             self._trail.append(motion.position)
             near.append(self._near_point())
         return WalkResult(STRETCH, done, touched, near=arcs_around(start, near, hand, motion.radius_m))
@@ -152,15 +157,17 @@ class WallWalk:
         points = [self._waypoint()]
         self.on_step(points[0])
         seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
-        last, way = motion.position, 0.0
+        last, way, stuck = motion.position, 0.0, 0
         while way < length_m:
             if self._meets(meet):
                 return WalkResult(MET, way, (), tuple(points))
-            if self._blind_rad > TURNS_RAD_MAX:
+            if self._blind_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
                 return WalkResult(SHUT, way, (), tuple(points))
             before, before_point = motion.position, self._waypoint()
             yield self._step(hand)
-            way += math.dist(before, motion.position)
+            step_m = math.dist(before, motion.position)
+            way += step_m
+            stuck = stuck + 1 if step_m < STUCK_FRACTION * motion.step_m else 0
             if not self._sees(keep):
                 yield from self._back(margin_m, keep)
                 return WalkResult(LOST, way, (), tuple(points))
