@@ -32,8 +32,8 @@ Moved = Sequence[int]
 class PushExecution:
     """The pushes of one cycle.
 
-    `pushes` counts the successful ones, and `stopped` those whose leader is back at its slot after a wall stopped it. `lost` are robots that did not reach their slots. `scan` and `cycle` are those
-    of the present cycle.
+    `pushes` counts the successful ones, and `stopped` those that a wall stopped, with the leader back at its slot. `lost`
+    are robots that did not reach their slots. `scan` and `cycle` are those of the present cycle.
     """
 
     def __init__(
