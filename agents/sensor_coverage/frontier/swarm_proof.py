@@ -31,6 +31,8 @@ from zwerm.maths.simplicial import FlagComplex
 
 # A followed wall lies beyond a line of sight if it closes the direction this far [rad] beside it.
 BESIDE_RAD: Final = 0.02
+# Angle [rad] to an open arc within which another slot may stand in the opening.
+OPENING_RAD: Final = math.radians(15.0)
 # Arcs that differ by less than this [rad] in total are equally open.
 EQUAL_RAD: Final = 1e-6
 
@@ -110,17 +112,26 @@ class SwarmProof:
     def spare(self, candidates: Iterable[int]) -> list[int]:
         """Return candidates that can all leave together: no other slot becomes more open, and no part is cut off.
 
-        So the proof of the slots that stay is as complete as before, and needs none of those that leave.
+        So the proof of the slots that stay is as complete as before, and needs none of those that leave. A slot with open
+        arcs may be the first one beyond an opening: it stays unless all that its neighbours see around it is closed.
         """
         now, found = self, list[int]()
         for slot in candidates:
             if not _connected(sorted(now._neighbours[slot]), now._neighbours):
                 continue
             without = now._without(slot)
+            if now._open(slot) and any(without._is_open(each, slot) for each in now._neighbours[slot]):
+                continue
             if all(_sum(without._open(each)) <= _sum(now._open(each)) + EQUAL_RAD for each in without._around):
                 now = without
                 found.append(slot)
         return found
+
+    def _is_open(self, slot: int, other: int) -> bool:
+        """Return whether a slot is open in the direction of another one, or close beside it."""
+        there = self._scan.views[slot][other]
+        arcs = self._open(slot)
+        return any((there - start + OPENING_RAD) % math.tau < width + 2.0 * OPENING_RAD for start, width in arcs)
 
     # --- what has changed -------------------------------------------------------------------------------------------
 

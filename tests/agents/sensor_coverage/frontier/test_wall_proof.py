@@ -97,11 +97,59 @@ def test_a_triangle_closes_the_arc_between_its_robots() -> None:
     assert arcs[0] == [pytest.approx((math.pi / 3.0, math.tau - math.pi / 3.0))]
 
 
+# Slot 0 and slot 1 see each other, and a walk in the south from the south-east of slot 0 to the south-west of slot 1.
+PAIR = {0: {1: 0.0}, 1: {0: math.pi}}
+SOUTH = (math.radians(-90.0),)
+
+
+def between_two(*degrees: tuple[int, int]) -> WalkPoint:
+    return [WalkPoint({0: math.radians(a), 1: math.radians(b)}, SOUTH, ()) for a, b in degrees]
+
+
 def test_a_walk_past_two_robots_closes_the_arc_between_robot_and_wall() -> None:
-    views = {0: {1: 0.0}, 1: {0: math.pi}}
-    walk = Walk(0, 1, (WalkPoint({0: -0.5, 1: math.pi + 0.5}, (-math.pi / 2.0,), ()),))
-    arcs = open_arcs(views, (walk,))
-    assert arcs[0] == [pytest.approx((0.0, math.tau - 0.5))]
+    """The wall goes on beyond the lines of sight from both robots to the point of the walk."""
+    points = [
+        WalkPoint({0: math.radians(-70.0)}, SOUTH, ()),
+        *between_two((-45, -135)),
+        WalkPoint({1: math.radians(-110.0)}, SOUTH, ()),
+    ]
+    arcs = open_arcs(PAIR, (Walk(0, -1, tuple(points)),))
+    assert arcs[0] == [pytest.approx((0.0, math.tau - math.radians(70.0)))]
+    assert arcs[1] == [pytest.approx((math.pi + math.radians(70.0), math.tau - math.radians(70.0)))]
+
+
+def test_two_points_of_walks_beside_a_door_close_nothing() -> None:
+    """The triangles of the two robots with the points cross. Behind the crossing, each robot would rely on the other."""
+    walks = tuple(Walk(0, -1, tuple(between_two(each))) for each in ((-75, -105), (-35, -145)))
+    assert {slot: round(sum(each.width_rad for each in arcs), 6) for slot, arcs in open_arcs(PAIR, walks).items()} == {
+        0: round(math.tau, 6),
+        1: round(math.tau, 6),
+    }
+
+
+def test_a_walk_past_a_robot_is_no_wall() -> None:
+    points = [WalkPoint({0: math.radians(each)}, (), (1,)) for each in (10, 40, 80)]
+    arcs = open_arcs({0: {}, 1: {}}, (Walk(0, -1, tuple(points)),))
+    assert arcs[0] == [(0.0, math.tau)]
+
+
+# --- slots that the proof does not need -------------------------------------------------------------------------------
+
+
+def spare(views: Mapping[int, Mapping[int, float]], walks: tuple[Walk, ...]) -> list[int]:
+    proof = SwarmProof()
+    proof.update(ScanResult(views, FlagComplex(views), ()), walks, {}, {})
+    return proof.spare(views)
+
+
+def test_a_robot_beside_two_others_is_spare_where_walks_close_all() -> None:
+    """Three robots see each other, and each sees a walk all around the room."""
+    sixty = math.radians(60.0)
+    views = {0: {1: 0.0, 2: sixty}, 1: {0: math.pi, 2: 2.0 * sixty}, 2: {0: -2.0 * sixty, 1: -sixty}}
+    ring = [WalkPoint(dict.fromkeys(views, math.radians(each)), SOUTH, ()) for each in range(0, 361, 20)]
+    assert spare(views, (Walk(0, -1, tuple(ring)),)) == [0, 1], "one robot sees all"
+    assert spare(views, ()) == [], "each triangle closes an arc of the others"
+    assert spare({0: {1: 0.0}, 1: {0: math.pi, 2: 0.0}, 2: {1: math.pi}}, ()) == [], "the end of a single file"
 
 
 def test_a_walk_that_touches_robot_and_wall_closes_the_pocket_between_them() -> None:
