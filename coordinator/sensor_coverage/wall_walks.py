@@ -67,7 +67,7 @@ class WallWalks:
         self.idle: dict[int, None] = {}
         self.walks = 0
         self._searched = 0  # number of walks when spare robots were last searched
-        self._known: dict[int, None] = {}  # slots at that time
+        self._stayed: dict[int, None] = {}  # slots that began as the end of a walk
         self._slots = slots
         self._mailbox = mailbox
         self._sources = sources
@@ -112,6 +112,7 @@ class WallWalks:
                 return (leader,)
             followers = closed_up[0]
         self.walks += 1
+        self._stayed[slots.slot_of()[leader]] = None
         if walked.end == OPEN:
             if plan.mover in slots.occupant:
                 back = plan.direction + math.pi - heading
@@ -131,17 +132,16 @@ class WallWalks:
         return tuple(occupant[each] for each in scan.complex_.vertices if each in occupant) if self.idle else ()
 
     def find_spare(self, scan: ScanResult) -> bool:
-        """After a walk, let those robots be idle that the proof of coverage does not need; return whether there are any.
+        """After a walk, let those robots be idle that stayed after earlier walks, and that the proof of coverage does not need.
 
-        A slot that did not exist when the walk began is kept: the next walk may need it.
+        The slot of the latest walk is kept: the next walk may need it. Return whether there are any.
         """
         if self.walks == self._searched:
             return False
         self._searched = self.walks
         vertices = scan.complex_.vertices
-        candidates = [each for each in reversed(vertices) if each in self._known and each not in scan.bases]
-        found = self._walls.spare(scan, candidates)
-        self._known = dict.fromkeys(vertices)
+        self._stayed = {slot: None for slot in self._stayed if slot in vertices}
+        found = self._walls.spare(scan, list(self._stayed)[-2::-1])
         self.idle |= dict.fromkeys(found)
         return bool(found)
 

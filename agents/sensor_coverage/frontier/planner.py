@@ -5,7 +5,7 @@ and side. The planner moves no robot.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
@@ -16,7 +16,6 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
 # Directions to try into a wide gap around one robot, as offsets from the bisector of the gap.
@@ -32,8 +31,8 @@ BRIDGE: Final = 100
 LAST: Final = 200
 # A drive that a wall stopped also rules out directions within this angle.
 BLOCKED_RAD: Final = math.radians(20.0)
-# Where walls are followed, a robot beside an edge stays only if it has driven this fraction of its hop: a followed wall
-# needs no robot between it and the lattice.
+# Where walls are followed, and all slots are known, a robot stays beside an edge only if it has driven this fraction of its
+# hop: a followed wall needs no robot between it and the lattice.
 WHOLE_HOP: Final = 0.98
 
 
@@ -49,21 +48,14 @@ class Planner:
         self.walls = WallPlans(parameters, slots)
         self._slots = slots
         self._follows_walls = parameters.walls == "followed"
-        self._opened: Mapping[int, Sequence[Arc]] | None = None
+        self._whole_hops = False
         self._views, self._complex, self._bases = ScanResult({}, FlagComplex({}), ())
         self._plans: list[Plan] = []
 
-    def update(
-        self,
-        scan: ScanResult,
-        edges: Iterable[Edge] | None = None,
-    ) -> None:
-        """Take a new scan, and find the fence, or the part of it on `edges`. Algorithm 3.
-
-        Where the proof of coverage of all slots is known, no robot drives into a direction in which it is closed.
-        """
+    def update(self, scan: ScanResult, edges: Iterable[Edge] | None = None) -> None:
+        """Take a new scan, and find the fence, or the part of it on `edges`. Algorithm 3."""
         self._views, self._complex, self._bases = scan
-        self._opened = self.walls.open_arcs(scan) if self._follows_walls and edges is None else None
+        self._whole_hops = self._follows_walls and edges is None
         found = self.fence = fence(self._views, self._complex, self._parameters.corner_margin_rad, edges)
         obstacle = dict.fromkeys(found.corners)
         self._plans = []
@@ -78,15 +70,14 @@ class Planner:
     def plans(self) -> Iterator[list[Plan]]:
         """Yield groups of possible deployments by falling priority.
 
-        Edges come first, because a robot between two others covers more than a robot at a gap. Where the proof of coverage
-        of all slots is known, a walk does what other directions into a gap and the last attempts do.
+        Edges come first, because a robot between two others covers more than a robot at a gap.
         """
         yield [*self._bridges(), *self._plans]
         yield list(self._vertex_plans())
         into_holes = list(self._hole_plans())
         self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in into_holes}))
         yield into_holes
-        yield list(self._last_plans()) if self._opened is None else []
+        yield list(self._last_plans())
         if self._follows_walls:
             along_walls = list(self.walls.plans(ScanResult(self._views, self._complex, self._bases)))
             self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in along_walls}))
@@ -141,10 +132,8 @@ class Planner:
                 continue
             if walls_matter and self._walled(mover, self._views[mover][other] + sign * near):
                 continue
-            if self._is_closed(mover, direction):
-                continue
             clear = min(self._parameters.clear_m, 0.85 * length)
-            if self._opened is not None:
+            if self._whole_hops:
                 clear = WHOLE_HOP * length
             plans.append(Plan(key, mover, direction, length, clear, anchors))
         return plans
@@ -166,14 +155,11 @@ class Planner:
         movers = [each for each in self._complex.vertices if each not in self._bases]
         for i, a, _, gap in wedges(self._views, self._complex, movers):
             end = gap > END_RAD
-            turns = END_TURNS_RAD if end else VERTEX_TURNS_RAD
-            for number, turn in enumerate(turns if self._opened is None else turns[:1]):
+            for number, turn in enumerate(END_TURNS_RAD if end else VERTEX_TURNS_RAD):
                 direction = self._views[i][a] + gap / 2.0 + turn
                 key = (i, a, 0, END_FIRST + number if end else number)
                 narrow = gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD
                 if narrow or key in self.attempt_log.closed or self._walled(i, direction):
-                    continue
-                if self._is_closed(i, direction):
                     continue
                 if any(angle_between(each, direction) < BLOCKED_RAD for each in self.attempt_log.blocked.get(i, ())):
                     continue
@@ -210,9 +196,3 @@ class Planner:
 
     def _walled(self, slot: int, direction: float) -> bool:
         return any(angle_between(each, direction) < SIXTY_RAD for each in self._slots.walls.get(slot, ()))
-
-    def _is_closed(self, slot: int, direction: float) -> bool:
-        """Return whether the proof of coverage is closed in a direction from a slot."""
-        if self._opened is None:
-            return False
-        return not any((direction - arc.start_rad) % math.tau < arc.width_rad for arc in self._opened.get(slot, ()))

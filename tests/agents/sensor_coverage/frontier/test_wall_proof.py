@@ -102,7 +102,7 @@ PAIR = {0: {1: 0.0}, 1: {0: math.pi}}
 SOUTH = (math.radians(-90.0),)
 
 
-def between_two(*degrees: tuple[int, int]) -> WalkPoint:
+def between_two(*degrees: tuple[int, int]) -> list[WalkPoint]:
     return [WalkPoint({0: math.radians(a), 1: math.radians(b)}, SOUTH, ()) for a, b in degrees]
 
 
