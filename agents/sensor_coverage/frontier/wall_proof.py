@@ -7,14 +7,14 @@ responsible for the space beyond it. Beyond a step of a walk is a wall. An open 
 there.
 
 An obstacle that lies within one triangle is not found. The triangle's sides are at most r_v long.
+
+Walks are remembered in directions from the slots that saw them.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.walks import Arc, Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 
 # An open arc narrower than this [rad] counts as closed: a body at r_v is 8 degrees wide.
@@ -35,8 +35,50 @@ NO_SLOT: Final = -1
 HAIR_RAD: Final = 1e-9
 
 
-# The bearing [rad] of each visible slot, by the slot that sees it.
-Views = Mapping[int, Mapping[int, float]]
+class Arc(NamedTuple):
+    """Directions from `start_rad` to the left, over `width_rad`."""
+
+    start_rad: float
+    width_rad: float
+
+
+class WalkPoint(NamedTuple):
+    """A point of a walk: the direction [rad] to it from each slot that it sees, the directions of walls that it touches.
+
+    `robots` are the slots that the walking robot touches.
+    """
+
+    seen: Mapping[int, float]
+    walls: tuple[float, ...]
+    robots: tuple[int, ...]
+
+    @property
+    def in_touch(self) -> bool:
+        """True if the walking robot touched anything."""
+        return bool(self.walls or self.robots)
+
+    @property
+    def passes_robots(self) -> bool:
+        """True if the walking robot touched robots, and no wall. Behind these may be free space."""
+        return bool(self.robots) and not self.walls
+
+    def turned(self, by: float) -> "WalkPoint":
+        """Return the same point with all directions turned by an angle [rad]."""
+        return WalkPoint(
+            {slot: each + by for slot, each in self.seen.items()}, tuple(each + by for each in self.walls), self.robots
+        )
+
+
+class Walk(NamedTuple):
+    """A stretch of wall that a robot followed, in the frame of one robot; `hand` is +1 if the wall was on the left."""
+
+    frame: int
+    hand: int
+    points: tuple[WalkPoint, ...]
+
+    def turned(self, frame: int, by: float) -> "Walk":
+        """Return the walk in another frame."""
+        return Walk(frame, self.hand, tuple(each.turned(by) for each in self.points))
 
 
 class TouchCounter:
@@ -63,36 +105,6 @@ class SeenPoint(NamedTuple):
 
     number: int
     point: WalkPoint
-
-
-def open_arcs(
-    views: Views,
-    complex_: FlagComplex,
-    walks: Iterable[Walk],
-    touched: Mapping[int, Sequence[float]],
-    near: Mapping[int, Sequence[Arc]] = MappingProxyType({}),
-) -> dict[int, list[Arc]]:
-    """Return the arcs in which each slot is open.
-
-    `touched` has the directions of walls in touch with a slot. `near` has the arcs in which a wall close to it was followed.
-    """
-    closed = {slot: [*arcs_of_walls(touched.get(slot, ())), *near.get(slot, ())] for slot in complex_.vertices}
-    for i, j, k in complex_.triangles:
-        for a, b, c in ((i, j, k), (j, i, k), (k, i, j)):
-            closed[a].append(arc_between(views[a][b], views[a][c]))
-    for walk in walks:
-        last: dict[int, SeenPoint] = {}
-        touch = TouchCounter()
-        for number, point in enumerate(walk.points):
-            touch.take(number, point.in_touch)
-            for slot in point.seen:
-                if slot in closed:
-                    beside = {each: views[slot][each] for each in complex_.neighbours[slot]}
-                    before = point_before(slot, last.get(slot), SeenPoint(number, point), touch.since)
-                    closed[slot] += [arc for _, arc in arcs_of_step(slot, before, point, walk.hand, beside)]
-                last[slot] = SeenPoint(number, point)
-    found = {slot: complement(arcs) for slot, arcs in closed.items()}
-    return {slot: arcs for slot, arcs in found.items() if arcs}
 
 
 def point_before(slot: int, last: SeenPoint | None, now: SeenPoint, touch_since: int) -> WalkPoint | None:
@@ -123,7 +135,7 @@ def arcs_of_step(
     `before` is the point before it. `beside` has the directions [rad] of the slots that share an edge with the slot.
     """
     there = point.seen[slot]
-    if before is not None and slot in before.seen:
+    if before is not None and slot in before.seen and not (before.passes_robots or point.passes_robots):
         step = math.remainder(there - before.seen[slot], math.tau)
         if step * hand < 0.0:  # the slot and the wall are on different sides of the step
             yield None, arc_between(before.seen[slot], there)

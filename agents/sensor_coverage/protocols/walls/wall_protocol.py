@@ -10,8 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, Final, NamedTuple, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
-from zwerm.agents.sensor_coverage.frontier.walks import WalkPoint
-from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, SlotProof, TouchCounter, point_before
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, SlotProof, TouchCounter, WalkPoint, point_before
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
