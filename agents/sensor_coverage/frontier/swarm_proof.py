@@ -1,11 +1,6 @@
 """The local proof of coverage (`zwerm.agents.sensor_coverage.frontier.wall_proof`) of all slots, by a node that knows them.
 
-A triangle of two slots and a point of a walk counts only if the space beyond its sides is proved, too: two such triangles
-with different points may cross, and each slot would rely on the other's. So at both slots, beyond the line of sight to
-the point, there must be a wall that was followed, another such triangle with the same point, or a triangle of robots that
-contains the point.
-
-Most of this does not change from scan to scan. It is computed again for the slots around which something has changed.
+Most of it does not change from scan to scan. It is computed again for the slots around which something has changed.
 """
 
 import math
@@ -16,6 +11,7 @@ from typing import Final, NamedTuple
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     Arc,
+    Pair,
     SeenPoint,
     TouchCounter,
     Walk,
@@ -24,13 +20,13 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     arcs_of_step,
     arcs_of_walls,
     complement,
+    ends_at,
+    fan_of,
     point_before,
     united,
 )
 from zwerm.maths.simplicial import FlagComplex
 
-# A followed wall lies beyond a line of sight if it closes the direction this far [rad] beside it.
-BESIDE_RAD: Final = 0.02
 # Angle [rad] to an open arc within which another slot may stand in the opening.
 OPENING_RAD: Final = math.radians(15.0)
 # Arcs that differ by less than this [rad] in total are equally open.
@@ -57,9 +53,6 @@ class Around(NamedTuple):
     passed: int
     view: Mapping[int, float]
     walls: Sequence[Arc]
-
-
-Pair = tuple[int, int]
 
 
 class SwarmProof:
@@ -202,54 +195,18 @@ class SwarmProof:
         found = list(self._around[slot].walls)
         for _, before, point, hand, between in self._passed.get(slot, ()):
             if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
-                found += [arc for _, arc in arcs_of_step(slot, before, point, hand, {})]
+                found += arcs_of_step(slot, before, point, hand)
         return united(found)
 
-    # --- triangles of two slots and a point of a walk ---------------------------------------------------------------
-
     def _valid(self, point: WalkPoint) -> tuple[Pair, ...]:
-        """Return the pairs of slots whose triangle with a point counts. The space beyond both its sides is proved."""
-        known = self._neighbours
-        seen = [slot for slot in point.seen if slot in known]
-        pairs = [(a, b) for a in seen for b in seen if a < b and b in known[a]]
-        closed = {(slot, side): self._ends_at_wall(slot, point, side) for slot in seen for side in (1, -1)}
-        for slot in seen:
-            if not (closed[slot, 1] and closed[slot, -1]) and self._is_inside(slot, point, seen):
-                closed[slot, 1] = closed[slot, -1] = True
-        sides = {(a, b): self._side(a, b, point) for pair in pairs for a, b in (pair, pair[::-1])}
-        while True:
-            kept = [
-                pair
-                for pair in pairs
-                if all(
-                    closed[a, -sides[a, b]]
-                    or any(sides[a, c] == -sides[a, b] for c in seen if (a, c) in sides and _ordered(a, c) in pairs)
-                    for a, b in (pair, pair[::-1])
-                )
-            ]
-            if len(kept) == len(pairs):
-                return tuple(kept)
-            pairs = kept
-
-    def _side(self, a: int, b: int, point: WalkPoint) -> int:
-        """Return +1 if slot b is to the left of a point, seen from slot a, else -1."""
-        return 1 if math.remainder(self._scan.views[a][b] - point.seen[a], math.tau) > 0.0 else -1
-
-    def _ends_at_wall(self, slot: int, point: WalkPoint, side: int) -> bool:
-        """Return whether the directions on one side of a point end at a wall, seen from a slot."""
-        there = point.seen[slot] + side * BESIDE_RAD
-        return any((there - start) % math.tau < width for start, width in self._walled[slot])
-
-    def _is_inside(self, slot: int, point: WalkPoint, seen: Iterable[int]) -> bool:
-        """Return whether a triangle of this slot and two others contains a point. One of these sees the point."""
-        views, known = self._scan.views, self._neighbours
-        return any(
-            _between(point.seen[slot], views[slot][a], views[slot][b])
-            and _between(point.seen[a], views[a][slot], views[a][b])
-            for a in seen
-            if a in known[slot]
-            for b in known[slot] & known[a]
-        )
+        """Return the pairs of slots whose triangle with a point counts."""
+        at_walls = {
+            (slot, side): ends_at(self._walled[slot], there, side)
+            for slot, there in point.seen.items()
+            if slot in self._neighbours
+            for side in (1, -1)
+        }
+        return fan_of(point, self._scan.views, self._neighbours, at_walls)
 
 
 def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
@@ -257,7 +214,7 @@ def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     last: dict[int, SeenPoint] = {}
     touch = TouchCounter()
     for number, point in enumerate(walk.points):
-        touch.take(number, point.in_touch)
+        touch.take(number, bool(point.walls))
         now = SeenPoint(number, point)
         for slot in point.seen:
             before = point_before(slot, last.get(slot), now, touch.since)
@@ -265,16 +222,6 @@ def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             between = tuple(each.seen.keys() for each in walk.points[since:number])
             yield slot, Passed(first + number, before, point, walk.hand, between)
             last[slot] = now
-
-
-def _between(there: float, a: float, b: float) -> bool:
-    """Return whether a direction [rad] lies within the smaller angle between two others."""
-    left, right = math.remainder(a - there, math.tau), math.remainder(b - there, math.tau)
-    return left * right < 0.0 and abs(left) + abs(right) < math.pi
-
-
-def _ordered(a: int, b: int) -> Pair:
-    return (a, b) if a < b else (b, a)
 
 
 def _connected(slots: Sequence[int], around: Mapping[int, Collection[int]]) -> bool:

@@ -63,6 +63,12 @@ def test_walls_in_different_directions_close_no_arc_between_them() -> None:
     assert arcs_around((0.0, 0.0), apart, 1, 0.07) == ()
 
 
+def test_a_robot_in_touch_is_no_wall_beside_a_slot() -> None:
+    """The robot leaves its slot around another robot, which may stand in an opening."""
+    way = [NearPoint((0.1, 0.14 - 0.05 * each), ()) for each in range(5)]
+    assert arcs_around((0.0, 0.0), way, 1, 0.07) == arcs_around((0.0, 0.0), way, -1, 0.07) == ()
+
+
 class Wedged:
     """A robot in touch with two walls, of which no velocity moves it."""
 
