@@ -99,17 +99,20 @@ class Drives:
         return self._drive.velocities(acting)
 
     def _lasting_velocities(self) -> Velocities:
-        if self._velocities is None:
-            self._velocities = self._drive.velocities(self._commanded)
-        elif self._changed:
-            robots = self._changed
-            forward, left, turn = (None if each is None else each.copy() for each in self._velocities)
-            for whole, part in zip((forward, left, turn), self._drive.velocities(self._commanded[robots]), strict=True):
-                if whole is not None:
-                    whole[robots] = part
-            self._velocities = forward, left, turn
-        self._changed = []
-        return self._velocities
+        last, robots = self._velocities, self._changed
+        if last is not None and not robots:
+            return last
+        if last is None:
+            found = self._drive.velocities(self._commanded)
+        else:
+            forward, left, turn = self._drive.velocities(self._commanded[robots])
+            found = (
+                _replaced(last[0], robots, forward),
+                None if last[1] is None or left is None else _replaced(last[1], robots, left),
+                _replaced(last[2], robots, turn),
+            )
+        self._velocities, self._changed = found, []
+        return found
 
     def _noise_at(self, tick: int) -> Floats:
         block, offset = divmod(tick, _BLOCK_TICKS)
@@ -121,3 +124,10 @@ class Drives:
             self._noise_block = block
         noise: Floats = self._noise[offset]
         return noise
+
+
+def _replaced(whole: Floats, rows: list[int], values: Floats) -> Floats:
+    """Return a copy of `whole` (n,) with other values (k,) in some rows."""
+    copy = whole.copy()
+    copy[rows] = values
+    return copy
