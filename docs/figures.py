@@ -35,7 +35,6 @@ SPEED: Final = {"iterations_to_91_5_percent_completion": "iterations to 91.5 %",
 # Table, its axis, the label of the axis, and whether its scale is logarithmic.
 RADIO: Final = (
     ("landmark-loss", AXIS, "fraction of messages lost", False),
-    ("landmark-bursts", "packets", "messages in a burst, 0.3 of all lost", True),
     ("landmark-range", "radio.range_m", "range of the radio [r]", True),
 )
 EXPLORATION: Final = {"completion_fraction": "completion", "iterations": "iterations to the end"}
@@ -177,9 +176,9 @@ def dispersion_figure() -> Figure:
 
 
 def radio_figure() -> Figure:
-    """Return completion and iterations of landmark exploration over loss, bursts and range of the radio."""
-    figure = Figure(figsize=(10.5, 5.8), layout="constrained")
-    panels = figure.subplots(2, 3, sharey="row", sharex="col")
+    """Return completion and iterations of landmark exploration over loss and range of the radio."""
+    figure = Figure(figsize=(8.6, 5.8), layout="constrained")
+    panels = figure.subplots(2, len(RADIO), sharey="row", sharex="col")
     for column, (name, axis, label, is_log) in enumerate(RADIO):
         found = _measured.load(name)
         for axes, metric in zip(panels[:, column], EXPLORATION, strict=True):
@@ -203,7 +202,7 @@ def radio_figure() -> Figure:
         axes.set_ylabel(title)
     panels[0, 0].set_ylim(0.9, 1.0)
     panels[1, 0].set_ylim(bottom=0.0)
-    panels[1, 0].legend(frameon=False, loc="lower left")
+    panels[1, 0].legend(frameon=False, loc="upper left")
     figure.suptitle("landmark-free, 10 robots; bars: 95 % interval of the mean", x=0.01, ha="left", fontsize=10)
     return figure
 
