@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    CONTACT_RAD,
     Arc,
     Pair,
     SeenPoint,
@@ -52,7 +53,8 @@ class Around(NamedTuple):
 
     passed: int
     view: Mapping[int, float]
-    walls: Sequence[Arc]
+    touched: Sequence[float]
+    near: Sequence[Arc]
 
 
 class SwarmProof:
@@ -70,7 +72,7 @@ class SwarmProof:
         self._scan = ScanResult({}, FlagComplex({}), ())
         self._neighbours: dict[int, frozenset[int]] = {}
         self._around: dict[int, Around] = {}
-        self._walled: dict[int, list[Arc]] = {}  # arcs that end at walls, by slot
+        self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
         self._pairs: dict[int, tuple[Pair, ...]] = {}  # the valid triangles, by the number of their point
         self._open_arcs: dict[int, list[Arc]] = {}
 
@@ -90,9 +92,8 @@ class SwarmProof:
         changed: dict[int, None] = {}
         for slot in complex_.vertices:
             view = scan.views[slot]
-            walls = [*arcs_of_walls(touched.get(slot, ())), *near.get(slot, ())]
             beside = {each: view[each] for each in complex_.neighbours[slot]}
-            now = Around(len(self._passed.get(slot, ())), beside, walls)
+            now = Around(len(self._passed.get(slot, ())), beside, touched.get(slot, ()), tuple(near.get(slot, ())))
             if self._around.get(slot) != now:
                 self._around[slot] = now
                 changed[slot] = None
@@ -148,7 +149,7 @@ class SwarmProof:
         other._neighbours = {
             each: seen - {slot} if slot in seen else seen for each, seen in self._neighbours.items() if each != slot
         }
-        other._around, other._walled = dict(self._around), dict(self._walled)
+        other._around, other._followed = dict(self._around), dict(self._followed)
         other._pairs, other._open_arcs = dict(self._pairs), dict(self._open_arcs)
         other._refresh(dict.fromkeys(sorted(self._neighbours[slot])), [slot])
         return other
@@ -160,12 +161,12 @@ class SwarmProof:
         for slot in gone:
             points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
             stale |= self._witnessed.get(slot, {})
-            for known in (self._around, self._walled, self._open_arcs):
+            for known in (self._around, self._followed, self._open_arcs):
                 known.pop(slot, None)
         for slot in stale:
             if slot in self._around:
                 points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
-                self._walled[slot] = self._arcs_to_walls(slot)
+                self._followed[slot] = self._arcs_to_walls(slot)
                 self._open_arcs.pop(slot, None)
         for number in points:
             old, new = self._pairs.get(number, ()), self._valid(self._points[number])
@@ -181,7 +182,7 @@ class SwarmProof:
         known = self._open_arcs.get(slot)
         if known is None:
             view, beside = self._scan.views[slot], self._neighbours[slot]
-            closed = list(self._walled[slot])
+            closed = [*self._followed[slot], *arcs_of_walls(self._around[slot].touched)]
             closed += [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
             for each in self._passed.get(slot, ()):
                 for pair in self._pairs.get(each.number, ()):
@@ -191,8 +192,9 @@ class SwarmProof:
         return known
 
     def _arcs_to_walls(self, slot: int) -> list[Arc]:
-        """Return the arcs at a slot that end at walls. They are disjoint."""
-        found = list(self._around[slot].walls)
+        """Return the arcs at a slot that end at followed walls or at contacts. They are disjoint."""
+        around = self._around[slot]
+        found = [*arcs_of_walls(around.touched, CONTACT_RAD), *around.near]
         for _, before, point, hand, between in self._passed.get(slot, ()):
             if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
                 found += arcs_of_step(slot, before, point, hand)
@@ -201,7 +203,7 @@ class SwarmProof:
     def _valid(self, point: WalkPoint) -> tuple[Pair, ...]:
         """Return the pairs of slots whose triangle with a point counts."""
         at_walls = {
-            (slot, side): ends_at(self._walled[slot], there, side)
+            (slot, side): ends_at(self._followed[slot], there, side)
             for slot, there in point.seen.items()
             if slot in self._neighbours
             for side in (1, -1)

@@ -146,6 +146,23 @@ def test_two_points_of_walks_beside_a_door_close_nothing() -> None:
     }
 
 
+def test_robots_in_touch_with_both_sides_of_a_door_do_not_close_it() -> None:
+    """A walk in the next room is seen between the robots only. Each robot touches the end of a wall below it."""
+    contacts = [math.radians(-80.0)]
+    point = between_two((-45, -135))
+    walks = (Walk(0, -1, tuple(point)),)
+    proof = SwarmProof()
+    proof.update(ScanResult(PAIR, FlagComplex(PAIR), ()), walks, {0: contacts, 1: [math.radians(-100.0)]}, {})
+    assert _degrees(proof.open_arcs()) == {0: 270, 1: 270}
+    local = at_slot(0, PAIR, *contacts)
+    pass_walk(local, 0, point, -1)
+    assert math.degrees(open_rad(local)) == pytest.approx(270.0)
+
+
+def _degrees(arcs: Mapping[int, Iterable[Arc]]) -> dict[int, int]:
+    return {slot: round(math.degrees(sum(each.width_rad for each in found))) for slot, found in arcs.items()}
+
+
 def test_a_walk_past_a_robot_is_no_wall() -> None:
     points = [WalkPoint({0: math.radians(each)}, (), (1,)) for each in (10, 40, 80)]
     arcs = open_arcs({0: {}, 1: {}}, (Walk(0, -1, tuple(points)),))
