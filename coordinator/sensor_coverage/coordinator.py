@@ -282,8 +282,6 @@ class SensorCoverageCoordinator:
         self.walking.idle = {slot: None for slot in self.walking.idle if slot in self.slots.occupant}
         if self.walking.idle:
             self.scan = scan = scan._replace(complex_=scan.complex_.without(self.walking.idle))
-        if self.walking.find_spare(scan):
-            self.scan = scan = scan._replace(complex_=scan.complex_.without(self.walking.idle))
         if self._redundancy == "link":
             self.redundant = self._leave_requests.redundant_slots(scan)
             if self.redundant:

@@ -66,8 +66,6 @@ class WallWalks:
     ) -> None:
         self.idle: dict[int, None] = {}
         self.walks = 0
-        self._searched = 0  # number of walks when spare robots were last searched
-        self._stayed: dict[int, None] = {}  # slots that began as the end of a walk
         self._slots = slots
         self._mailbox = mailbox
         self._sources = sources
@@ -112,38 +110,15 @@ class WallWalks:
                 return (leader,)
             followers = closed_up[0]
         self.walks += 1
-        self._stayed[slots.slot_of()[leader]] = None
         if walked.end == OPEN:
             if plan.mover in slots.occupant:
                 back = plan.direction + math.pi - heading
                 yield from pushing.correct(leader, [(slots.occupant[plan.mover], back)])
             return (*followers, leader)
-        keep = self._keep(plan, scan)
+        keep = (slots.occupant[plan.mover],) if plan.beside and plan.mover in slots.occupant else ()
         meet = tuple(slots.occupant[each] for each in plan.meet if each in slots.occupant)
         yield from self._legs(leader, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
         return (*followers, leader)
-
-    def _keep(self, plan: Plan, scan: ScanResult) -> tuple[int, ...]:
-        """Return the robots of which the walking robot must see one; empty if any robot is enough."""
-        occupant = self._slots.occupant
-        if plan.beside and plan.mover in occupant:
-            return (occupant[plan.mover],)
-        # Idle robots may leave, and then nobody would see the walking robot at its end.
-        return tuple(occupant[each] for each in scan.complex_.vertices if each in occupant) if self.idle else ()
-
-    def find_spare(self, scan: ScanResult) -> bool:
-        """After a walk, let those robots be idle that stayed after earlier walks, and that the proof of coverage does not need.
-
-        The slot of the latest walk is kept: the next walk may need it. Return whether there are any.
-        """
-        if self.walks == self._searched:
-            return False
-        self._searched = self.walks
-        vertices = scan.complex_.vertices
-        self._stayed = {slot: None for slot in self._stayed if slot in vertices}
-        found = self._walls.spare(scan, list(self._stayed)[-2::-1])
-        self.idle |= dict.fromkeys(found)
-        return bool(found)
 
     def axis(self, base: int) -> Routine[Sequence[float]]:
         """Return bearings [rad] for a station's first robot, parallel to a wall nearby: lattices along walls need fewer robots.

@@ -160,6 +160,12 @@ def united(arcs: Iterable[Arc]) -> list[Arc]:
     return found
 
 
+def overlap(a: Arc, b: Arc) -> float:
+    """Return the size [rad] of the directions that two arcs share."""
+    off = (b.start_rad - a.start_rad) % math.tau
+    return max(0.0, min(a.width_rad - off, b.width_rad)) + max(0.0, min(off + b.width_rad - math.tau, a.width_rad))
+
+
 def complement(arcs: Iterable[Arc]) -> list[Arc]:
     """Return the arcs that no given arc contains, without those that are narrower than GAP_RAD."""
     spans = sorted((each.start_rad % math.tau, each.width_rad) for each in arcs)
