@@ -150,7 +150,7 @@ def test_the_failure_of_a_controller_arrives_and_its_process_exits_with_1(nothin
 
 def test_a_failed_robot_exits_only_after_the_world_has_confirmed_its_failure(nothing_left: None) -> None:
     with LocalSwarm("run", members(1, "small_controllers:Wordy")) as swarm:
-        with swarm.link._changed:  # the world takes in messages, and confirms nothing
+        with swarm.link._lock:  # the world takes in messages, and confirms nothing
             swarm.link.send(0, encode(Observation(5, 0.0)))
             until(lambda: swarm.link._arrivals, "the failure arrived")
             assert not swarm.supervisor.wait(WAIT_S), "no time limit ends its wait"
@@ -163,7 +163,7 @@ def test_a_failed_robot_exits_only_after_the_world_has_confirmed_its_failure(not
 
 
 def test_a_failed_robot_exits_on_sigterm_without_a_confirmation(nothing_left: None) -> None:
-    with LocalSwarm("run", members(1, "small_controllers:Wordy")) as swarm, swarm.link._changed:
+    with LocalSwarm("run", members(1, "small_controllers:Wordy")) as swarm, swarm.link._lock:
         swarm.link.send(0, encode(Observation(5, 0.0)))
         until(lambda: swarm.link._arrivals, "the failure arrived")
         swarm.supervisor.send_signal(0, signal.SIGTERM)
