@@ -143,7 +143,7 @@ class _Swarm(ABC):
 
     def _member(self, credential: Credential) -> ExpectedNode:
         controller, setup = self._members[credential.node]
-        return ExpectedNode(credential.incarnation, controller, encode(setup), self._paced)
+        return ExpectedNode(credential.incarnation, controller, encode(setup), self._paced, session=credential.zid)
 
     @abstractmethod
     def _open(self, directory: Path) -> None:
