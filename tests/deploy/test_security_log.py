@@ -13,7 +13,8 @@ import msgspec
 import pytest
 from command_line import zwerm
 from network import free_port
-from support import ROBOTS, ROOT, ZWERM, scenario, until
+from support import ROBOTS, ROOT, ZWERM, scenario
+from waiting import until
 
 from zwerm.deploy.identity import load
 from zwerm.deploy.router_messages import RefusalParser, RouterEvent
