@@ -16,7 +16,6 @@ import socket
 import struct
 import subprocess
 import sys
-import threading
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -36,10 +35,11 @@ ROOT: Final = Path(__file__).parents[1]
 ROBOTS: Final = 4
 SETTINGS: Final = ("computation-free", "--set", f"robots.count={ROBOTS}", "--set", "time.straggler_s=120.0", "--json")
 PROGRAM: Final = (sys.executable, "-c", "from zwerm.cli.app import main; main()")
+_LEASE: Final = "transport/link/tx/lease"  # [ms]
 _PATIENCE: Final = "transport/link/tx/queue/congestion_control/block/wait_before_close"  # [us]
 READS: Final = ("**", "@/**", "@/*/router/**", "@/*/router/config/**")
 WRONG_PASSWORDS: Final = 10
-GUESS_MS: Final = 2_000
+GUESS_MS: Final = 4_000
 LONG_S: Final = 600.0
 ENDLESS_S: Final = 1e6
 LOCAL_DURATION_S: Final = 1_000.0
@@ -64,7 +64,7 @@ def session(endpoint: str, credential: Credential | None, timeout_ms: int = 1_00
     )
     settings: dict[str, Any] = {"mode": "client", "connect/endpoints": [endpoint], "connect/timeout_ms": timeout_ms}
     # An attacker waits as long as a busy router needs, so that everything it sends arrives.
-    settings |= {"connect/exit_on_failure": True, _PATIENCE: round(1e6 * LONG_S)}
+    settings |= {"connect/exit_on_failure": True, _PATIENCE: round(1e6 * LONG_S), _LEASE: round(1e3 * LONG_S)}
     return open_session(settings | identity, "refused")
 
 
@@ -227,7 +227,8 @@ def main() -> None:
             return process
 
         world = start(
-            *("world", *settings, "--listen", endpoint, "--credentials", str(keys)), "--security-log", "log.jsonl"
+            *("world", *settings, "--listen", endpoint, "--credentials", str(keys)),
+            *("--outage", str(LONG_S), "--security-log", "log.jsonl"),
         )
         until(lambda: world.poll() is not None or (keys.exists() and keys.stat().st_size), "credentials written")
         credentials = load(keys)
@@ -268,12 +269,9 @@ def main() -> None:
                     received[0] += 1  # it was admitted
                 tried["sessions with a wrong password or none"] = number + 1
 
-        attacks = [threading.Thread(target=each) for each in (steal, raw, guess)]
-        for attack in attacks:
-            attack.start()
         robots = start("robot", "--connect", endpoint, "--credentials", str(keys))
-        for attack in attacks:
-            attack.join()
+        for attack in (steal, raw, guess):
+            attack()
         connections.await_reading()
         world.send_signal(signal.SIGINT)
         out, err = world.communicate(timeout=LONG_S)
