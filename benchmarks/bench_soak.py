@@ -239,6 +239,7 @@ def rows_of(result: RunResult, samples: Sequence[dict[str, float]]) -> list[dict
 
     return [
         row("memory of the world [MB]", "world_mb", 1, f"trend at most {WORLD_MB_PER_H_MAX:g}"),
+        row("heap of the world in use [MB]", "heap_used_mb", 1, ""),
         row("descriptors of the world", "world_descriptors", 0, "no trend"),
         row("threads of the world", "world_threads", 0, "no trend"),
         row(
@@ -247,6 +248,7 @@ def rows_of(result: RunResult, samples: Sequence[dict[str, float]]) -> list[dict
         row("memory of a robot, largest [MB]", "robot_mb_max", 2, ""),
         row("descriptors of a robot, most", "robot_descriptors_max", 0, "no trend"),
         count("wall time [s]", round(result.wall_s)),
+        count("longest delay of a tick [s]", round(max((each["slip_s"] for each in samples), default=0.0), 2)),
         count("ticks", result.ticks),
         count("observations", result.robot_ticks),
         count("radio packets delivered", result.radio["delivered"]),
