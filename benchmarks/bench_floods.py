@@ -52,7 +52,7 @@ CLOSE_WAIT: Final = "08"  # in /proc/net/tcp
 QUIET_SAMPLES: Final = 100
 
 
-def session(endpoint: str, credential: Credential | None, timeout_ms: int = 1_000) -> zenoh.Session:
+def session(endpoint: str, credential: Credential | None, timeout_ms: int = 60_000) -> zenoh.Session:
     """Open a session, with a credential or without one. Raises LinkError where the router refuses it."""
     identity = (
         {}

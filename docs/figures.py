@@ -73,9 +73,9 @@ def soak_figure() -> Figure:
         axes.set_title(title, loc="left", fontsize=10)
         axes.set_xlabel("minutes")
         axes.grid(alpha=0.3)
-        axes.set_ylim(bottom=0.0)
+        axes.set_ylim(0.0, 1.1 * max(float(row[column]) for row in rows for column in columns))
         if len(columns) > 1:
-            axes.legend(frameon=False, loc="lower right")
+            axes.legend(frameon=False, loc="center right", bbox_to_anchor=(1.0, 0.35))
     return figure
 
 
