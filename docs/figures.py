@@ -20,7 +20,7 @@ AXIS: Final = "radio.loss+uplink.loss"
 STYLES: Final = {"central": ("#0072B2", "o"), "decentralised": ("#D55E00", "s")}
 SOAK: Final = FOLDER / "images" / "soak.csv"  # as `benchmarks/bench_soak.py --series` writes it
 SOAK_PANELS: Final = {
-    "memory of the world [MB]": {"world_mb": "world"},
+    "memory of the world [MB]": {"world_mb": "resident", "heap_used_mb": "heap in use"},
     "memory of a robot [MB]": {"old_robot_mb_mean": "mean of those that live on", "robot_mb_max": "largest"},
     "open descriptors": {"world_descriptors": "world", "robot_descriptors_max": "a robot, most"},
 }
@@ -87,9 +87,9 @@ def soak_figure() -> Figure:
         axes.set_title(title, loc="left", fontsize=10)
         axes.set_xlabel("minutes")
         axes.grid(alpha=0.3)
-        axes.set_ylim(bottom=0.0)
+        axes.set_ylim(0.0, 1.1 * max(float(row[column]) for row in rows for column in columns))
         if len(columns) > 1:
-            axes.legend(frameon=False, loc="lower right")
+            axes.legend(frameon=False, loc="center right", bbox_to_anchor=(1.0, 0.35))
     return figure
 
 

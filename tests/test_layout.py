@@ -37,6 +37,10 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
         "zwerm/record/recording.py",
         "wall_clock",
     ): "what was recorded goes to the disk twice a second; the run does not see it",
+    (
+        "zwerm/link/arrival_signal.py",
+        "wall_clock",
+    ): "waiting for answers has a deadline; it decides only that a node is lost",
     ("zwerm/link/node_link.py", "wall_clock"): "joining has a deadline; observations and commands do not look at it",
 }
 LONG_FILES: dict[str, str] = {}

@@ -195,9 +195,10 @@ def assign(
             break
         task = best[3]
         # The robots go in single file: the nearest goes first, and so goes farthest. The last in the order is the lead.
-        near = sorted(waiting, key=lambda each: (distances[each].get(task.end, FAR), each))
+        away = {each: distances[each].get(task.end, FAR) for each in waiting}
+        near = sorted(waiting, key=lambda each: (away[each], _behind_mm(statuses[each], places[each], task), each))
         reach = max(join_mm, best[0])
-        near = [each for each in near if distances[each].get(task.end, FAR) <= reach and (task, each) not in skip]
+        near = [each for each in near if away[each] <= reach and (task, each) not in skip]
         near = near[: room(slice_map, task, len(waiting))]
         number += 1
         plan = CorridorPlan(view.epoch, number, task.end, task.direction, task.own_slice, tuple(reversed(near)))
@@ -208,6 +209,18 @@ def assign(
         if one_corridor:
             break
     return made
+
+
+def _behind_mm(status: Status, place: End | None, task: Task) -> int:
+    """Return how far a robot stands behind others at the same place, on the way to a task: only differences count.
+
+    Robots in single file cannot pass each other.
+    """
+    if place == task.end:
+        return -task.direction * status.x_mm
+    if place is None or place.slice == task.end.slice:
+        return abs(status.y_mm - task.end.y_mm)
+    return -status.x_mm if task.end.slice > place.slice else status.x_mm
 
 
 def _place(slice_map: SliceMap, status: Status | None) -> End | None:

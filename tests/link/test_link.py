@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from network import NIL, RUN, Network, ask, hello, network
-from support import until
+from waiting import until
 
 from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.swarm import LocalSwarm
@@ -328,7 +328,7 @@ def test_a_goodbye_is_confirmed_only_when_the_world_answers(net: Network) -> Non
     node.join()
     node.send(b"last words")
     heard = threading.Event()
-    with net.link._changed:  # the world can neither confirm nor take note of a loss
+    with net.link._lock:  # the world can neither confirm nor take note of a loss
         node.send_goodbye("tired", heard.set)
         assert not heard.wait(0.2)
     assert heard.wait(20.0)
@@ -343,7 +343,7 @@ def test_closing_the_link_ends_the_wait_for_a_confirmation(net: Network) -> None
     node = net.node(0)
     node.join()
     heard = threading.Event()
-    with net.link._changed:
+    with net.link._lock:
         node.send_goodbye("tired", heard.set)
         node.close()
         assert heard.wait(20.0)

@@ -21,6 +21,7 @@ from zenoh.handlers import Callback
 from zwerm.errors import LinkError
 from zwerm.link import Arrival, arrival
 from zwerm.link.admission import EVICTED, IDENTITY, NOT_JOINED, SOFTWARE, Admission, ExpectedNode
+from zwerm.link.arrival_signal import ArrivalSignal
 from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threads
 from zwerm.link.software import software
 from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
@@ -42,7 +43,9 @@ class ZenohWorldLink:
         self._run = run
         self._members = Admission(members, software())
         self._source_of: dict[str, int] = {}
-        self._changed = threading.Condition()
+        self._signal = ArrivalSignal()
+        self._lock = self._signal.lock
+        self._room = threading.Condition(self._lock)  # only Zenoh's threads wait for it
         self._dismissed = False
         self._arrivals: deque[Arrival] = deque()
         self._wanted = CAPACITY  # number of arrivals at which Zenoh's thread wakes the receiver
@@ -66,12 +69,11 @@ class ZenohWorldLink:
 
     def wait_joined(self, enough: Callable[[Collection[int]], bool], timeout_s: float) -> bool:
         """Wait until `enough(joined nodes)` is true; return whether it is within `timeout_s` seconds."""
-        with self._changed:
-            return self._changed.wait_for(lambda: enough(self._members.joined.keys()), timeout_s)
+        return self._signal.wait_for(lambda: enough(self._members.joined.keys()), timeout_s)
 
     def expect(self, node: int, member: ExpectedNode) -> None:
         """Allow a lost or new node to join as `member`. Raises LinkError if it is still joined."""
-        with self._changed:
+        with self._lock:
             try:
                 self._members.expect(node, member)
             except ValueError as error:
@@ -120,16 +122,22 @@ class ZenohWorldLink:
 
     def evict(self, node: int) -> None:
         """Drop all messages of a node that arrive from now on."""
-        with self._changed:
+        with self._lock:
             self._evicted.add(node)
             self._source_of.pop(command_key(self._run, node), None)
+
+    def node_of_session(self, session: str) -> int:
+        """Return the node that has joined by the session with this Zenoh id, or -1."""
+        with self._lock:
+            return self._members.node_of_session(session)
 
     def close(self) -> None:
         """Release all resources of the link; idempotent."""
         self._dismissed = True
-        with self._changed:
+        with self._lock:
             self._closed = True
-            self._changed.notify_all()
+            self._room.notify_all()
+            self._signal.notify()
         self._session.close()  # type: ignore[no-untyped-call]
 
     def _wait(self, count: int, timeout_s: float) -> None:
@@ -137,21 +145,18 @@ class ZenohWorldLink:
             raise LinkError("the world's link is closed")
         if len(self._arrivals) >= count or timeout_s <= 0:
             return
-        with self._changed:
-            self._wanted = min(count, CAPACITY)
-            self._changed.wait_for(
-                lambda: len(self._arrivals) >= self._wanted or self._losses or self._closed, timeout_s
-            )
-            self._wanted = CAPACITY
+        self._wanted = wanted = min(count, CAPACITY)
+        self._signal.wait_for(lambda: len(self._arrivals) >= wanted or self._losses or self._closed, timeout_s)
+        self._wanted = CAPACITY
 
     def _take(self, count: int) -> list[Arrival]:
         full = len(self._arrivals) >= CAPACITY
         pop = self._arrivals.popleft
         arrivals = [pop() for _ in range(count)]
         if full or self._losses:
-            with self._changed:
+            with self._lock:
                 self._losses -= sum(arrival.payload is None for arrival in arrivals)
-                self._changed.notify_all()
+                self._room.notify_all()
         return arrivals
 
     def _publisher(self, key: str) -> zenoh.Publisher:
@@ -171,13 +176,14 @@ class ZenohWorldLink:
             return
         self._arrivals.append(arrival((node, sample.payload.to_bytes())))
         if len(self._arrivals) >= self._wanted:
-            with self._changed:
-                self._changed.notify_all()
-                self._changed.wait_for(lambda: len(self._arrivals) < CAPACITY or self._closed)
+            self._signal.notify()
+        if len(self._arrivals) >= CAPACITY:
+            with self._room:
+                self._room.wait_for(lambda: len(self._arrivals) < CAPACITY or self._closed)
 
     def _refuse_command(self, node: int) -> None:
         """Count a command of a node that has not joined or was evicted."""
-        with self._changed:
+        with self._lock:
             self.refusals.count(node, EVICTED if node in self._evicted else NOT_JOINED)
 
     def _on_liveliness(self, sample: zenoh.Sample) -> None:
@@ -185,12 +191,12 @@ class ZenohWorldLink:
         if sample.kind == zenoh.SampleKind.PUT:
             return
         node = node_of(str(sample.key_expr))
-        with self._changed:
+        with self._lock:
             self._source_of.pop(command_key(self._run, node), None)
             if self._members.lose(node) and not self._dismissed:
                 self._arrivals.append(Arrival(node, None))
                 self._losses += 1
-            self._changed.notify_all()
+            self._signal.notify()
 
     def _on_hello(self, query: zenoh.Query) -> None:
         """Answer a node's hello or goodbye. Runs in a thread of its own."""
@@ -201,7 +207,7 @@ class ZenohWorldLink:
             except ValueError:
                 welcome = Welcome(refused=IDENTITY)
             if welcome.refused:
-                with self._changed:
+                with self._lock:
                     self.refusals.count(_node_in(key), welcome.refused)
             query.reply(key, encode(welcome))
 
@@ -211,7 +217,7 @@ class ZenohWorldLink:
             hello = decode_hello(payload)
         except REFUSABLE as error:
             return Welcome(refused=refusal(error).reason)
-        with self._changed:
+        with self._lock:
             refused = self._members.greet(node, hello)
             if isinstance(hello, Goodbye):
                 return Welcome(refused=refused)
@@ -220,7 +226,7 @@ class ZenohWorldLink:
                 return Welcome(refused=refused, detail=differing)
             member = self._members.expected(node)
             self._source_of[command_key(self._run, node)] = node
-            self._changed.notify_all()
+            self._signal.notify()
         return Welcome(
             controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced, code=member.code
         )

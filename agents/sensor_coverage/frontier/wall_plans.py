@@ -11,8 +11,8 @@ from zwerm.agents.sensor_coverage.frontier.directions import add_wall
 from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.walks import Arc
-from zwerm.agents.sensor_coverage.frontier.wall_proof import open_arcs
+from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc
 
 # Fourth element of the keys of plans to join two parts of the swarm.
 JOIN: Final = 2000
@@ -34,6 +34,7 @@ class WallPlans:
         self.unproven: tuple[int, ...] = ()
         self._parameters = parameters
         self._slots = slots
+        self._proof = SwarmProof()
         self.tried: dict[int, list[float]] = {}
         self._joined: dict[tuple[int, tuple[int, ...]], int] = {}
 
@@ -41,7 +42,8 @@ class WallPlans:
         """Return the arcs in which each slot is open."""
         slots = self._slots
         touched = {slot: [*slots.walls.get(slot, ()), *slots.felt.get(slot, ())] for slot in scan.complex_.vertices}
-        return open_arcs(scan.views, scan.complex_, slots.walks, touched, slots.near)
+        self._proof.update(scan, slots.walks, touched, slots.near)
+        return self._proof.open_arcs()
 
     def plans(self, scan: ScanResult) -> Iterator[Plan]:
         """Yield a plan for each open arc that has attempts left."""

@@ -7,20 +7,27 @@ responsible for the space beyond it. Beyond a step of a walk is a wall. An open 
 there.
 
 An obstacle that lies within one triangle is not found. The triangle's sides are at most r_v long.
+
+A triangle of two slots and a point of a walk counts only if the space beyond its sides is proved, too: two such triangles
+with different points may cross, and each slot would rely on the other's (`fan_of`).
+
+Walks are remembered in directions from the slots that saw them. What a slot closed together with others counts while
+these stand.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.walks import Arc, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.maths.simplicial import FlagComplex
 
 # An open arc narrower than this [rad] counts as closed: a body at r_v is 8 degrees wide.
 GAP_RAD: Final = math.radians(6.0)
 # A wall in touch with a standing robot closes this angle [rad] on both sides of its direction.
 TOUCH_RAD: Final = math.radians(45.0)
+# The touched wall lies within this angle [rad] of the direction: half a switch.
+CONTACT_RAD: Final = math.radians(15.0)
 # A walking robot that touches a wall and a standing robot at once closes this angle [rad] between the two.
 POCKET_RAD: Final = math.radians(55.0)
 # Successive points without a contact at which a walking robot still follows the wall: it turns round a corner.
@@ -29,31 +36,69 @@ BLIND_MAX: Final = 3
 HIDDEN_RAD: Final = math.radians(30.0)
 # A point of a walk is news for the walking robot if the open arcs become smaller by this [rad].
 NEWS_RAD: Final = 0.02
-# Stands for the slot at the third corner of a triangle whose third corner is another point of the walk.
-NO_SLOT: Final = -1
+# A followed wall lies beyond a line of sight if it closes the direction this far [rad] beside it.
+BESIDE_RAD: Final = 0.02
 # Arcs apart by less than this [rad] are stored as one.
 HAIR_RAD: Final = 1e-9
 
 
-# The bearing [rad] of each visible slot, by the slot that sees it.
-Views = Mapping[int, Mapping[int, float]]
+class Arc(NamedTuple):
+    """Directions from `start_rad` to the left, over `width_rad`."""
+
+    start_rad: float
+    width_rad: float
+
+
+class WalkPoint(NamedTuple):
+    """A point of a walk: the direction [rad] to it from each slot that it sees, the directions of walls that it touches.
+
+    `robots` are the slots that the walking robot touches.
+    """
+
+    seen: Mapping[int, float]
+    walls: tuple[float, ...]
+    robots: tuple[int, ...]
+
+    @property
+    def passes_robots(self) -> bool:
+        """True if the walking robot touched robots, and no wall. Behind these may be free space."""
+        return bool(self.robots) and not self.walls
+
+    def turned(self, by: float) -> "WalkPoint":
+        """Return the same point with all directions turned by an angle [rad]."""
+        return WalkPoint(
+            {slot: each + by for slot, each in self.seen.items()}, tuple(each + by for each in self.walls), self.robots
+        )
+
+
+class Walk(NamedTuple):
+    """A stretch of wall that a robot followed, in the frame of one robot; `hand` is +1 if the wall was on the left."""
+
+    frame: int
+    hand: int
+    points: tuple[WalkPoint, ...]
+
+    def turned(self, frame: int, by: float) -> "Walk":
+        """Return the walk in another frame."""
+        return Walk(frame, self.hand, tuple(each.turned(by) for each in self.points))
 
 
 class TouchCounter:
     """Counts since which point of a walk the robot follows the wall. It may be out of touch for a few points at corners.
 
-    It turns towards the wall meanwhile, and so enters each opening that its body fits through.
+    It turns towards the wall meanwhile, and so enters each opening that its body fits through. A robot in touch is no wall:
+    a walk around a robot in an opening leads past the opening.
     """
 
     def __init__(self) -> None:
         self.since = 0
         self._blind = BLIND_MAX + 1
 
-    def take(self, number: int, in_touch: bool) -> None:
-        """Take in whether the robot touches anything at the point with this number."""
-        if in_touch and self._blind > BLIND_MAX:
+    def take(self, number: int, at_wall: bool) -> None:
+        """Take in whether the robot touches a wall at the point with this number."""
+        if at_wall and self._blind > BLIND_MAX:
             self.since = number
-        self._blind = 0 if in_touch else self._blind + 1
+        self._blind = 0 if at_wall else self._blind + 1
         if self._blind > BLIND_MAX:
             self.since = number + 1
 
@@ -63,36 +108,6 @@ class SeenPoint(NamedTuple):
 
     number: int
     point: WalkPoint
-
-
-def open_arcs(
-    views: Views,
-    complex_: FlagComplex,
-    walks: Iterable[Walk],
-    touched: Mapping[int, Sequence[float]],
-    near: Mapping[int, Sequence[Arc]] = MappingProxyType({}),
-) -> dict[int, list[Arc]]:
-    """Return the arcs in which each slot is open.
-
-    `touched` has the directions of walls in touch with a slot. `near` has the arcs in which a wall close to it was followed.
-    """
-    closed = {slot: [*arcs_of_walls(touched.get(slot, ())), *near.get(slot, ())] for slot in complex_.vertices}
-    for i, j, k in complex_.triangles:
-        for a, b, c in ((i, j, k), (j, i, k), (k, i, j)):
-            closed[a].append(arc_between(views[a][b], views[a][c]))
-    for walk in walks:
-        last: dict[int, SeenPoint] = {}
-        touch = TouchCounter()
-        for number, point in enumerate(walk.points):
-            touch.take(number, point.in_touch)
-            for slot in point.seen:
-                if slot in closed:
-                    beside = {each: views[slot][each] for each in complex_.neighbours[slot]}
-                    before = point_before(slot, last.get(slot), SeenPoint(number, point), touch.since)
-                    closed[slot] += [arc for _, arc in arcs_of_step(slot, before, point, walk.hand, beside)]
-                last[slot] = SeenPoint(number, point)
-    found = {slot: complement(arcs) for slot, arcs in closed.items()}
-    return {slot: arcs for slot, arcs in found.items() if arcs}
 
 
 def point_before(slot: int, last: SeenPoint | None, now: SeenPoint, touch_since: int) -> WalkPoint | None:
@@ -110,29 +125,21 @@ def point_before(slot: int, last: SeenPoint | None, now: SeenPoint, touch_since:
     return last.point if last.number >= touch_since and apart <= HIDDEN_RAD else None
 
 
-def arcs_of_walls(directions: Iterable[float]) -> list[Arc]:
-    """Return the arcs that walls in touch close, by their directions [rad]."""
-    return [Arc(each - TOUCH_RAD, 2.0 * TOUCH_RAD) for each in directions]
+def arcs_of_walls(directions: Iterable[float], half_rad: float = TOUCH_RAD) -> list[Arc]:
+    """Return the arcs that walls in touch close, `half_rad` on both sides of their directions [rad]."""
+    return [Arc(each - half_rad, 2.0 * half_rad) for each in directions]
 
 
-def arcs_of_step(
-    slot: int, before: WalkPoint | None, point: WalkPoint, hand: int, beside: Mapping[int, float]
-) -> Iterator[tuple[int | None, Arc]]:
-    """Yield the arcs that a point of a walk closes at a slot that it sees, each with the other robot of the triangle, if any.
-
-    `before` is the point before it. `beside` has the directions [rad] of the slots that share an edge with the slot.
-    """
+def arcs_of_step(slot: int, before: WalkPoint | None, point: WalkPoint, hand: int) -> Iterator[Arc]:
+    """Yield the arcs at a slot that end at the walls in touch at a point of a walk and since `before`, the point before it."""
     there = point.seen[slot]
-    if before is not None and slot in before.seen:
+    if before is not None and slot in before.seen and not (before.passes_robots or point.passes_robots):
         step = math.remainder(there - before.seen[slot], math.tau)
         if step * hand < 0.0:  # the slot and the wall are on different sides of the step
-            yield None, arc_between(before.seen[slot], there)
-    for other in point.seen:
-        if other != slot and other in beside:
-            yield other, arc_between(beside[other], there)
+            yield arc_between(before.seen[slot], there)
     if slot in point.robots and point.walls:
         off = min((math.remainder(each - there, math.tau) for each in point.walls), key=abs)
-        yield None, arc_between(there, there + math.copysign(min(abs(off), POCKET_RAD), off))
+        yield arc_between(there, there + math.copysign(min(abs(off), POCKET_RAD), off))
 
 
 def arc_between(a_rad: float, b_rad: float) -> Arc:
@@ -153,6 +160,12 @@ def united(arcs: Iterable[Arc]) -> list[Arc]:
     return found
 
 
+def overlap(a: Arc, b: Arc) -> float:
+    """Return the size [rad] of the directions that two arcs share."""
+    off = (b.start_rad - a.start_rad) % math.tau
+    return max(0.0, min(a.width_rad - off, b.width_rad)) + max(0.0, min(off + b.width_rad - math.tau, a.width_rad))
+
+
 def complement(arcs: Iterable[Arc]) -> list[Arc]:
     """Return the arcs that no given arc contains, without those that are narrower than GAP_RAD."""
     spans = sorted((each.start_rad % math.tau, each.width_rad) for each in arcs)
@@ -171,50 +184,180 @@ def complement(arcs: Iterable[Arc]) -> list[Arc]:
     return found
 
 
+# --- triangles of two slots and a point of a walk ---------------------------------------------------------------------
+
+Pair = tuple[int, int]
+# By slot and side of a point (+1 left, -1 right): whether the directions beyond the line of sight to the point are closed.
+Beyond = Mapping[tuple[int, int], bool]
+
+
+def fan_of(
+    point: WalkPoint,
+    views: Mapping[int, Mapping[int, float]],
+    neighbours: Mapping[int, Collection[int]],
+    at_walls: Beyond,
+) -> tuple[Pair, ...]:
+    """Return the pairs of slots whose triangle with a point counts: at both slots the space beyond the triangle is proved.
+
+    Beyond the line of sight from a slot to the point there must be a wall that was followed (`at_walls`), or another such
+    triangle with the same point, or a triangle of robots that contains the point. A wall in touch with a slot counts here
+    in the direction of the contact only: two robots may touch the ends of walls on both sides of a door.
+    """
+    seen = [slot for slot in point.seen if slot in neighbours]
+    pairs = [(a, b) for a in seen for b in seen if a < b and b in neighbours[a]]
+    if not pairs:
+        return ()
+    closed = {(slot, side): at_walls.get((slot, side), False) for slot in seen for side in (1, -1)}
+    for slot in seen:
+        if not (closed[slot, 1] and closed[slot, -1]) and _is_inside(slot, point, seen, views, neighbours):
+            closed[slot, 1] = closed[slot, -1] = True
+    sides = {(a, b): side_of(point, a, views[a][b]) for pair in pairs for a, b in (pair, pair[::-1])}
+    while True:
+        beyond = {(a, sides[a, b]) for pair in pairs for a, b in (pair, pair[::-1])}
+        kept = [
+            pair
+            for pair in pairs
+            if all(closed[a, -sides[a, b]] or (a, -sides[a, b]) in beyond for a, b in (pair, pair[::-1]))
+        ]
+        if len(kept) == len(pairs):
+            return tuple(kept)
+        pairs = kept
+
+
+def side_of(point: WalkPoint, slot: int, direction: float) -> int:
+    """Return +1 if a direction [rad] from a slot is to the left of a point, else -1."""
+    return 1 if math.remainder(direction - point.seen[slot], math.tau) > 0.0 else -1
+
+
+def ends_at(arcs: Iterable[Arc], there: float, side: int) -> bool:
+    """Return whether one of these arcs contains the directions on one side of a direction [rad]."""
+    beside = there + side * BESIDE_RAD
+    return any((beside - start) % math.tau < width for start, width in arcs)
+
+
+def _is_inside(
+    slot: int,
+    point: WalkPoint,
+    seen: Iterable[int],
+    views: Mapping[int, Mapping[int, float]],
+    neighbours: Mapping[int, Collection[int]],
+) -> bool:
+    """Return whether a triangle of this slot and two others contains a point. One of these sees the point."""
+    return any(
+        _between(point.seen[slot], views[slot][a], views[slot][b])
+        and _between(point.seen[a], views[a][slot], views[a][b])
+        for a in seen
+        if a in neighbours[slot]
+        for b in neighbours[slot]
+        if b in neighbours[a]
+    )
+
+
+def _between(there: float, a: float, b: float) -> bool:
+    """Return whether a direction [rad] lies within the smaller angle between two others."""
+    left, right = math.remainder(a - there, math.tau), math.remainder(b - there, math.tau)
+    return left * right < 0.0 and abs(left) + abs(right) < math.pi
+
+
+# --- the proof of one slot ----------------------------------------------------------------------------------------------
+
+
+class Step(NamedTuple):
+    """A point of a walk, the point before it if the wall was followed since, and the hand at the wall.
+
+    `witnesses` are the slots that saw the way between, where this slot did not.
+    """
+
+    before: WalkPoint | None
+    point: WalkPoint
+    hand: int
+    witnesses: tuple[int, ...] = ()
+
+
 class SlotProof:
     """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator. It keeps no walks.
 
-    `around` are the slots that share an edge with it, and their directions [rad]. An arc that another standing robot closed
-    together with a walk counts while that robot is a neighbour.
+    `around` are the slots that share an edge with it, and their directions [rad]. An arc that other standing robots closed
+    together with a walk counts while they stand within two hops.
     """
 
     def __init__(self) -> None:
         self.around: Mapping[int, float] = {}
+        self._scan = ScanResult({}, FlagComplex({}), ())
         self._by_view: list[Arc] = []
-        self._by_walks: dict[int, list[Arc]] = {}  # by the slot at the third corner, or NO_SLOT for a wall
+        self._at_walls: list[Arc] = []  # arcs of walls in touch
+        self._contacts: list[Arc] = []  # the directions of their contacts
+        self._by_walks: dict[tuple[int, ...], list[Arc]] = {}  # by the slots that must stand
 
-    def update(self, slot: int, view: Mapping[int, float], complex_: FlagComplex, touched: Iterable[float]) -> None:
-        """Take in the slot's view [rad] and the complex around it, and the directions [rad] of walls in touch."""
-        self.around = {each: view[each] for each in complex_.neighbours[slot]}
-        self._by_view = arcs_of_walls(touched)
-        for triangle in complex_.triangles:
+    def update(self, slot: int, scan: ScanResult, touched: Iterable[float]) -> None:
+        """Take in the slot's view and the complex around it, and the directions [rad] of walls in touch."""
+        view = scan.views[slot]
+        self._scan = scan
+        self.around = {each: view[each] for each in scan.complex_.neighbours[slot]}
+        touched = tuple(touched)
+        self._at_walls, self._contacts = arcs_of_walls(touched), arcs_of_walls(touched, CONTACT_RAD)
+        self._by_view = []
+        for triangle in scan.complex_.triangles:
             if slot in triangle:
                 a, b = (each for each in triangle if each != slot)
                 self._by_view.append(arc_between(view[a], view[b]))
 
     def open_arcs(self) -> list[Arc]:
         """Return the arcs that nothing closes."""
-        walks = [arc for slot, arcs in self._by_walks.items() if slot == NO_SLOT or slot in self.around for arc in arcs]
-        return complement([*self._by_view, *walks])
+        standing = self._scan.complex_.neighbours
+        walks = [
+            arc for slots, arcs in self._by_walks.items() if all(each in standing for each in slots) for arc in arcs
+        ]
+        return complement([*self._by_view, *self._at_walls, *walks])
 
-    def pass_point(self, slot: int, before: WalkPoint | None, point: WalkPoint, hand: int) -> bool:
-        """Take in a point of a walk that this slot sees, and the point before it; return whether the open arcs are smaller."""
+    def pass_step(self, slot: int, earlier: Step | None, step: Step) -> bool:
+        """Take in a step of a walk whose end this slot sees, and the step before; return whether the open arcs are smaller."""
         old = sum(each.width_rad for each in self.open_arcs())
-        for other, arc in arcs_of_step(slot, before, point, hand, self.around):
-            key = NO_SLOT if other is None else other
-            self._by_walks[key] = united([*self._by_walks.get(key, ()), arc])
+        for arc in arcs_of_step(slot, step.before, step.point, step.hand):
+            self._add(step.witnesses, arc)
+        self._add_fan(slot, step.point, [step])
+        if earlier is not None and earlier.point is step.before:
+            self._add_fan(slot, earlier.point, [earlier, step])
         return sum(each.width_rad for each in self.open_arcs()) < old - NEWS_RAD
+
+    def _add_fan(self, slot: int, point: WalkPoint, steps: Sequence[Step]) -> None:
+        """Add the triangles of this slot, a neighbour and a point, if the space beyond them is proved by these steps."""
+        views, neighbours = self._scan.views, self._scan.complex_.neighbours
+        if slot not in point.seen or not any(each in self.around for each in point.seen):
+            return
+        at_walls = {}
+        for each in point.seen:
+            walls = [
+                arc
+                for step in steps
+                if each in step.point.seen and not step.witnesses
+                for arc in arcs_of_step(each, step.before, step.point, step.hand)
+            ]
+            if each == slot:
+                walls += [*self._contacts, *self._by_walks.get((), ())]
+            for side in (1, -1):
+                at_walls[each, side] = ends_at(walls, point.seen[each], side)
+        fan = fan_of(point, views, neighbours, at_walls)
+        if any(slot in pair for pair in fan):
+            needed = tuple(sorted({each for pair in fan for each in pair} - {slot}))
+            for pair in fan:
+                if slot in pair:
+                    self._add(needed, arc_between(views[slot][sum(pair) - slot], point.seen[slot]))
+
+    def _add(self, needed: tuple[int, ...], arc: Arc) -> None:
+        self._by_walks[needed] = united([*self._by_walks.get(needed, ()), arc])
 
     def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
         """Add arcs (start, width) [rad] in which a wall close to the slot was followed."""
-        self._by_walks[NO_SLOT] = united([*self._by_walks.get(NO_SLOT, ()), *(Arc(*each) for each in arcs)])
+        for each in arcs:
+            self._add((), Arc(*each))
 
-    def memory(self) -> tuple[tuple[int, float, float], ...]:
+    def memory(self) -> tuple[tuple[tuple[int, ...], float, float], ...]:
         """Return the arcs that walks closed, for the slot's next occupant."""
-        return tuple((slot, *arc) for slot, arcs in self._by_walks.items() for arc in arcs)
+        return tuple((slots, *arc) for slots, arcs in self._by_walks.items() for arc in arcs)
 
-    def inherit(self, memory: Iterable[tuple[int, float, float]]) -> None:
+    def inherit(self, memory: Iterable[tuple[tuple[int, ...], float, float]]) -> None:
         """Take over the arcs that walks closed from the slot's former occupant."""
         self._by_walks = {}
-        for slot, start, width in memory:
-            self._by_walks.setdefault(slot, []).append(Arc(start, width))
+        for slots, start, width in memory:
+            self._by_walks.setdefault(slots, []).append(Arc(start, width))

@@ -39,7 +39,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
 
     `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
     `felt` are directions [rad] of walls closer than a body. `explored` are directions of attempts to follow a wall.
-    `proved` has the arcs that walks closed: (slot at another corner or NOWHERE, start [rad], width [rad]).
+    `proved` has the arcs that walks closed: (slots that must stand, start [rad], width [rad]).
     """
 
     slot: int
@@ -53,7 +53,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     obstructed: tuple[tuple[tuple[int, ...], int], ...] = ()
     felt: tuple[float, ...] = ()
     explored: tuple[float, ...] = ()
-    proved: tuple[tuple[int, float, float], ...] = ()
+    proved: tuple[tuple[tuple[int, ...], float, float], ...] = ()
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).

@@ -14,7 +14,9 @@ class PassedPoint(_WalkMessage, frozen=True, tag="passed"):
     """To all: the `number`-th point of the walk of a push. The wall is at the `hand` (+1 left, -1 right).
 
     `seen` has (robot, direction [rad] from that robot to the point). `walls` are directions of touched walls, and
-    `robots` touched robots. The walking robot has been in touch since the point with the number `touch_since`.
+    `robots` touched robots. The walking robot follows the wall since the point with the number `touch_since`.
+    `hidden` has, for each robot that sees the walking robot again, the number of the last point that it saw before, and for
+    the points between the robots that saw them.
     """
 
     push: int
@@ -24,6 +26,7 @@ class PassedPoint(_WalkMessage, frozen=True, tag="passed"):
     seen: tuple[tuple[int, float], ...]
     walls: tuple[float, ...]
     robots: tuple[int, ...]
+    hidden: tuple[tuple[int, int, tuple[tuple[int, ...], ...]], ...] = ()
 
 
 class ArcClosed(_WalkMessage, frozen=True, tag="arc-closed"):

@@ -64,10 +64,9 @@ DriveToWalk = Generator[BodyVelocity, None, WalkResult]
 
 
 class NearPoint(NamedTuple):
-    """A point [m] of the way along a wall close to the start, whether the robot touched anything, and walls [rad]."""
+    """A point [m] of the way along a wall close to the start, and the directions of touched walls [rad]."""
 
     at: Vector
-    in_touch: bool
     walls: tuple[float, ...]
 
 
@@ -201,7 +200,7 @@ class WallWalk:
         return motion.velocity(ux * motion.step_m, uy * motion.step_m)
 
     def _near_point(self) -> NearPoint:
-        return NearPoint(self._motion.position, bool(self._motion.frame.contacts), self._motion.frame.touched)
+        return NearPoint(self._motion.position, self._motion.frame.touched)
 
     def _waypoint(self) -> Waypoint:
         frame = self._motion.frame
@@ -259,7 +258,7 @@ def arcs_around(
     found = []
     for before, point in pairwise(points):
         near_m = min(math.dist(start, each.at) for each in (before, point))
-        if (before.in_touch or point.in_touch) and near_m > NEAR_M_MIN:
+        if (before.walls or point.walls) and near_m > NEAR_M_MIN:
             step = _between(start, before.at, point.at)
             if step[1] * hand < 0.0:  # the start and the wall are on different sides of the step
                 found.append(step)

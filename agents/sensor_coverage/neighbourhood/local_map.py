@@ -271,7 +271,7 @@ class LocalMap(NeighbourTable):
     def _plan_walks(self, scan: ScanResult) -> None:
         """Find the open arcs around this robot, and the walks into them. A robot without neighbours has none."""
         me, slots = self.slot, self._slots
-        self.proof.update(me, scan.views[me], scan.complex_, (*slots.walls.get(me, ()), *slots.felt.get(me, ())))
+        self.proof.update(me, scan, (*slots.walls.get(me, ()), *slots.felt.get(me, ())))
         arcs, beside = self.proof.open_arcs(), next(iter(self.proof.around), me)
         self.wall_plans, self.unproven = self._planner.walls.plans_at(me, beside, arcs if beside != me else ())
 

@@ -1,6 +1,7 @@
 """The lead's decisions: the barrier, room in a corridor, reservations and division."""
 
 import msgspec
+import pytest
 
 from zwerm.agents.robot_teams.mapping.facts import RIGHT, TOP, End, SweptSegment, TracedArc
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
@@ -71,6 +72,16 @@ def test_free_robots_form_one_corridor_where_there_is_room() -> None:
     made = assign(swept(0, 1), VIEW, (), (), statuses, (), False, 6_000)
     assert len(made[0].order) == 4
     assert made[0].anchor.slice in (0, 1)
+
+
+@pytest.mark.parametrize("ahead", [0, 1])
+def test_of_robots_at_one_end_the_one_ahead_goes_first(ahead: int) -> None:
+    there = End(1, TOP, 5_000)
+    x_mm = {node: 1_500 if node == ahead else 900 for node in (0, 1)}
+    statuses = {node: msgspec.structs.replace(status(node, 0, at=there), x_mm=x_mm[node]) for node in (0, 1)}
+    first, *_ = assign(swept(0, 1), View(2, 0, (0, 1)), (), (), statuses, (), False, 6_000)
+    assert (first.anchor, first.direction) == (there, RIGHT)
+    assert first.order == (1 - ahead, ahead), "the lead of a corridor is the last in its order"
 
 
 def test_a_reserved_cell_is_left_to_the_robots_that_work_in_it() -> None:

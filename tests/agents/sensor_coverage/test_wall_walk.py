@@ -5,8 +5,7 @@ from typing import cast
 
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.walks import Arc
-from zwerm.agents.sensor_coverage.frontier.wall_proof import united
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, united
 from zwerm.agents.sensor_coverage.messages.commands import SHUT
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
@@ -48,8 +47,8 @@ def test_a_robot_goes_into_an_opening_at_its_hand() -> None:
 def test_a_wall_followed_close_to_a_slot_closes_the_arc_of_the_corner() -> None:
     """The slot touches a wall in the west. The robot follows the wall in the north into the corner, and comes back."""
     way = [(0.1, (90,)), (0.05, (90,)), (0.0, (90, 180))]
-    points = [NearPoint((x, 0.14), True, tuple(math.radians(each) for each in walls)) for x, walls in way]
-    points += [NearPoint((0.0, y), True, (math.pi,)) for y in (0.09, 0.04, 0.0)]
+    points = [NearPoint((x, 0.14), tuple(math.radians(each) for each in walls)) for x, walls in way]
+    points += [NearPoint((0.0, y), (math.pi,)) for y in (0.09, 0.04, 0.0)]
     arcs = arcs_around((0.0, 0.0), points, -1, 0.07)
     closed = united([Arc(*each) for each in arcs])
     assert len(closed) == 1
@@ -60,8 +59,14 @@ def test_a_wall_followed_close_to_a_slot_closes_the_arc_of_the_corner() -> None:
 
 def test_walls_in_different_directions_close_no_arc_between_them() -> None:
     """The robot drives from one wall to another: what is between is not followed."""
-    apart = [NearPoint((0.2, 0.0), True, (0.0,)), NearPoint((0.0, 0.2), True, (math.pi / 2.0,))]
+    apart = [NearPoint((0.2, 0.0), (0.0,)), NearPoint((0.0, 0.2), (math.pi / 2.0,))]
     assert arcs_around((0.0, 0.0), apart, 1, 0.07) == ()
+
+
+def test_a_robot_in_touch_is_no_wall_beside_a_slot() -> None:
+    """The robot leaves its slot around another robot, which may stand in an opening."""
+    way = [NearPoint((0.1, 0.14 - 0.05 * each), ()) for each in range(5)]
+    assert arcs_around((0.0, 0.0), way, 1, 0.07) == arcs_around((0.0, 0.0), way, -1, 0.07) == ()
 
 
 class Wedged:

@@ -10,8 +10,14 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, Final, NamedTuple, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
-from zwerm.agents.sensor_coverage.frontier.walks import WalkPoint
-from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, SlotProof, TouchCounter, point_before
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    SeenPoint,
+    SlotProof,
+    Step,
+    TouchCounter,
+    WalkPoint,
+    point_before,
+)
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
@@ -20,6 +26,10 @@ from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 
 # A robot makes plans again this many ticks after the latest point that closed something: the walk has passed.
 PASSED_TICKS: Final = 10
+# Points for which it is remembered who saw them, and points in which it is repeated who sees the walking robot again. Who
+# misses more points than the latter takes them as unseen.
+REMEMBERED_POINTS: Final = 60
+RESENT_POINTS: Final = 10
 
 
 class ProvedSlot(Protocol):
@@ -61,11 +71,43 @@ class WalkSituation(Protocol):
 
 
 class _Received(NamedTuple):
-    """The latest point that was received from a walking robot, and the slot where it was received."""
+    """The latest point that was received from a walking robot, its step, and the slot where it was received."""
 
     push: int
     slot: int
     seen: SeenPoint
+    step: Step
+
+
+class _Hidden(NamedTuple):
+    """A robot sees the walking robot again at the point `number`, after `last`; and the robots that saw the points between."""
+
+    number: int
+    last: int
+    between: tuple[tuple[int, ...], ...]
+
+
+class Sightlines:
+    """Which robots saw the points of this robot's walk, and which see it again after they had lost it."""
+
+    def __init__(self) -> None:
+        self._seen: dict[int, tuple[int, ...]] = {}  # the latest points
+        self._last: dict[int, int] = {}
+        self._hidden: dict[int, _Hidden] = {}
+
+    def take(self, number: int, seen: tuple[int, ...]) -> tuple[tuple[int, int, tuple[tuple[int, ...], ...]], ...]:
+        """Take in the robots that see a point, and return those that see the walking robot again; see `PassedPoint`."""
+        for node in seen:
+            last = self._last.get(node)
+            if last is not None and last < number - 1:
+                # Points that are forgotten were seen by nobody, as far as is known.
+                between = [self._seen.get(each, ()) for each in range(last + 1, number)]
+                self._hidden[node] = _Hidden(number, last, tuple(dict.fromkeys(between)))
+            self._last[node] = number
+        self._seen[number] = seen
+        self._seen.pop(number - REMEMBERED_POINTS, None)
+        self._hidden = {node: each for node, each in self._hidden.items() if each.number > number - RESENT_POINTS}
+        return tuple((node, each.last, each.between) for node, each in self._hidden.items() if node in seen)
 
 
 class WallProtocol(Component):
@@ -82,7 +124,7 @@ class WallProtocol(Component):
         self._push: int | None = None  # the push of this robot's own walk
         self._hand = 1
         self._number = 0
-        self._touch = TouchCounter()
+        self._touch, self._sightlines = TouchCounter(), Sightlines()
         self._closed = False
         self._received: dict[int, _Received] = {}
         self._replan_at: int | None = None
@@ -93,7 +135,8 @@ class WallProtocol(Component):
     def begin(self, push: int, hand: int) -> None:
         """Announce the points of the walk that begins now."""
         if push != self._push:
-            self._push, self._hand, self._number, self._touch = push, hand, 0, TouchCounter()
+            self._push, self._hand, self._number = push, hand, 0
+            self._touch, self._sightlines = TouchCounter(), Sightlines()
         self._closed = False
         self._situation.wall_walk.on_step = self._announce
 
@@ -110,7 +153,7 @@ class WallProtocol(Component):
     def _announce(self, at: Waypoint) -> None:
         heading = self._situation.local_map.heading or 0.0
         self._number += 1
-        self._touch.take(self._number, bool(at.touched or at.robots))
+        self._touch.take(self._number, bool(at.touched))
         point = PassedPoint(
             self._push or 0,
             self._number,
@@ -119,6 +162,7 @@ class WallProtocol(Component):
             tuple((each.node, wrapped(each.bearing_rad + heading + math.pi)) for each in at.sightings),
             tuple(wrapped(each + heading) for each in at.touched),
             at.robots,
+            self._sightlines.take(self._number, tuple(each.node for each in at.sightings)),
         )
         self._outbox.append(Outgoing(None, point))
 
@@ -152,13 +196,36 @@ class WallProtocol(Component):
         if slot not in point.seen:
             return
         received = self._received.get(sender)
-        last = received.seen if received is not None and received[:2] == (passed.push, slot) else None
+        if received is not None and received[:2] != (passed.push, slot):
+            received = None
         now = SeenPoint(passed.number, point)
-        self._received[sender] = _Received(passed.push, slot, now)
-        before = point_before(slot, last, now, passed.touch_since)
-        if local_map.proof.pass_point(slot, before, point, passed.hand):
+        step = Step(None, point, passed.hand)
+        if received is not None:
+            witnesses = self._witnesses(passed, received.seen.number, slots)
+            before = point_before(slot, received.seen, now, passed.touch_since)
+            if before is not None and witnesses is not None:
+                step = Step(before, point, passed.hand, witnesses)
+        self._received[sender] = _Received(passed.push, slot, now, step)
+        if local_map.proof.pass_step(slot, None if received is None else received.step, step):
             self._replan_at = tick + PASSED_TICKS
             self._outbox.append(Outgoing(sender, ArcClosed(passed.push)))
+
+    def _witnesses(self, passed: PassedPoint, last: int, slots: Mapping[int, int]) -> tuple[int, ...] | None:
+        """Return slots that saw all points since the one with the number `last`, as far as this robot did not; or None.
+
+        Points whose messages were lost were seen, unless the walking robot says otherwise.
+        """
+        hidden = next((each for each in passed.hidden if each[0] == self._situation.node), None)
+        if hidden is None or hidden[1] < last:
+            return () if passed.number - last <= RESENT_POINTS else None
+        found: dict[int, None] = {}
+        for witnesses in hidden[2]:
+            known = [slots[node] for node in witnesses if node in slots]
+            if not known:
+                return None
+            if not any(each in found for each in known):
+                found[known[0]] = None
+        return tuple(sorted(found))
 
     def _spread(self, push: int) -> None:
         self._over[push] = None

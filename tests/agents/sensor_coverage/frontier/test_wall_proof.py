@@ -1,13 +1,16 @@
 """The proof of coverage by arcs: conditions that close a direction, and conditions that do not."""
 
 import math
+from collections.abc import Iterable, Mapping
 
 import pytest
 
+from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.walks import Walk, WalkPoint
-from zwerm.agents.sensor_coverage.frontier.wall_proof import SlotProof, open_arcs
+from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, SlotProof, Step, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
+from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import RESENT_POINTS, Sightlines
 from zwerm.maths.simplicial import FlagComplex
 
 # Directions of a walk, and the walls that it touches.
@@ -21,9 +24,16 @@ def around(*degrees: float, hand: int, touched: bool = True) -> Walk:
     return Walk(0, hand, tuple(WalkPoint({0: math.radians(each)}, walls, ()) for each in degrees))
 
 
+def open_arcs(views: Mapping[int, Mapping[int, float]], walks: tuple[Walk, ...], *walls: float) -> dict[int, list[Arc]]:
+    """Return the open arcs of all slots; slot 0 touches walls in some directions."""
+    proof = SwarmProof()
+    proof.update(ScanResult(views, FlagComplex(views), ()), walks, {0: walls}, {})
+    return proof.open_arcs()
+
+
 def opened(*walks: Walk, walls: tuple[float, ...] = ()) -> list[tuple[int, int]]:
     """Return the open arcs of slot 0 in whole degrees."""
-    arcs = open_arcs(ALONE, FlagComplex(ALONE), walks, {0: walls}).get(0, [])
+    arcs = open_arcs(ALONE, walks, *walls).get(0, [])
     return [(round(math.degrees(each.start_rad)), round(math.degrees(each.width_rad))) for each in arcs]
 
 
@@ -55,13 +65,28 @@ def test_a_walk_that_loses_the_wall_no_longer_follows_it() -> None:
     assert opened(Walk(0, -1, (WalkPoint({0: 0.0}, (0.0,), ()), *free))) == [(40, 320)]
 
 
-def test_a_robot_may_lose_a_walk_behind_a_corner() -> None:
-    hidden = WalkPoint({}, (0.0,), ())
+def test_a_robot_may_lose_a_walk_behind_a_corner_that_another_robot_sees() -> None:
+    hidden, unseen = WalkPoint({1: 0.0}, (0.0,), ()), WalkPoint({}, (0.0,), ())
     seen = [WalkPoint({0: math.radians(each)}, (0.0,), ()) for each in (10, 35, 70)]
-    assert opened(Walk(0, -1, (seen[0], hidden, seen[1]))) == [(35, 335)]
-    assert opened(Walk(0, -1, (seen[0], hidden, seen[2]))) == [(0, 360)], "too wide an arc"
-    lost = [WalkPoint({}, (), ())] * 4
-    assert opened(Walk(0, -1, (seen[0], *lost, seen[1]))) == [(0, 360)], "the robot was not in touch"
+
+    def at_slot_0(*points: WalkPoint) -> list[Arc]:
+        return open_arcs({0: {}, 1: {}}, (Walk(0, -1, points),))[0]
+
+    assert sum(at_slot_0(seen[0], hidden, seen[1])[0]) == pytest.approx(math.tau + math.radians(10.0))
+    assert at_slot_0(seen[0], unseen, seen[1]) == [(0.0, math.tau)], "nobody saw the way between"
+    assert at_slot_0(seen[0], hidden, seen[2]) == [(0.0, math.tau)], "too wide an arc"
+    lost = [WalkPoint({1: 0.0}, (), ())] * 4
+    assert at_slot_0(seen[0], *lost, seen[1]) == [(0.0, math.tau)], "the robot was not in touch"
+    assert opened(Walk(0, -1, (seen[0], hidden, seen[1]))) == [(0, 360)], "the robot that saw the way has left"
+
+
+def test_a_robot_in_touch_keeps_no_walk_at_the_wall() -> None:
+    """The walk passes a robot that stands in an opening, behind a corner."""
+    hidden = [WalkPoint({1: 0.0}, (), (1,))] * 4
+    ends = [WalkPoint({0: math.radians(each)}, SOUTH, ()) for each in (10, 35)]
+    views: dict[int, dict[int, float]] = {0: {}, 1: {}}
+    assert open_arcs(views, (Walk(0, -1, (ends[0], *hidden, ends[1])),))[0] == [(0.0, math.tau)]
+    assert open_arcs(views, (Walk(0, -1, (ends[0], *hidden[:1], ends[1])),))[0] != [(0.0, math.tau)]
 
 
 def test_a_walk_closes_the_arc_that_it_was_seen_in() -> None:
@@ -78,15 +103,80 @@ def test_a_wall_in_touch_closes_a_quarter_turn() -> None:
 
 def test_a_triangle_closes_the_arc_between_its_robots() -> None:
     views = {0: {1: 0.0, 2: math.pi / 3.0}, 1: {0: math.pi, 2: 2.0}, 2: {0: -2.0, 1: -1.0}}
-    arcs = open_arcs(views, FlagComplex(views), (), {})
+    arcs = open_arcs(views, ())
     assert arcs[0] == [pytest.approx((math.pi / 3.0, math.tau - math.pi / 3.0))]
 
 
+# Slot 0 and slot 1 see each other, and a walk in the south from the south-east of slot 0 to the south-west of slot 1.
+PAIR = {0: {1: 0.0}, 1: {0: math.pi}}
+SOUTH = (math.radians(-90.0),)
+
+
+def between_two(*degrees: tuple[int, int]) -> list[WalkPoint]:
+    return [WalkPoint({0: math.radians(a), 1: math.radians(b)}, SOUTH, ()) for a, b in degrees]
+
+
 def test_a_walk_past_two_robots_closes_the_arc_between_robot_and_wall() -> None:
-    views = {0: {1: 0.0}, 1: {0: math.pi}}
-    walk = Walk(0, 1, (WalkPoint({0: -0.5, 1: math.pi + 0.5}, (-math.pi / 2.0,), ()),))
-    arcs = open_arcs(views, FlagComplex(views), (walk,), {})
-    assert arcs[0] == [pytest.approx((0.0, math.tau - 0.5))]
+    """The wall goes on beyond the lines of sight from both robots to the point of the walk."""
+    points = [
+        WalkPoint({0: math.radians(-70.0)}, SOUTH, ()),
+        *between_two((-45, -135)),
+        WalkPoint({1: math.radians(-110.0)}, SOUTH, ()),
+    ]
+    arcs = open_arcs(PAIR, (Walk(0, -1, tuple(points)),))
+    assert arcs[0] == [pytest.approx((0.0, math.tau - math.radians(70.0)))]
+    assert arcs[1] == [pytest.approx((math.pi + math.radians(70.0), math.tau - math.radians(70.0)))]
+
+
+# Each walk ends beside a door that is between the two robots.
+DOOR = tuple(between_two(each) for each in ((-75, -105), (-35, -145)))
+PASSING = [
+    WalkPoint({0: math.radians(-70.0)}, SOUTH, ()),
+    *between_two((-45, -135)),
+    WalkPoint({0: math.radians(-30.0), 1: math.radians(-110.0)}, SOUTH, ()),
+]
+
+
+def test_two_points_of_walks_beside_a_door_close_nothing() -> None:
+    """The triangles of the two robots with the points cross. Behind the crossing, each robot would rely on the other."""
+    walks = tuple(Walk(0, -1, tuple(points)) for points in DOOR)
+    assert {slot: round(sum(each.width_rad for each in arcs), 6) for slot, arcs in open_arcs(PAIR, walks).items()} == {
+        0: round(math.tau, 6),
+        1: round(math.tau, 6),
+    }
+
+
+def test_robots_in_touch_with_both_sides_of_a_door_do_not_close_it() -> None:
+    """A walk in the next room is seen between the robots only. Each robot touches the end of a wall below it."""
+    contacts = [math.radians(-80.0)]
+    point = between_two((-45, -135))
+    walks = (Walk(0, -1, tuple(point)),)
+    proof = SwarmProof()
+    proof.update(ScanResult(PAIR, FlagComplex(PAIR), ()), walks, {0: contacts, 1: [math.radians(-100.0)]}, {})
+    assert _degrees(proof.open_arcs()) == {0: 270, 1: 270}
+    local = at_slot(0, PAIR, *contacts)
+    pass_walk(local, 0, point, -1)
+    assert math.degrees(open_rad(local)) == pytest.approx(270.0)
+
+
+def test_both_ends_of_an_edge_rely_on_the_same_point_of_a_walk() -> None:
+    """There is a wall on both sides of a door. Slot 0 would rely on the left wall, and slot 1 on the right one."""
+    left, right = ((-84, -153), (-80, -150), (-77, -148)), ((-33, -103), (-30, -100), (-26, -96))
+    walks = tuple(Walk(0, -1, tuple(between_two(*each))) for each in (left, right))
+    one = [_degrees(open_arcs(PAIR, (walk,))) for walk in walks]
+    assert one == [{0: 276, 1: 328}, {0: 327, 1: 276}]
+    both = _degrees(open_arcs(PAIR, walks))
+    assert both in ({0: 276, 1: 321}, {0: 320, 1: 276}), "closed by one point, and by the steps of the other walk"
+
+
+def _degrees(arcs: Mapping[int, Iterable[Arc]]) -> dict[int, int]:
+    return {slot: round(math.degrees(sum(each.width_rad for each in found))) for slot, found in arcs.items()}
+
+
+def test_a_walk_past_a_robot_is_no_wall() -> None:
+    points = [WalkPoint({0: math.radians(each)}, (), (1,)) for each in (10, 40, 80)]
+    arcs = open_arcs({0: {}, 1: {}}, (Walk(0, -1, tuple(points)),))
+    assert arcs[0] == [(0.0, math.tau)]
 
 
 def test_a_walk_that_touches_robot_and_wall_closes_the_pocket_between_them() -> None:
@@ -107,23 +197,69 @@ def test_walks_turn_with_the_frame_in_which_they_were_seen() -> None:
     assert slots.walks[1].turned(3, 1.0) == Walk(3, 1, (WalkPoint({0: 1.75 + math.pi}, (2.5,), (0,)),))
 
 
-def test_a_slot_keeps_what_a_walk_closed_and_passes_it_on() -> None:
-    """Slot 0 sees slot 1. The walk closes an arc with slot 1, and an arc by a step along the wall."""
-    views = {0: {1: 0.0}, 1: {0: math.pi}}
-    points = [
-        WalkPoint({0: -0.5, 1: math.pi + 0.5}, (-math.pi / 2.0,), ()),
-        WalkPoint({0: -0.9}, (-math.pi / 2.0,), ()),
-    ]
+# --- without a coordinator: the proof at one slot -----------------------------------------------------------------------
+
+
+def at_slot(slot: int, views: Mapping[int, Mapping[int, float]], *walls: float) -> SlotProof:
+    """Return the proof at a slot that touches walls in these directions [rad]."""
     proof = SlotProof()
-    proof.update(0, views[0], FlagComplex(views), ())
-    assert proof.pass_point(0, None, points[0], 1)
-    assert proof.open_arcs() == [pytest.approx((0.0, math.tau - 0.5))]
-    assert proof.pass_point(0, points[0], points[1], 1)
-    assert not proof.pass_point(0, points[0], points[1], 1), "nothing is new"
-    assert proof.open_arcs() == [pytest.approx((0.0, math.tau - 0.9))]
+    proof.update(slot, ScanResult(views, FlagComplex(views), ()), walls)
+    return proof
+
+
+def pass_walk(proof: SlotProof, slot: int, points: Iterable[WalkPoint], hand: int) -> list[bool]:
+    """Let a walk pass a slot; return after which points the open arcs are smaller."""
+    steps: list[Step] = []
+    smaller = []
+    for point in points:
+        last = steps[-1] if steps else None
+        steps.append(Step(None if last is None else last.point, point, hand))
+        smaller.append(proof.pass_step(slot, last, steps[-1]))
+    return smaller
+
+
+def open_rad(proof: SlotProof) -> float:
+    return sum(each.width_rad for each in proof.open_arcs())
+
+
+def test_a_slot_keeps_what_a_walk_closed_and_passes_it_on() -> None:
+    """Slot 0 sees slot 1. The walk closes arcs by its steps, and an arc with slot 1."""
+    proof = at_slot(0, PAIR)
+    assert pass_walk(proof, 0, PASSING, -1) == [False, True, True]
+    assert proof.open_arcs() == [pytest.approx((0.0, math.tau - math.radians(70.0)))]
+    assert not any(pass_walk(proof, 0, PASSING, -1)), "nothing is new"
     heir = SlotProof()
     heir.inherit(proof.memory())
-    heir.update(0, views[0], FlagComplex(views), ())
+    heir.update(0, ScanResult(PAIR, FlagComplex(PAIR), ()), ())
     assert heir.open_arcs() == proof.open_arcs()
-    heir.update(0, {}, FlagComplex({0: {}}), ())
-    assert heir.open_arcs() == [pytest.approx((math.tau - 0.5, math.tau - 0.4))], "slot 1 is gone"
+    heir.update(0, ScanResult({0: {}}, FlagComplex({0: {}}), ()), ())
+    assert open_rad(heir) == pytest.approx(math.tau - math.radians(40.0)), "slot 1 is gone"
+
+
+def test_two_points_of_walks_beside_a_door_close_nothing_at_a_slot() -> None:
+    """The triangles of the two robots with the points cross. Behind the crossing, each robot would rely on the other."""
+    proof = at_slot(0, PAIR)
+    for points in DOOR:
+        pass_walk(proof, 0, points, -1)
+    assert open_rad(proof) == pytest.approx(math.tau)
+
+
+def test_an_arc_behind_a_corner_stays_closed_while_the_robot_that_saw_the_way_stands() -> None:
+    proof = at_slot(0, PAIR)
+    before, point = (WalkPoint({0: math.radians(each)}, SOUTH, ()) for each in (-90.0, -70.0))
+    assert proof.pass_step(0, None, Step(before, point, -1, (1,)))
+    assert open_rad(proof) == pytest.approx(math.tau - math.radians(20.0))
+    proof.update(0, ScanResult({0: {}}, FlagComplex({0: {}}), ()), ())
+    assert open_rad(proof) == pytest.approx(math.tau)
+
+
+def test_a_walking_robot_tells_who_saw_the_way_that_a_robot_did_not_see() -> None:
+    lines = Sightlines()
+    assert lines.take(1, (7, 8)) == ()
+    assert lines.take(2, (8,)) == ()
+    assert lines.take(3, (8, 9)) == ()
+    assert lines.take(4, (7, 9)) == ((7, 1, ((8,), (8, 9))),)
+    assert lines.take(5, (7,)) == ((7, 1, ((8,), (8, 9))),), "repeated, because the message may be lost"
+    for number in range(6, 4 + RESENT_POINTS):
+        assert lines.take(number, (7,))
+    assert lines.take(4 + RESENT_POINTS, (7,)) == ()

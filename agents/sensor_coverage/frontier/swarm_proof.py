@@ -1,0 +1,223 @@
+"""The local proof of coverage (`zwerm.agents.sensor_coverage.frontier.wall_proof`) of all slots, by a node that knows them.
+
+Most of it does not change from scan to scan. It is computed again for the slots around which something has changed.
+"""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
+
+from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    CONTACT_RAD,
+    Arc,
+    Pair,
+    SeenPoint,
+    TouchCounter,
+    Walk,
+    WalkPoint,
+    arc_between,
+    arcs_of_step,
+    arcs_of_walls,
+    complement,
+    ends_at,
+    fan_of,
+    overlap,
+    point_before,
+    side_of,
+    united,
+)
+from zwerm.maths.simplicial import FlagComplex
+
+# A triangle closes more than another one only if the difference is larger than this [rad].
+EQUAL_RAD: Final = 1e-6
+
+
+class Passed(NamedTuple):
+    """A point of a walk that a slot saw, the point before it if that closes an arc, and the hand at the wall.
+
+    `number` counts the points of all walks. The slot did not see the points between these two. Each of them was seen by
+    other slots.
+    """
+
+    number: int
+    before: WalkPoint | None
+    point: WalkPoint
+    hand: int
+    between: tuple[Collection[int], ...]
+
+
+class Around(NamedTuple):
+    """What was known around a slot when its arcs were found."""
+
+    passed: int
+    view: Mapping[int, float]
+    touched: Sequence[float]
+    near: Sequence[Arc]
+
+
+class SwarmProof:
+    """The closed arcs of all slots of one scan."""
+
+    def __init__(self) -> None:
+        self._walks: Sequence[Walk] = ()
+        self._count = 0  # walks that `_points` contains
+        self._points: list[WalkPoint] = []
+        self._passed: dict[int, list[Passed]] = {}
+        self._witnessed: dict[int, dict[int, None]] = {}  # slots that rely on points which this slot saw
+        self._forget()
+
+    def _forget(self) -> None:
+        self._scan = ScanResult({}, FlagComplex({}), ())
+        self._neighbours: dict[int, frozenset[int]] = {}
+        self._around: dict[int, Around] = {}
+        self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
+        self._pairs: dict[int, tuple[Pair, ...]] = {}  # the valid triangles, by the number of their point
+        self._chosen: dict[Pair, tuple[WalkPoint, ...]] = {}  # the points of triangles beside an edge, one a side
+        self._open_arcs: dict[int, list[Arc]] = {}
+
+    def update(
+        self,
+        scan: ScanResult,
+        walks: Sequence[Walk],
+        touched: Mapping[int, Sequence[float]],
+        near: Mapping[int, Sequence[Arc]],
+    ) -> None:
+        """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it."""
+        self._index(walks)
+        self._scan = scan
+        complex_ = scan.complex_
+        gone = [slot for slot in self._around if slot not in complex_.neighbours]
+        self._neighbours = {slot: frozenset(each) for slot, each in complex_.neighbours.items()}
+        changed: dict[int, None] = {}
+        for slot in complex_.vertices:
+            view = scan.views[slot]
+            beside = {each: view[each] for each in complex_.neighbours[slot]}
+            now = Around(len(self._passed.get(slot, ())), beside, touched.get(slot, ()), tuple(near.get(slot, ())))
+            if self._around.get(slot) != now:
+                self._around[slot] = now
+                changed[slot] = None
+        self._refresh(changed, gone)
+
+    def open_arcs(self) -> dict[int, list[Arc]]:
+        """Return the arcs in which each slot is open, without the slots that are open in none."""
+        return {slot: arcs for slot in self._around if (arcs := self._open(slot))}
+
+    # --- what has changed -------------------------------------------------------------------------------------------
+
+    def _index(self, walks: Sequence[Walk]) -> None:
+        """Find the slots that saw each point of the walks that are new. Another list: all have other directions."""
+        if walks is not self._walks:
+            self._walks, self._count = walks, 0
+            self._points, self._passed, self._witnessed = [], {}, {}
+            self._forget()
+        for walk in walks[self._count :]:
+            for slot, passed in _passes(walk, len(self._points)):
+                self._passed.setdefault(slot, []).append(passed)
+                for each in dict.fromkeys(each for witnesses in passed.between for each in witnesses):
+                    self._witnessed.setdefault(each, {})[slot] = None
+            self._points += walk.points
+        self._count = len(walks)
+
+    def _refresh(self, changed: dict[int, None], gone: Iterable[int]) -> None:
+        """Find the arcs again of slots around which something has changed, and of those that rely on slots that are gone."""
+        points: dict[int, None] = {}
+        stale = dict(changed)
+        for slot in gone:
+            points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
+            stale |= self._witnessed.get(slot, {})
+            self._spoil(slot)
+            for known in (self._around, self._followed):
+                known.pop(slot, None)
+        for slot in stale:
+            if slot in self._around:
+                points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
+                self._followed[slot] = self._arcs_to_walls(slot)
+                self._spoil(slot)
+        for number in points:
+            old, new = self._pairs.get(number, ()), self._valid(self._points[number])
+            if old != new:
+                self._pairs[number] = new
+                for slot in dict.fromkeys(slot for pair in (*old, *new) for slot in pair):
+                    self._spoil(slot)
+
+    def _spoil(self, slot: int) -> None:
+        """Forget what depends on the arcs of a slot."""
+        self._open_arcs.pop(slot, None)
+        for pair in [pair for pair in self._chosen if slot in pair]:
+            del self._chosen[pair]
+            for each in pair:
+                self._open_arcs.pop(each, None)
+
+    # --- arcs -------------------------------------------------------------------------------------------------------
+
+    def _open(self, slot: int) -> list[Arc]:
+        """Return the open arcs of a slot."""
+        known = self._open_arcs.get(slot)
+        if known is None:
+            view = self._scan.views[slot]
+            closed = self._closed_without_fans(slot)
+            for other in self._neighbours[slot]:
+                closed += [arc_between(view[other], each.seen[slot]) for each in self._choose(slot, other)]
+            known = self._open_arcs[slot] = complement(closed)
+        return known
+
+    def _closed_without_fans(self, slot: int) -> list[Arc]:
+        """Return the arcs of a slot that walls and triangles of robots close."""
+        view, beside = self._scan.views[slot], self._neighbours[slot]
+        closed = [*self._followed[slot], *arcs_of_walls(self._around[slot].touched)]
+        return closed + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
+
+    def _choose(self, slot: int, other: int) -> tuple[WalkPoint, ...]:
+        """Return the point of the triangle on each side of an edge, if there is one: the one that closes most at both ends.
+
+        With different points at the two ends, the triangles would cross, and each end would rely on the other.
+        """
+        a, b = pair = (slot, other) if slot < other else (other, slot)
+        known = self._chosen.get(pair)
+        if known is None:
+            views = self._scan.views
+            points = [each.point for each in self._passed.get(a, ()) if pair in self._pairs.get(each.number, ())]
+            best: dict[int, tuple[float, WalkPoint]] = {}
+            opened = {each: complement(self._closed_without_fans(each)) for each in (pair if points else ())}
+            for point in points:
+                arcs = ((a, arc_between(views[a][b], point.seen[a])), (b, arc_between(views[b][a], point.seen[b])))
+                gain = sum(overlap(arc, each) for slot, arc in arcs for each in opened[slot])
+                side = side_of(point, a, views[a][b])
+                if side not in best or gain > best[side][0] + EQUAL_RAD:
+                    best[side] = gain, point
+            known = self._chosen[pair] = tuple(point for _, point in best.values())
+        return known
+
+    def _arcs_to_walls(self, slot: int) -> list[Arc]:
+        """Return the arcs at a slot that end at followed walls or at contacts. They are disjoint."""
+        around = self._around[slot]
+        found = [*arcs_of_walls(around.touched, CONTACT_RAD), *around.near]
+        for _, before, point, hand, between in self._passed.get(slot, ()):
+            if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
+                found += arcs_of_step(slot, before, point, hand)
+        return united(found)
+
+    def _valid(self, point: WalkPoint) -> tuple[Pair, ...]:
+        """Return the pairs of slots whose triangle with a point counts."""
+        at_walls = {
+            (slot, side): ends_at(self._followed[slot], there, side)
+            for slot, there in point.seen.items()
+            if slot in self._neighbours
+            for side in (1, -1)
+        }
+        return fan_of(point, self._scan.views, self._neighbours, at_walls)
+
+
+def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
+    """Yield each slot that saw a point of a walk, with that point; `first` is the number of the first point."""
+    last: dict[int, SeenPoint] = {}
+    touch = TouchCounter()
+    for number, point in enumerate(walk.points):
+        touch.take(number, bool(point.walls))
+        now = SeenPoint(number, point)
+        for slot in point.seen:
+            before = point_before(slot, last.get(slot), now, touch.since)
+            since = number if before is None else last[slot].number + 1
+            between = tuple(each.seen.keys() for each in walk.points[since:number])
+            yield slot, Passed(first + number, before, point, walk.hand, between)
+            last[slot] = now
