@@ -11,14 +11,16 @@ In real time a world that is delayed gets the answers of many ticks at once, and
 
 import argparse
 import csv
+import ctypes
 import math
 import os
 import statistics
+import sys
 import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from csv_rows import add_csv_option, write_csv
@@ -95,6 +97,21 @@ def descriptors(pid: int) -> int:
     return len(list(Path(f"/proc/{pid}/fd").iterdir()))
 
 
+class _MallocInfo(ctypes.Structure):
+    """The C library's `struct mallinfo2`: sizes [bytes] of its heaps together."""
+
+    _names = ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost")
+    _fields_: ClassVar = [(name, ctypes.c_size_t) for name in _names]
+
+
+def heap_mb() -> tuple[float, float]:
+    """Return the memory of this process that the C library's heaps have lent, and what they keep free [MB]."""
+    read = ctypes.CDLL(None).mallinfo2
+    read.restype = _MallocInfo
+    found = read()
+    return (found.uordblks + found.hblkhd) / MEBIBYTE, found.fordblks / MEBIBYTE
+
+
 def sample(time_s: float, first: Sequence[int]) -> dict[str, float]:
     """Measure all processes; `first` are the robots of the beginning, of which some still live."""
     memory: dict[int, float] = {}
@@ -112,6 +129,9 @@ def sample(time_s: float, first: Sequence[int]) -> dict[str, float]:
     return {
         "time_s": time_s,
         "world_mb": memory_mb(me),
+        "heap_used_mb": heap_mb()[0],
+        "heap_free_mb": heap_mb()[1],
+        "python_blocks": sys.getallocatedblocks(),
         "world_descriptors": descriptors(me),
         "world_threads": len(list(Path(f"/proc/{me}/task").iterdir())),
         "robots": len(memory),
@@ -126,13 +146,16 @@ def sample(time_s: float, first: Sequence[int]) -> dict[str, float]:
 class Sampler:
     """Samples this process and its robots, and writes each sample to `path` at once.
 
-    Samples are taken every `every_s` of the wall clock, in a thread of their own; with `tick_s`, the duration of a tick, of
-    virtual time.
+    `tick_s` is the duration of a tick. Samples are taken every `every_s` of the wall clock, in a thread of their own; of
+    virtual time where the run is not `paced`.
     """
 
-    def __init__(self, path: Path | None, every_s: float, tick_s: float | None = None) -> None:
+    def __init__(self, path: Path | None, every_s: float, tick_s: float, *, paced: bool = True) -> None:
         self.samples: list[dict[str, float]] = []
         self._tick_s = tick_s
+        self._paced = paced
+        self._slip_s = 0.0  # the longest time by which a tick was behind, since the last sample
+        self._begin_s = math.inf
         self._first: Sequence[int] = ()
         self._path = path
         self._every_s = every_s
@@ -143,12 +166,15 @@ class Sampler:
         """Begin when all robots have joined."""
         if count == total:
             self._first = own_robots()
-            if self._tick_s is None:
+            if self._paced:
                 self._thread.start()
 
     def ticked(self, tick: int, ticks: int) -> None:
         """Take a sample where one is due by virtual time."""
-        if self._tick_s is not None and tick * self._tick_s >= (len(self.samples) + 1) * self._every_s:
+        behind_s = time.monotonic() - tick * self._tick_s
+        self._begin_s = min(self._begin_s, behind_s)
+        self._slip_s = max(self._slip_s, behind_s - self._begin_s)
+        if not self._paced and tick * self._tick_s >= (len(self.samples) + 1) * self._every_s:
             self._sample(tick * self._tick_s)
 
     def covered(self, fraction: float, robots: int) -> None:
@@ -166,7 +192,8 @@ class Sampler:
             self._sample(time.monotonic() - begin_s)
 
     def _sample(self, time_s: float) -> None:
-        self.samples.append(sample(round(time_s, 1), self._first))
+        slip_s, self._slip_s = self._slip_s, 0.0
+        self.samples.append(sample(round(time_s, 1), self._first) | {"slip_s": slip_s})
         if self._path is not None:
             with self._path.open("a", encoding="utf-8", newline="") as file:
                 writer = csv.DictWriter(file, list(self.samples[0]), lineterminator="\n")
@@ -212,6 +239,7 @@ def rows_of(result: RunResult, samples: Sequence[dict[str, float]]) -> list[dict
 
     return [
         row("memory of the world [MB]", "world_mb", 1, f"trend at most {WORLD_MB_PER_H_MAX:g}"),
+        row("heap of the world in use [MB]", "heap_used_mb", 1, ""),
         row("descriptors of the world", "world_descriptors", 0, "no trend"),
         row("threads of the world", "world_threads", 0, "no trend"),
         row(
@@ -220,6 +248,7 @@ def rows_of(result: RunResult, samples: Sequence[dict[str, float]]) -> list[dict
         row("memory of a robot, largest [MB]", "robot_mb_max", 2, ""),
         row("descriptors of a robot, most", "robot_descriptors_max", 0, "no trend"),
         count("wall time [s]", round(result.wall_s)),
+        count("longest delay of a tick [s]", round(max((each["slip_s"] for each in samples), default=0.0), 2)),
         count("ticks", result.ticks),
         count("observations", result.robot_ticks),
         count("radio packets delivered", result.radio["delivered"]),
@@ -242,15 +271,19 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=100)
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--lock-step", action="store_true", help="do not pace the run; times are virtual")
+    parser.add_argument("--tick-s", type=float, default=TICK_S, help="the duration of a tick [s]")
     parser.add_argument("--every-s", type=float, default=10.0, help="seconds between samples")
     parser.add_argument("--series", type=Path, metavar="FILE", help="write every sample to this CSV file")
     add_csv_option(parser)
     options = parser.parse_args()
     if options.series is not None:
         options.series.unlink(missing_ok=True)
-    sampler = Sampler(options.series, options.every_s, TICK_S if options.lock_step else None)
+    sampler = Sampler(options.series, options.every_s, options.tick_s, paced=not options.lock_step)
     duration_s = options.minutes * MINUTE_S
-    asked, pace = settings(options.robots, duration_s), None if options.lock_step else 1.0
+    asked, pace = (
+        [*settings(options.robots, duration_s), f"time.dt_s={options.tick_s}"],
+        None if options.lock_step else 1.0,
+    )
     try:
         result = run("gossip-max", runner="processes", overrides=asked, realtime=pace, watcher=sampler)
     finally:

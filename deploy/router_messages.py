@@ -3,8 +3,8 @@ connections that speak another protocol.
 
 Zenoh reports these only in its log, which it writes to descriptor 1. `capture` moves the standard output of this process to
 another descriptor, and reads Zenoh's log in a thread. This holds until the process ends, because Zenoh's log cannot be
-switched off again. So it is for the command line. The log has a line for each message that the router carries: the world
-needs about half as much processor time again (measured with 30 robots in lock-step).
+switched off again. The log has a line for each message that the router carries: the world
+needs up to twice the processor time (measured with 30 robots in lock-step).
 """
 
 import contextlib
@@ -17,6 +17,8 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import zenoh
+
+from zwerm.wire.refusals import Refusals
 
 # What Zenoh's log holds: every decision of the access control, failed handshakes, and discarded messages.
 _FILTER: Final = ",".join(
@@ -77,6 +79,8 @@ class RefusalParser:
     """
 
     def __init__(self) -> None:
+        # Which node a session belongs to that the log has not named, -1 for none.
+        self.node_of_session: Callable[[str], int] = lambda session: -1
         self._key = b""
         self._evaluated: set[bytes] = set()
         self._node_of: dict[bytes, int] = {}  # by session
@@ -106,7 +110,8 @@ class RefusalParser:
             self._evaluated.add(operation)
             return None
         tried = f"session {_text(session)}: {_text(operation)} on {_text(key)}"
-        return RouterEvent(DENIED, self._node_of.get(session, -1), tried)
+        node = self._node_of.get(session)
+        return RouterEvent(DENIED, self.node_of_session(_text(session)) if node is None else node, tried)
 
 
 def _text(part: bytes) -> str:
@@ -118,7 +123,7 @@ class RouterMessages:
 
     def __init__(self) -> None:
         self.on_event: Callable[[RouterEvent], object] | None = None
-        self._parser = RefusalParser()
+        self.parser = RefusalParser()
         self._settled: queue.SimpleQueue[None] = queue.SimpleQueue()  # Ctrl-C cannot leave it locked, unlike an Event
         reader, writer = os.pipe()
         sys.stdout.flush()
@@ -150,8 +155,47 @@ class RouterMessages:
             for line in lines:
                 if line == _SETTLE:
                     self._settled.put(None)
-                elif (event := self._parser.parse(line)) is not None and self.on_event is not None:
+                elif (event := self.parser.parse(line)) is not None and self.on_event is not None:
                     self.on_event(event)
+
+
+class RouterCounts:
+    """Counts what this process's router refuses, by node and reason, from now on. `note` is called with each refusal.
+
+    `node_of_session` tells which joined node a Zenoh id belongs to, -1 for none. It names sessions that began before.
+    """
+
+    def __init__(
+        self,
+        node_of_session: Callable[[str], int] | None = None,
+        note: Callable[[int, str, str], object] = lambda node, reason, detail: None,
+    ) -> None:
+        self._refusals = Refusals()
+        self._note = note
+        self._messages = capture()
+        if node_of_session is not None:
+            self._messages.parser.node_of_session = node_of_session
+        self._messages.on_event = self._on_event
+
+    def denials(self) -> dict[int, int]:
+        """Return the number of operations that the router has denied to each known node so far."""
+        return {node: reasons.get(DENIED, 0) for node, reasons in self._refusals.by_node.items() if node >= 0}
+
+    def settled(self) -> Refusals:
+        """Return the counts of all that the router has refused so far."""
+        if self._messages.on_event is not None:
+            self._messages.settle()
+        return self._refusals
+
+    def close(self) -> None:
+        """Count no more; idempotent."""
+        if self._messages.on_event is not None:
+            self._messages.settle()
+            self._messages.on_event = None
+
+    def _on_event(self, event: RouterEvent) -> None:
+        self._refusals.count(event.node, event.reason)
+        self._note(event.node, event.reason, event.detail)
 
 
 _SETTLE: Final = b"zwerm: everything before this line was read"

@@ -16,9 +16,8 @@ from typing import Any, Final, Self
 
 import msgspec
 
-from zwerm.deploy.router_messages import DENIED, RouterEvent, RouterMessages, capture
+from zwerm.deploy.router_messages import RouterCounts
 from zwerm.errors import ScenarioError
-from zwerm.wire.refusals import Refusals
 
 LINES_MAX: Final = 1_000
 UNKNOWN_NODE: Final = -1
@@ -32,7 +31,6 @@ class SecurityLog:
     """
 
     def __init__(self, path: Path, router: bool) -> None:
-        self._router_refusals = Refusals()
         self.error = ""  # why the log is incomplete
         self._path = path
         self._counts: dict[int, Counter[str]] = {}
@@ -52,9 +50,7 @@ class SecurityLog:
             pass
         with contextlib.suppress(OSError):  # a device
             self._file.truncate(0)
-        self._router: RouterMessages | None = capture() if router else None
-        if self._router is not None:
-            self._router.on_event = self._on_router
+        self.router: RouterCounts | None = RouterCounts(note=self.note) if router else None
 
     def __enter__(self) -> Self:
         return self
@@ -73,32 +69,15 @@ class SecurityLog:
                 known = None if node == UNKNOWN_NODE else node
                 self._write({"node": known, "reason": reason, "detail": detail})
 
-    def denials(self) -> dict[int, int]:
-        """Return the number of operations that the router has denied to each known node so far."""
-        known = self._router_refusals.by_node
-        return {node: reasons.get(DENIED, 0) for node, reasons in known.items() if node != UNKNOWN_NODE}
-
-    def router_refusals(self) -> Refusals:
-        """Return the counts of all that the router has refused so far."""
-        if self._router is not None:
-            self._router.settle()
-        return self._router_refusals
-
     def close(self) -> None:
         """Write the counts, and close the file; idempotent."""
-        if self._router is not None:
-            self._router.settle()
-            self._router.on_event = None
-            self._router = None
+        if self.router is not None:
+            self.router.close()
         with self._lock:
             if not self._file.closed:
                 self._write({"counts": counts_by_name(self._counts)})
                 with contextlib.suppress(OSError):
                     self._file.close()
-
-    def _on_router(self, event: RouterEvent) -> None:
-        self._router_refusals.count(event.node, event.reason)
-        self.note(event.node, event.reason, event.detail)
 
     def _write(self, line: dict[str, Any]) -> None:
         if self.error or self._file.closed:

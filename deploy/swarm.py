@@ -106,6 +106,7 @@ class _Swarm(ABC):
         self._progress = progress or (lambda joined, total: None)
         self._deadline_s = deadline_s
         self._stack = contextlib.ExitStack()
+        self._probed = ""  # the endpoint by which the router is probed
         self._probe_password = secrets.token_urlsafe(SECRET_BYTES)
 
     def __enter__(self) -> Self:
@@ -143,7 +144,32 @@ class _Swarm(ABC):
 
     def _member(self, credential: Credential) -> ExpectedNode:
         controller, setup = self._members[credential.node]
-        return ExpectedNode(credential.incarnation, controller, encode(setup), self._paced)
+        return ExpectedNode(credential.incarnation, controller, encode(setup), self._paced, session=credential.zid)
+
+    @contextlib.contextmanager
+    def _joining(self) -> Iterator[None]:
+        """Add to the error of a robot that does not join where the router takes no more sessions."""
+        try:
+            yield
+        except LinkError as error:
+            if self.takes_sessions():
+                raise
+            raise LinkError(f"{error}; the router takes no more sessions") from None
+
+    def takes_sessions(self) -> bool:
+        """Return whether the router admits one more session, within PROBE_S_MAX."""
+        settings = {
+            "mode": "client",
+            "connect/endpoints": [self._probed],
+            "connect/timeout_ms": round(1000 * PROBE_S_MAX),
+            "connect/exit_on_failure": True,
+            "transport/auth/usrpwd": {"user": PROBE, "password": self._probe_password},
+        }
+        try:
+            open_session(settings, "probe").close()  # type: ignore[no-untyped-call]
+        except LinkError:
+            return False
+        return True
 
     @abstractmethod
     def _open(self, directory: Path) -> None:
@@ -190,7 +216,7 @@ class LocalSwarm(_Swarm):
 
     def _open(self, directory: Path) -> None:
         prepare(len(self._members))
-        endpoint = self._endpoint = f"{UNIX_PROTOCOL}/{directory}/router"
+        endpoint = self._probed = f"{UNIX_PROTOCOL}/{directory}/router"
         self.credentials = issue(self._run, self._members)
         self._listen(directory, [endpoint])
         self._current = {credential.node: credential for credential in self.credentials.nodes}
@@ -254,31 +280,6 @@ class LocalSwarm(_Swarm):
             self.supervisor.restart(credential, self._deadline_s)
         return_freed()
 
-    @contextlib.contextmanager
-    def _joining(self) -> Iterator[None]:
-        """Add to the error of a robot that does not join whether the router still takes sessions: it may have stopped to."""
-        try:
-            yield
-        except LinkError as error:
-            if self.takes_sessions():
-                raise
-            raise LinkError(f"{error}; the router takes no more sessions") from None
-
-    def takes_sessions(self) -> bool:
-        """Return whether the router admits one more session, within PROBE_S_MAX."""
-        settings = {
-            "mode": "client",
-            "connect/endpoints": [self._endpoint],
-            "connect/timeout_ms": round(1000 * PROBE_S_MAX),
-            "connect/exit_on_failure": True,
-            "transport/auth/usrpwd": {"user": PROBE, "password": self._probe_password},
-        }
-        try:
-            open_session(settings, "probe").close()  # type: ignore[no-untyped-call]
-        except LinkError:
-            return False
-        return True
-
     def _end(self) -> None:
         for node in sorted(self._stopped):
             self.resume(node)
@@ -323,7 +324,8 @@ class RemoteSwarm(_Swarm):
         self._tls = tls
 
     def _open(self, directory: Path) -> None:
-        self._listen(directory, self._endpoints, self._take_credentials())
+        self._probed = f"{UNIX_PROTOCOL}/{directory}/router"  # the world's own: it has no certificate of a node
+        self._listen(directory, [*self._endpoints, self._probed], self._take_credentials())
         if self._credentials_file is not None:
             save(self.credentials, self._credentials_file)
             self._stack.callback(self._credentials_file.unlink, missing_ok=True)
@@ -351,6 +353,11 @@ class RemoteSwarm(_Swarm):
         return made
 
     def _gather(self) -> None:
+        with self._joining():
+            self._await_all()
+        close_without_waiting()
+
+    def _await_all(self) -> None:
         total = len(self._members)
         count = 0
         end_s = time.monotonic() + self._deadline_s
@@ -362,7 +369,6 @@ class RemoteSwarm(_Swarm):
                 )
             count = len(self.link.joined)
             self._progress(count, total)
-        close_without_waiting()
 
     def _end(self) -> None:
         self.link.dismiss("the run is over")

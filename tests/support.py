@@ -3,8 +3,6 @@
 import importlib.util
 import os
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -64,14 +62,6 @@ def gone(pids: set[int]) -> bool:
         except OSError:
             continue
     return True
-
-
-def until(holds: Callable[[], object], what: str, deadline_s: float = 30.0) -> None:
-    """Return as soon as `holds()` is true, and fail the test if it is not within `deadline_s` seconds."""
-    end_s = time.monotonic() + deadline_s
-    while not holds():
-        assert time.monotonic() < end_s, f"{what} within {deadline_s:g} s"
-        os.sched_yield()
 
 
 def script(path: Path) -> ModuleType:

@@ -157,9 +157,7 @@ class World:
             answer = self.intake.accept(node, payload, late_allowed)
         except ProtocolError as error:
             if self.intake.refusals.of_node(node) == FLOOD:
-                self.bodies.advance_early()
-                self.crash(node, f"flood: {FLOOD} of its messages were refused, the last one as {error}")
-                self.on_flood(node)
+                self.evict(node, f"{FLOOD} of its messages were refused, the last one as {error}")
             if error.stray or not (late_allowed or self.intake.is_pending(node)):
                 raise
             reason = f"its command was refused: {error}{self.place_of(node)}"
@@ -201,6 +199,12 @@ class World:
         """Record that a node's program ended: its motors stop, it is never awaited again, its body stays where it is."""
         self.status.crash_ticks.setdefault(node, self.tick)
         self._lifecycle.crash(node, printable(reason))
+
+    def evict(self, node: int, reason: str) -> None:
+        """Record that a node has crashed because it floods the run, and stop its messages."""
+        self.bodies.advance_early()  # its motors stop after this tick, whether it was computed early or not
+        self.crash(node, f"flood: {reason}")
+        self.on_flood(node)
 
     def withhold(self, node: int, withheld: bool) -> None:
         """Exclude a node from observation, or include it again."""

@@ -178,7 +178,7 @@ def assign(
     limit = join_mm if active else FAR - 1
     waiting = [node for node in free if node in distances]
     while waiting:
-        best: tuple[int, int, int, int, Task] | None = None
+        best: tuple[int, int, int, Task] | None = None
         for node in waiting:
             before = latest.get(node)
             for task in tasks:
@@ -188,12 +188,12 @@ def assign(
                     continue
                 if (task, node) in skip or any(each.holds(task) for each in reserved):
                     continue
-                rank = (far, turns, _behind_mm(statuses[node], places[node], task), node, task)
+                rank = (far, turns, -node, task)
                 if best is None or rank < best:
                     best = rank
         if best is None:
             break
-        task = best[-1]
+        task = best[3]
         # The robots go in single file: the nearest goes first, and so goes farthest. The last in the order is the lead.
         away = {each: distances[each].get(task.end, FAR) for each in waiting}
         near = sorted(waiting, key=lambda each: (away[each], _behind_mm(statuses[each], places[each], task), each))

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 from command_line import zwerm
-from support import ROBOTS, ZWERM, until
+from support import ROBOTS, ZWERM
+from waiting import until
 
 SHORT = ("--set", "time.duration_s=1", "--set", "robots.count=3")
 MCAP_END = b"\x89MCAP0\r\n"

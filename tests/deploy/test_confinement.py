@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import gone, scenario, until
+from support import gone, scenario
+from waiting import until
 
 from zwerm.agents.runtime.confinement import Confinement
 from zwerm.errors import LinkError, ScenarioError

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from command_line import zwerm
 from network import free_port, tick
-from support import until
+from waiting import until
 
 from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.endpoints import check_encryption

@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from support import ROOT, ZWERM, until
+from support import ROOT, ZWERM
+from waiting import until
 
 from zwerm.deploy.network.namespaces import Namespaces, address_of, unavailable_reason
 from zwerm.errors import LinkError

@@ -16,15 +16,17 @@ from typing import Any
 
 import pytest
 from network import free_port, tick
-from support import ROBOTS, ROOT, children_of, gone, until
+from support import ROBOTS, ROOT, children_of, gone
+from waiting import until
 
 from zwerm.agents.runtime.contract import Setup
-from zwerm.deploy.identity import router_settings
+from zwerm.deploy.identity import load, router_settings
 from zwerm.deploy.remote import run_robots
 from zwerm.deploy.supervisor import interrupts_held, prepare
 from zwerm.deploy.swarm import Certificate, LocalSwarm, RemoteSwarm
 from zwerm.errors import LinkError
 from zwerm.link import Arrival
+from zwerm.link.session import open_session
 from zwerm.wire.messages import Failure, Observation, encode, open_answer
 
 ECHO = "small_controllers:Echo"
@@ -114,14 +116,44 @@ def test_a_router_that_takes_no_more_sessions_is_named(nothing_left: None, monke
     def full(*arguments: Any) -> dict[str, Any]:
         return router_settings(*arguments) | {"transport/unicast/max_sessions": 1}
 
+    with LocalSwarm("run", members(2)) as swarm:
+        assert swarm.takes_sessions()
+        assert set(tick(swarm.link, range(2), 0)) == {0, 1}
     with monkeypatch.context() as patched:
         patched.setattr("zwerm.deploy.swarm.router_settings", full)
         patched.setattr("zwerm.deploy.swarm.PROBE_S_MAX", 1.0)
         with pytest.raises(LinkError, match=r"^node [01] .*; the router takes no more sessions$"):
             LocalSwarm("run", members(2), deadline_s=4.0).__enter__()
-    with LocalSwarm("run", members(2)) as swarm:
-        assert swarm.takes_sessions()
-        assert set(tick(swarm.link, range(2), 0)) == {0, 1}
+
+
+def test_a_router_of_other_hosts_that_takes_no_more_sessions_is_named(
+    nothing_left: None, monkeypatch: pytest.MonkeyPatch, private_tmp: Path
+) -> None:
+    def full(*arguments: Any) -> dict[str, Any]:
+        return router_settings(*arguments) | {"transport/unicast/max_sessions": 1}
+
+    endpoint, keys = f"tcp/127.0.0.1:{free_port()}", private_tmp / "keys"
+    ended = threading.Event()
+
+    def occupy() -> None:
+        until(lambda: keys.exists() and keys.stat().st_size, "credentials written")
+        node = load(keys).nodes[0]
+        login = {"user": node.user, "password": node.password}
+        settings = {"mode": "client", "id": node.zid, "connect/endpoints": [endpoint], "transport/auth/usrpwd": login}
+        with open_session(settings, "no session"):
+            ended.wait(30.0)
+
+    occupant = threading.Thread(target=occupy)
+    with monkeypatch.context() as patched:
+        patched.setattr("zwerm.deploy.swarm.router_settings", full)
+        patched.setattr("zwerm.deploy.swarm.PROBE_S_MAX", 1.0)
+        occupant.start()
+        with pytest.raises(
+            LinkError, match=r"^2 nodes did not join within 3 s, .*; the router takes no more sessions$"
+        ):
+            RemoteSwarm("run", members(2), listen=[endpoint], credentials_file=keys, deadline_s=3.0).__enter__()
+    ended.set()
+    occupant.join()
 
 
 def test_the_failure_of_a_controller_arrives_and_its_process_exits_with_1(nothing_left: None) -> None:

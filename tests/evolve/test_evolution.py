@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import ROOT, ZWERM, scenario, until
+from support import ROOT, ZWERM, scenario
+from waiting import until
 
 from zwerm.errors import ScenarioError
 from zwerm.evolve.evolution import Evolution, EvolutionResult, EvolutionSettings

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from network import network
-from support import until
+from waiting import until
 
 from zwerm.link.world_link import ZenohWorldLink
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from network import NIL, RUN, Network, ask, hello, network
-from support import until
+from waiting import until
 
 from zwerm.agents.runtime.contract import Setup
 from zwerm.deploy.swarm import LocalSwarm

@@ -12,7 +12,8 @@ import pytest
 from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
-from support import ROBOTS, ROOT, ZWERM, gone, until
+from support import ROBOTS, ROOT, ZWERM, gone
+from waiting import until
 
 
 def start(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:

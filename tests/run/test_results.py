@@ -35,6 +35,12 @@ def test_a_robot_that_is_not_in_the_arena_has_no_pose() -> None:
     assert np.isfinite(poses.x_m[poses.present]).all()
 
 
+@pytest.mark.parametrize(("count", "words"), [(1, "1 robot, 0.1 s"), (2, "2 robots, 0.1 s")])
+def test_a_title_names_the_number_of_robots(count: int, words: str) -> None:
+    robots = {"count": count, "controller": "reporters:Reports", "sensors": []}
+    assert zwerm.run(scenario(robots=robots, time={"duration_s": 0.1}), 1, "inline").ending == words
+
+
 def test_metrics_over_time_are_arrays(result: zwerm.RunResult) -> None:
     assert result.series["time_s"].tolist() == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
     assert result.series["cell_coverage_fraction"].dtype == np.float64

@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from support import ROBOTS, ROOT, ZWERM, children_of, gone, scenario, until
+from support import ROBOTS, ROOT, ZWERM, children_of, gone, scenario
+from waiting import until
 
 from zwerm.run.runner import Runner, run
 

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from study_files import DEADLINE_S, GRID, TINY, run_here
-from support import ROOT, until
+from support import ROOT
+from waiting import until
 
 from zwerm.study.rows import read_rows
 from zwerm.study.study_tables import Study, load_study

@@ -13,7 +13,8 @@ import msgspec
 import pytest
 import yaml
 from study_files import DEADLINE_S, GRID, TINY, run_here
-from support import ROOT, until
+from support import ROOT
+from waiting import until
 
 from zwerm.errors import LinkError, ScenarioError
 from zwerm.study.distribute.merging import merge_files

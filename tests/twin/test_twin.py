@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import ROOT, ZWERM, children_of, gone, scenario, until
+from support import ROOT, ZWERM, children_of, gone, scenario
+from waiting import until
 
 from zwerm.deploy.network.impairments import supported
 from zwerm.deploy.network.namespaces import Namespaces, netem_unavailable_reason, unavailable_reason

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from support import scenario, until
+from support import scenario
+from waiting import until
 
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.identity import load

@@ -15,7 +15,8 @@ from zwerm.world.scene import Bools, Floats, Ints, Scene
 # The search is slightly too far, so that the model alone decides at the edge of its range.
 _SLACK: Final = 1.0 + 1e-9
 
-# Up to this many distances, comparing all is faster than keeping pairs (measured).
+# Up to this many distances, comparing all is faster than keeping pairs (measured). A sender counts once, however many packets
+# it sends: in real time a delayed world gets the packets of many ticks at once. It must not import a library then.
 _DENSE_PAIRS: Final = 20_000
 
 # The margin of kept pairs, as a fraction of the bound.
@@ -55,7 +56,7 @@ class Reach:
         everyone = len(self._ids) - hears
         if bound_m == np.inf:
             ids, counts = self._all(senders, everyone)
-        elif len(senders) * len(self._ids) <= _DENSE_PAIRS or not hears.all():
+        elif min(len(senders), len(self._ids)) * len(self._ids) <= _DENSE_PAIRS or not hears.all():
             ids, counts = self._near(scene.position, senders, bound_m * _SLACK)
         else:
             ids, counts = self._kept(scene.position, senders, bound_m * _SLACK)

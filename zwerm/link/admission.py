@@ -33,13 +33,17 @@ MEANINGS: Final[Mapping[str, str]] = {
 
 
 class ExpectedNode(Struct, frozen=True):
-    """A node that may join: its incarnation, its controller's name, its encoded Setup, and whether time is real."""
+    """A node that may join: its incarnation, its controller's name, its encoded Setup, and whether time is real.
+
+    `code` is the digest of its controller's file, and `session` the Zenoh id of its session.
+    """
 
     incarnation: int
     controller: str
     setup: bytes
     paced: bool = False
     code: str = ""
+    session: str = ""
 
 
 class Admission:
@@ -73,6 +77,10 @@ class Admission:
             return RETURNED
         self.joined[node] = expected.incarnation
         return ""
+
+    def node_of_session(self, session: str) -> int:
+        """Return the node that has joined by this session, or -1. The router admits no second session with its id."""
+        return next((node for node in self.joined if self._expected[node].session == session), -1)
 
     def expected(self, node: int) -> ExpectedNode:
         """Return what is expected of a node that has been admitted."""

@@ -126,6 +126,11 @@ class ZenohWorldLink:
             self._evicted.add(node)
             self._source_of.pop(command_key(self._run, node), None)
 
+    def node_of_session(self, session: str) -> int:
+        """Return the node that has joined by the session with this Zenoh id, or -1."""
+        with self._lock:
+            return self._members.node_of_session(session)
+
     def close(self) -> None:
         """Release all resources of the link; idempotent."""
         self._dismissed = True

@@ -208,8 +208,8 @@ class RunResult:
     def ending(self) -> str:
         """Number of robots at the end, and duration of the run."""
         there = int(self.metrics.get("robots_deployed", self.metrics.get("robots_in_arena", self.robots)))
-        robots = f"{self.robots} robots" if there == self.robots else f"{there} of {self.robots} robots"
-        return f"{robots}, {self.sim_s:g} s"
+        robots = f"{self.robots} robot{'' if self.robots == 1 else 's'}"
+        return f"{robots if there == self.robots else f'{there} of {robots}'}, {self.sim_s:g} s"
 
     @property
     def title(self) -> str:

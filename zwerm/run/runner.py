@@ -20,6 +20,7 @@ from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
 from zwerm.run.assembly import assemble_run, observers_of
+from zwerm.run.denial_guard import DenialGuard
 from zwerm.run.hang_guard import hang_guard
 from zwerm.run.kept_result import KeptResult
 from zwerm.run.measurement import measure, truth_of
@@ -98,7 +99,8 @@ def run(
             world.schedule.late_joiners,
         )
         with hang_guard(scenario.time.straggler_s), _security(security_log, router=False) as security:
-            return drive(world, link, seed, runner, realtime, watcher, record, link, metrics, security)
+            guard = DenialGuard(security)
+            return drive(world, link, seed, runner, realtime, watcher, record, link, metrics, guard)
     _refuse_main(members)
     _try_controllers(members)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
@@ -115,7 +117,8 @@ def run(
             confinement=confinement,
         )
         with KeptResult(swarm.close) as kept, swarm:
-            kept.result = drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, security)
+            guard = DenialGuard(security, swarm.link.node_of_session)
+            kept.result = drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, guard)
         return kept.end()
 
 
@@ -196,7 +199,8 @@ def serve(
             on_refusal=None if security is None else security.note,
         )
         with KeptResult(swarm.close) as kept, swarm:
-            kept.result = drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, security)
+            guard = DenialGuard(security, swarm.link.node_of_session)
+            kept.result = drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, guard)
         return kept.end()
 
 
@@ -215,7 +219,7 @@ def drive(
     record: Path | None = None,
     programs: NodeProcesses | None = None,
     metrics: Observers | None = None,
-    security: "SecurityLog | None" = None,
+    guard: DenialGuard | None = None,
 ) -> RunResult:
     """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`.
 
@@ -237,11 +241,10 @@ def drive(
             world.telemetry.listeners.append(recording.telemetry)
             observers.append(ExchangeObserver(world, recording))
         observers.append(sampling)
-        if security is not None:
-            from zwerm.run.denial_guard import DenialGuard
-
-            world.intake.refusals.listener = security.note
-            observers.append(DenialGuard(security))
+        if guard is not None:
+            stack.callback(guard.close)
+            guard.note_refusals(world)
+            observers.append(guard)
         driver = (
             LockStep(world, link, observers, programs)
             if realtime is None
@@ -258,14 +261,14 @@ def drive(
         wall_s = time.monotonic() - start
         sampling.finish()
         refusals = world.intake.refusals | link.refusals
-        if security is not None:
-            refusals |= security.router_refusals()
+        if guard is not None:
+            refusals |= guard.refusals()
         result = _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, refusals)
         if recording is not None:
             recording.close()
             result.problems += [recording.error] if recording.error else []
-        if security is not None:
-            result.problems += [security.error] if security.error else []
+        if guard is not None:
+            result.problems += guard.problems
         return result
 
 

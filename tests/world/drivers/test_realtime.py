@@ -8,7 +8,8 @@ import threading
 from collections import Counter
 from pathlib import Path
 
-from support import ROOT, ZWERM, scenario, until
+from support import ROOT, ZWERM, scenario
+from waiting import until
 
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs, restart_spec

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import robots_of_this_process, scenario, until
+from support import robots_of_this_process, scenario
+from waiting import until
 
 from zwerm.deploy.node_specs import node_specs
 from zwerm.deploy.swarm import LocalSwarm

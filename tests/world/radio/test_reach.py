@@ -66,6 +66,17 @@ def test_the_receivers_are_those_of_a_test_of_every_pair(
         assert (got.counts + got.absent + got.off + got.beyond == count - 1).all()
 
 
+def test_many_packets_of_few_senders_at_once_need_no_search_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A world that is delayed in real time gets the packets of many ticks in one; to import SciPy then stops it again."""
+    monkeypatch.setattr(reach, "tree_of", lambda points: pytest.fail("it makes a search tree"))
+    random, count = np.random.Generator(np.random.Philox(1)), 100
+    position, everyone = random.uniform(0.0, 5.0, (count, 2)), np.ones(count, dtype=np.bool_)
+    senders = np.tile(np.arange(count), 64)
+    got = Reach(range(count)).find(scene_of(position, everyone), ~everyone, senders, 1.0)
+    expected = one_by_one(position, everyone, np.arange(count), 1.0) * 64
+    assert [each.tolist() for each in np.split(got.ids, np.cumsum(got.counts)[:-1])] == expected
+
+
 def see_all_pairs(radio: Radio) -> None:
     """Let the models judge every packet, as if none had a bound."""
     channel: Any = radio.medium.channels["robots"]

@@ -76,7 +76,8 @@ def _algorithms(text: str) -> "list[dict[str, Any]]":
     entries: list[dict[str, Any]] = []
     for name in built_in():
         scenario = load(name)
-        size = f"{scenario.robots.count} robots, {scenario.time.duration_s:g} s"
+        count = scenario.robots.count
+        size = f"{count} robot{'' if count == 1 else 's'}, {scenario.time.duration_s:g} s"
         entries.append({"kind": "scenario", "name": name, "size": size, "summary": scenario.summary})
     for name in built_in_studies():
         study = load_study(name)
