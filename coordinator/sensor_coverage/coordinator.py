@@ -28,7 +28,7 @@ from zwerm.coordinator.sensor_coverage.command_mailbox import (
 )
 from zwerm.coordinator.sensor_coverage.leave_requests import LeaveRequests
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
-from zwerm.coordinator.sensor_coverage.quiescence import COVERED, QuiescenceDetector
+from zwerm.coordinator.sensor_coverage.quiescence import COVERED, GIVEN_UP, QuiescenceDetector, ScanSchedule
 from zwerm.coordinator.sensor_coverage.relative_homology import RelativeHomology
 from zwerm.coordinator.sensor_coverage.sources import Sources
 from zwerm.coordinator.sensor_coverage.wall_walks import WallWalks
@@ -41,16 +41,6 @@ REDUNDANT_COST: Final = -100.0
 
 # Pause [ticks] between scans while the coordinator watches a covered space.
 WATCH_TICKS: Final = 50
-
-# Explanations of the outcomes other than `covered`.
-GIVEN_UP: Final = {
-    "depot-dry": "the depot is empty",
-    "source-blocked": "no robot can leave the base",
-    "source-lost": "no base station answers",
-    "cut-off": "no path leads to the frontier",
-    "no-end": "too many cycles",
-    "unproven": "a wall was not followed to its end",
-}
 
 
 class SensorCoverageSetup(Protocol):
@@ -108,6 +98,7 @@ class SensorCoverageCoordinator:
         self.redundant: tuple[int, ...] = ()
         self.outcome = ""
         self.cycle = 0
+        self._schedule = ScanSchedule()
         self._restarted = setup.incarnation > 1
         self._leave_requests = LeaveRequests(parameters.corner_margin_rad, self.slots, self.mailbox)
         self._redundancy = setup.services.get("redundancy", "coordinator")
@@ -149,10 +140,11 @@ class SensorCoverageCoordinator:
 
         With several stations line 1 is carried out by each station that sees no robot, and pushes run concurrently.
         """
-        moved: Moved = ()
+        moved: list[int] = []
         while self.cycle < self.parameters.cycles_max and not self.outcome:  # 2: do
             self.cycle += 1
-            scan = yield from self._scan_swarm(moved)  # 3: R := ComputeRipsComplex({N_i})
+            # 3: R := ComputeRipsComplex({N_i})
+            scan = self.pushing.scan if self._schedule.unscanned else (yield from self._scan_swarm(moved))
             self._update_fence(scan)  # 4: [F, O] := FenceSubcomplex(R, {theta})
             plans: Sequence[Plan] = ()
             if stations := self._stations_without_robots():
@@ -162,9 +154,14 @@ class SensorCoverageCoordinator:
                     yield from self._find_redundant()  # 5: (periodically) identify redundant robots
                 plans = yield from self._find_paths()  # 6: find path in the 1-skeleton
                 pushes = [self._carry_out(plan) for plan in plans]  # 7 and 8: push robots in path, deploy robot n + 1
+            if self._schedule.unscanned and not pushes:
+                self._schedule.scan_next()
+                continue  # only a new scan shows that nothing is left
             self._report_complex(plans)
             self.outcome = self._judge(bool(pushes))  # 9: while F is not empty
-            moved = [robot for each in (yield from run_concurrently(pushes)) for robot in each]
+            moved, stopped = moved if self._schedule.unscanned else [], self.pushing.stopped
+            moved += [robot for each in (yield from run_concurrently(pushes)) for robot in each]
+            self._schedule.end_cycle(len(pushes), self.pushing.stopped - stopped)
             yield from self._reconsider_outcome()
 
     def _carry_out(self, plan: Plan) -> Routine[Moved]:

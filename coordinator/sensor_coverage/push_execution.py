@@ -32,8 +32,8 @@ Moved = Sequence[int]
 class PushExecution:
     """The pushes of one cycle.
 
-    `pushes` counts the successful ones. `lost` are robots that did not reach their slots. `scan` and `cycle` are those
-    of the present cycle.
+    `pushes` counts the successful ones, and `stopped` those that a wall stopped, with the leader back at its slot. `lost`
+    are robots that did not reach their slots. `scan` and `cycle` are those of the present cycle.
     """
 
     def __init__(
@@ -45,6 +45,7 @@ class PushExecution:
         frontier: FrontierService,
     ) -> None:
         self.pushes = 0
+        self.stopped = 0
         self.lost: dict[int, None] = {}
         self.cycle = 0
         self.scan = ScanResult({}, FlagComplex({}), ())
@@ -116,6 +117,7 @@ class PushExecution:
         self._mailbox.send(robot, command, drive=True)
         arrived = yield from self._arrivals([robot])
         if robot in arrived and not arrived[robot].ok:  # it goes on waiting
+            self.stopped += 1
             self._frontier.note_failure(plan, arrived[robot].driven_m)
             return (robot,)
         del self._sources.waiting[base]
@@ -175,6 +177,7 @@ class PushExecution:
         if not isinstance(answer, Arrived):
             return {}
         if not answer.ok:
+            self.stopped += 1
             self._frontier.note_failure(plan, answer.driven_m)
             return None
         return {leader: answer}

@@ -97,6 +97,7 @@ class WallWalks:
         if walked.end == SHUT:
             for each in walked.touched:
                 self._walls.note_wall(plan.mover, each + heading)
+            pushing.stopped += 1
             return (leader,)
         followers: Sequence[int] = ()
         if station:

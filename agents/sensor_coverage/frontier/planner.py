@@ -31,6 +31,9 @@ BRIDGE: Final = 100
 LAST: Final = 200
 # A drive that a wall stopped also rules out directions within this angle.
 BLOCKED_RAD: Final = math.radians(20.0)
+# Where walls are followed, and all slots are known, a robot stays beside an edge only if it has driven this fraction of its
+# hop: a followed wall needs no robot between it and the lattice.
+WHOLE_HOP: Final = 0.98
 
 
 class Planner:
@@ -44,12 +47,15 @@ class Planner:
         self._parameters = parameters
         self.walls = WallPlans(parameters, slots)
         self._slots = slots
+        self._follows_walls = parameters.walls == "followed"
+        self._whole_hops = False
         self._views, self._complex, self._bases = ScanResult({}, FlagComplex({}), ())
         self._plans: list[Plan] = []
 
     def update(self, scan: ScanResult, edges: Iterable[Edge] | None = None) -> None:
         """Take a new scan, and find the fence, or the part of it on `edges`. Algorithm 3."""
         self._views, self._complex, self._bases = scan
+        self._whole_hops = self._follows_walls and edges is None
         found = self.fence = fence(self._views, self._complex, self._parameters.corner_margin_rad, edges)
         obstacle = dict.fromkeys(found.corners)
         self._plans = []
@@ -72,7 +78,7 @@ class Planner:
         self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in into_holes}))
         yield into_holes
         yield list(self._last_plans())
-        if self._parameters.walls == "followed":
+        if self._follows_walls:
             along_walls = list(self.walls.plans(ScanResult(self._views, self._complex, self._bases)))
             self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in along_walls}))
             yield along_walls
@@ -127,6 +133,8 @@ class Planner:
             if walls_matter and self._walled(mover, self._views[mover][other] + sign * near):
                 continue
             clear = min(self._parameters.clear_m, 0.85 * length)
+            if self._whole_hops:
+                clear = WHOLE_HOP * length
             plans.append(Plan(key, mover, direction, length, clear, anchors))
         return plans
 

@@ -3,13 +3,12 @@
 Most of it does not change from scan to scan. It is computed again for the slots around which something has changed.
 """
 
-import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from copy import copy
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    CONTACT_RAD,
     Arc,
     Pair,
     SeenPoint,
@@ -22,14 +21,14 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     complement,
     ends_at,
     fan_of,
+    overlap,
     point_before,
+    side_of,
     united,
 )
 from zwerm.maths.simplicial import FlagComplex
 
-# Angle [rad] to an open arc within which another slot may stand in the opening.
-OPENING_RAD: Final = math.radians(15.0)
-# Arcs that differ by less than this [rad] in total are equally open.
+# A triangle closes more than another one only if the difference is larger than this [rad].
 EQUAL_RAD: Final = 1e-6
 
 
@@ -52,7 +51,8 @@ class Around(NamedTuple):
 
     passed: int
     view: Mapping[int, float]
-    walls: Sequence[Arc]
+    touched: Sequence[float]
+    near: Sequence[Arc]
 
 
 class SwarmProof:
@@ -70,8 +70,9 @@ class SwarmProof:
         self._scan = ScanResult({}, FlagComplex({}), ())
         self._neighbours: dict[int, frozenset[int]] = {}
         self._around: dict[int, Around] = {}
-        self._walled: dict[int, list[Arc]] = {}  # arcs that end at walls, by slot
+        self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
         self._pairs: dict[int, tuple[Pair, ...]] = {}  # the valid triangles, by the number of their point
+        self._chosen: dict[Pair, tuple[WalkPoint, ...]] = {}  # the points of triangles beside an edge, one a side
         self._open_arcs: dict[int, list[Arc]] = {}
 
     def update(
@@ -90,9 +91,8 @@ class SwarmProof:
         changed: dict[int, None] = {}
         for slot in complex_.vertices:
             view = scan.views[slot]
-            walls = [*arcs_of_walls(touched.get(slot, ())), *near.get(slot, ())]
             beside = {each: view[each] for each in complex_.neighbours[slot]}
-            now = Around(len(self._passed.get(slot, ())), beside, walls)
+            now = Around(len(self._passed.get(slot, ())), beside, touched.get(slot, ()), tuple(near.get(slot, ())))
             if self._around.get(slot) != now:
                 self._around[slot] = now
                 changed[slot] = None
@@ -101,30 +101,6 @@ class SwarmProof:
     def open_arcs(self) -> dict[int, list[Arc]]:
         """Return the arcs in which each slot is open, without the slots that are open in none."""
         return {slot: arcs for slot in self._around if (arcs := self._open(slot))}
-
-    def spare(self, candidates: Iterable[int]) -> list[int]:
-        """Return candidates that can all leave together: no other slot becomes more open, and no part is cut off.
-
-        So the proof of the slots that stay is as complete as before, and needs none of those that leave. A slot with open
-        arcs may be the first one beyond an opening: it stays unless all that its neighbours see around it is closed.
-        """
-        now, found = self, list[int]()
-        for slot in candidates:
-            if not _connected(sorted(now._neighbours[slot]), now._neighbours):
-                continue
-            without = now._without(slot)
-            if now._open(slot) and any(without._is_open(each, slot) for each in now._neighbours[slot]):
-                continue
-            if all(_sum(without._open(each)) <= _sum(now._open(each)) + EQUAL_RAD for each in without._around):
-                now = without
-                found.append(slot)
-        return found
-
-    def _is_open(self, slot: int, other: int) -> bool:
-        """Return whether a slot is open in the direction of another one, or close beside it."""
-        there = self._scan.views[slot][other]
-        arcs = self._open(slot)
-        return any((there - start + OPENING_RAD) % math.tau < width + 2.0 * OPENING_RAD for start, width in arcs)
 
     # --- what has changed -------------------------------------------------------------------------------------------
 
@@ -142,17 +118,6 @@ class SwarmProof:
             self._points += walk.points
         self._count = len(walks)
 
-    def _without(self, slot: int) -> "SwarmProof":
-        """Return the proof without a slot."""
-        other = copy(self)
-        other._neighbours = {
-            each: seen - {slot} if slot in seen else seen for each, seen in self._neighbours.items() if each != slot
-        }
-        other._around, other._walled = dict(self._around), dict(self._walled)
-        other._pairs, other._open_arcs = dict(self._pairs), dict(self._open_arcs)
-        other._refresh(dict.fromkeys(sorted(self._neighbours[slot])), [slot])
-        return other
-
     def _refresh(self, changed: dict[int, None], gone: Iterable[int]) -> None:
         """Find the arcs again of slots around which something has changed, and of those that rely on slots that are gone."""
         points: dict[int, None] = {}
@@ -160,19 +125,28 @@ class SwarmProof:
         for slot in gone:
             points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
             stale |= self._witnessed.get(slot, {})
-            for known in (self._around, self._walled, self._open_arcs):
+            self._spoil(slot)
+            for known in (self._around, self._followed):
                 known.pop(slot, None)
         for slot in stale:
             if slot in self._around:
                 points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
-                self._walled[slot] = self._arcs_to_walls(slot)
-                self._open_arcs.pop(slot, None)
+                self._followed[slot] = self._arcs_to_walls(slot)
+                self._spoil(slot)
         for number in points:
             old, new = self._pairs.get(number, ()), self._valid(self._points[number])
             if old != new:
                 self._pairs[number] = new
-                for slot in (slot for pair in (*old, *new) for slot in pair):
-                    self._open_arcs.pop(slot, None)
+                for slot in dict.fromkeys(slot for pair in (*old, *new) for slot in pair):
+                    self._spoil(slot)
+
+    def _spoil(self, slot: int) -> None:
+        """Forget what depends on the arcs of a slot."""
+        self._open_arcs.pop(slot, None)
+        for pair in [pair for pair in self._chosen if slot in pair]:
+            del self._chosen[pair]
+            for each in pair:
+                self._open_arcs.pop(each, None)
 
     # --- arcs -------------------------------------------------------------------------------------------------------
 
@@ -180,19 +154,44 @@ class SwarmProof:
         """Return the open arcs of a slot."""
         known = self._open_arcs.get(slot)
         if known is None:
-            view, beside = self._scan.views[slot], self._neighbours[slot]
-            closed = list(self._walled[slot])
-            closed += [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
-            for each in self._passed.get(slot, ()):
-                for pair in self._pairs.get(each.number, ()):
-                    if slot in pair:
-                        closed.append(arc_between(view[sum(pair) - slot], each.point.seen[slot]))
+            view = self._scan.views[slot]
+            closed = self._closed_without_fans(slot)
+            for other in self._neighbours[slot]:
+                closed += [arc_between(view[other], each.seen[slot]) for each in self._choose(slot, other)]
             known = self._open_arcs[slot] = complement(closed)
         return known
 
+    def _closed_without_fans(self, slot: int) -> list[Arc]:
+        """Return the arcs of a slot that walls and triangles of robots close."""
+        view, beside = self._scan.views[slot], self._neighbours[slot]
+        closed = [*self._followed[slot], *arcs_of_walls(self._around[slot].touched)]
+        return closed + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
+
+    def _choose(self, slot: int, other: int) -> tuple[WalkPoint, ...]:
+        """Return the point of the triangle on each side of an edge, if there is one: the one that closes most at both ends.
+
+        With different points at the two ends, the triangles would cross, and each end would rely on the other.
+        """
+        a, b = pair = (slot, other) if slot < other else (other, slot)
+        known = self._chosen.get(pair)
+        if known is None:
+            views = self._scan.views
+            points = [each.point for each in self._passed.get(a, ()) if pair in self._pairs.get(each.number, ())]
+            best: dict[int, tuple[float, WalkPoint]] = {}
+            opened = {each: complement(self._closed_without_fans(each)) for each in (pair if points else ())}
+            for point in points:
+                arcs = ((a, arc_between(views[a][b], point.seen[a])), (b, arc_between(views[b][a], point.seen[b])))
+                gain = sum(overlap(arc, each) for slot, arc in arcs for each in opened[slot])
+                side = side_of(point, a, views[a][b])
+                if side not in best or gain > best[side][0] + EQUAL_RAD:
+                    best[side] = gain, point
+            known = self._chosen[pair] = tuple(point for _, point in best.values())
+        return known
+
     def _arcs_to_walls(self, slot: int) -> list[Arc]:
-        """Return the arcs at a slot that end at walls. They are disjoint."""
-        found = list(self._around[slot].walls)
+        """Return the arcs at a slot that end at followed walls or at contacts. They are disjoint."""
+        around = self._around[slot]
+        found = [*arcs_of_walls(around.touched, CONTACT_RAD), *around.near]
         for _, before, point, hand, between in self._passed.get(slot, ()):
             if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
                 found += arcs_of_step(slot, before, point, hand)
@@ -201,7 +200,7 @@ class SwarmProof:
     def _valid(self, point: WalkPoint) -> tuple[Pair, ...]:
         """Return the pairs of slots whose triangle with a point counts."""
         at_walls = {
-            (slot, side): ends_at(self._walled[slot], there, side)
+            (slot, side): ends_at(self._followed[slot], there, side)
             for slot, there in point.seen.items()
             if slot in self._neighbours
             for side in (1, -1)
@@ -222,15 +221,3 @@ def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             between = tuple(each.seen.keys() for each in walk.points[since:number])
             yield slot, Passed(first + number, before, point, walk.hand, between)
             last[slot] = now
-
-
-def _connected(slots: Sequence[int], around: Mapping[int, Collection[int]]) -> bool:
-    """Return whether slots, one at least, are connected by edges among themselves."""
-    reached = list(slots[:1])
-    for each in reached:
-        reached += [other for other in slots if other in around[each] and other not in reached]
-    return bool(slots) and len(reached) == len(slots)
-
-
-def _sum(arcs: Iterable[Arc]) -> float:
-    return sum(each.width_rad for each in arcs)

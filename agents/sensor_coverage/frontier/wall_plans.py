@@ -40,18 +40,10 @@ class WallPlans:
 
     def open_arcs(self, scan: ScanResult) -> dict[int, list[Arc]]:
         """Return the arcs in which each slot is open."""
-        self._prove(scan)
-        return self._proof.open_arcs()
-
-    def spare(self, scan: ScanResult, candidates: Iterable[int]) -> list[int]:
-        """Return candidates that the proof does not need, and that can leave the complex together."""
-        self._prove(scan)
-        return self._proof.spare(candidates)
-
-    def _prove(self, scan: ScanResult) -> None:
         slots = self._slots
         touched = {slot: [*slots.walls.get(slot, ()), *slots.felt.get(slot, ())] for slot in scan.complex_.vertices}
         self._proof.update(scan, slots.walks, touched, slots.near)
+        return self._proof.open_arcs()
 
     def plans(self, scan: ScanResult) -> Iterator[Plan]:
         """Yield a plan for each open arc that has attempts left."""

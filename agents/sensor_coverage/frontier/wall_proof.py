@@ -26,6 +26,8 @@ from zwerm.maths.simplicial import FlagComplex
 GAP_RAD: Final = math.radians(6.0)
 # A wall in touch with a standing robot closes this angle [rad] on both sides of its direction.
 TOUCH_RAD: Final = math.radians(45.0)
+# The touched wall lies within this angle [rad] of the direction: half a switch.
+CONTACT_RAD: Final = math.radians(15.0)
 # A walking robot that touches a wall and a standing robot at once closes this angle [rad] between the two.
 POCKET_RAD: Final = math.radians(55.0)
 # Successive points without a contact at which a walking robot still follows the wall: it turns round a corner.
@@ -123,9 +125,9 @@ def point_before(slot: int, last: SeenPoint | None, now: SeenPoint, touch_since:
     return last.point if last.number >= touch_since and apart <= HIDDEN_RAD else None
 
 
-def arcs_of_walls(directions: Iterable[float]) -> list[Arc]:
-    """Return the arcs that walls in touch close, by their directions [rad]."""
-    return [Arc(each - TOUCH_RAD, 2.0 * TOUCH_RAD) for each in directions]
+def arcs_of_walls(directions: Iterable[float], half_rad: float = TOUCH_RAD) -> list[Arc]:
+    """Return the arcs that walls in touch close, `half_rad` on both sides of their directions [rad]."""
+    return [Arc(each - half_rad, 2.0 * half_rad) for each in directions]
 
 
 def arcs_of_step(slot: int, before: WalkPoint | None, point: WalkPoint, hand: int) -> Iterator[Arc]:
@@ -156,6 +158,12 @@ def united(arcs: Iterable[Arc]) -> list[Arc]:
         else:
             found.append(Arc(start, width))
     return found
+
+
+def overlap(a: Arc, b: Arc) -> float:
+    """Return the size [rad] of the directions that two arcs share."""
+    off = (b.start_rad - a.start_rad) % math.tau
+    return max(0.0, min(a.width_rad - off, b.width_rad)) + max(0.0, min(off + b.width_rad - math.tau, a.width_rad))
 
 
 def complement(arcs: Iterable[Arc]) -> list[Arc]:
@@ -192,7 +200,8 @@ def fan_of(
     """Return the pairs of slots whose triangle with a point counts: at both slots the space beyond the triangle is proved.
 
     Beyond the line of sight from a slot to the point there must be a wall that was followed (`at_walls`), or another such
-    triangle with the same point, or a triangle of robots that contains the point.
+    triangle with the same point, or a triangle of robots that contains the point. A wall in touch with a slot counts here
+    in the direction of the contact only: two robots may touch the ends of walls on both sides of a door.
     """
     seen = [slot for slot in point.seen if slot in neighbours]
     pairs = [(a, b) for a in seen for b in seen if a < b and b in neighbours[a]]
@@ -276,7 +285,8 @@ class SlotProof:
         self.around: Mapping[int, float] = {}
         self._scan = ScanResult({}, FlagComplex({}), ())
         self._by_view: list[Arc] = []
-        self._at_walls: list[Arc] = []  # walls in touch
+        self._at_walls: list[Arc] = []  # arcs of walls in touch
+        self._contacts: list[Arc] = []  # the directions of their contacts
         self._by_walks: dict[tuple[int, ...], list[Arc]] = {}  # by the slots that must stand
 
     def update(self, slot: int, scan: ScanResult, touched: Iterable[float]) -> None:
@@ -284,7 +294,8 @@ class SlotProof:
         view = scan.views[slot]
         self._scan = scan
         self.around = {each: view[each] for each in scan.complex_.neighbours[slot]}
-        self._at_walls = arcs_of_walls(touched)
+        touched = tuple(touched)
+        self._at_walls, self._contacts = arcs_of_walls(touched), arcs_of_walls(touched, CONTACT_RAD)
         self._by_view = []
         for triangle in scan.complex_.triangles:
             if slot in triangle:
@@ -323,7 +334,7 @@ class SlotProof:
                 for arc in arcs_of_step(each, step.before, step.point, step.hand)
             ]
             if each == slot:
-                walls += [*self._at_walls, *self._by_walks.get((), ())]
+                walls += [*self._contacts, *self._by_walks.get((), ())]
             for side in (1, -1):
                 at_walls[each, side] = ends_at(walls, point.seen[each], side)
         fan = fan_of(point, views, neighbours, at_walls)

@@ -146,29 +146,37 @@ def test_two_points_of_walks_beside_a_door_close_nothing() -> None:
     }
 
 
+def test_robots_in_touch_with_both_sides_of_a_door_do_not_close_it() -> None:
+    """A walk in the next room is seen between the robots only. Each robot touches the end of a wall below it."""
+    contacts = [math.radians(-80.0)]
+    point = between_two((-45, -135))
+    walks = (Walk(0, -1, tuple(point)),)
+    proof = SwarmProof()
+    proof.update(ScanResult(PAIR, FlagComplex(PAIR), ()), walks, {0: contacts, 1: [math.radians(-100.0)]}, {})
+    assert _degrees(proof.open_arcs()) == {0: 270, 1: 270}
+    local = at_slot(0, PAIR, *contacts)
+    pass_walk(local, 0, point, -1)
+    assert math.degrees(open_rad(local)) == pytest.approx(270.0)
+
+
+def test_both_ends_of_an_edge_rely_on_the_same_point_of_a_walk() -> None:
+    """There is a wall on both sides of a door. Slot 0 would rely on the left wall, and slot 1 on the right one."""
+    left, right = ((-84, -153), (-80, -150), (-77, -148)), ((-33, -103), (-30, -100), (-26, -96))
+    walks = tuple(Walk(0, -1, tuple(between_two(*each))) for each in (left, right))
+    one = [_degrees(open_arcs(PAIR, (walk,))) for walk in walks]
+    assert one == [{0: 276, 1: 328}, {0: 327, 1: 276}]
+    both = _degrees(open_arcs(PAIR, walks))
+    assert both in ({0: 276, 1: 321}, {0: 320, 1: 276}), "closed by one point, and by the steps of the other walk"
+
+
+def _degrees(arcs: Mapping[int, Iterable[Arc]]) -> dict[int, int]:
+    return {slot: round(math.degrees(sum(each.width_rad for each in found))) for slot, found in arcs.items()}
+
+
 def test_a_walk_past_a_robot_is_no_wall() -> None:
     points = [WalkPoint({0: math.radians(each)}, (), (1,)) for each in (10, 40, 80)]
     arcs = open_arcs({0: {}, 1: {}}, (Walk(0, -1, tuple(points)),))
     assert arcs[0] == [(0.0, math.tau)]
-
-
-# --- slots that the proof does not need -------------------------------------------------------------------------------
-
-
-def spare(views: Mapping[int, Mapping[int, float]], walks: tuple[Walk, ...]) -> list[int]:
-    proof = SwarmProof()
-    proof.update(ScanResult(views, FlagComplex(views), ()), walks, {}, {})
-    return proof.spare(views)
-
-
-def test_a_robot_beside_two_others_is_spare_where_walks_close_all() -> None:
-    """Three robots see each other, and each sees a walk all around the room."""
-    sixty = math.radians(60.0)
-    views = {0: {1: 0.0, 2: sixty}, 1: {0: math.pi, 2: 2.0 * sixty}, 2: {0: -2.0 * sixty, 1: -sixty}}
-    ring = [WalkPoint(dict.fromkeys(views, math.radians(each)), SOUTH, ()) for each in range(0, 361, 20)]
-    assert spare(views, (Walk(0, -1, tuple(ring)),)) == [0, 1], "one robot sees all"
-    assert spare(views, ()) == [], "each triangle closes an arc of the others"
-    assert spare({0: {1: 0.0}, 1: {0: math.pi, 2: 0.0}, 2: {1: math.pi}}, ()) == [], "the end of a single file"
 
 
 def test_a_walk_that_touches_robot_and_wall_closes_the_pocket_between_them() -> None:
