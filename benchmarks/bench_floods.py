@@ -286,9 +286,9 @@ def main() -> None:
     unix = local["refused"]["reasons"]
     trace, local_trace = (trace_inline(ticks) for ticks in (found["ticks"], local["ticks"]))
     tried["connections that never speak, on the Unix socket of a local run"] = local["opened"]
-    # Each flood, and reads; Zenoh tries wrong passwords again within the timeout of a session.
+    # The flood, and reads; Zenoh tries wrong passwords again within the timeout of a session.
     expected = {
-        "denied": f">= {2 * options.messages}",
+        "denied": f">= {options.messages}",  # Zenoh's library sends nothing of a session that may know no subscriber
         "foreign-session": "2",
         "schema": "1",  # the hello after the flood
         "handshake": str(options.connections),
