@@ -87,9 +87,9 @@ def flood(intruder: zenoh.Session, key: str, messages: int) -> int:
     """Put many messages on a key, and return how many the session took."""
     sent = 0
     with contextlib.suppress(zenoh.ZError):  # the world has ended
-        publisher = intruder.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
+        # Without a publisher: that would stop sending when it learns that it may know no subscriber.
         for sent in range(1, messages + 1):  # noqa: B007 - the count after the last one
-            publisher.put(b"forged")
+            intruder.put(key, b"forged", congestion_control=zenoh.CongestionControl.BLOCK)
     return sent
 
 

@@ -248,7 +248,7 @@ class World:
 
     def _wake_on_changes(self) -> None:
         """Wake the sleepers whose contacts or visible ids have changed."""
-        if not self.scene.moved.any():
+        if not (self._wakes.watching and self.scene.moved.any()):
             return
         for field in self._wakes.events:
             if len(watchers := self._wakes.watchers(field)):

@@ -33,7 +33,7 @@ from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BY
 from zwerm.agents.landmark_exploration.sharing.log_gossip import AddressedMessage, Gossip
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
-from zwerm.coordinator.landmark_exploration.greedy_assignment import GreedyAssignment
+from zwerm.coordinator.landmark_exploration.greedy_assignment import GUIDED_MAX, GreedyAssignment
 from zwerm.wire.messages import Command, Observation, Transmission
 
 # Ticks after which a robot without a frontier is considered again: the first time, and at most.
@@ -117,6 +117,8 @@ class LandmarkCoordinator:
         self._robots = {node: _Robot() for node in range(setup.node)}
         self._greedy = GreedyAssignment(self.map.complex, rules.beta)
         self._costs: dict[int, tuple[int, Costs]] = {}
+        # Frontiers that were still free after the last assignment; None for more than GUIDED_MAX.
+        self._left: list[int] | None = []
         self._failures: dict[int, int] = {}
         self._outbox: list[Transmission] = []
         self._acknowledge: dict[int, int] = {}
@@ -235,6 +237,9 @@ class LandmarkCoordinator:
                 continue
             taken.append(robot.task.key)
         offer = Offer(frontiers, taken)
+        if self._rules.strategy == "cost-utility" and self._has_new_frontier(offer):
+            for robot in self._robots.values():
+                robot.consider_at = self._tick
         free = [node for node in living if self._robots[node].free and self._robots[node].consider_at <= self._tick]
         if not frontiers.open:
             pass
@@ -247,7 +252,18 @@ class LandmarkCoordinator:
         else:
             for node in free:
                 self._give(node, self._uncoordinated(node, living), cut_off=self._rules.walk_if_cut_off)
+        self._left = offer.free_keys(GUIDED_MAX)
         return not frontiers.open and self._finish(living)
+
+    def _has_new_frontier(self, offer: Offer) -> bool:
+        """Return whether a frontier is free that was not left over by the last assignment: all free robots are considered.
+
+        If only those whose time to wait is over were considered, a far robot would be sent, and the nearest one would wait.
+        """
+        if self._left is None:
+            return False  # so many are free that only robots without a path to any of them wait
+        keys = offer.free_keys(GUIDED_MAX)
+        return keys is None or not set(keys) <= set(self._left)
 
     def _give(self, node: int, choice: Choice | None, cut_off: bool = False) -> None:
         """Assign a frontier to a robot; without a `choice`, consider the robot again later.

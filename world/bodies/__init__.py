@@ -14,10 +14,13 @@ class Drive(ABC):
     """The kinematics of a kind of body: the base class of the plug-in kind `drive`.
 
     `command` is the type of drive that a controller commands. With `has_wheels` the robot's Setup has its wheel base.
+    `memoryless` states that each row of `velocities` depends on the same row of its argument only. It is then computed for the
+    robots whose command has changed, and for no others.
     """
 
     command: ClassVar[type[BodyVelocity] | type[WheelSpeeds]]
     has_wheels: ClassVar[bool] = False
+    memoryless: ClassVar[bool] = False
 
     def __init__(self, body: BodyTable) -> None:
         self.body = body

@@ -14,6 +14,7 @@ class Differential(Drive):
 
     command: ClassVar[type[BodyVelocity] | type[WheelSpeeds]] = WheelSpeeds
     has_wheels: ClassVar[bool] = True
+    memoryless: ClassVar[bool] = True
 
     def velocities(self, commanded: Floats) -> Velocities:
         """Return forward speed and turn of (n, 2) wheel speeds, left and right [m/s]."""

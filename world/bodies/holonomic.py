@@ -13,6 +13,7 @@ class Holonomic(Drive):
     """Scales the velocity to `max_speed_m_s`, keeping its direction, and clamps the turn to `max_turn_rad_s`."""
 
     command: ClassVar[type[BodyVelocity] | type[WheelSpeeds]] = BodyVelocity
+    memoryless: ClassVar[bool] = True
 
     def velocities(self, commanded: Floats) -> Velocities:
         """Return the velocities of (n, 3) commands: forward [m/s], left [m/s], turn [rad/s]."""

@@ -37,6 +37,7 @@ class Parking:
         self._moved_tick: Ints = np.zeros(count, dtype=np.int64)
         self._tick = 0
         self._search_tick = 0
+        self._urgent = False
 
     def admit(self, robot: int) -> None:
         """Take a new body, which is in the engine."""
@@ -49,13 +50,19 @@ class Parking:
         self._moved_tick[moved] = self._tick
         self._tick += 1
 
+    def urge(self) -> None:
+        """Take notice that drives have changed: a parked body may be driven."""
+        self._urgent = True
+
     def change(self, position: Floats, present: Bools, driven: Bools) -> tuple[Ints, Ints]:
         """Return the ids of the bodies that enter the engine now, and of those that leave it.
 
         `position` (n, 2) [m]; `present` (n,) are the bodies in the arena, `driven` (n,) those with a velocity command.
         """
-        if self._tick < self._search_tick and not (driven & self.parked).any():
+        if self._tick < self._search_tick and not (self._urgent and (driven & self.parked).any()):
+            self._urgent = False
             return _NO_ROBOTS, _NO_ROBOTS
+        self._urgent = False
         self._search_tick = self._tick + SEARCH_TICKS
         awake = present & (driven | (self._moved_tick >= self._tick - _STILL_TICKS))
         count, total = np.count_nonzero(awake), np.count_nonzero(present)

@@ -13,6 +13,7 @@ import pymunk
 from pymunk import batch
 
 from zwerm.scenario.tables import BodyTable
+from zwerm.world.bodies import Velocities
 from zwerm.world.bodies.parking import FEW_BODIES, SEARCH_TICKS, Parking
 from zwerm.world.scene import Bools, Floats, Ints
 
@@ -24,7 +25,7 @@ _OVERLAP_LEFT_FRACTION: Final = 0.1
 _OVERLAP_IGNORED_M: Final = 1e-5
 
 _FORCE: Final = batch.BodyFields.FORCE | batch.BodyFields.TORQUE
-_VELOCITY: Final = batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+_VELOCITY_AND_FORCE: Final = batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY | _FORCE
 _POSE: Final = batch.BodyFields.BODY_ID | batch.BodyFields.POSITION | batch.BodyFields.ANGLE
 
 
@@ -46,6 +47,11 @@ class Physics:
         self._middle_s: Floats = np.arange(0.5, body.substeps)[:, None] * self._substep_s
         self._inertia: Floats = np.array([body.mass_kg, body.mass_kg, self._moment]) / self._substep_s
         self._poses = batch.Buffer()
+        # The newest drives, those of the bodies in the engine, and which robots have a drive at all.
+        nothing = np.zeros(count)
+        self._drives: Velocities = (nothing, None, nothing)
+        self._engine_drives: Velocities = (nothing, None, nothing)
+        self._driven: Bools = np.zeros(count, dtype=np.bool_)
         self._resting = True
         self._arranged = False
 
@@ -90,18 +96,23 @@ class Physics:
         self._rows = _plain([row for row, _ in rows], len(rows))
         self._ids = _plain([robot for _, robot in rows], len(self.position))
         self._pushes: Floats = np.zeros((self._table.substeps, len(ids), 3))
-        self._start: Floats = np.zeros((len(ids), 3))
-        self._push_buffers = [_buffer(pushes) for pushes in self._pushes]
+        self._start: Floats = np.zeros((len(ids), 6))  # the velocity, and the force of the first substep
+        self._push_buffers = [_buffer(pushes) for pushes in self._pushes[1:]]
         self._start_buffer = _buffer(self._start)
         self._resting = False
         self._arranged = True
 
-    def _park(self, forward: Floats, left: Floats | None, turn: Floats) -> None:
-        """Move bodies into the engine and out of it."""
+    def _take(self, forward: Floats, left: Floats | None, turn: Floats) -> None:
+        """Take new drives."""
         driven = (forward != 0.0) | (turn != 0.0)
         if left is not None:
             driven |= left != 0.0
-        entering, leaving = self._parking.change(self.position, self._present, driven)
+        self._drives, self._driven = (forward, left, turn), driven
+        self._parking.urge()
+
+    def _park(self) -> None:
+        """Move bodies into the engine and out of it."""
+        entering, leaving = self._parking.change(self.position, self._present, self._driven)
         for robot in entering.tolist():
             body = self._bodies[robot]
             self._space.add(body, *body.shapes)
@@ -112,22 +123,34 @@ class Physics:
             self._arranged = False
 
     def advance(self, forward_m_s: Floats, left_m_s: Floats | None, turn_rad_s: Floats) -> Bools:
-        """Integrate one tick under the drives (n,), by robot id; return (n,) which robots moved."""
+        """Integrate one tick under the drives (n,), by robot id; return (n,) which robots moved.
+
+        The same arrays as before mean the same drives: do not write to them.
+        """
         moved: Bools = np.zeros(len(self.position), dtype=np.bool_)
-        idle = not (forward_m_s.any() or turn_rad_s.any() or (left_m_s is not None and left_m_s.any()))
-        if idle and self._resting and self._arranged:
+        last_forward, last_left, last_turn = self._drives
+        same = forward_m_s is last_forward and left_m_s is last_left and turn_rad_s is last_turn
+        if not same:
+            self._take(forward_m_s, left_m_s, turn_rad_s)
+        if self._resting and self._arranged and not self._driven.any():
             return moved
         may_park = len(self._bodies) > FEW_BODIES or self._parking.in_use
         if may_park:
-            self._park(forward_m_s, left_m_s, turn_rad_s)
-        if not self._arranged:
-            self._arrange()
+            self._park()
+        if not (same and self._arranged):
+            if not self._arranged:
+                self._arrange()
+            ids = self._ids
+            self._engine_drives = (
+                forward_m_s[ids],
+                None if left_m_s is None else left_m_s[ids],
+                turn_rad_s[ids],
+            )
         ids, rows = self._ids, self._rows
-        turn = turn_rad_s[ids]
-        forward = forward_m_s[ids]
-        left = None if left_m_s is None else left_m_s[ids]
+        forward, left, turn = self._engine_drives
         # The heading in the middle of each substep, so that an arc is integrated by its chords.
-        angle = self.heading[ids] + self._middle_s * turn
+        here, heading = self.position[ids], self.heading[ids]
+        angle = heading + self._middle_s * turn
         pushes = self._pushes
         if angle.any():
             cos, sin = np.cos(angle), np.sin(angle)
@@ -141,12 +164,14 @@ class Physics:
             pushes[:, rows, 0] = forward
             pushes[:, rows, 1] = 0.0 if left is None else left
         pushes[:, rows, 2] = turn
-        self._start[:] = pushes[0]
+        self._start[:, :3] = pushes[0]
         # The force of substep s acts on the velocity that substep s + 1 integrates.
         pushes[:-1] = pushes[1:]
         pushes *= self._inertia
         space = self._space
-        batch.set_space_bodies(space, _VELOCITY, self._start_buffer)
+        self._start[:, 3:] = pushes[0]
+        batch.set_space_bodies(space, _VELOCITY_AND_FORCE, self._start_buffer)
+        space.step(self._substep_s)
         for buffer in self._push_buffers:
             batch.set_space_bodies(space, _FORCE, buffer)
             space.step(self._substep_s)
@@ -154,11 +179,11 @@ class Physics:
         batch.get_space_bodies(space, _POSE, self._poses)
         poses = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 3)[rows]
         place, angle = poses[:, :2], poses[:, 2]
-        x, y = (self.position[ids] != place).T
-        moved[ids] = x | y | (self.heading[ids] != angle)
+        differs = here != place
+        moved[ids] = differs[:, 0] | differs[:, 1] | (heading != angle)
         self.position[ids] = place
         self.heading[ids] = angle
-        self._resting = not moved.any()
+        self._resting = not np.count_nonzero(moved)
         if may_park:
             self._parking.note_moved(moved)
         return moved

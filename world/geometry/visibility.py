@@ -5,6 +5,7 @@ moves; turning on the spot is not moving. With a range the cost is near-linear i
 quadratic, and cubic if robots also occlude each other. Headings, noise and radio models have no part here.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,10 @@ _TRIPLES_AT_ONCE = 1 << 15
 
 # Up to this fraction of the present robots, observers are measured against all robots: the other pairs are not needed.
 _FEW_OBSERVERS = 0.25
+
+# Robots this much farther away than the range are kept as candidates of a few observers, as a fraction of the range.
+_MARGIN_FRACTION = 0.5
+_HALF_MARGIN_ON_AXIS = 0.5 * _MARGIN_FRACTION / math.sqrt(2.0)
 
 
 class VisiblePairs(NamedTuple):
@@ -112,36 +117,59 @@ class NearPairs:
 class FewObservers:
     """The robots within a range of a few observers, for any range and one scene, which is measured once.
 
-    The cost grows with observers times robots, and no work is done for the pairs of other robots.
+    `robots` are the observers, as bytes. The cost grows with observers times robots, and no work is done for the pairs of
+    other robots. Candidates are found within the range and a margin. They are those of the next scenes, too, until a robot
+    has moved half the margin.
     """
 
     def __init__(self) -> None:
-        self._position: Floats = np.empty((0, 2))
+        self._searched: Floats = np.empty((0, 2))  # the positions at which the candidates were found
+        self._position: Floats = np.empty((0, 2))  # the positions at which they were measured
         self._present: Bools = np.empty(0, dtype=np.bool_)
-        self._robots: Ints = np.empty(0, dtype=np.int64)
+        self.robots = b""
         self._reach_m = -1.0
         self._row: Ints = np.empty(0, dtype=np.int64)
+        self._observer: Ints = np.empty(0, dtype=np.int64)
         self._seen: Ints = np.empty(0, dtype=np.int64)
         self._apart2: Floats = np.empty(0)
 
     def within(self, scene: Scene, robots: Ints, range_m: float) -> tuple[Ints, Ints]:
         """Return pairs (k,), (k,) of a row of `robots` and a present robot at most range_m from it, sorted."""
-        known = scene.position is self._position and scene.present is self._present and range_m <= self._reach_m
-        if not known or not np.array_equal(robots, self._robots):
-            self._measure(scene, robots, max(range_m, self._reach_m))
+        known = scene.present is self._present and range_m <= self._reach_m and robots.tobytes() == self.robots
+        if not known or not self._measured_again(scene.position):
+            self._search(scene, robots, max(range_m, self._reach_m))
         near = self._apart2 <= range_m**2
         return self._row[near], self._seen[near]
 
-    def _measure(self, scene: Scene, robots: Ints, reach_m: float) -> None:
+    def _measured_again(self, position: Floats) -> bool:
+        """Measure the candidates at these positions (n, 2), unless a robot has moved too far since they were found."""
+        if position is self._position:
+            return True
+        # A robot that moved by no more along each axis moved by no more than half the margin.
+        axis_m = _HALF_MARGIN_ON_AXIS * self._reach_m
+        moved = position - self._searched
+        if not -axis_m <= np.minimum.reduce(moved, axis=None, initial=0.0) or not (
+            np.maximum.reduce(moved, axis=None, initial=0.0) <= axis_m
+        ):
+            return False
+        apart = position[self._seen] - position[self._observer]
+        apart *= apart
+        self._apart2 = apart[:, 0] + apart[:, 1]
+        self._position = position
+        return True
+
+    def _search(self, scene: Scene, robots: Ints, reach_m: float) -> None:
         x, y = scene.position.T
         apart2 = (x - x[robots][:, None]) ** 2 + (y - y[robots][:, None]) ** 2
         # Slightly too far, so that the comparison in `within` alone decides at the edge.
-        near = apart2 <= (reach_m * (1.0 + 1e-9)) ** 2
+        near = apart2 <= (reach_m * (1.0 + _MARGIN_FRACTION + 1e-9)) ** 2
         near &= scene.present
         near[np.arange(len(robots)), robots] = False
         self._row, self._seen = near.nonzero()
+        self._observer = robots[self._row]
         self._apart2 = apart2[self._row, self._seen]
-        self._position, self._present, self._robots, self._reach_m = scene.position, scene.present, robots, reach_m
+        self._searched = self._position = scene.position
+        self._present, self.robots, self._reach_m = scene.present, robots.tobytes(), reach_m
 
 
 class Visibility:
@@ -152,7 +180,8 @@ class Visibility:
         self._present: Bools = np.empty(0, dtype=np.bool_)
         self._verdicts = WallVerdicts()
         self._near = NearPairs()
-        self._few = FewObservers()
+        # One for the robots that are awake, one for the sleepers that watch.
+        self._few = [FewObservers(), FewObservers()]
         self._pairs: dict[tuple[float | None, bool, bool], Ints] = {}
         self._sightings: dict[tuple[float | None, bool, bool], tuple[Ints, Ints]] = {}
 
@@ -205,7 +234,11 @@ class Visibility:
 
     def _few_sightings(self, scene: Scene, robots: Ints, range_m: float, through_walls: bool) -> VisiblePairs:
         """Return the sightings of a few robots without those of all others; a range and walls are all that limits them."""
-        row, seen = self._few.within(scene, robots, range_m)
+        if robots.tobytes() != self._few[0].robots:
+            self._few.reverse()
+        row, seen = self._few[0].within(scene, robots, range_m)
+        if not len(row):
+            return VisiblePairs(row, seen, np.zeros(len(robots), dtype=np.int64))
         if not (through_walls or scene.arena.is_convex):
             observer = robots[row]
             first, second = np.minimum(observer, seen), np.maximum(observer, seen)

@@ -124,8 +124,8 @@ def in_body_frames(dx: Floats, dy: Floats, heading: Floats, whose: Ints) -> tupl
 
     There is one robot for each of the vectors, or for each column of them.
     """
-    if not heading.any():
+    theirs = heading.take(whose)
+    if not (theirs.any() or heading.any()):
         return dx, dy
-    heading = heading.take(whose)
-    cos, sin = np.cos(heading), np.sin(heading)
+    cos, sin = np.cos(theirs), np.sin(theirs)
     return cos * dx + sin * dy, cos * dy - sin * dx

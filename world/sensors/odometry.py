@@ -53,14 +53,18 @@ class Odometry(Sensor):
         self._tick = scene.tick
         self._known &= scene.present
         known = self._known[robots]
-        self._before = (robots, known, self._position[robots], self._heading[robots])
-        if not known.all():
+        position, heading = self._position[robots], self._heading[robots]
+        self._before = (robots, known, position, heading)
+        if np.count_nonzero(known) < len(robots):
             new = robots[~known]
             self._position[new], self._heading[new], self._known[new] = scene.position[new], scene.heading[new], True
-        dx, dy = (scene.position[robots] - self._position[robots]).T
+            position, heading = self._position[robots], self._heading[robots]
+        here, now = scene.position[robots], scene.heading[robots]
+        moved = here - position
+        dx, dy = moved[:, 0], moved[:, 1]
         forward, left = in_body_frames(dx, dy, self._heading, robots)
-        turn = scene.heading[robots] - self._heading[robots]
-        self._position[robots], self._heading[robots] = scene.position[robots], scene.heading[robots]
+        turn = now - heading
+        self._position[robots], self._heading[robots] = here, now
         if any(self._distance_noise):
             distance = np.hypot(dx, dy)
             draw = scene.draws.normal("sensor.odometry.distance", scene.tick, robots)

@@ -9,7 +9,7 @@ touches. Each tick a closed switch reads open with probability `false_negative`,
 
 import math
 from collections.abc import Callable, Collection
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 from pydantic import Field
@@ -17,8 +17,16 @@ from pydantic import Field
 from zwerm.maths.angles import wrap
 from zwerm.scenario.types import Fraction, Positive, Table
 from zwerm.wire.messages import Contact
-from zwerm.world.scene import Ints, Scene
+from zwerm.world.scene import Floats, Ints, Scene
 from zwerm.world.sensors import Sensor, Surroundings, chosen, portions
+
+# Walls are measured this far beyond the switches, so that a robot without a wall there is not measured again at once [m].
+_AHEAD_M: Final = 0.3
+
+# What rounding may add to a distance [m].
+_ROUNDING_M: Final = 1e-9
+
+_NO_WALLS: Final = (np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
 
 
 class TouchTable(Table):
@@ -48,18 +56,21 @@ class Touch(Sensor):
         self._contacts = [Contact(bearing, self._sector_rad / 2.0) for bearing in bearings]
         self._number = {bearing: number for number, bearing in enumerate(bearings)}
         self._visibility = surroundings.visibility
+        # No wall comes into reach of a robot until it is this far from the place where its walls were measured [m²].
+        self._measured = np.zeros((surroundings.count, 2))
+        self._free2 = np.full(surroundings.count, -1.0)
 
     def read(self, scene: Scene, robots: Ints) -> list[tuple[Contact, ...]]:
         """Return the closed switches of each of `robots`."""
         here = scene.position[robots]
-        walls = scene.arena.walls_within(here, scene.radius_m + self._reach_m)
+        walls = self._walls(scene, robots, here)
         # A wall between two bodies in reach is in reach of both, so no line between bodies has to be tested.
         others = self._visibility.sightings(scene, robots, 2.0 * scene.radius_m + self._reach_m, through_walls=True)
         errs = self._false_negative > 0.0 or self._false_positive > 0.0
-        if not (errs or len(walls.point) or len(others.observer)):
+        if not (errs or len(walls[0]) or len(others.observer)):
             return [()] * len(robots)
-        row = np.concatenate([walls.point, np.searchsorted(robots, others.observer)])
-        place = np.concatenate([walls.nearest, scene.position[others.seen]])
+        row = np.concatenate([walls[0], np.searchsorted(robots, others.observer)])
+        place = np.concatenate([walls[1], scene.position[others.seen]])
         closed = np.zeros((len(robots), len(self._switch)), dtype=np.bool_)
         dx, dy = (place - here[row]).T
         bearing = np.arctan2(dy, dx) - scene.heading[robots[row]]
@@ -70,6 +81,27 @@ class Touch(Sensor):
         row, switch = closed.nonzero()
         ends = np.searchsorted(row, np.arange(len(robots)), side="right")
         return portions([self._contacts[each] for each in switch.tolist()], ends)
+
+    def _walls(self, scene: Scene, robots: Ints, here: Floats) -> tuple[Ints, Floats]:
+        """Return the row (k,) of a robot and the nearest place (k, 2) of each wall in reach.
+
+        Only robots that may have come to a wall since their walls were measured are measured again.
+        """
+        moved = here - self._measured[robots]
+        moved *= moved
+        rows = (moved[:, 0] + moved[:, 1] > self._free2[robots]).nonzero()[0]
+        if not len(rows):
+            return _NO_WALLS
+        reach_m = scene.radius_m + self._reach_m
+        near, places = robots[rows], here[rows]
+        walls = scene.arena.walls_within(places, reach_m + _AHEAD_M)
+        distance_m = np.full(len(rows), reach_m + _AHEAD_M)
+        np.minimum.at(distance_m, walls.point, walls.distance_m)
+        self._measured[near] = places
+        free_m = distance_m - reach_m - _ROUNDING_M
+        self._free2[near] = np.copysign(free_m * free_m, free_m)
+        touched = np.flatnonzero(walls.distance_m <= reach_m)
+        return rows[walls.point[touched]], walls.nearest[touched]
 
     @staticmethod
     def signature(reading: tuple[Contact, ...]) -> tuple[float, ...]:

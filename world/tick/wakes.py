@@ -36,6 +36,7 @@ class Wakes:
         self._dt_s = dt_s
         self._due: Floats = np.full(count, NEVER)  # the tick of the next observation
         self._on_packet: Bools = np.zeros(count, dtype=np.bool_)
+        self._watched = dict.fromkeys(self.events, 0)  # the number of nodes in each column of `_watching`
         self._watching: dict[str, Bools] = {field: np.zeros(count, dtype=np.bool_) for field in self.events}
         self._newest: dict[str, dict[int, Any]] = {field: {} for field in self.events}  # readings
         self._unmerged: dict[str, tuple[Sequence[int], Sequence[Any]]] = {}  # the newest of all nodes observed together
@@ -63,6 +64,7 @@ class Wakes:
         self._on_packet[node] = wake.on_packet
         for field, event in self.events.items():
             watching = getattr(wake, event.asked_by)
+            self._watched[field] += watching - int(self._watching[field][node])
             self._watching[field][node] = watching
             if watching and node in self._newest[field]:
                 self._seen[field][node] = event.signature(self._newest[field][node])
@@ -75,9 +77,14 @@ class Wakes:
             if self._on_packet[node]:
                 self._due[node] = tick
 
+    @property
+    def watching(self) -> bool:
+        """True if any sleeper wakes on a change of a sensor."""
+        return any(self._watched.values())
+
     def watchers(self, field: str) -> Ints:
         """Return the sleepers that wake on a change of the sensor `field`."""
-        return np.flatnonzero(self._watching[field])
+        return np.flatnonzero(self._watching[field]) if self._watched[field] else _NO_NODES
 
     def note_readings(self, field: str, nodes: Ints, readings: Sequence[Any], tick: int) -> None:
         """Wake those of `nodes` whose reading differs from the one they observed last."""
@@ -100,7 +107,7 @@ class Wakes:
     def awake(self, tick: int) -> Ints:
         """Return the nodes to observe at `tick`, ascending; sleepers among them are awake from now on."""
         if self._asleep or self._stale:
-            self._ids = np.flatnonzero(self._due <= tick)
+            self._ids = (self._due <= tick).nonzero()[0]
             self._stale = False
             for node in self._ids.tolist():
                 if node in self._asleep:
@@ -111,10 +118,15 @@ class Wakes:
     def _rouse(self, node: int) -> None:
         self._asleep.pop(node, None)
         self._on_packet[node] = False
-        for watching in self._watching.values():
-            watching[node] = False
+        for field, watching in self._watching.items():
+            if watching[node]:
+                watching[node] = False
+                self._watched[field] -= 1
 
     @property
     def sleeping(self) -> bool:
         """True if any node sleeps."""
         return bool(self._asleep)
+
+
+_NO_NODES: Final[Ints] = np.zeros(0, dtype=np.int64)

@@ -1,8 +1,11 @@
 """Whole runs in a small hall: every combination of services, loss, small packets, crashes, partitions."""
 
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from zwerm.agents.landmark_exploration.mapping.map_file import map_of_reports, write_map
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
@@ -203,3 +206,26 @@ def test_baselines_explore_everything_too(strategy: str) -> None:
     result = ran(hall(None, coordinator=table))
     assert result.outcome == "completed"
     assert result.metrics["completion_fraction"] > 0.93
+
+
+def test_a_random_walk_maps_what_it_sees_and_is_slower() -> None:
+    short = {"dt_s": 0.1, "duration_s": 40.0}
+    parameters = {"robots_expected": 4, "strategy": "random-walk", "turn_sd_rad": 0.8}
+    walk = ran(hall(GOSSIP, time=short, robots={"parameters": parameters}))
+    explored = ran(hall(GOSSIP, time=short))
+    assert walk.outcome == "time-limit"
+    assert 0.5 < walk.metrics["completion_fraction"] < explored.metrics["completion_fraction"]
+
+
+def test_a_building_of_a_bitmap_is_explored(tmp_path: Path) -> None:
+    cells = np.full((56, 76), 255, np.uint8)
+    cells[[*range(3), *range(53, 56)], :] = cells[:, [*range(3), *range(73, 76)]] = 0
+    cells[18:38, 26:50] = 0
+    Image.fromarray(cells).save(tmp_path / "building.png")
+    base = read(load("landmark-map").folder / "landmark-map.toml")
+    base |= {"name": "building", "arena": {"map": "building.png", "resolution_m": 0.05}}
+    base["robots"] |= {"count": 4, "parameters": {"robots_expected": 4}}
+    result = ran(validate(base, "building.toml", tmp_path))
+    assert result.outcome == "completed"
+    assert result.metrics["completion_fraction"] > 0.9
+    assert result.metrics["landmark_complex_holes"] == result.metrics["obstacles"] == 1

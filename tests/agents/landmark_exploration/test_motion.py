@@ -147,6 +147,12 @@ def test_a_wall_well_behind_the_line_is_none() -> None:
     assert plane.follow(explore(plane.view, 1, 2, random(), lambda: False, 40, 40)) == "timed-out"
 
 
+def test_minimal_effort_ends_one_tick_behind_the_line() -> None:
+    plane = Plane(0.5, -0.4)
+    assert plane.follow(explore(plane.view, 1, 2, random(), lambda: False, 40, 1)) == "timed-out"
+    assert 0.0 < plane.y <= 2 * STEP
+
+
 def test_a_frontier_whose_landmarks_are_not_seen_is_not_reached() -> None:
     plane = Plane(0.5, 0.3)
     assert plane.follow(explore(plane.view, 80, 81, random(), lambda: False, 40, 40)) == "unreached"

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.cost_utility import Offer, cost_utility
+from zwerm.agents.landmark_exploration.mapping.frontier_status import CLEAR, REOPENED, TIMED_OUT, key_of
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing.exploration_tasks import landmark_bytes, read_task
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, TaskPart, TaskReport, Vector
@@ -100,3 +101,27 @@ def test_a_robot_that_no_path_leads_to_a_frontier_walks_or_waits(walks: bool) ->
     outbox = node.step(Observation(0, 0.0, (Packet("uplink", messages.write(report), 0),))).outbox
     parts = [part for part in map(messages.read, [each.payload for each in outbox]) if isinstance(part, TaskPart)]
     assert [read_task(part.bytes_).walk for part in parts] == [True] * walks
+
+
+def test_a_frontier_that_opens_goes_to_the_nearest_robot_although_that_one_waits() -> None:
+    """A robot that found no free frontier waits before it is considered again. A frontier that opens ends this time."""
+    node = coordinator()
+    for first in range(1, 6):
+        node.map.observe(BearingSnapshot((first, first + 1, first + 2), (0, 20, 40)), (first, 0))
+    here, there = key_of(1, 2), key_of(6, 7)
+    node.map.raise_all([key for key in node.map.frontiers.open if key not in (here, there)], CLEAR)
+    node.map.raise_all([there], TIMED_OUT)
+
+    def assigned(tick: int, reports: dict[int, tuple[int, ...]]) -> dict[int | None, int | None]:
+        inbox = tuple(
+            Packet("uplink", messages.write(TaskReport(1, 0, 0, True, True, 0, landmark_bytes(seen))), robot)
+            for robot, seen in reports.items()
+        )
+        outbox = node.step(Observation(tick, 0.1 * tick, inbox)).outbox
+        parts = [(each.to, messages.read(each.payload)) for each in outbox]
+        return {to: read_task(part.bytes_).key for to, part in parts if isinstance(part, TaskPart)}
+
+    assert assigned(0, {0: (1, 2, 3)}) == {0: here}
+    assert assigned(1, {1: (5, 6, 7)}) == {}, "robot 1 finds no free frontier, and waits"
+    node.map.raise_all([there], REOPENED)
+    assert assigned(2, {2: (1, 2, 3)}) == {1: there}, "robot 2 is considered for the first time, but is far"

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from msgspec.structs import astuple
 
 import zwerm
 from zwerm.catalogue import DRIVES
 from zwerm.errors import ScenarioError
+from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import BodyTable
-from zwerm.world.bodies.drives import find_drive
+from zwerm.world.bodies.drives import Drives, find_drive
 
 
 @pytest.mark.parametrize("kind", sorted(DRIVES))
@@ -28,6 +30,34 @@ def test_a_differential_drive_turns_by_the_difference_of_its_wheels() -> None:
     assert left is None
     assert forward == pytest.approx([0.3, 0.3])
     assert turn == pytest.approx([2.0, 0.0])
+
+
+@pytest.mark.parametrize("kind", sorted(DRIVES))
+@pytest.mark.parametrize("latency_ticks", [0, 1])
+def test_velocities_that_last_are_those_of_the_newest_commands(kind: str, latency_ticks: int) -> None:
+    body = BodyTable(kind=kind, max_speed_m_s=0.1, max_turn_rad_s=1.0, wheel_base_m=0.05, latency_ticks=latency_ticks)
+    count, random = 40, np.random.Generator(np.random.Philox(5))
+    drives, whole = Drives(body, count, Draws(1)), find_drive(kind)(body)
+    axes = len(whole.command.__struct_fields__)
+    commanded = np.zeros((count, axes))
+    same, before = 0, None
+    for _ in range(300):
+        some = random.choice(count, int(random.choice([0, 1, 3, 30])), replace=False).tolist()
+        orders = {robot: whole.command(*random.choice([0.0, 0.05, 0.2], axes).tolist()) for robot in some}
+        if orders:
+            drives.command(orders)
+        for robot, order in orders.items():
+            commanded[robot] = astuple(order)
+        if random.random() < 0.1:
+            drives.stop(7)
+            commanded[7] = 0.0
+        found = drives.velocities(0)
+        for part, expected in zip(found, whole.velocities(commanded), strict=True):
+            assert (part is None) == (expected is None)
+            assert part is None or part.tolist() == expected.tolist()
+        same += found is before
+        before = found
+    assert same > 30  # the control: some of them are kept
 
 
 def test_a_drive_of_a_users_own_moves_the_robots_of_a_run() -> None:

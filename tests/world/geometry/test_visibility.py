@@ -168,3 +168,22 @@ def test_few_observers_see_what_they_see_among_all_pairs(make_scene, walled, see
         assert found.ends.tolist() == [sum(1 for i, _ in expected if i <= robot) for robot in robots.tolist()]
         moved = int(random.integers(40))
         poses[moved] = (*random.uniform(0.05, 2.95, 2).tolist(), 0.0)
+
+
+def test_few_observers_keep_candidates_and_see_what_new_ones_see(make_scene, walled):
+    random = np.random.Generator(np.random.Philox(5))
+    remembering = Visibility()
+    places = random.uniform(0.1, 2.9, (40, 2))
+    ways = random.uniform(-0.03, 0.03, (40, 2))
+    present = make_scene(np.zeros((40, 3))).present
+    changes = set()
+    for tick in range(60):
+        places = np.clip(places + ways * (random.random((40, 1)) < 0.3), 0.05, 2.95)
+        scene = make_scene(np.column_stack([places, np.zeros(40)]), walled, tick=tick)
+        scene.present = present
+        for robots in (np.array([2, 5, 9]), np.array([1, 30])):
+            for range_m in (0.2, 0.7):
+                kept, new = (each.sightings(scene, robots, range_m) for each in (remembering, Visibility()))
+                assert [each.tolist() for each in kept] == [each.tolist() for each in new]
+                changes.add(tuple(kept.seen.tolist()))
+    assert len(changes) > 20  # robots come into sight, and leave it

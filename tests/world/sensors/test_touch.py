@@ -56,6 +56,25 @@ def test_a_switch_closes_up_to_its_reach_from_the_bodys_surface_and_no_farther(m
             assert [contact.bearing_rad for contact in reading] == ([pytest.approx(bearing)] if touches else [])
 
 
+def test_a_sensor_that_was_read_before_feels_the_walls_that_a_new_one_feels(make_scene, sensor_for, arena):
+    random = np.random.Generator(np.random.Philox(7))
+    places, ways = random.uniform(0.1, 2.9, (12, 2)), random.uniform(-0.06, 0.06, (12, 2))
+    settings = {"reach_m": 0.01, "switches": 12}
+    used, touched = None, 0
+    for tick in range(120):
+        ahead = places + ways
+        out = (ahead < 0.05) | (ahead > 2.95)
+        ways[out] *= -1.0
+        places = np.where(out, places, ahead)
+        scene = make_scene(np.column_stack([places, np.zeros(12)]), arena, tick=tick, radius_m=0.05)
+        used = used or sensor_for(scene, "touch", **settings)
+        robots = np.arange(tick % 3, 12)
+        found = used.read(scene, robots)
+        assert found == sensor_for(scene, "touch", **settings).read(scene, robots)
+        touched += sum(map(bool, found))
+    assert touched > 20
+
+
 def test_turning_a_robot_moves_the_contact_the_other_way(make_scene, sensor_for):
     for quarter in range(-3, 5):
         scene = make_scene([(1.0, 0.037, quarter * math.pi / 2)])
