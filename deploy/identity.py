@@ -33,6 +33,10 @@ ACCEPT_TIMEOUT_MS: Final = 5_000
 # The router discards a longer message. The receiver refuses and counts messages between MESSAGE_BYTES_MAX and this size.
 _MESSAGE_BYTES_MAX: Final = 16 * MESSAGE_BYTES_MAX
 
+# Batches of 64 KiB that can wait to be sent to a node: a world that is delayed fills all of them, for every node. A thread
+# of its own sends them, so that a long message waits only for that.
+_BATCHES: Final = 4
+
 # Operations allowed to a node on its keys: (key, message, flow seen from the router).
 _PERMISSIONS: Final = (
     (command_key, "put", "ingress"),
@@ -106,6 +110,7 @@ def router_settings(
         "transport/unicast/max_sessions": 2 * capacity + 100,
         "transport/auth/usrpwd/dictionary_file": str(dictionary),
         "transport/link/rx/max_message_size": _MESSAGE_BYTES_MAX,
+        "transport/link/tx/queue/size/data": _BATCHES,
         "access_control": access_control(credentials, identity is not None and identity.mutual),
         **transport_settings(endpoints, credentials.lease_s),
         **({} if identity is None else _tls_settings(identity)),

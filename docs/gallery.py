@@ -1,5 +1,8 @@
 """Draw the pictures of the gallery: `python docs/gallery.py`, or `python docs/gallery.py NAME ...` for some scenarios only.
 
+With `--buildings` it draws instead the runs of `benchmarks/bench_buildings.py` with seed 1 and no noise, one for each kind of
+building.
+
 Runs each built-in scenario inline with seed 1 and writes its picture, reduced to a small palette, to `docs/images/gallery/`.
 All of them together take about fifteen minutes of processor time. Run `make pages` afterwards: the page lists the pictures that
 are there.
@@ -7,6 +10,7 @@ are there.
 
 import argparse
 import io
+import sys
 from pathlib import Path
 from typing import Final
 
@@ -16,7 +20,13 @@ import zwerm
 from zwerm.scenario.load import built_in
 from zwerm.view.canvas import BLUE, ORANGE, OUTSIDE, SKY, VERMILLION, WALL, YELLOW
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from random_buildings import KINDS, random_building
+
 FOLDER: Final = Path(__file__).parent / "images" / "gallery"
+BUILDINGS: Final = FOLDER / "buildings"
+BODY_M: Final = 0.14
 SEED: Final = 1
 WIDTHS: Final = (900, 760, 640)  # pixels, tried in this order
 HEIGHT_MAX: Final = 1200
@@ -52,13 +62,25 @@ def draw(name: str) -> Path:
     return path
 
 
+def draw_building(kind: str) -> Path:
+    """Run sensor coverage in a drawn building and write its picture."""
+    path = BUILDINGS / f"{kind}.png"
+    arena = f'arena={{wkt="{random_building(kind, SEED)}", passage_m={BODY_M}}}'
+    settings = (arena, "robots.sensors.0.sd_rad=0.0")
+    zwerm.run("sensor-coverage-map", seed=SEED, runner="inline", overrides=settings).picture(path)
+    path.write_bytes(small(path))
+    return path
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description="Draw the pictures of the gallery.")
     parser.add_argument("names", nargs="*", metavar="NAME", help="a built-in scenario; all of them by default")
-    names = parser.parse_args().names or built_in()
-    FOLDER.mkdir(parents=True, exist_ok=True)
+    parser.add_argument("--buildings", action="store_true", help="draw sensor coverage in drawn buildings instead")
+    options = parser.parse_args()
+    BUILDINGS.mkdir(parents=True, exist_ok=True)
+    names = KINDS if options.buildings else options.names or built_in()
     for name in names:
-        path = draw(name)
+        path = draw_building(name) if options.buildings else draw(name)
         print(f"{name}: {path.stat().st_size:,} bytes", flush=True)
 
 

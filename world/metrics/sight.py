@@ -22,8 +22,8 @@ _QUARTER_SIDES = 64
 _PIECE_RAD = 0.5
 # Bodies in contact may overlap a wall by a little.
 _INSIDE = 0.98
-# Overlays that fail in floating point are computed on a grid of this size [m].
-_GRID_M = 1e-9
+# Grids [m] for overlays that fail on nearly coincident edges, one after the other.
+_GRIDS_M = (1e-9, 1e-7, 1e-6, 1e-5)
 
 
 def hexagonal_packing_robots(arena: Arena, range_m: float) -> float:
@@ -75,11 +75,19 @@ def seen_from(place: Floats, range_m: float, arena: Arena) -> shapely.Geometry:
 
 
 def robust(operation: Callable[..., shapely.Geometry], *geometries: Any) -> shapely.Geometry:
-    """Return an overlay of geometries; where it fails on nearly coincident edges, on a grid of `_GRID_M`."""
+    """Return an overlay of geometries; where it fails on nearly coincident edges, on the finest grid on which it does not.
+
+    Raises shapely.errors.GEOSException where it fails on all of `_GRIDS_M`.
+    """
     try:
         return operation(*geometries)
     except shapely.errors.GEOSException:
-        return operation(*geometries, grid_size=_GRID_M)
+        for grid_m in _GRIDS_M[:-1]:
+            try:
+                return operation(*geometries, grid_size=grid_m)
+            except shapely.errors.GEOSException:
+                continue
+        return operation(*geometries, grid_size=_GRIDS_M[-1])
 
 
 def _shadow(

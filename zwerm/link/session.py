@@ -30,8 +30,8 @@ SETTINGS: Final[Mapping[str, Any]] = {
     "transport/shared_memory/enabled": False,
     "transport/unicast/qos/enabled": False,
     # Batches of 64 KiB that can wait to be sent. With the minimum, 2, a long message blocks on the thread that sends it.
-    # Zenoh allocates them when needed, and keeps them: a world that is delayed needs all of them, for every robot.
-    "transport/link/tx/queue/size/data": 4,
+    # Zenoh allocates them only when needed, and keeps them.
+    "transport/link/tx/queue/size/data": 16,
 }
 
 UNIX_PROTOCOL: Final = "unixsock-stream"

@@ -170,9 +170,10 @@ def test_a_coverage_that_is_never_reached_has_no_time() -> None:
     assert found["deployment_cycles"] >= 1.0
 
 
-def test_an_overlay_that_fails_in_floating_point_is_computed_on_a_grid() -> None:
-    def fails(a: shapely.Geometry, b: shapely.Geometry, grid_size: float | None = None) -> shapely.Geometry:
-        if grid_size is None:
+@pytest.mark.parametrize("finest_m", [1e-9, 1e-6])
+def test_an_overlay_that_fails_in_floating_point_is_computed_on_a_grid(finest_m: float) -> None:
+    def fails(a: shapely.Geometry, b: shapely.Geometry, grid_size: float = 0.0) -> shapely.Geometry:
+        if grid_size < finest_m:
             raise shapely.errors.GEOSException("TopologyException: Ring edge missing")
         return shapely.difference(a, b, grid_size=grid_size)
 
