@@ -46,7 +46,7 @@ class Passed(NamedTuple):
     between: tuple[Collection[int], ...]
 
 
-class Around(NamedTuple):
+class ArcBasis(NamedTuple):
     """What was known around a slot when its arcs were found."""
 
     passed: int
@@ -69,7 +69,7 @@ class SwarmProof:
     def _forget(self) -> None:
         self._scan = ScanResult({}, FlagComplex({}), ())
         self._neighbours: dict[int, frozenset[int]] = {}
-        self._around: dict[int, Around] = {}
+        self._around: dict[int, ArcBasis] = {}
         self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
         self._pairs: dict[int, tuple[Pair, ...]] = {}  # the valid triangles, by the number of their point
         self._chosen: dict[Pair, tuple[WalkPoint, ...]] = {}  # the points of triangles beside an edge, one a side
@@ -92,7 +92,7 @@ class SwarmProof:
         for slot in complex_.vertices:
             view = scan.views[slot]
             beside = {each: view[each] for each in complex_.neighbours[slot]}
-            now = Around(len(self._passed.get(slot, ())), beside, touched.get(slot, ()), tuple(near.get(slot, ())))
+            now = ArcBasis(len(self._passed.get(slot, ())), beside, touched.get(slot, ()), tuple(near.get(slot, ())))
             if self._around.get(slot) != now:
                 self._around[slot] = now
                 changed[slot] = None

@@ -16,11 +16,8 @@ these stand.
 """
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Final, NamedTuple
-
-from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.maths.simplicial import FlagComplex
 
 # An open arc narrower than this [rad] counts as closed: a body at r_v is 8 degrees wide.
 GAP_RAD: Final = math.radians(6.0)
@@ -257,107 +254,3 @@ def _between(there: float, a: float, b: float) -> bool:
     """Return whether a direction [rad] lies within the smaller angle between two others."""
     left, right = math.remainder(a - there, math.tau), math.remainder(b - there, math.tau)
     return left * right < 0.0 and abs(left) + abs(right) < math.pi
-
-
-# --- the proof of one slot ----------------------------------------------------------------------------------------------
-
-
-class Step(NamedTuple):
-    """A point of a walk, the point before it if the wall was followed since, and the hand at the wall.
-
-    `witnesses` are the slots that saw the way between, where this slot did not.
-    """
-
-    before: WalkPoint | None
-    point: WalkPoint
-    hand: int
-    witnesses: tuple[int, ...] = ()
-
-
-class SlotProof:
-    """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator. It keeps no walks.
-
-    `around` are the slots that share an edge with it, and their directions [rad]. An arc that other standing robots closed
-    together with a walk counts while they stand within two hops.
-    """
-
-    def __init__(self) -> None:
-        self.around: Mapping[int, float] = {}
-        self._scan = ScanResult({}, FlagComplex({}), ())
-        self._by_view: list[Arc] = []
-        self._at_walls: list[Arc] = []  # arcs of walls in touch
-        self._contacts: list[Arc] = []  # the directions of their contacts
-        self._by_walks: dict[tuple[int, ...], list[Arc]] = {}  # by the slots that must stand
-
-    def update(self, slot: int, scan: ScanResult, touched: Iterable[float]) -> None:
-        """Take in the slot's view and the complex around it, and the directions [rad] of walls in touch."""
-        view = scan.views[slot]
-        self._scan = scan
-        self.around = {each: view[each] for each in scan.complex_.neighbours[slot]}
-        touched = tuple(touched)
-        self._at_walls, self._contacts = arcs_of_walls(touched), arcs_of_walls(touched, CONTACT_RAD)
-        self._by_view = []
-        for triangle in scan.complex_.triangles:
-            if slot in triangle:
-                a, b = (each for each in triangle if each != slot)
-                self._by_view.append(arc_between(view[a], view[b]))
-
-    def open_arcs(self) -> list[Arc]:
-        """Return the arcs that nothing closes."""
-        standing = self._scan.complex_.neighbours
-        walks = [
-            arc for slots, arcs in self._by_walks.items() if all(each in standing for each in slots) for arc in arcs
-        ]
-        return complement([*self._by_view, *self._at_walls, *walks])
-
-    def pass_step(self, slot: int, earlier: Step | None, step: Step) -> bool:
-        """Take in a step of a walk whose end this slot sees, and the step before; return whether the open arcs are smaller."""
-        old = sum(each.width_rad for each in self.open_arcs())
-        for arc in arcs_of_step(slot, step.before, step.point, step.hand):
-            self._add(step.witnesses, arc)
-        self._add_fan(slot, step.point, [step])
-        if earlier is not None and earlier.point is step.before:
-            self._add_fan(slot, earlier.point, [earlier, step])
-        return sum(each.width_rad for each in self.open_arcs()) < old - NEWS_RAD
-
-    def _add_fan(self, slot: int, point: WalkPoint, steps: Sequence[Step]) -> None:
-        """Add the triangles of this slot, a neighbour and a point, if the space beyond them is proved by these steps."""
-        views, neighbours = self._scan.views, self._scan.complex_.neighbours
-        if slot not in point.seen or not any(each in self.around for each in point.seen):
-            return
-        at_walls = {}
-        for each in point.seen:
-            walls = [
-                arc
-                for step in steps
-                if each in step.point.seen and not step.witnesses
-                for arc in arcs_of_step(each, step.before, step.point, step.hand)
-            ]
-            if each == slot:
-                walls += [*self._contacts, *self._by_walks.get((), ())]
-            for side in (1, -1):
-                at_walls[each, side] = ends_at(walls, point.seen[each], side)
-        fan = fan_of(point, views, neighbours, at_walls)
-        if any(slot in pair for pair in fan):
-            needed = tuple(sorted({each for pair in fan for each in pair} - {slot}))
-            for pair in fan:
-                if slot in pair:
-                    self._add(needed, arc_between(views[slot][sum(pair) - slot], point.seen[slot]))
-
-    def _add(self, needed: tuple[int, ...], arc: Arc) -> None:
-        self._by_walks[needed] = united([*self._by_walks.get(needed, ()), arc])
-
-    def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
-        """Add arcs (start, width) [rad] in which a wall close to the slot was followed."""
-        for each in arcs:
-            self._add((), Arc(*each))
-
-    def memory(self) -> tuple[tuple[tuple[int, ...], float, float], ...]:
-        """Return the arcs that walks closed, for the slot's next occupant."""
-        return tuple((slots, *arc) for slots, arcs in self._by_walks.items() for arc in arcs)
-
-    def inherit(self, memory: Iterable[tuple[tuple[int, ...], float, float]]) -> None:
-        """Take over the arcs that walks closed from the slot's former occupant."""
-        self._by_walks = {}
-        for slots, start, width in memory:
-            self._by_walks.setdefault(slots, []).append(Arc(start, width))

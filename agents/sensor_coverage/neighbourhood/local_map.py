@@ -13,8 +13,8 @@ from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, add_wall, refined_reference, wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_proof import SlotProof
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over

@@ -10,14 +10,8 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, Final, NamedTuple, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
-from zwerm.agents.sensor_coverage.frontier.wall_proof import (
-    SeenPoint,
-    SlotProof,
-    Step,
-    TouchCounter,
-    WalkPoint,
-    point_before,
-)
+from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof, WallStep
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, WalkPoint, point_before
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
@@ -76,7 +70,7 @@ class _Received(NamedTuple):
     push: int
     slot: int
     seen: SeenPoint
-    step: Step
+    step: WallStep
 
 
 class _Hidden(NamedTuple):
@@ -199,12 +193,12 @@ class WallProtocol(Component):
         if received is not None and received[:2] != (passed.push, slot):
             received = None
         now = SeenPoint(passed.number, point)
-        step = Step(None, point, passed.hand)
+        step = WallStep(None, point, passed.hand)
         if received is not None:
             witnesses = self._witnesses(passed, received.seen.number, slots)
             before = point_before(slot, received.seen, now, passed.touch_since)
             if before is not None and witnesses is not None:
-                step = Step(before, point, passed.hand, witnesses)
+                step = WallStep(before, point, passed.hand, witnesses)
         self._received[sender] = _Received(passed.push, slot, now, step)
         if local_map.proof.pass_step(slot, None if received is None else received.step, step):
             self._replan_at = tick + PASSED_TICKS

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Mapping
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof, WallStep
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, SlotProof, Step, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import RESENT_POINTS, Sightlines
 from zwerm.maths.simplicial import FlagComplex
@@ -209,11 +210,11 @@ def at_slot(slot: int, views: Mapping[int, Mapping[int, float]], *walls: float) 
 
 def pass_walk(proof: SlotProof, slot: int, points: Iterable[WalkPoint], hand: int) -> list[bool]:
     """Let a walk pass a slot; return after which points the open arcs are smaller."""
-    steps: list[Step] = []
+    steps: list[WallStep] = []
     smaller = []
     for point in points:
         last = steps[-1] if steps else None
-        steps.append(Step(None if last is None else last.point, point, hand))
+        steps.append(WallStep(None if last is None else last.point, point, hand))
         smaller.append(proof.pass_step(slot, last, steps[-1]))
     return smaller
 
@@ -247,7 +248,7 @@ def test_two_points_of_walks_beside_a_door_close_nothing_at_a_slot() -> None:
 def test_an_arc_behind_a_corner_stays_closed_while_the_robot_that_saw_the_way_stands() -> None:
     proof = at_slot(0, PAIR)
     before, point = (WalkPoint({0: math.radians(each)}, SOUTH, ()) for each in (-90.0, -70.0))
-    assert proof.pass_step(0, None, Step(before, point, -1, (1,)))
+    assert proof.pass_step(0, None, WallStep(before, point, -1, (1,)))
     assert open_rad(proof) == pytest.approx(math.tau - math.radians(20.0))
     proof.update(0, ScanResult({0: {}}, FlagComplex({0: {}}), ()), ())
     assert open_rad(proof) == pytest.approx(math.tau)
