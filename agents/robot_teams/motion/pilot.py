@@ -293,16 +293,18 @@ class Pilot:
             if closing > limit:
                 vx -= (closing - limit) * other.nx
                 vy -= (closing - limit) * other.ny
-        # Walls deflect the motion: the deflected motion must not lead into a body either.
-        wx, wy = vx, vy
+        # Walls deflect the motion, one after the other: no motion on the way there may lead into a body either. A wreck is
+        # among the walls, and another wall may turn the robot back into it.
+        motions = [(vx, vy)]
         for nx, ny in senses.walls:
+            wx, wy = motions[-1]
             into = wx * nx + wy * ny
             if into > 0.0:
-                wx, wy = wx - into * nx, wy - into * ny
+                motions.append((wx - into * nx, wy - into * ny))
         scale = 1.0
         for other in senses.robots:
             limit = max(0.0, other.gap_m) / (2.0 * self._dt_s)
-            closing = max(vx * other.nx + vy * other.ny, wx * other.nx + wy * other.ny)
+            closing = max(wx * other.nx + wy * other.ny for wx, wy in motions)
             if closing > limit + 1e-6:
                 scale = min(scale, limit / closing)
         return vx * scale, vy * scale

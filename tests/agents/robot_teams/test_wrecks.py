@@ -1,5 +1,6 @@
 """A robot is taken for a wreck by touch, rest and silence together; facts that name it are void once it is alive."""
 
+import numpy as np
 import pytest
 
 from zwerm.agents.robot_teams.mapping.facts import (
@@ -17,7 +18,7 @@ from zwerm.agents.robot_teams.mapping.facts import (
 )
 from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.motion.manoeuvres import Approach, SliceGrid
-from zwerm.agents.robot_teams.motion.pilot import IDLE, RUNNING
+from zwerm.agents.robot_teams.motion.pilot import IDLE, RUNNING, Pilot
 from zwerm.agents.robot_teams.motion.senses import Beside, Senses
 from zwerm.agents.robot_teams.motion.wrecks import STILL_S, TOUCHED_S, WreckWatch
 from zwerm.agents.robot_teams.robot import TeamRobot
@@ -169,3 +170,14 @@ def test_a_robot_whose_end_a_wreck_hides_looks_for_another_end(hidden: bool) -> 
         states.append(robot.pilot.state)
         robot.map.add(Void(0, -300, 4_600 if hidden else 5_600, 5_400 if hidden else 6_400, WRECK))
     assert states == [IDLE, RUNNING if hidden else IDLE]
+
+
+@pytest.mark.parametrize("y_mm", [-1_500, -900, -500, -200, -100, 0, 100])
+def test_a_robot_between_a_wall_and_a_wreck_does_not_slide_into_the_wreck(y_mm: int) -> None:
+    wall, wreck = (0.0, 1.0), (-0.6, -0.8)
+    beside = Beside(2, -0.3, -0.4, *wreck, -0.015, 0.0, 0.0, Wreck(2, 1))
+    pilot = Pilot(1, 1.0, 0.05, np.random.default_rng(1))
+    pilot.start(Approach(End(-1, BOTTOM, y_mm), SliceGrid(0.0, 0.95), lambda senses: []))
+    vx, vy = pilot.step(Senses(1, 0.0, 0.0, (wall, wreck), (beside,)))
+    along_wall = vx, min(vy, 0.0)
+    assert along_wall[0] * wreck[0] + along_wall[1] * wreck[1] <= 1e-6
