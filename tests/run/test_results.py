@@ -1,6 +1,7 @@
 """A result as arrays and as pandas frames, without a recording."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from support import scenario
 
 import zwerm
 from zwerm.errors import MissingExtraError
+from zwerm.record.recording import Recording
 
 
 @pytest.fixture
@@ -39,6 +41,22 @@ def test_a_robot_that_is_not_in_the_arena_has_no_pose() -> None:
 def test_a_title_names_the_number_of_robots(count: int, words: str) -> None:
     robots = {"count": count, "controller": "reporters:Reports", "sensors": []}
     assert zwerm.run(scenario(robots=robots, time={"duration_s": 0.1}), 1, "inline").ending == words
+
+
+def test_an_interrupt_while_the_recording_is_closed_does_not_lose_the_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    close = Recording.close
+
+    def closed_and_interrupted(recording: Recording) -> None:
+        close(recording)
+        monkeypatch.undo()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Recording, "close", closed_and_interrupted)
+    robots = {"count": 2, "controller": "reporters:Reports", "sensors": []}
+    found = zwerm.run(scenario(robots=robots, time={"duration_s": 0.3}), 1, record=tmp_path / "run.mcap")
+    assert (found.outcome, found.ticks) == ("interrupted", 3)
 
 
 def test_metrics_over_time_are_arrays(result: zwerm.RunResult) -> None:

@@ -118,7 +118,7 @@ def run(
         )
         with KeptResult(swarm.close) as kept, swarm:
             guard = DenialGuard(security, swarm.link.node_of_session)
-            kept.result = drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, guard)
+            drive(world, swarm.link, seed, runner, realtime, watcher, record, swarm, metrics, guard, kept)
         return kept.end()
 
 
@@ -200,7 +200,7 @@ def serve(
         )
         with KeptResult(swarm.close) as kept, swarm:
             guard = DenialGuard(security, swarm.link.node_of_session)
-            kept.result = drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, guard)
+            drive(world, swarm.link, seed, "remote", realtime, watcher, record, None, metrics, guard, kept)
         return kept.end()
 
 
@@ -220,11 +220,12 @@ def drive(
     programs: NodeProcesses | None = None,
     metrics: Observers | None = None,
     guard: DenialGuard | None = None,
+    kept: KeptResult | None = None,
 ) -> RunResult:
     """Run `world` over a link on which all nodes have joined, and return the result; write a recording to `record`.
 
     `programs` carries out on nodes' programs what the scenario's faults demand. `metrics` measure the run; without them, new
-    observers do, as the scenario asks.
+    observers do, as the scenario asks. `kept` gets the result before the recording is closed: an interrupt may come then.
     """
     scenario = world.scenario
     if metrics is None:
@@ -264,6 +265,8 @@ def drive(
         if guard is not None:
             refusals |= guard.refusals()
         result = _result(world, seed, runner, outcome, reason, wall_s, driver, sampling, refusals)
+        if kept is not None:
+            kept.result = result
         if recording is not None:
             recording.close()
             result.problems += [recording.error] if recording.error else []

@@ -151,12 +151,12 @@ def test_the_time_to_a_coverage_is_the_time_at_which_it_is_in_sight(deployed: Ru
     found, tracks = deployed.metrics, deployed.history.arrays()
     times = [found[f"time_to_{percent}_percent_coverage_s"] for percent in (50, 90, 99)]
     assert times == sorted(times)
+    sight = SeenArea(deployed.arena, 1.0)
     for percent, time_s in zip((50, 90, 99), times, strict=True):
-        before, after = (
-            SeenArea(deployed.arena, 1.0).fraction(tracks.position[k][tracks.present[k]])
-            for k in (np.searchsorted(tracks.time_s, time_s - 1.0) - 1, np.searchsorted(tracks.time_s, time_s + 1.0))
-        )
-        assert before < percent / 100.0 <= after
+        first, last = (np.searchsorted(tracks.time_s, time_s + off_s) for off_s in (-1.0, 1.0))
+        # Robots move on meanwhile, so a place may go out of sight again.
+        before, *near = (sight.fraction(tracks.position[k][tracks.present[k]]) for k in range(first - 1, last + 1))
+        assert before < percent / 100.0 <= max(near)
     assert deployed.series["coverage_fraction"][-1] == found["coverage_fraction"]
     assert deployed.series["robots_deployed"][-1] == found["robots_deployed"]
 
