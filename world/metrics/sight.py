@@ -6,6 +6,7 @@ one range apart. The number of its points in free space depends on the position 
 positions is used here: the free area divided by the area of one cell.
 """
 
+import contextlib
 import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -77,17 +78,14 @@ def seen_from(place: Floats, range_m: float, arena: Arena) -> shapely.Geometry:
 def robust(operation: Callable[..., shapely.Geometry], *geometries: Any) -> shapely.Geometry:
     """Return an overlay of geometries; where it fails on nearly coincident edges, on the finest grid on which it does not.
 
-    Raises shapely.errors.GEOSException where it fails on all of `_GRIDS_M`.
+    A result that is no valid geometry is a failure, too. Where all of `_GRIDS_M` fail, edges move by as much as the last.
     """
-    try:
-        return operation(*geometries)
-    except shapely.errors.GEOSException:
-        for grid_m in _GRIDS_M[:-1]:
-            try:
-                return operation(*geometries, grid_size=grid_m)
-            except shapely.errors.GEOSException:
-                continue
-        return operation(*geometries, grid_size=_GRIDS_M[-1])
+    for grid_m in (None, *_GRIDS_M):
+        with contextlib.suppress(shapely.errors.GEOSException):
+            found = operation(*geometries) if grid_m is None else operation(*geometries, grid_size=grid_m)
+            if shapely.is_valid(found):
+                return found
+    return operation(*(shapely.buffer(each, _GRIDS_M[-1]) for each in geometries))
 
 
 def _shadow(
