@@ -14,6 +14,7 @@ from pymunk import batch
 
 from zwerm.scenario.tables import BodyTable
 from zwerm.world.bodies import Velocities
+from zwerm.world.bodies.approach import ApproachLimit, Meeting
 from zwerm.world.bodies.parking import FEW_BODIES, SEARCH_TICKS, Parking
 from zwerm.world.scene import Bools, Floats, Ints
 
@@ -25,7 +26,9 @@ _OVERLAP_LEFT_FRACTION: Final = 0.1
 _OVERLAP_IGNORED_M: Final = 1e-5
 
 _FORCE: Final = batch.BodyFields.FORCE | batch.BodyFields.TORQUE
-_VELOCITY_AND_FORCE: Final = batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY | _FORCE
+_VELOCITY: Final = batch.BodyFields.VELOCITY
+_MOTION: Final = batch.BodyFields.POSITION | _VELOCITY
+_VELOCITY_AND_FORCE: Final = _VELOCITY | batch.BodyFields.ANGULAR_VELOCITY | _FORCE
 _POSE: Final = batch.BodyFields.BODY_ID | batch.BodyFields.POSITION | batch.BodyFields.ANGLE
 
 
@@ -43,6 +46,11 @@ class Physics:
         self._present: Bools = np.zeros(count, dtype=np.bool_)
         # Contact, the way of both bodies until the next search, and half a body more for what the solver adds.
         self._parking = Parking(count, 3.0 * body.radius_m + 2.0 * body.max_speed_m_s * dt_s * SEARCH_TICKS)
+        self._approach = (
+            ApproachLimit(body.radius_m, body.max_speed_m_s, segments, dt_s, self._substep_s, 0.5 * _OVERLAP_IGNORED_M)
+            if body.collide and body.continuous_collision
+            else None
+        )
         # The middle of each substep [s], and the factor from a change of velocity to the force that causes it.
         self._middle_s: Floats = np.arange(0.5, body.substeps)[:, None] * self._substep_s
         self._inertia: Floats = np.array([body.mass_kg, body.mass_kg, self._moment]) / self._substep_s
@@ -171,10 +179,11 @@ class Physics:
         space = self._space
         self._start[:, 3:] = pushes[0]
         batch.set_space_bodies(space, _VELOCITY_AND_FORCE, self._start_buffer)
-        space.step(self._substep_s)
+        meeting = None if self._approach is None else self._approach.meeting(here)
+        self._step(meeting)
         for buffer in self._push_buffers:
             batch.set_space_bodies(space, _FORCE, buffer)
-            space.step(self._substep_s)
+            self._step(meeting)
         self._poses.clear()
         batch.get_space_bodies(space, _POSE, self._poses)
         poses = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 3)[rows]
@@ -187,6 +196,19 @@ class Physics:
         if may_park:
             self._parking.note_moved(moved)
         return moved
+
+    def _step(self, meeting: Meeting | None) -> None:
+        """Integrate one substep, in which the bodies of `meeting` approach each other no faster than they may."""
+        if self._approach is not None and meeting is not None:
+            self._poses.clear()
+            batch.get_space_bodies(self._space, _MOTION, self._poses)
+            motion = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 4)
+            position, velocity = motion[self._rows, :2], motion[self._rows, 2:].copy()
+            if self._approach.slow(position, velocity, meeting):
+                slowed = motion[:, 2:].copy()
+                slowed[self._rows] = velocity
+                batch.set_space_bodies(self._space, _VELOCITY, _buffer(slowed))
+        self._space.step(self._substep_s)
 
 
 def _make_space(substep_s: float, friction: float, segments: Floats) -> pymunk.Space:
