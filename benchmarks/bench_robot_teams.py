@@ -21,7 +21,7 @@ import numpy as np
 import shapely
 from csv_rows import add_csv_option, append_row, read_rows, write_csv
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
 
 from random_arenas import ORIGIN_M, leaning_arena, random_arena, start_group
 from shapely.geometry import Polygon, box
@@ -221,7 +221,7 @@ def summary(rows: Sequence[dict[str, str]], known: Sequence[dict[str, str]]) -> 
             "runs": str(len(runs)),
             "completed": str(sum(run["outcome"] == "completed" for run in runs)),
             "least coverage": f"{min(float(run['coverage_fraction']) for run in runs):.4f}",
-            "least gap [m]": f"{min(gaps):.3f}" if gaps else "",
+            "least gap [m]": f"{min(gaps):z.3f}" if gaps else "",
             "time [s]": f"{np.mean([float(run['completion_time_s']) for run in runs]):.0f}",
             "time / one robot's": f"{np.median(alone):.2f}" if alone else "",
             "time / undisturbed": f"{np.median(calm):.2f}" if calm and setting else "",

@@ -42,6 +42,8 @@ SHORT_M: Final = 0.1
 SLACK_M: Final = 0.75
 # Largest distance between two touches of one boundary, and of a boundary from a body that stands there [m]: two bodies.
 BESIDE_BODY_M: Final = 1.1
+# Length of a way outside the slab after which a robot that comes back has gone around robots in a circle [m].
+CIRCLE_M: Final = 3.0
 # Largest distance of two touches across a straight wall [m].
 IN_LINE_M: Final = 0.05
 
@@ -215,6 +217,7 @@ class BoundaryTrace:
         self._x_m = grid.x_m(start.slice)
         self._last: Vector | None = None
         self._length_m = 0.0
+        self._out_m = math.inf  # the length when it last left the slab
         self._extreme: Vector = (-math.inf, 0.0)
         self._wall_tick = -10
         self._touched_m: Vector = self._x_m, start.y_mm / 1000.0
@@ -245,15 +248,17 @@ class BoundaryTrace:
             self._extreme = depth, y
         spacing = self._grid.spacing_m
         if depth > CROSSED_M:
+            if not self._inside and self._length_m - self._out_m > CIRCLE_M:
+                return None
             self._inside = True
         if depth > spacing + CROSSED_M:
             self._arrive(senses, self.start.slice + d, 1)
             return None
         if self._inside and depth < -CROSSED_M:
-            if self._is_beyond(senses):
+            if self._is_beyond(senses) or (blocks and self._is_occupied(senses)):
                 self._arrive(senses, self.start.slice, -1)
                 return None
-            self._inside = False
+            self._inside, self._out_m = False, self._length_m
         if depth < -SLACK_M:
             return None
         if blocks and self._inside and senses.walls:
@@ -276,6 +281,10 @@ class BoundaryTrace:
         side = self.start.side
         lean = min([ny * side for _, ny in senses.walls], default=1.0)
         return lean < -LEANS or (lean < INTO and abs(senses.y_m - self.start.y_mm / 1000.0) > SHORT_M)
+
+    def _is_occupied(self, senses: Senses) -> bool:
+        """Return whether a robot in contact stands at the other end of the slice, so that no wall is felt there."""
+        return any((end.slice, end.side) == (self.start.slice, -self.start.side) for end in self._parked(senses))
 
     def _arrive(self, senses: Senses, k: int, way: int) -> None:
         x, y, side = senses.x_m, senses.y_m, self.start.side * way

@@ -124,3 +124,25 @@ def test_only_a_robot_at_the_next_end_tells_a_robot_at_a_wall_where_it_leads(par
         trace.step(Senses(1, 0.05, 5.0, ((0.0, 1.0),), ()), ())
         trace.step(Senses(2, 0.1, 4.98, walls, ()), [(0.0, -1.0)])
         assert (trace.end == parked) == (proves and bool(walls))
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_trace_ends_at_a_robot_at_the_other_end_of_its_slice_and_never_circles(known: bool) -> None:
+    """A robot stands at the upper end of an obstacle, 2 m high, which the trace goes around from its lower end."""
+    parked = End(0, BOTTOM, 7_000)
+    trace = BoundaryTrace(End(0, TOP, 5_000), RIGHT, GRID, lambda senses: [parked] if known else [])
+    wall, robot = ((-1.0, 0.0),), ((0.0, -1.0),)
+    right = [(0.5, 5.0 + y, wall, ()) for y in np.linspace(0.0, 2.3, 24)]
+    over = [(0.5 - x, 7.5, (), robot) for x in np.linspace(0.0, 1.0, 11)]
+    left = [(-0.5, 7.5 - y, ((1.0, 0.0),), ()) for y in np.linspace(0.0, 3.0, 31)]
+    under = [(-0.5 + x, 4.5, ((0.0, 1.0),), ()) for x in np.linspace(0.0, 1.0, 11)]
+    steps = 0
+    for _ in range(3):
+        for x, y, walls, blocks in [*right, *over, *left, *under]:
+            steps += 1
+            if trace.step(Senses(steps, float(x), float(y), walls, ()), blocks) is None:
+                assert trace.end == (parked if known else None)
+                assert (trace.arc is not None) == known
+                assert steps <= len([*right, *over, *left, *under])
+                return
+    raise AssertionError("the trace goes around in a circle")
