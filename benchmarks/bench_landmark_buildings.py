@@ -1,6 +1,6 @@
 """Landmark exploration of drawn buildings: whether `completed` is true, and how much of the building is mapped.
 
-The seed draws the building (`tests/random_buildings.py`, scaled to `--area` square ranges of sight), the landmarks and
+The seed draws the building (`tests/helpers/random_buildings.py`, scaled to `--area` square ranges of sight), the landmarks and
 the places of the robots. A run is *right* if it is `completed` with a completion of at least 0.9. It is *false* if it is
 `completed` with less, or where a robot concluded while a living one knew an open frontier. Every other run ended at the
 time limit, or failed.
@@ -25,7 +25,7 @@ from csv_rows import write_csv
 
 from zwerm import run
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
 
 from random_buildings import KINDS, random_building
 

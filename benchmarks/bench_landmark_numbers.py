@@ -10,6 +10,7 @@ The halls of the group `halls` are drawn: their size, obstacles, landmarks, robo
 import argparse
 import csv
 import json
+import math
 import subprocess
 import time
 from collections.abc import Collection, Iterator, Sequence
@@ -19,13 +20,14 @@ from statistics import mean
 from typing import Any, Final
 
 import gudhi
-import numpy as np
 from csv_rows import add_csv_option, write_csv
+from landmark_halls import hall
 
 from zwerm import RunResult, run
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, read_report
 from zwerm.agents.landmark_exploration.sharing.log_entries import snapshot_of
+from zwerm.maths.statistics import condense
 from zwerm.world.metrics.landmark_exploration import maximal
 
 ROOT: Final = Path(__file__).parents[1]
@@ -35,6 +37,8 @@ CODE: Final = ("zwerm", "agents", "coordinator", "world", "scenarios")
 GOSSIP: Final = ("services.map=gossip", "services.assignment=claims")
 SMALL: Final = ("robots.parameters.message_bytes_max=64",)
 LONG: Final = "time.duration_s=1200"
+LONGER: Final = "time.duration_s=1500"
+BURSTS: Final = "radio.models=[{kind='gilbert_elliott', loss_fraction=0.2, burst_packets=8.0}]"
 
 
 def robots(count: int) -> tuple[str, str]:
@@ -47,13 +51,12 @@ GROUPS: Final[dict[str, tuple[str, tuple[str, ...], int]]] = {
     "free": ("landmark-free", (LONG,), 10),
     "free-gossip": ("landmark-free", (LONG, *GOSSIP), 20),
     "free-gossip-loss": ("landmark-free", (LONG, *GOSSIP, "radio.loss=0.5"), 10),
+    "free-gossip-bursts": ("landmark-free", (LONG, *GOSSIP, BURSTS), 5),
     # Seeds 1 to 6 chose the rules for a short range: the others test them.
-    "free-gossip-range": ("landmark-free", (LONG, *GOSSIP, "radio.range_m=0.7"), 20),
+    "free-gossip-range": ("landmark-free", (LONG, *GOSSIP, "radio.range_m=0.7"), 10),
     "simple": ("landmark-simple", (LONG,), 10),
-    # The first runs end by themselves, the others when completion is certain.
-    "complex-whole": ("landmark-complex", (LONG,), 2),
-    "complex": ("landmark-complex", ("time.duration_s=350",), 10),
-    "complex-gossip": ("landmark-complex", ("time.duration_s=200", *GOSSIP), 1),
+    "complex": ("landmark-complex", (LONGER,), 10),
+    "complex-gossip": ("landmark-complex", (LONGER, *GOSSIP), 3),
     "complex-20": ("landmark-complex", ("time.duration_s=400", *robots(20)), 5),
     "complex-10": ("landmark-complex", ("time.duration_s=700", *robots(10)), 5),
     "complex-processes": ("landmark-complex", ("time.duration_s=20",), 1),
@@ -69,6 +72,7 @@ GROUPS: Final[dict[str, tuple[str, tuple[str, ...], int]]] = {
     "presence": ("landmark-presence", (LONG,), 10),
     "free-nearest-frontier": ("landmark-free", (LONG, "coordinator.parameters.strategy=nearest-frontier"), 10),
     "free-min-pos": ("landmark-free", (LONG, "coordinator.parameters.strategy=min-pos"), 10),
+    "random-walk": ("landmark-random-walk", ("time.duration_s=400",), 3),
     "navigate": ("landmark-navigate", (), 1),
     "navigate-presence": (
         "landmark-navigate",
@@ -97,39 +101,6 @@ KEPT: Final = (
 )
 EXTRA: Final = ("gudhi_agrees", "processes_agree", "update_mean_ms", "update_most_ms")
 COLUMNS: Final = ("group", "seed", "commit", "outcome", "problems", "processor_s", *KEPT, *EXTRA)
-
-
-def hall(seed: int) -> tuple[str, ...]:
-    """Return the settings of a drawn hall: up to two boxes in it, 4 to 7 robots, and trouble of the radio."""
-    random = np.random.default_rng([14, seed])
-    width, height = random.uniform(2.6, 4.6), random.uniform(2.4, 3.6)
-    boxes = []
-    for each in range(int(random.integers(0, 3))):
-        x, y = width * (0.2 + 0.45 * each), random.uniform(0.7, height - 1.3)
-        dx, dy = random.uniform(0.3, 0.7, 2)
-        boxes.append([[x, y], [x + dx, y], [x + dx, y + dy], [x, y + dy]])
-    robots = int(random.integers(4, 8))
-    trouble = (
-        ("radio.loss=0.5",),
-        ("radio.range_m=0.7",),
-        ("radio.loss=0.5", "radio.range_m=0.7"),
-        ("radio.models=[{kind='gilbert_elliott', loss_fraction=0.5, burst_packets=32.0}]",),
-        ("faults=[{kind='partition', groups=[[0, 1], [2, 3]], at_s=2.0, for_s=60.0}]",),
-        (
-            "radio.loss=0.3",
-            "faults=[{kind='crash', nodes=[1], at_s=15.0}, {kind='crash', nodes=[2], at_s=20.0, until_s=30.0}]",
-        ),
-    )[seed % 6]
-    return (
-        f"arena.size_m=[{width:.3f},{height:.3f}]",
-        f"arena.obstacles={json.dumps([[[round(x, 3), round(y, 3)] for x, y in box] for box in boxes])}",
-        f"scatter.dispersion_m={random.uniform(0.45, 0.65):.3f}",
-        f"robots.count={robots}",
-        f"robots.parameters.robots_expected={robots}",
-        "robots.parameters.dead_ticks=800",
-        "robots.on_crash=continue",
-        *trouble,
-    )
 
 
 def commit_now() -> str:
@@ -234,6 +205,10 @@ class Group:
         """Return the values of a metric in the trials that have it."""
         return [trial[metric] for trial in self.trials if metric in trial]
 
+    def by_seed(self, metric: str) -> dict[int, float]:
+        """Return the value of a metric by the seed of its trial."""
+        return {trial["seed"]: trial[metric] for trial in self.trials if metric in trial}
+
     def mean(self, metric: str) -> float:
         """Return the mean of a metric."""
         return mean(self.values(metric))
@@ -246,12 +221,12 @@ def summary(some: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         groups[f"{name}, fresh seeds"] = Group(name, some, above=10)
     rows: list[dict[str, Any]] = []
 
-    def row(what: str, asked: str, measured: str, *names: str) -> None:
+    def row(what: str, asked: str, measured: str, *names: str, paper: str = "") -> None:
         counts = sorted({len(groups[name]) for name in names})
-        rows.append({"what": what, "asked": asked, "measured": measured, "n": " and ".join(map(str, counts))})
+        overall(what, asked, measured, " and ".join(map(str, counts)), paper)
 
-    def overall(what: str, asked: str, measured: str, n: int) -> None:
-        rows.append({"what": what, "asked": asked, "measured": measured, "n": str(n)})
+    def overall(what: str, asked: str, measured: str, n: int | str, paper: str = "") -> None:
+        rows.append({"what": what, "asked": asked, "the paper": paper, "measured": measured, "n": str(n)})
 
     def compared(of: str, over: str) -> None:
         if not groups[of] or not groups[over]:
@@ -265,55 +240,83 @@ def summary(some: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         row(f"bytes of a robot, {of} over {over}", "", f"{sent:.2f}", of, over)
 
     def spread(group: Group, metric: str, digits: int) -> str:
+        """Return the mean, half its 95 % interval, the least and the most."""
         values = group.values(metric)
-        return f"{mean(values):.{digits}f} ({min(values):.{digits}f} to {max(values):.{digits}f})"
+        half = condense(values).half_width
+        interval = "" if math.isnan(half) else f" ± {half:.{digits}f}"
+        return f"{mean(values):.{digits}f}{interval} ({min(values):.{digits}f} to {max(values):.{digits}f})"
 
-    for name, asked in (("free", ".96"), ("simple", ".95"), ("complex", ".915")):
+    def ratio_of(group: Group, other: Group, metric: str) -> str:
+        return f"{group.mean(metric) / other.mean(metric):.2f}"
+
+    def less(group: Group, other: Group) -> str:
+        """Return the mean difference of completions of the seeds that both groups have, and its 95 % interval."""
+        found, others = group.by_seed("completion_fraction"), other.by_seed("completion_fraction")
+        apart = condense([found[seed] - others[seed] for seed in sorted(found.keys() & others.keys())])
+        if math.isnan(apart.half_width):
+            return f"{apart.mean:+.3f}"
+        return f"{apart.mean:+.3f} ({apart.mean - apart.half_width:+.3f} to {apart.mean + apart.half_width:+.3f})"
+
+    for name, asked, paper in (
+        ("free", ".96", ("0.98", "1864")),
+        ("simple", ".95", ("0.95", "1266")),
+        ("complex", ".915", ("0.915", "2373")),
+    ):
         group = groups[name]
         if not group:
             continue
-        row(f"completion, {name}", f"at least 0{asked}", spread(group, "completion_fraction", 3), name)
+        row(f"completion, {name}", f"at least 0{asked}", spread(group, "completion_fraction", 3), name, paper=paper[0])
         completed = sum(each["outcome"] == "completed" for each in group.trials)
-        if name != "complex":
-            row(f"runs completed, {name}", "", f"{completed} of {len(group)}", name)
-            row(f"iterations to the end, {name}", "", spread(group, "iterations", 0), name)
-    if groups["complex-whole"]:
-        group = groups["complex-whole"]
-        completed = sum(each["outcome"] == "completed" for each in group.trials)
-        row("runs completed, complex-whole", "", f"{completed} of {len(group)}", "complex-whole")
-        row("iterations to the end, complex-whole", "", spread(group, "iterations", 0), "complex-whole")
-        row("completion, complex-whole", "at least 0.915", spread(group, "completion_fraction", 3), "complex-whole")
-    whole = [each for name in ("free", "simple", "complex", "complex-whole") for each in groups[name].trials]
+        row(f"runs completed, {name}", "", f"{completed} of {len(group)}", name)
+        row(f"iterations to the end, {name}", "", spread(group, "iterations", 0), name, paper=paper[1])
+    whole = [each for name in ("free", "simple", "complex") for each in groups[name].trials]
     if whole:
         equal = sum(each["landmark_complex_holes"] == each["obstacles"] for each in whole)
         overall("holes equal obstacles", "in at least 95 %", f"{equal} of {len(whole)}", len(whole))
     name = "iterations_to_91_5_percent_completion"
     if groups["complex"]:
-        row("iterations to 91.5 %, complex", "at most 2373", spread(groups["complex"], name, 0), "complex")
+        row(
+            "iterations to 91.5 %, complex", "at most 2373", spread(groups["complex"], name, 0), "complex", paper="2373"
+        )
     for few, count in (("complex-10", 10), ("complex-20", 20)):
         if groups[few] and groups["complex"]:
             ratio = groups[few].mean(name) / groups["complex"].mean(name)
             least = 0.85 * 30 / count
             row(f"speed of 30 robots over {count}, to 91.5 %", f"at least {least:.2f}", f"{ratio:.2f}", few, "complex")
     if groups["complex-gossip"] and groups["complex"]:
-        ratio = groups["complex-gossip"].mean(name) / groups["complex"].mean(name)
         what = "iterations to 91.5 %, complex-gossip over complex"
-        row(what, "at most 1.3", f"{ratio:.2f}", "complex-gossip", "complex")
+        row(
+            what,
+            "at most 1.3",
+            ratio_of(groups["complex-gossip"], groups["complex"], name),
+            "complex-gossip",
+            "complex",
+        )
     for of, over, asked in (
+        ("complex-gossip", "complex", 1.3),
         ("free-gossip", "free", 1.3),
         ("free-gossip-loss", "free-gossip", 2),
+        ("free-gossip-bursts", "free-gossip", 2),
         ("free-gossip-range", "free-gossip", 2),
         ("free-gossip-range, fresh seeds", "free-gossip, fresh seeds", 2),
     ):
         if groups[of] and groups[over]:
-            ratio = groups[of].mean("iterations") / groups[over].mean("iterations")
-            row(f"iterations, {of} over {over}", f"at most {asked}", f"{ratio:.2f}", of, over)
-            apart = groups[of].mean("completion_fraction") - groups[over].mean("completion_fraction")
-            row(f"completion, {of} less {over}", "at least -0.010", f"{apart:+.3f}", of, over)
+            ratio = ratio_of(groups[of], groups[over], "iterations")
+            row(f"iterations, {of} over {over}", f"at most {asked}", ratio, of, over)
+            row(f"completion, {of} less {over}", "at least -0.010", less(groups[of], groups[over]), of, over)
     for of, over in (("free-64-bytes", "free"), ("free-gossip-64-bytes", "free-gossip"), ("presence", "free-gossip")):
         compared(of, over)
     for name in ("free-nearest-frontier", "free-min-pos"):
         compared(name, "free")
+    if groups["random-walk"] and groups["free"]:
+        name = "iterations_to_95_percent_completion"
+        row("iterations to 95 %, free", "", spread(groups["free"], name, 0), "free")
+        reached = len(groups["random-walk"].values(name))
+        row("runs that reach 95 %, random-walk", "", f"{reached} of {len(groups['random-walk'])}", "random-walk")
+        if reached:
+            row("iterations to 95 %, random-walk", "", spread(groups["random-walk"], name, 0), "random-walk")
+            ratio = ratio_of(groups["random-walk"], groups["free"], name)
+            row("iterations to 95 %, random-walk over free", "", ratio, "random-walk", "free", paper="about 3")
     for name in ("navigate", "navigate-presence"):
         if groups[name]:
             goals = sum(groups[name].values("navigation_goals"))
@@ -334,7 +337,7 @@ def summary(some: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     if groups["complex"]:
         pace = mean(0.1 * each["iterations"] / each["processor_s"] for each in groups["complex"].trials)
         row("inline faster than real time, complex", "at least 10", f"{pace:.0f}", "complex")
-    ended = [each for each in some if "concluded_early" in each]
+    ended = [each for each in some if "concluded_early" in each and each["group"] != "random-walk"]
     if ended:
         early = sum(each["concluded_early"] for each in ended)
         completed = sum(each["outcome"] == "completed" for each in ended)

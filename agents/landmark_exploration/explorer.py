@@ -30,6 +30,7 @@ from zwerm.agents.landmark_exploration.sharing.log_entries import failure_entry,
 from zwerm.agents.landmark_exploration.sharing.log_gossip import AddressedMessage, Gossip
 from zwerm.agents.landmark_exploration.sharing.registers import Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
+from zwerm.agents.landmark_exploration.sharing.turn_taking import TurnTaking
 from zwerm.agents.landmark_exploration.sharing.upload import Upload
 from zwerm.agents.landmark_exploration.view import ExplorerView, Slide
 from zwerm.agents.landmark_exploration.wayfinding import MEETING_TICKS, VISIT_TICKS, meet, visit
@@ -40,9 +41,8 @@ from zwerm.wire.messages import Command, Observation, Packet, Transmission
 # Ticks between reports of a free robot, and of a busy robot. Reports show the coordinator that the robot works.
 FREE_REPORT_TICKS: Final = 5
 BUSY_REPORT_TICKS: Final = 50
-# Ticks after which a robot that found no frontier to explore looks for one again: at first, and at most.
-RETRY_TICKS: Final = 10
-RETRY_TICKS_MAX: Final = 80
+# Up to this many free frontiers a robot considers them at once when another one opens. With more, some are near.
+FEW_FREE: Final = 48
 # A robot adds observations to its map in its first LOOK_TICKS, and then only while it explores: observations of an idle
 # robot would open frontiers without end. It does so again if no path led to any free frontier for CUT_OFF_TICKS.
 LOOK_TICKS: Final = 5
@@ -100,8 +100,7 @@ class Explorer(Controller):
         self._claim = 0
         self._frozen = False
         self._quiet_since = 0
-        self._choose_at = 0
-        self._patience_ticks = RETRY_TICKS
+        self._turns = TurnTaking()
         self._news_at = 0
         self._no_way_since: int | None = None
         self._cut_off = False
@@ -253,28 +252,28 @@ class Explorer(Controller):
     def _choose(self) -> None:
         """Choose a frontier and claim it, if robots assign themselves."""
         rules, tick = self.parameters, self.view.tick
-        if not self._claims or self._frozen or rules.strategy == "random-walk" or tick < self._choose_at:
+        if not self._claims or self._frozen or rules.strategy == "random-walk":
             return
         frontiers = self.map.frontiers
+        alone = rules.strategy == "nearest-frontier"
         avoided = dict.fromkeys(key for key, until in self._avoid_until.items() if tick < until)
-        choice = offer = None
-        if frontiers.open:
-            alone = rules.strategy == "nearest-frontier"
-            policy: Policy = nearest_frontier if alone else cost_utility(rules.beta)
-            offer = Offer(frontiers, () if alone else self.registers.claims(self.setup.node, tick), avoided)
-            choice = policy(self.map.complex, self.view.snapshot.landmarks, offer)
+        offer = Offer(frontiers, () if alone else self.registers.claims(self.setup.node, tick), avoided)
+        if not self._turns.considers(offer.free_keys(FEW_FREE), tick):
+            return
+        policy: Policy = nearest_frontier if alone else cost_utility(rules.beta)
+        choice = policy(self.map.complex, self.view.snapshot.landmarks, offer)
         if choice is None:
-            if offer is None or offer.is_empty():
+            if offer.is_empty():
                 self._no_way_since = None
             elif self._no_way_since is None:
                 self._no_way_since = tick
             has_no_way = self._no_way_since is not None and tick - self._no_way_since >= CUT_OFF_TICKS
             self._cut_off = has_no_way or not (frontiers.open or frontiers.has_area)
-            self._choose_at = tick + self._patience_ticks
-            self._patience_ticks = min(2 * self._patience_ticks, RETRY_TICKS_MAX)
+            self._turns.found_none(tick)
             return
-        self._patience_ticks = RETRY_TICKS
         self._no_way_since, self._cut_off = None, False
+        if not alone and not self._turns.claims(len(choice.path), tick):
+            return
         status = ABANDONED if frontiers.statuses[choice.key] == REOPENED else TIMED_OUT
         self._task = ExplorationTask(choice.key, tuple(map(self.map.complex.snapshot_of, choice.path)), status)
         self._claim = choice.key + 1

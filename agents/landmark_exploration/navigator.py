@@ -5,7 +5,7 @@ reached it when it sees all of them. The map comes from a file (see `map_file`),
 """
 
 from functools import partial
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final
 
 from msgspec import Meta, Struct
 
@@ -19,16 +19,21 @@ from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ControllerError
 from zwerm.wire.messages import Command, Observation
 
+PARAMETERS: Final = "robots.parameters"
+
+Goal = Annotated[tuple[int, ...], Meta(min_length=1)]
+
 
 class NavigatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
     """The text of the map's file, and the goals: sets of landmarks, one after the other.
 
-    Without goals each robot draws `random_goals` of them, free simplices of the map. With `presence_only` no bearing is used,
-    neither of the map nor of the sensor. The robot then has to know the sensor's range, `range_m`.
+    Every landmark of a goal is in the map. Without goals each robot draws `random_goals` of them, free simplices of the map.
+    With `presence_only` no bearing is used, neither of the map nor of the sensor. The robot then has to know the sensor's
+    range, `range_m`.
     """
 
     map_file: str
-    goals: tuple[tuple[int, ...], ...] = ()
+    goals: tuple[Goal, ...] = ()
     random_goals: Annotated[int, Meta(ge=1, le=10_000)] = 10
     presence_only: bool = False
     range_m: Annotated[float, Meta(gt=0.0)] = 1.0
@@ -46,7 +51,17 @@ class Navigator(Controller):
         try:
             self.map = read_map(rules.map_file)
         except ValueError as error:
-            raise ControllerError(f"map_file: {error}") from None
+            raise ControllerError(f"{PARAMETERS}.map_file: {error}") from None
+        known = {landmark for simplex in self.map.complex.simplices.values() for landmark in simplex}
+        if not known:
+            raise ControllerError(f"{PARAMETERS}.map_file: expected a map with an observation, got none")
+        if not rules.presence_only and not any(len(set(each)) > 1 for each in self.map.complex.table.values()):
+            raise ControllerError(f"{PARAMETERS}.map_file: expected bearings, or presence_only=true, got a map without")
+        for goal in rules.goals:
+            strange = sorted(set(goal) - known)
+            if strange:
+                text = f"expected landmarks of the map, got {list(goal)}: {strange} are not in it"
+                raise ControllerError(f"{PARAMETERS}.goals: {text}")
         assert setup.body is not None
         self._speed_m_s = setup.body.max_speed_m_s
         self._goals = rules.goals or self._draw(rules.random_goals)
@@ -64,8 +79,6 @@ class Navigator(Controller):
 
     def _draw(self, count: int) -> tuple[tuple[int, ...], ...]:
         simplices = sorted(self.map.complex.simplices.values())
-        if not simplices:
-            return ()
         return tuple(simplices[each] for each in self.random.integers(len(simplices), size=count))
 
     def step(self, observation: Observation) -> Command:

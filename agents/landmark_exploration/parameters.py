@@ -7,6 +7,7 @@ from msgspec import Meta, Struct
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BYTES, SMALL_BYTES
 
 Ticks = Annotated[int, Meta(ge=1, le=1_000_000)]
+MessageBytes = Annotated[int, Meta(ge=SMALL_BYTES, le=LARGE_BYTES)]
 NonNegative = Annotated[float, Meta(ge=0.0)]
 
 # Strategies of robots that choose frontiers themselves, and of a coordinator that assigns them.
@@ -30,7 +31,7 @@ class ExplorerParameters(Struct, frozen=True, forbid_unknown_fields=True):
     strategy: Strategy = "cost-utility"
     cross_ticks: Ticks = 40
     search_ticks: Ticks = 40
-    message_bytes_max: Annotated[int, Meta(ge=SMALL_BYTES, le=LARGE_BYTES)] = LARGE_BYTES
+    message_bytes_max: MessageBytes = LARGE_BYTES
     lease_ticks: Ticks = 300
     dead_ticks: Ticks = 1_500
     freeze_ticks: Ticks = 40

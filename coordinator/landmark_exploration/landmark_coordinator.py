@@ -26,7 +26,7 @@ from zwerm.agents.landmark_exploration.mapping.cost_utility import (
 from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, REOPENED, TIMED_OUT, pair_of
 from zwerm.agents.landmark_exploration.mapping.landmark_map import FAILURES_MAX, LandmarkMap
 from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, columns, write_report
-from zwerm.agents.landmark_exploration.parameters import CentralStrategy, NonNegative, Ticks
+from zwerm.agents.landmark_exploration.parameters import CentralStrategy, MessageBytes, NonNegative, Ticks
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing.exploration_tasks import ExplorationTask, cut, landmarks_in, write_task
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import LARGE_BYTES, Entries, TaskReport, Vector
@@ -62,7 +62,7 @@ class CoordinatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
     strategy: CentralStrategy = "cost-utility"
     walk_if_cut_off: bool = True
     dead_ticks: Ticks = 600
-    message_bytes_max: int = LARGE_BYTES
+    message_bytes_max: MessageBytes = LARGE_BYTES
 
 
 class LandmarkCoordinatorSetup(Protocol):

@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 from PIL import Image
 from shapely.geometry import box
 
-from zwerm.agents.landmark_exploration.mapping.map_reports import MapReport, write_report
+from zwerm.agents.landmark_exploration.mapping.map_reports import GoalReport, MapReport, write_report
 from zwerm.record.history import History
 from zwerm.view.animation import animate_run
 from zwerm.view.canvas import Sheet
-from zwerm.view.layers.landmark_exploration import ASSIGNED, FRONTIER, SIMPLEX, LandmarkComplexLayer
+from zwerm.view.layers.landmark_exploration import (
+    ASSIGNED,
+    FRONTIER,
+    SIMPLEX,
+    LandmarkComplexLayer,
+    LandmarkNavigationLayer,
+)
 from zwerm.view.run_view import RunView
 from zwerm.view.stills import draw_run
 from zwerm.world.arena.arena import Arena
@@ -142,3 +148,54 @@ def test_stills_and_animations_show_the_complex_with_its_frontiers(tmp_path: Pat
 def test_a_run_without_landmarks_has_no_such_layer(count: int) -> None:
     run = RunView(Arena(box(0, 0, 4, 2)), History(), 0.05, "trial", landmarks=LANDMARKS[:count])
     assert LandmarkComplexLayer.applies(run) is bool(count)
+
+
+# Robot 0 goes to one goal until 1 s, and to another until 3 s; robot 1 goes to a goal of one landmark.
+GOALS = (
+    (1.0, 0, GoalReport((0, 1, 2), True, 10)),
+    (2.0, 1, GoalReport((3,), True, 20)),
+    (3.0, 0, GoalReport((1, 3, 4, 99), True, 20)),  # the arena has no landmark 99
+)
+
+
+def navigation(at_s: float | None) -> tuple[list[tuple[float, ...]], list[NDArray[np.float64]]]:
+    """Return the bounds [m] of the goals that are shown at a time, and the ways."""
+    history = History()
+    for time_s in (0.0, 1.0, 2.0, 3.0):
+        moved = PLACES + np.array([time_s, 0.0])
+        history.append(
+            SimpleNamespace(time_s=time_s, position=moved, heading=np.zeros(2), present=np.ones(2, dtype=bool))
+        )
+    records = [
+        TelemetryRecord(round(10 * time_s), time_s, node, {}, write_report(report), PLACES, np.ones(2, bool))
+        for time_s, node, report in GOALS
+    ]
+    run = RunView(Arena(box(0, 0, 4, 2)), history, 0.05, "trial", snapshots=records, landmarks=LANDMARKS)
+    assert LandmarkNavigationLayer.applies(run)
+    layer = LandmarkNavigationLayer(Sheet(run.arena, "trial"), run)
+    layer.show(run.history.arrays(), 1, at_s)
+    goals, ways = layer.artists
+    corners = [path.vertices for path in goals.get_paths()]
+    bounds = [(*each.min(axis=0), *each.max(axis=0)) for each in corners]
+    return bounds, [np.asarray(each) for each in ways.get_segments()]
+
+
+def test_each_robot_is_shown_with_its_goal_at_the_time_and_its_way_since_the_goal_before() -> None:
+    slack = pytest.approx
+    goals, ways = navigation(0.5)
+    assert goals[0] == slack((0.45, 0.45, 1.55, 1.55), abs=0.02)
+    assert goals[1] == slack((3.45, 0.45, 3.55, 0.55), abs=0.02)
+    assert [each[:, 0].tolist() for each in ways] == [slack([0.4]), slack([3.0])]
+    goals, ways = navigation(2.0)
+    assert goals[0] == slack((1.45, 0.45, 3.55, 1.55), abs=0.02)
+    assert [each[:, 0].tolist() for each in ways] == [slack([1.4, 2.4]), slack([3.0, 4.0, 5.0])]
+    goals, ways = navigation(None)
+    assert goals[0] == slack((1.45, 0.45, 3.55, 1.55), abs=0.02)
+    assert [each[:, 0].tolist() for each in ways] == [slack([1.4, 2.4, 3.4]), slack([3.0, 4.0, 5.0])]
+
+
+def test_only_what_the_run_reported_is_in_the_legend() -> None:
+    run = view(0.5)
+    labels = [str(each.get_label()) for each in LandmarkComplexLayer(Sheet(run.arena, "trial"), run).legend()]
+    assert labels == ["landmark"]
+    assert not LandmarkNavigationLayer.applies(run)

@@ -7,6 +7,7 @@ clears. Statuses are those of `frontier`. Observations that are faces of others 
 """
 
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import Annotated, Any, Final
 
 import msgspec
@@ -67,6 +68,8 @@ def read_map(text: str) -> LandmarkMap:
             raise ValueError(
                 f"no landmark map: observation {number} has {len(landmarks)} landmarks, {len(bearings)} bearings"
             )
+        if any(a >= b for a, b in pairwise(landmarks)):
+            raise ValueError(f"no landmark map: observation {number}: expected ascending ids, got {list(landmarks)}")
         snapshot: BearingSnapshot = snapshot_of(zip(landmarks, bearings, strict=True))
         map_.observe(snapshot, (number, 0))
     for a, b, status in file.closed:

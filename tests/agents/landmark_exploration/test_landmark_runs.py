@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
+from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.mapping.map_file import map_of_reports, write_map
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
-from zwerm.errors import ScenarioError
+from zwerm.errors import ControllerError, ScenarioError
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
 from zwerm.scenario.load import load, read, validate
@@ -198,6 +200,48 @@ def test_a_map_file_that_is_not_there_is_one_line() -> None:
         run("landmark-navigate", 1, "inline", ["robots.parameters.map_file=nowhere.json"])
     (line,) = error.value.mistakes
     assert "robots.parameters.map_file: cannot be read: No such file or directory, got 'nowhere.json'" in line
+
+
+@pytest.mark.parametrize(
+    ("goals", "line"),
+    [
+        ([[0, 9_999]], "robots.parameters.goals: expected landmarks of the map, got [0, 9999]: [9999] are not in it"),
+        ([[]], "robots.parameters.goals[0]: expected array of length >= 1, got [[]]"),
+    ],
+)
+def test_goals_that_the_map_does_not_have_are_refused_in_one_line(goals: list[list[int]], line: str) -> None:
+    with pytest.raises((ControllerError, ScenarioError)) as error:
+        run("landmark-navigate", 1, "inline", [f"robots.parameters.goals={goals}"])
+    assert str(error.value).endswith(line)
+
+
+@pytest.mark.parametrize(
+    ("observations", "line"),
+    [([], "expected a map with an observation"), ([BearingSnapshot((1, 2, 3), (88, 88, 88))], "expected bearings, or")],
+    ids=["no observation", "no bearings"],
+)
+def test_a_map_by_which_no_robot_navigates_is_refused_in_one_line(
+    observations: list[BearingSnapshot], line: str, tmp_path: Path
+) -> None:
+    map_ = LandmarkMap()
+    for each in observations:
+        map_.observe(each)
+    (tmp_path / "map.json").write_text(write_map(map_))
+    with pytest.raises(ControllerError, match=rf"^robots\.parameters\.map_file: {line}"):
+        run("landmark-navigate", 1, "inline", [f"robots.parameters.map_file='{tmp_path / 'map.json'}'"])
+
+
+@pytest.mark.parametrize("of", ["robots", "coordinator"])
+def test_a_cap_below_the_longest_entry_is_refused_in_one_line(of: str) -> None:
+    with pytest.raises(ScenarioError, match=rf"{of}\.parameters\.message_bytes_max: expected >= 64, got 63"):
+        run("landmark-free", 1, "inline", [f"{of}.parameters.message_bytes_max=63"])
+
+
+def test_an_unknown_strategy_is_refused_with_those_that_there_are() -> None:
+    with pytest.raises(ScenarioError) as error:
+        run("landmark-free", 1, "inline", ["coordinator.parameters.strategy=auction"])
+    (line,) = error.value.mistakes
+    assert line.endswith("strategy: expected 'cost-utility' or 'nearest-frontier' or 'min-pos', got \"auction\"")
 
 
 @pytest.mark.parametrize("strategy", ["nearest-frontier", "min-pos"])

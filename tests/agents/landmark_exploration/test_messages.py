@@ -4,7 +4,7 @@ import itertools
 import random
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
@@ -34,6 +34,8 @@ snapshots = st.dictionaries(ids, st.integers(0, 255), max_size=20).map(
 )
 
 
+# A loaded machine may draw the first examples slowly.
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(snapshots, max_size=3), st.integers(0, 200_000))
 def test_a_log_holds_all_observations_in_packets_of_any_size(some: list[BearingSnapshot], origin: int) -> None:
     log = tuple(entry for each in some for entry in entries.observation_entries(each))
@@ -158,6 +160,10 @@ def test_a_map_survives_its_file() -> None:
         ('{"format":"x","observations":[]}', "expected the format 'landmark-map/1', got 'x'"),
         ('{"format":"landmark-map/1","observations":[[[1,2],[3]]]}', "observation 0 has 2 landmarks, 1 bearings"),
         ('{"format":"landmark-map/1","observations":[[[1],[300]]]}', "no landmark map: "),
+        (
+            '{"format":"landmark-map/1","observations":[[[2,2],[1,3]]]}',
+            "observation 0: expected ascending ids, got [2, 2]",
+        ),
     ],
 )
 def test_a_file_that_holds_no_map_is_refused_in_one_line(text: str, line: str) -> None:

@@ -1,6 +1,7 @@
 """Claims expire by the receiver's clock, and no robot concludes while a robot in reach may still add to the map."""
 
 import copy
+import random
 from dataclasses import dataclass, field
 
 import pytest
@@ -175,6 +176,53 @@ def test_two_robots_never_conclude_early_in_any_interleaving() -> None:
     states, concluded = explore(2, 6)
     assert states > 100
     assert concluded > 0
+
+
+class Hasty(Model):
+    """A robot that does not compare digests: all that it asks is that each robot has said that it is frozen."""
+
+    def concludes(self) -> bool:
+        known = self.registers.newest
+        return self.frozen and len(known) == self.count and all(each.frozen for each in known.values())
+
+
+def walk(seed: int, model: type[Model], count: int = 3) -> int:
+    """Carry out a random interleaving, with messages lost, late and copied; return how often a robot could conclude."""
+    fate = random.Random(seed)
+    robots, air, concluded = [model(me, count) for me in range(count)], [], 0
+    for _ in range(60):
+        robot = fate.choice(robots)
+        move = fate.choice(["write", "freeze", "speak", "speak", "deliver", "deliver", "copy", "lose"])
+        if move == "write" and not robot.frozen and robot.written < 2:
+            robot.write()
+        elif move == "freeze":
+            robot.frozen = True
+        elif move == "speak":
+            packet = copy.deepcopy(robot.speak())
+            air += [(other, packet) for other in robots if other is not robot]
+        elif air:
+            number = fate.randrange(len(air))
+            to, packet = air[number] if move == "copy" else air.pop(number)
+            if move != "lose":
+                to.hear(packet)
+        if any(each.concludes() for each in robots):
+            concluded += 1
+            assert all(each.frozen for each in robots), "a robot may still write"
+            assert len({each.replica.digest for each in robots}) == 1, "a robot lacks what another has"
+    return concluded
+
+
+def walks_that_conclude(model: type[Model]) -> int:
+    return sum(walk(seed, model) > 0 for seed in range(150))
+
+
+def test_three_robots_never_conclude_early_in_random_interleavings() -> None:
+    assert walks_that_conclude(Model) > 5
+
+
+def test_the_check_finds_robots_that_do_not_compare_digests() -> None:
+    with pytest.raises(AssertionError, match=r"a robot (may still write|lacks what another has)"):
+        walks_that_conclude(Hasty)
 
 
 def test_the_model_finds_a_conclusion_that_takes_one_word_for_all() -> None:
