@@ -35,3 +35,8 @@ class AttemptLog:
             self.closed[key] = None
         self.failed[key, mover] = None
         self.blocked.setdefault(mover, []).append(direction_rad)
+
+    def forget_gaps(self) -> None:
+        """Forget the attempts at gaps, and that gaps are closed."""
+        self.closed = {key: None for key in self.closed if key[2] != 0}
+        self.attempts = {key: count for key, count in self.attempts.items() if key[2] != 0}

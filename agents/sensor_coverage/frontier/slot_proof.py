@@ -17,7 +17,12 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     fan_of,
     united,
 )
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
 from zwerm.maths.simplicial import FlagComplex
+
+# The slots that must stand, and those that saw the walk: see `SlotProof._add`.
+Witnesses = tuple[tuple[int, ...], tuple[int, ...]]
 
 
 class WallStep(NamedTuple):
@@ -36,21 +41,25 @@ class SlotProof:
     """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator. It keeps no walks.
 
     `around` are the slots that share an edge with it, and their directions [rad]. An arc that other standing robots closed
-    together with a walk counts while they stand within two hops.
+    together with a walk counts while they stand within two hops. `lose` names the neighbours' slots that are lost for good.
     """
 
     def __init__(self) -> None:
         self.around: Mapping[int, float] = {}
+        self._slot = NOWHERE
         self._scan = ScanResult({}, FlagComplex({}), ())
         self._by_view: list[Arc] = []
         self._at_walls: list[Arc] = []  # arcs of walls in touch
         self._contacts: list[Arc] = []  # the directions of their contacts
-        self._by_walks: dict[tuple[int, ...], list[Arc]] = {}  # by the slots that must stand
+        self._by_walks: dict[Witnesses, list[Arc]] = {}
+        # Arcs that end at the stretch of wall up to the latest point, seen without a break.
+        self._stretch: list[Arc] = []
+        self._stretch_end: WalkPoint | None = None
 
     def update(self, slot: int, scan: ScanResult, touched: Iterable[float]) -> None:
         """Take in the slot's view and the complex around it, and the directions [rad] of walls in touch."""
         view = scan.views[slot]
-        self._scan = scan
+        self._slot, self._scan = slot, scan
         self.around = {each: view[each] for each in scan.complex_.neighbours[slot]}
         touched = tuple(touched)
         self._at_walls, self._contacts = arcs_of_walls(touched), arcs_of_walls(touched, CONTACT_RAD)
@@ -64,15 +73,23 @@ class SlotProof:
         """Return the arcs that nothing closes."""
         standing = self._scan.complex_.neighbours
         walks = [
-            arc for slots, arcs in self._by_walks.items() if all(each in standing for each in slots) for arc in arcs
+            arc
+            for (needed, _), arcs in self._by_walks.items()
+            if all(each in standing for each in needed)
+            for arc in arcs
         ]
         return complement([*self._by_view, *self._at_walls, *walks])
 
     def pass_step(self, slot: int, earlier: WallStep | None, step: WallStep) -> bool:
         """Take in a step of a walk whose end this slot sees, and the step before; return whether the open arcs are smaller."""
         old = sum(each.width_rad for each in self.open_arcs())
+        if step.before is None or step.before is not self._stretch_end or step.witnesses:
+            self._stretch = []
+        self._stretch += arcs_of_step(slot, step.before, step.point, step.hand)
+        self._stretch_end = step.point
+        seen = (*step.witnesses, *step.point.seen, *(() if step.before is None else step.before.seen))
         for arc in arcs_of_step(slot, step.before, step.point, step.hand):
-            self._add(step.witnesses, arc)
+            self._add(step.witnesses, seen, arc)
         self._add_fan(slot, step.point, [step])
         if earlier is not None and earlier.point is step.before:
             self._add_fan(slot, earlier.point, [earlier, step])
@@ -92,30 +109,45 @@ class SlotProof:
                 for arc in arcs_of_step(each, step.before, step.point, step.hand)
             ]
             if each == slot:
-                walls += [*self._contacts, *self._by_walks.get((), ())]
+                walls += [*self._stretch, *self._contacts, *self._by_walks.get(((), ()), ())]
             for side in (1, -1):
                 at_walls[each, side] = ends_at(walls, point.seen[each], side)
         fan = fan_of(point, views, neighbours, at_walls)
         if any(slot in pair for pair in fan):
-            needed = tuple(sorted({each for pair in fan for each in pair} - {slot}))
+            needed = dict.fromkeys(each for pair in fan for each in pair)
             for pair in fan:
                 if slot in pair:
-                    self._add(needed, arc_between(views[slot][sum(pair) - slot], point.seen[slot]))
+                    self._add(needed, point.seen, arc_between(views[slot][sum(pair) - slot], point.seen[slot]))
 
-    def _add(self, needed: tuple[int, ...], arc: Arc) -> None:
-        self._by_walks[needed] = united([*self._by_walks.get(needed, ()), arc])
+    def _add(self, needed: Iterable[int], seen: Iterable[int], arc: Arc) -> None:
+        """Add an arc that counts while the slots `needed` stand, until one of the slots `seen` is lost, which saw the walk."""
+        key = self._others(needed), self._others(seen)
+        self._by_walks[key] = united([*self._by_walks.get(key, ()), arc])
+
+    def _others(self, slots: Iterable[int]) -> tuple[int, ...]:
+        """Return slots without this one, each once, ascending."""
+        return tuple(sorted(dict.fromkeys(each for each in slots if each != self._slot)))
+
+    def lose(self, *slots: int) -> None:
+        """Forget the arcs of walks that one of these slots saw: its robot has died or left, and no robot takes it over.
+
+        A walk ends where no standing robot sees it. So what it leaves out is the part of the robots that saw it.
+        """
+        self._by_walks = {
+            key: arcs for key, arcs in self._by_walks.items() if not any(each in key[1] for each in slots)
+        }
 
     def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
         """Add arcs (start, width) [rad] in which a wall close to the slot was followed."""
         for each in arcs:
-            self._add((), Arc(*each))
+            self._add((), (), Arc(*each))
 
-    def memory(self) -> tuple[tuple[tuple[int, ...], float, float], ...]:
+    def memory(self) -> tuple[ProvedArc, ...]:
         """Return the arcs that walks closed, for the slot's next occupant."""
-        return tuple((slots, *arc) for slots, arcs in self._by_walks.items() for arc in arcs)
+        return tuple((*key, *arc) for key, arcs in self._by_walks.items() for arc in arcs)
 
-    def inherit(self, memory: Iterable[tuple[tuple[int, ...], float, float]]) -> None:
+    def inherit(self, memory: Iterable[ProvedArc]) -> None:
         """Take over the arcs that walks closed from the slot's former occupant."""
         self._by_walks = {}
-        for slots, start, width in memory:
-            self._by_walks.setdefault(slots, []).append(Arc(start, width))
+        for needed, seen, start, width in memory:
+            self._by_walks.setdefault((needed, seen), []).append(Arc(start, width))

@@ -1,6 +1,9 @@
 """The local proof of coverage (`zwerm.agents.sensor_coverage.frontier.wall_proof`) of all slots, by a node that knows them.
 
 Most of it does not change from scan to scan. It is computed again for the slots around which something has changed.
+
+A walk ends where no standing robot sees it, and the deployment goes on from there. So what a walk leaves out is the part of
+the robots that saw it. When one of them is gone, nothing is known of its part: the points that it saw close nothing.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -64,6 +67,7 @@ class SwarmProof:
         self._points: list[WalkPoint] = []
         self._passed: dict[int, list[Passed]] = {}
         self._witnessed: dict[int, dict[int, None]] = {}  # slots that rely on points which this slot saw
+        self._gone: dict[int, None] = {}  # slots that stood in an earlier scan
         self._forget()
 
     def _forget(self) -> None:
@@ -81,12 +85,18 @@ class SwarmProof:
         walks: Sequence[Walk],
         touched: Mapping[int, Sequence[float]],
         near: Mapping[int, Sequence[Arc]],
-    ) -> None:
-        """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it."""
+    ) -> tuple[int, ...]:
+        """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.
+
+        Return the slots around which points of walks count no more, because a slot that saw them is gone.
+        """
+        before = self._neighbours
         self._index(walks)
         self._scan = scan
         complex_ = scan.complex_
-        gone = [slot for slot in self._around if slot not in complex_.neighbours]
+        gone = [slot for slot in before if slot not in complex_.neighbours]
+        back = [slot for slot in self._gone if slot in complex_.neighbours]
+        self._gone = {slot: None for slot in (*self._gone, *gone) if slot not in back}
         self._neighbours = {slot: frozenset(each) for slot, each in complex_.neighbours.items()}
         changed: dict[int, None] = {}
         for slot in complex_.vertices:
@@ -96,7 +106,11 @@ class SwarmProof:
             if self._around.get(slot) != now:
                 self._around[slot] = now
                 changed[slot] = None
-        self._refresh(changed, gone)
+        left = dict.fromkeys(
+            slot for each in (*gone, *back) for passed in self._passed.get(each, ()) for slot in passed.point.seen
+        )
+        self._refresh(changed | left, gone)
+        return tuple(slot for slot in left if slot in self._around)
 
     def open_arcs(self) -> dict[int, list[Arc]]:
         """Return the arcs in which each slot is open, without the slots that are open in none."""
@@ -193,12 +207,20 @@ class SwarmProof:
         around = self._around[slot]
         found = [*arcs_of_walls(around.touched, CONTACT_RAD), *around.near]
         for _, before, point, hand, between in self._passed.get(slot, ()):
+            if not self._counts(point) or (before is not None and not self._counts(before)):
+                continue
             if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
                 found += arcs_of_step(slot, before, point, hand)
         return united(found)
 
+    def _counts(self, point: WalkPoint) -> bool:
+        """Return whether all slots that saw a point of a walk still stand."""
+        return self._gone.keys().isdisjoint(point.seen)
+
     def _valid(self, point: WalkPoint) -> tuple[Pair, ...]:
         """Return the pairs of slots whose triangle with a point counts."""
+        if not self._counts(point):
+            return ()
         at_walls = {
             (slot, side): ends_at(self._followed[slot], there, side)
             for slot, there in point.seen.items()
@@ -209,15 +231,20 @@ class SwarmProof:
 
 
 def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
-    """Yield each slot that saw a point of a walk, with that point; `first` is the number of the first point."""
+    """Yield each slot that saw a point of a walk with a contact, and that point; `first` is the number of the first point.
+
+    Points without a contact close nothing: whether the robot turns round a corner is known when it is in touch again.
+    """
     last: dict[int, SeenPoint] = {}
     touch = TouchCounter()
     for number, point in enumerate(walk.points):
         touch.take(number, bool(point.walls))
+        if point.is_blind:
+            continue
         now = SeenPoint(number, point)
         for slot in point.seen:
-            before = point_before(slot, last.get(slot), now, touch.since)
-            since = number if before is None else last[slot].number + 1
-            between = tuple(each.seen.keys() for each in walk.points[since:number])
-            yield slot, Passed(first + number, before, point, walk.hand, between)
+            since = last[slot].number if slot in last else number
+            between = tuple(each.seen.keys() for each in walk.points[since:number] if slot not in each.seen)
+            before = point_before(slot, last.get(slot), now, touch.since, bool(between))
+            yield slot, Passed(first + number, before, point, walk.hand, between if before is not None else ())
             last[slot] = now

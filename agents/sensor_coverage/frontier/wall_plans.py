@@ -42,7 +42,8 @@ class WallPlans:
         """Return the arcs in which each slot is open."""
         slots = self._slots
         touched = {slot: [*slots.walls.get(slot, ()), *slots.felt.get(slot, ())] for slot in scan.complex_.vertices}
-        self._proof.update(scan, slots.walks, touched, slots.near)
+        for slot in self._proof.update(scan, slots.walks, touched, slots.near):
+            self.tried.pop(slot, None)
         return self._proof.open_arcs()
 
     def plans(self, scan: ScanResult) -> Iterator[Plan]:

@@ -57,6 +57,11 @@ class WalkPoint(NamedTuple):
     robots: tuple[int, ...]
 
     @property
+    def is_blind(self) -> bool:
+        """True if the walking robot touched nothing. It turns round a corner, or has lost the wall."""
+        return not (self.walls or self.robots)
+
+    @property
     def passes_robots(self) -> bool:
         """True if the walking robot touched robots, and no wall. Behind these may be free space."""
         return bool(self.robots) and not self.walls
@@ -107,19 +112,17 @@ class SeenPoint(NamedTuple):
     point: WalkPoint
 
 
-def point_before(slot: int, last: SeenPoint | None, now: SeenPoint, touch_since: int) -> WalkPoint | None:
+def point_before(slot: int, last: SeenPoint | None, now: SeenPoint, touch_since: int, hidden: bool) -> WalkPoint | None:
     """Return the point with which a point of a walk closes an arc at a slot, or None.
 
-    `last` is the latest point that the slot saw before. The robot must have followed the wall since that point: it does
-    since the point with the number `touch_since`. The slot may have lost it meanwhile, behind a corner. Then other robots
-    saw the way between, and are responsible for the space beside it.
+    `last` is the latest point with a contact that the slot saw before. The robot must have followed the wall since that
+    point: it does since the point with the number `touch_since`. With `hidden` the slot has lost it meanwhile, behind a
+    corner. Then other robots saw the way between, and are responsible for the space beside it.
     """
-    if last is None:
+    if last is None or last.number < touch_since:
         return None
-    if last.number == now.number - 1:
-        return last.point if last.number >= touch_since - 1 else None
     apart = abs(math.remainder(now.point.seen[slot] - last.point.seen[slot], math.tau))
-    return last.point if last.number >= touch_since and apart <= HIDDEN_RAD else None
+    return last.point if not hidden or apart <= HIDDEN_RAD else None
 
 
 def arcs_of_walls(directions: Iterable[float], half_rad: float = TOUCH_RAD) -> list[Arc]:

@@ -6,6 +6,9 @@ frame of the base.
 
 from msgspec import Struct
 
+# An arc that a walk closed: the slots that must stand, the slots that saw the walk there, start [rad], width [rad].
+ProvedArc = tuple[tuple[int, ...], tuple[int, ...], float, float]
+
 
 class _PushMessagePart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A part of a message."""
@@ -39,7 +42,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
 
     `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
     `felt` are directions [rad] of walls closer than a body. `explored` are directions of attempts to follow a wall.
-    `proved` has the arcs that walks closed: (slots that must stand, start [rad], width [rad]).
+    `proved` has the arcs that walks closed.
     """
 
     slot: int
@@ -53,7 +56,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     obstructed: tuple[tuple[tuple[int, ...], int], ...] = ()
     felt: tuple[float, ...] = ()
     explored: tuple[float, ...] = ()
-    proved: tuple[tuple[tuple[int, ...], float, float], ...] = ()
+    proved: tuple[ProvedArc, ...] = ()
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).

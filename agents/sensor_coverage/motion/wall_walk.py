@@ -6,7 +6,7 @@ its way are passed in the same manner, but the robot does not press against them
 """
 
 import math
-from collections.abc import Callable, Collection, Generator, Iterable, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
@@ -40,6 +40,10 @@ FEEL_M: Final = 0.12
 CLEAR_M: Final = 0.3
 # Points closer [m] to the start have no direction from there.
 NEAR_M_MIN: Final = 0.02
+# A robot in sight is not in touch if its bearing shows a distance of more than this many radii of a body. It shows none
+# unless the walking robot moved by this distance [m] across its line of sight: a bearing's noise would decide.
+TOUCHING_RADII_MAX: Final = 4.0
+ACROSS_M_MIN: Final = 0.03
 # Two contacts whose bearings differ by less than this [rad] are with the same wall; a switch is 30 degrees wide.
 SAME_WALL_RAD: Final = math.radians(35.0)
 # Two contacts at the same point that differ by less than this [rad] are the walls of a corner.
@@ -82,7 +86,9 @@ class WallWalk:
         self._wall_rad = 0.0
         self._trail: list[Vector] = []
         self._blind_rad = 0.0
+        self._was_in_touch = False  # whether there was a contact at the latest step
         self._start = motion.position
+        self._out_of_reach: frozenset[int] = frozenset()  # robots in the direction of a contact that are not in touch
 
     @property
     def way(self) -> Vector:
@@ -152,7 +158,7 @@ class WallWalk:
         if not self._sees(keep):
             return WalkResult(LOST)
         self._trail = [motion.position]
-        self._blind_rad = 0.0
+        self._blind_rad, self._out_of_reach = 0.0, frozenset()
         points = [self._waypoint()]
         self.on_step(points[0])
         seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
@@ -162,8 +168,9 @@ class WallWalk:
                 return WalkResult(MET, way, (), tuple(points))
             if self._blind_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
                 return WalkResult(SHUT, way, (), tuple(points))
-            before, before_point = motion.position, self._waypoint()
+            before, before_point, seen_before = motion.position, self._waypoint(), frame.seen
             yield self._step(hand)
+            self._check_contacts(before, seen_before)
             step_m = math.dist(before, motion.position)
             way += step_m
             stuck = stuck + 1 if step_m < STUCK_FRACTION * motion.step_m else 0
@@ -191,13 +198,32 @@ class WallWalk:
         if not contacts:
             self._wall_rad += hand * TURN_RAD
             self._blind_rad += TURN_RAD
+            self._was_in_touch = False
             heading = self._wall_rad - hand * (math.pi / 2.0 - PRESS_RAD)
         else:
-            self._blind_rad = 0.0
+            walls = [each.bearing_rad for each in contacts if each.node is None]
+            if self._was_in_touch:
+                self._blind_rad = 0.0
+            elif self._blind_rad > math.tau and walls:
+                # There is no wall at the hand: the robot circles, and touches another wall once in each turn.
+                self._wall_rad = min(walls, key=lambda each: _apart(each, self._wall_rad))
+            self._was_in_touch = True
             heading = swept(self._wall_rad, contacts, hand)
             self._wall_rad = heading + hand * (math.pi / 2.0 - PRESS_RAD)
         ux, uy = unit(heading)
         return motion.velocity(ux * motion.step_m, uy * motion.step_m)
+
+    def _check_contacts(self, before: Vector, seen_before: Mapping[int, float]) -> None:
+        """Find the robots that are in the direction of a contact, but too far away: the robot touches something else."""
+        motion, seen = self._motion, self._motion.frame.seen
+        moved = motion.position[0] - before[0], motion.position[1] - before[1]
+        self._out_of_reach = frozenset(
+            node
+            for node in (each.node for each in motion.frame.contacts)
+            if node in seen
+            and node in seen_before
+            and is_farther(TOUCHING_RADII_MAX * motion.radius_m, moved, seen_before[node], seen[node])
+        )
 
     def _near_point(self) -> NearPoint:
         return NearPoint(self._motion.position, self._motion.frame.touched)
@@ -209,7 +235,9 @@ class WallWalk:
             frame.y_m,
             tuple(Sighting(node, bearing) for node, bearing in sorted(frame.seen.items())),
             tuple(each.bearing_rad for each in frame.contacts if each.node is None),
-            tuple(each.node for each in frame.contacts if each.node is not None),
+            tuple(
+                each.node for each in frame.contacts if each.node is not None and each.node not in self._out_of_reach
+            ),
         )
 
     # --- sight ------------------------------------------------------------------------------------------------------
@@ -269,6 +297,16 @@ def arcs_around(
         for a, b in ((a, b) for a in before.walls for b in point.walls if _apart(a, b) < SAME_WALL_RAD):
             found.append(_between(start, _touched_point(before.at, a, radius_m), _touched_point(point.at, b, radius_m)))
     return tuple((a, width) if width >= 0.0 else (a + width, -width) for a, width in found)
+
+
+def is_farther(distance_m: float, moved_m: Vector, before_rad: float, now_rad: float) -> bool:
+    """Return whether a point is farther away than a distance, by its bearings before and after a drive by `moved_m`.
+
+    A drive along the line of sight shows nothing.
+    """
+    ux, uy = unit(now_rad)
+    across_m = abs(moved_m[0] * uy - moved_m[1] * ux)
+    return across_m > ACROSS_M_MIN and _apart(before_rad, now_rad) * distance_m < across_m
 
 
 def _touched_point(at: Vector, bearing_rad: float, radius_m: float) -> Vector:

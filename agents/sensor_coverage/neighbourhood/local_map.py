@@ -140,11 +140,9 @@ class LocalMap(NeighbourTable):
         if slot != NOWHERE and not self.states[node].moving and not self.path_vectors.is_claimed(slot):
             self._bodies.finished[node] = None
         self.path_vectors.forget(node, slot)
-        log = self._planner.attempt_log
-        for known in (log.closed, log.attempts):
-            for key in [key for key in known if key[2] == 0]:
-                del known[key]
+        self._planner.attempt_log.forget_gaps()
         self._planner.walls.tried.clear()
+        self.proof.lose(slot)
         if node in self._bodies.stopped.values():
             self.reopen()  # a drive that pushes its body finds out what is behind it
         self._plan_basis = None
@@ -152,6 +150,7 @@ class LocalMap(NeighbourTable):
 
     def restarted(self, node: int) -> None:
         """Forget a robot that has lost its memory, and end the claims of its slot."""
+        self.proof.lose(self._slot_of(node))
         self.path_vectors.forget(node, self._slot_of(node))
         super().restarted(node)
 
@@ -271,6 +270,7 @@ class LocalMap(NeighbourTable):
     def _plan_walks(self, scan: ScanResult) -> None:
         """Find the open arcs around this robot, and the walks into them. A robot without neighbours has none."""
         me, slots = self.slot, self._slots
+        self.proof.lose(*(each.slot for each in self.states.values() if each.redundant))
         self.proof.update(me, scan, (*slots.walls.get(me, ()), *slots.felt.get(me, ())))
         arcs, beside = self.proof.open_arcs(), next(iter(self.proof.around), me)
         self.wall_plans, self.unproven = self._planner.walls.plans_at(me, beside, arcs if beside != me else ())

@@ -95,6 +95,37 @@ def test_a_walk_ends_where_the_robot_is_wedged() -> None:
     assert ended.value.value.end == SHUT
 
 
+class Passing(Wedged):
+    """A robot that moves to the east below a wall, at a robot in the south-east, from which it is `away_m`."""
+
+    def __init__(self, away_m: float) -> None:
+        super().__init__()
+        self._robot = away_m * math.cos(1.0), -away_m * math.sin(1.0)
+        self._read()
+
+    def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        self.position = self.position[0] + 0.05, 0.0
+        self._read()
+        return BodyVelocity(x_m, y_m)
+
+    def _read(self) -> None:
+        bearing = math.atan2(self._robot[1], self._robot[0] - self.position[0])
+        self.frame.seen = {9: bearing}
+        self.frame.contacts = Touched(math.pi / 2.0, None), Touched(bearing, 9)
+
+
+@pytest.mark.parametrize(("away_m", "touched"), [(0.15, (9,)), (0.8, ())])
+def test_a_walking_robot_touches_no_robot_that_is_far_away(away_m: float, touched: tuple[int, ...]) -> None:
+    """The contact is with a wall or another thing. The pocket between that robot and the wall would count as closed."""
+    walk = WallWalk(cast(Locomotion, Passing(away_m)))
+    points = list[tuple[int, ...]]()
+    walk.on_step = lambda at: points.append(at.robots)
+    drive = walk.along(1, 3.0, (), (), 0.05)
+    for _ in range(3):
+        next(drive)
+    assert points[1:] == [touched] * 2
+
+
 # --- whole runs -----------------------------------------------------------------------------------------------------
 
 FOLLOWED = 'coordinator.parameters.walls="followed"'

@@ -187,7 +187,7 @@ class WallProtocol(Component):
             passed.walls,
             tuple(slots[node] for node in passed.robots if node in slots),
         )
-        if slot not in point.seen:
+        if slot not in point.seen or point.is_blind:
             return
         received = self._received.get(sender)
         if received is not None and received[:2] != (passed.push, slot):
@@ -196,7 +196,7 @@ class WallProtocol(Component):
         step = WallStep(None, point, passed.hand)
         if received is not None:
             witnesses = self._witnesses(passed, received.seen.number, slots)
-            before = point_before(slot, received.seen, now, passed.touch_since)
+            before = point_before(slot, received.seen, now, passed.touch_since, bool(witnesses))
             if before is not None and witnesses is not None:
                 step = WallStep(before, point, passed.hand, witnesses)
         self._received[sender] = _Received(passed.push, slot, now, step)

@@ -61,9 +61,11 @@ def test_a_walk_that_turns_round_a_corner_still_follows_the_wall() -> None:
     assert opened(Walk(0, -1, tuple(points))) == [(60, 310)]
 
 
-def test_a_walk_that_loses_the_wall_no_longer_follows_it() -> None:
-    free = [WalkPoint({0: math.radians(each)}, (), ()) for each in range(20, 100, 10)]
-    assert opened(Walk(0, -1, (WalkPoint({0: 0.0}, (0.0,), ()), *free))) == [(40, 320)]
+@pytest.mark.parametrize("count", [1, 3, 8])
+def test_points_without_a_contact_close_nothing_unless_the_wall_comes_back(count: int) -> None:
+    free = [WalkPoint({0: math.radians(10 * (each + 1))}, (), ()) for each in range(count)]
+    walk = Walk(0, -1, (WalkPoint({0: 0.0}, (0.0,), ()), *free))
+    assert opened(walk) == [(0, 360)]
 
 
 def test_a_robot_may_lose_a_walk_behind_a_corner_that_another_robot_sees() -> None:
@@ -136,6 +138,23 @@ PASSING = [
     *between_two((-45, -135)),
     WalkPoint({0: math.radians(-30.0), 1: math.radians(-110.0)}, SOUTH, ()),
 ]
+
+
+def test_points_of_a_walk_count_only_while_all_robots_stand_that_saw_them() -> None:
+    """The walk went on where slot 1 saw it. What it left out there was the part of slot 1."""
+    walks = (Walk(0, -1, tuple(PASSING)),)
+    proof = SwarmProof()
+    alone = ScanResult({0: {}}, FlagComplex({0: {}}), ())
+    together = ScanResult(PAIR, FlagComplex(PAIR), ())
+    assert proof.update(together, walks, {}, {}) == ()
+    closed = _degrees(proof.open_arcs())
+    assert proof.update(alone, walks, {}, {}) == (0,)
+    assert _degrees(proof.open_arcs()) == {0: 360}
+    turned = tuple(each.turned(0, 0.0) for each in walks)
+    assert proof.update(alone, turned, {}, {}) == ()
+    assert _degrees(proof.open_arcs()) == {0: 360}, "the slot is still gone after frames of robots became one"
+    assert proof.update(together, turned, {}, {}) == (0, 1)
+    assert _degrees(proof.open_arcs()) == closed, "the slot is occupied again"
 
 
 def test_two_points_of_walks_beside_a_door_close_nothing() -> None:
@@ -234,7 +253,12 @@ def test_a_slot_keeps_what_a_walk_closed_and_passes_it_on() -> None:
     heir.update(0, ScanResult(PAIR, FlagComplex(PAIR), ()), ())
     assert heir.open_arcs() == proof.open_arcs()
     heir.update(0, ScanResult({0: {}}, FlagComplex({0: {}}), ()), ())
-    assert open_rad(heir) == pytest.approx(math.tau - math.radians(40.0)), "slot 1 is gone"
+    assert open_rad(heir) == pytest.approx(math.tau - math.radians(40.0)), (
+        "the robot at slot 1 moves: another one comes"
+    )
+    heir.update(0, ScanResult(PAIR, FlagComplex(PAIR), ()), ())
+    heir.lose(1)
+    assert open_rad(heir) == pytest.approx(math.tau), "slot 1 is lost, which saw the walk, too"
 
 
 def test_two_points_of_walks_beside_a_door_close_nothing_at_a_slot() -> None:
