@@ -104,11 +104,13 @@ class _MallocInfo(ctypes.Structure):
     _fields_: ClassVar = [(name, ctypes.c_size_t) for name in _names]
 
 
+_READ_HEAPS: Final = ctypes.CDLL(None).mallinfo2  # opened once: each opening leaves a cycle of objects
+_READ_HEAPS.restype = _MallocInfo
+
+
 def heap_mb() -> tuple[float, float]:
     """Return the memory of this process that the C library's heaps have lent, and what they keep free [MB]."""
-    read = ctypes.CDLL(None).mallinfo2
-    read.restype = _MallocInfo
-    found = read()
+    found = _READ_HEAPS()
     return (found.uordblks + found.hblkhd) / MEBIBYTE, found.fordblks / MEBIBYTE
 
 

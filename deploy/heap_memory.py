@@ -7,6 +7,7 @@ although no more of it was in use.
 
 import contextlib
 import ctypes
+from functools import cache
 from typing import Final
 
 # Heaps that all threads share; the default is eight a core.
@@ -17,10 +18,16 @@ _M_ARENA_MAX: Final = -8
 def share_heaps() -> None:
     """Let the threads that start from now on share few heaps (Linux with the GNU C library)."""
     with contextlib.suppress(OSError, AttributeError):
-        ctypes.CDLL(None).mallopt(_M_ARENA_MAX, _HEAPS)
+        _c_library().mallopt(_M_ARENA_MAX, _HEAPS)
 
 
 def return_freed() -> None:
     """Return freed memory to the system (Linux with the GNU C library)."""
     with contextlib.suppress(OSError, AttributeError):
-        ctypes.CDLL(None).malloc_trim(0)
+        _c_library().malloc_trim(0)
+
+
+@cache
+def _c_library() -> ctypes.CDLL:
+    """Return the C library, opened once: each opening leaves a cycle of objects, which Python seldom looks for in a run."""
+    return ctypes.CDLL(None)

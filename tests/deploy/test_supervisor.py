@@ -278,7 +278,7 @@ def below(pid: int) -> set[int]:
 def program(tmp: Path, count: int, *controllers: str) -> Iterator[subprocess.Popen[str]]:
     """Run swarm_script.py in a process group and with a temporary directory of its own."""
     running = subprocess.Popen(
-        [sys.executable, str(ROOT / "tests" / "swarm_script.py"), str(count), *controllers],
+        [sys.executable, str(ROOT / "tests" / "helpers" / "swarm_script.py"), str(count), *controllers],
         env=os.environ | {"PYTHONPATH": f"{ROOT}:{ROBOTS}", "TMPDIR": str(tmp)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
