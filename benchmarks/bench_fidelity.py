@@ -17,7 +17,7 @@ import shapely
 from rich.console import Console
 from rich.table import Table
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
 
 from air import DT_S, Radio, ring
 from csv_rows import add_csv_option, write_csv

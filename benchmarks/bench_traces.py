@@ -22,10 +22,9 @@ from csv_rows import add_csv_option, write_csv
 
 from zwerm.run.result import RunResult
 from zwerm.run.runner import Runner, run
-from zwerm.scenario.load import load
+from zwerm.scenario.load import built_in, load
 from zwerm.scenario.tables import Scenario
 
-SCENARIOS: Final = Path(__file__).parents[1] / "scenarios"
 DURATION_S: Final = 10.0
 
 # Virtual seconds of scenarios in which little happens within DURATION_S, or whose ticks are short.
@@ -66,8 +65,7 @@ class Case:
 def cases(patterns: Sequence[str]) -> list[Case]:
     """Return the scenarios whose names match, each as it ships and with faults."""
     found = []
-    for path in sorted(SCENARIOS.glob("*.toml")):
-        name = path.stem
+    for name in built_in():
         if not any(fnmatchcase(name, each) for each in patterns):
             continue
         short_s = next((each for pattern, each in DURATIONS_S.items() if fnmatchcase(name, pattern)), DURATION_S)
