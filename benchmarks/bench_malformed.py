@@ -188,21 +188,23 @@ def main() -> None:
     for block in range(0, options.messages, BLOCK):
         decode_all(mutants(options.seed + block, min(BLOCK, options.messages - block)), counts)
     draw = random.Random(options.seed)
-    texts = {path: path.read_text() for path in sorted(SCENARIOS.glob("*.toml"))}
-    maps = {path: path.read_bytes() for path in sorted(SCENARIOS.glob("*.*")) if path.suffix not in (".toml", ".py")}
+    texts = {path: path.read_text() for path in sorted(SCENARIOS.glob("*/*.toml"))}
+    maps = {path: path.read_bytes() for path in sorted(SCENARIOS.glob("*/*.*")) if path.suffix not in (".toml", ".py")}
     with_maps = [path for path, text in texts.items() if any(each.name in text for each in maps)]
     longest_s, longest = 0.0, ""
     with TemporaryDirectory() as folder:
-        for path, content in maps.items():
-            (Path(folder) / path.name).write_bytes(content)
+        copies = {path: Path(folder) / path.parent.name / path.name for path in (*texts, *maps)}
+        for path, copy in copies.items():
+            copy.parent.mkdir(exist_ok=True)
+            copy.write_bytes(path.read_bytes())
         for number in range(options.scenarios + options.maps):
             kind = "scenarios" if number < options.scenarios else "maps"
             source = draw.choice(list(texts) if kind == "scenarios" else with_maps)
-            trial = Path(folder) / source.name
+            trial = copies[source]
             trial.write_text(mutated(texts[source], draw) if kind == "scenarios" else texts[source], encoding="utf-8")
             changed = draw.choice([path for path in maps if path.name in texts[source]]) if kind == "maps" else None
             if changed is not None:
-                (Path(folder) / changed.name).write_bytes(mutated_bytes(maps[changed], draw))
+                copies[changed].write_bytes(mutated_bytes(maps[changed], draw))
             begin_s = time.monotonic()
             try:
                 counts[kind][try_scenario(trial)] += 1
@@ -212,7 +214,7 @@ def main() -> None:
             if time.monotonic() - begin_s > longest_s:
                 longest_s, longest = time.monotonic() - begin_s, f"{kind} {number} of {source.name}"
             if changed is not None:
-                (Path(folder) / changed.name).write_bytes(maps[changed])
+                copies[changed].write_bytes(maps[changed])
     rows = [
         {"input": f"{name} (decoder)" if name in DECODERS else name, "tried": str(each.total())}
         | {"accepted": str(each["accepted"]), "refused": str(each["refused"]), "tracebacks": "0"}

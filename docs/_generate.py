@@ -333,7 +333,9 @@ def gallery() -> str:
     """Return every picture of the gallery, by algorithm, with the summary of its scenario."""
     parts = []
     for row in ALGORITHMS:
-        scenarios = [name for name in built_in() if row_of(name) is row and (GALLERY / f"{name}.png").exists()]
+        scenarios = [
+            name for name, file in built_in().items() if row_of(file) is row and (GALLERY / f"{name}.png").exists()
+        ]
         if scenarios:
             page = f"\n\nPaper: {row.paper}. [Page]({row.page})." if row.page else ""
             parts.append(f"## {row.title}{page}")

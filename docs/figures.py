@@ -35,6 +35,7 @@ SPEED: Final = {"iterations_to_91_5_percent_completion": "iterations to 91.5 %",
 # Table, its axis, the label of the axis, and whether its scale is logarithmic.
 RADIO: Final = (
     ("landmark-loss", AXIS, "fraction of messages lost", False),
+    ("landmark-bursts", "packets", "messages lost in a burst, 0.3 of all", True),
     ("landmark-range", "radio.range_m", "range of the radio [r]", True),
 )
 EXPLORATION: Final = {"completion_fraction": "completion", "iterations": "iterations to the end"}
@@ -176,8 +177,8 @@ def dispersion_figure() -> Figure:
 
 
 def radio_figure() -> Figure:
-    """Return completion and iterations of landmark exploration over loss and range of the radio."""
-    figure = Figure(figsize=(8.6, 5.8), layout="constrained")
+    """Return completion and iterations of landmark exploration over loss, length of bursts and range of the radio."""
+    figure = Figure(figsize=(10.5, 5.8), layout="constrained")
     panels = figure.subplots(2, len(RADIO), sharey="row", sharex="col")
     for column, (name, axis, label, is_log) in enumerate(RADIO):
         found = _measured.load(name)
@@ -190,6 +191,8 @@ def radio_figure() -> Figure:
                 ]
                 if some:
                     _draw(axes, some, variant, colour, marker, axis)
+                else:  # the channel of the coordinator has no range
+                    axes.axhline(_mean_without_loss(metric, variant), color=colour, linestyle="--", label=variant)
             axes.grid(alpha=0.3)
             if is_log:
                 ticks = sorted({float(row[axis]) for row in found.rows})
@@ -205,6 +208,13 @@ def radio_figure() -> Figure:
     panels[1, 0].legend(frameon=False, loc="upper left")
     figure.suptitle("landmark-free, 10 robots; bars: 95 % interval of the mean", x=0.01, ha="left", fontsize=10)
     return figure
+
+
+def _mean_without_loss(metric: str, variant: str) -> float:
+    name, axis, *_ = RADIO[0]
+    wanted = (metric, variant, 0.0)
+    rows = _measured.load(name).rows
+    return next(float(row["mean"]) for row in rows if (row["metric"], row["variant"], float(row[axis])) == wanted)
 
 
 def _draw(axes: Any, rows: list[dict[str, str]], variant: str, colour: str, marker: str, axis: str = AXIS) -> None:

@@ -19,8 +19,9 @@ from PIL import Image, ImageColor
 import zwerm
 from zwerm.scenario.load import built_in
 from zwerm.view.canvas import BLUE, ORANGE, OUTSIDE, SKY, VERMILLION, WALL, YELLOW
+from zwerm.view.layers.landmark_exploration import LandmarkComplexLayer, LandmarkNavigationLayer
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
 
 from random_buildings import KINDS, random_building
 
@@ -32,7 +33,11 @@ WIDTHS: Final = (900, 760, 640)  # pixels, tried in this order
 HEIGHT_MAX: Final = 1200
 COLOURS: Final = (96, 64, 48, 32, 16)  # besides those that are kept; tried in this order until the file is small enough
 # Colours that few pixels have, and that a palette made for the whole picture would lose.
-KEPT: Final = ("#FFFFFF", BLUE, ORANGE, OUTSIDE, SKY, VERMILLION, WALL, YELLOW)
+KEPT: Final = (
+    *("#FFFFFF", BLUE, ORANGE, OUTSIDE, SKY, VERMILLION, WALL, YELLOW),
+    *LandmarkComplexLayer.colours,
+    *LandmarkNavigationLayer.colours,
+)
 BYTES_MAX: Final = 150_000
 
 

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PARTS = ("agents", "world", "coordinator", "deploy", "scenarios", "studies")
 LINES_MAX = 400
+MODULES_MAX = 15
 
 # Code that decides what happens in a run: these folders, and all of the core but what starts a run and tells of it.
 DECIDING = ("agents", "world", "coordinator")
@@ -324,6 +326,11 @@ def test_no_file_has_more_than_400_lines_without_a_reason() -> None:
 UPPER_BOUND_OF_WALL_TIME = re.compile(
     r"assert\b.*((time\.\w+\(\) - \w+|\bwall_s) *<|\bwall_s == pytest\.approx|> *(time\.\w+\(\) - \w+|[\w.]*\bwall_s\b))"
 )
+
+
+def test_no_folder_of_code_has_more_than_15_modules() -> None:
+    folders = Counter(path.parent for path in sources("zwerm", *PARTS, "tests") if path.name != "__init__.py")
+    assert {str(folder): count for folder, count in folders.items() if count > MODULES_MAX} == {}
 
 
 def test_no_test_asserts_an_upper_bound_of_wall_time() -> None:

@@ -235,6 +235,6 @@ def test_every_class_of_the_catalogue_exists() -> None:
 
 
 def test_every_scenario_and_study_that_ships_belongs_to_a_row() -> None:
-    files = [*(ROOT / "scenarios").glob("*.toml"), *(ROOT / "studies").glob("*.toml")]
+    files = [*(ROOT / "scenarios").rglob("*.toml"), *(ROOT / "studies").rglob("*.toml")]
     assert len(files) > 30
-    assert [str(path.relative_to(ROOT)) for path in files if row_of(path.stem) is None] == []
+    assert [str(path.relative_to(ROOT)) for path in files if row_of(path) is None] == []

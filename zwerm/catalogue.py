@@ -7,8 +7,8 @@ Everything that lists, checks, preloads or documents algorithms and plug-ins rea
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from functools import lru_cache
+from pathlib import Path
 from typing import Final, Literal
 
 Role = Literal["robot", "base", "coordinator"]
@@ -43,7 +43,7 @@ class Algorithm:
     """One algorithm: its controllers by the name that a scenario uses, and all that comes with it.
 
     `variants` are tried in order: the first that agrees with the services a scenario names is taken. `metrics` are
-    measured and `layers` drawn in every run of these controllers. `scenarios` and `studies` are patterns of file names.
+    measured and `layers` drawn in every run of these controllers. Its scenarios and studies lie in folders called `name`.
     `reactive` names, by controller, the function that returns the wheel speeds of a robot in a batch (`zwerm.evolve.batch`).
     """
 
@@ -55,7 +55,6 @@ class Algorithm:
     variants: Sequence[Variant] = ()
     metrics: Sequence[str] = ()
     layers: Sequence[str] = ()
-    scenarios: Sequence[str] = ()
     reactive: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -107,7 +106,6 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             f"{_SENSOR_COVERAGE_METRICS}:Removals",
         ),
         layers=("zwerm.view.layers.sensor_coverage:ComplexLayer",),
-        scenarios=("sensor-coverage*",),
     ),
     Algorithm(
         name="voronoi_coverage",
@@ -122,7 +120,6 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
                 "voronoi-swarmbot": "zwerm.agents.voronoi_coverage:SwarmBotCoverage",
             }
         },
-        scenarios=("voronoi-*",),
     ),
     Algorithm(
         name="landmark_exploration",
@@ -146,8 +143,10 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             "zwerm.world.metrics.landmark_exploration:Exploration",
             "zwerm.world.metrics.landmark_exploration:Navigation",
         ),
-        layers=("zwerm.view.layers.landmark_exploration:LandmarkComplexLayer",),
-        scenarios=("landmark-*",),
+        layers=(
+            "zwerm.view.layers.landmark_exploration:LandmarkNavigationLayer",
+            "zwerm.view.layers.landmark_exploration:LandmarkComplexLayer",
+        ),
     ),
     Algorithm(
         name="computation_free",
@@ -160,7 +159,6 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
                 "random-walk": "zwerm.agents.computation_free:RandomWalk",
             }
         },
-        scenarios=("computation-free*",),
         reactive={"computation-free": "zwerm.agents.computation_free.reactive:wheel_fractions"},
     ),
     Algorithm(
@@ -178,7 +176,6 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         ),
         metrics=("zwerm.world.metrics.robot_teams:TeamCoverage",),
         layers=("zwerm.view.layers.robot_teams:CellsLayer",),
-        scenarios=("robot-teams*",),
     ),
     Algorithm(
         name="agreement",
@@ -191,13 +188,11 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
             }
         },
         metrics=("zwerm.world.metrics.agreement:Spread", "zwerm.world.metrics.agreement:Leaders"),
-        scenarios=("agreement-*",),
     ),
     Algorithm(
         name="gossip",
         title="Demonstrations of the radio: gossip and beacons",
         controllers={ROBOT: {"beacon": "zwerm.agents.gossip:Beacon", "gossip-max": "zwerm.agents.gossip:GossipMax"}},
-        scenarios=("beacon*", "gossip-*"),
     ),
 )
 
@@ -309,9 +304,16 @@ def plugins() -> dict[str, Mapping[str, str]]:
     }
 
 
-def row_of(file_name: str) -> Algorithm | None:
-    """Return the row whose patterns name a scenario or study of this name, or None."""
-    return next((row for row in ALGORITHMS if any(fnmatchcase(file_name, each) for each in row.scenarios)), None)
+@lru_cache(maxsize=2)
+def shipped(kind: Literal["scenarios", "studies"]) -> Mapping[str, Path]:
+    """Return the files of a kind that ship with Zwerm, by name, in alphabetical order."""
+    files = Path(__file__).with_name(kind).glob("*/*.toml")
+    return {path.stem: path for path in sorted(files, key=lambda each: each.stem)}
+
+
+def row_of(file: Path) -> Algorithm | None:
+    """Return the row to which a scenario or study belongs that ships with Zwerm, or None."""
+    return next((row for row in ALGORITHMS if row.name == file.parent.name), None)
 
 
 @lru_cache(maxsize=256)

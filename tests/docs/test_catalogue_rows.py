@@ -210,7 +210,8 @@ def grown(root: Path) -> Path:
     (root / "world" / "metrics" / "headcount.py").write_text(OWN_METRIC, encoding="utf-8")
     [scenario] = [block.text for block in blocks(RECIPES) if block.title == "headcount.toml"]
     scenario = scenario.replace("headcount:Member", "headcount").replace("headcount:Counter", "headcount")
-    (root / "scenarios" / "headcount.toml").write_text(scenario, encoding="utf-8")
+    (root / "scenarios" / "headcount").mkdir()
+    (root / "scenarios" / "headcount" / "headcount.toml").write_text(scenario, encoding="utf-8")
     return root
 
 

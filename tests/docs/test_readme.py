@@ -92,7 +92,11 @@ def test_the_toml_of_the_readme_is_a_valid_arena(desk: Path) -> None:
     Image.new("L", (100, 80), 254).save(desk / "warehouse.pgm")
     [table] = blocks("toml")
     (desk / "arena.toml").write_text(table)
-    tables = read(ROOT / "scenarios/computation-free.toml") | read(desk / "arena.toml") | {"name": "warehouse"}
+    tables = (
+        read(ROOT / "scenarios/computation_free/computation-free.toml")
+        | read(desk / "arena.toml")
+        | {"name": "warehouse"}
+    )
     world = assemble(validate(tables, "warehouse.toml", desk), 1)
     assert world.scene.arena.area_m2 == pytest.approx(20.0)
 

@@ -29,7 +29,7 @@ def test_a_decoder_that_raises_another_error_is_found(monkeypatch: pytest.Monkey
 
 def test_mutated_scenarios_are_accepted_or_refused_in_words(tmp_path: Path) -> None:
     draw = random.Random(11)
-    texts = [(bench_malformed.SCENARIOS / f"{name}.toml").read_text() for name in ("gossip-max", "beacon")]
+    texts = [(bench_malformed.SCENARIOS / f"gossip/{name}.toml").read_text() for name in ("gossip-max", "beacon")]
     outcomes = Counter[str]()
     for number in range(60):
         path = tmp_path / f"{number}.toml"
@@ -41,7 +41,9 @@ def test_mutated_scenarios_are_accepted_or_refused_in_words(tmp_path: Path) -> N
 def test_mutated_maps_are_accepted_or_refused_in_words(tmp_path: Path) -> None:
     draw, name = random.Random(12), "robot-teams-map"
     for suffix in (".toml", ".map", ".mcpp"):
-        (tmp_path / f"{name}{suffix}").write_bytes((bench_malformed.SCENARIOS / f"{name}{suffix}").read_bytes())
+        (tmp_path / f"{name}{suffix}").write_bytes(
+            (bench_malformed.SCENARIOS / f"robot_teams/{name}{suffix}").read_bytes()
+        )
     whole = (tmp_path / f"{name}.map").read_bytes()
     outcomes = Counter[str]()
     for _ in range(20):

@@ -3,10 +3,11 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Final, Optional
+from typing import Annotated, Final, Literal, Optional
 
 import typer
 
+from zwerm.catalogue import shipped
 from zwerm.errors import ScenarioError
 
 _ENDPOINT: Final = re.compile(r"[a-z][a-z-]*/\S+")
@@ -18,12 +19,11 @@ def check_endpoint(option: str, endpoint: str) -> None:
         raise ScenarioError([f"{option}: expected an endpoint such as tcp/0.0.0.0:7447, got {endpoint!r}"])
 
 
-def built_in_names(*folders: str) -> Callable[[str], list[str]]:
+def built_in_names(*kinds: Literal["scenarios", "studies"]) -> Callable[[str], list[str]]:
     """Return the function by which the shell completes the names of built-in files, and of TOML files."""
 
     def complete(incomplete: str) -> list[str]:
-        package = Path(__file__).parents[1]
-        names = sorted(path.stem for folder in folders for path in (package / folder).glob("*.toml"))
+        names = sorted(name for kind in kinds for name in shipped(kind))
         files = sorted(map(str, Path().glob("*.toml")))
         return [name for name in (*names, *files) if name.startswith(incomplete)]
 

@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Sequence
-from typing import Any, get_args
+from typing import Any, Literal, get_args, get_origin
 
 import msgspec
 from msgspec import Struct
@@ -101,6 +101,8 @@ def struct_mistakes(kind: type[Struct], given: dict[str, Any], path: str) -> lis
                 msgspec.convert(given[name], field.type)
             except msgspec.ValidationError as error:
                 rule, _, inner = str(error).replace("`", "").partition(" - at $")
+                if get_origin(field.type) is Literal:
+                    rule = f"expected {' or '.join(map(repr, get_args(field.type)))}"
                 found.append(f"{path}.{name}{inner}: {_as_ours(rule)}, got {_shown(given[name])}")
         elif field.required:
             found.append(f"{path}.{name}: required, and missing")

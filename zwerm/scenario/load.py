@@ -2,12 +2,13 @@
 
 import copy
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from zwerm.catalogue import shipped
 from zwerm.errors import ScenarioError
 from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.nearest import nearest
@@ -17,13 +18,10 @@ from zwerm.scenario.tables import Scenario
 from zwerm.scenario.toml_text import parse_toml
 from zwerm.scenario.types import OpenTable, is_file
 
-BUILT_IN = Path(__file__).parents[1] / "scenarios"
-STUDIES = Path(__file__).parents[1] / "studies"
 
-
-def built_in() -> dict[str, Path]:
+def built_in() -> Mapping[str, Path]:
     """Return the scenarios that ship with Zwerm, by name."""
-    return {path.stem: path for path in sorted(BUILT_IN.glob("*.toml"), key=lambda each: each.stem)}
+    return shipped("scenarios")
 
 
 def locate(name: str) -> Path:
@@ -32,12 +30,12 @@ def locate(name: str) -> Path:
     Raises ScenarioError where neither exists.
     """
     path = Path(name)
-    own = BUILT_IN / f"{name}.toml"
-    if path.name == name and is_file(own):
+    own = built_in().get(name)
+    if own is not None:
         return own
     if is_file(path):
         return path
-    if is_file(STUDIES / f"{name}.toml"):
+    if name in shipped("studies"):
         raise ScenarioError([f"{name}: is a study and no scenario; run it with: zwerm study {name}"])
     hint = "" if path.suffix == ".toml" else suggestion(name, built_in(), "zwerm list")
     raise ScenarioError([f"{name}: expected a scenario file or the name of a built-in one{hint}"])

@@ -23,7 +23,7 @@ _OWN: Final = Path(__file__).parents[1].resolve()
 def search_first(folder: Path) -> None:
     """Look for modules in a scenario's folder before any other place from now on."""
     found = folder.resolve()
-    if found.parent in (_OWN, _OWN.parent) and found.name == "scenarios":
+    if found.parent.name == "scenarios" and found.parents[1] in (_OWN, _OWN.parent):
         return
     place = str(found)
     if sys.path[:1] != [place]:

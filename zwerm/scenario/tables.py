@@ -76,7 +76,9 @@ class ArenaTable(Table):
 class BodyTable(Table):
     """A robot's body. A command takes effect `latency_ticks` ticks after the observation it answers.
 
-    `kind` is the drive: `differential`, `holonomic`, or a class of your own as module:Class.
+    `kind` is the drive: `differential`, `holonomic`, or a class of your own as module:Class. With
+    `continuous_collision` two bodies that meet stop where they touch, at any speed; without it, fast bodies may overlap
+    for a substep.
     """
 
     kind: str = "differential"
@@ -90,6 +92,7 @@ class BodyTable(Table):
     friction: NonNegative = 0.0
     drive_noise_fraction: Fraction = 0.0
     collide: bool = True
+    continuous_collision: bool = False
 
 
 class PlacementTable(Table):

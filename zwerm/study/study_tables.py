@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 
+from zwerm.catalogue import shipped
 from zwerm.errors import ScenarioError
 from zwerm.scenario.diagnostics import mistakes
 from zwerm.scenario.load import built_in as built_in_scenarios
@@ -167,12 +168,9 @@ class Study:
         }
 
 
-BUILT_IN = Path(__file__).parents[1] / "studies"
-
-
-def built_in() -> dict[str, Path]:
+def built_in() -> Mapping[str, Path]:
     """Return the files of the built-in studies, by name."""
-    return {path.stem: path for path in sorted(BUILT_IN.glob("*.toml"), key=lambda each: each.stem)}
+    return shipped("studies")
 
 
 def load_study(name: str) -> Study:

@@ -1,13 +1,12 @@
 """`zwerm list`: the catalogue of algorithms with their scenarios and studies, and of plug-ins."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.padding import Padding
 from rich.text import Text
 
-from zwerm.catalogue import ALGORITHMS, plugins, row_of
+from zwerm.catalogue import ALGORITHMS, Algorithm, plugins, row_of, shipped
 from zwerm.cli.terminal import errors_as_lines, out, print_json
 
 if TYPE_CHECKING:
@@ -46,10 +45,10 @@ def list_catalogue(
 
 def _print_names() -> None:
     """Print each algorithm with the names of its scenarios and the number of its studies; reads no file."""
-    scenarios, studies = (_names_in(folder) for folder in ("scenarios", "studies"))
+    scenarios, studies = shipped("scenarios"), shipped("studies")
     for row in (*ALGORITHMS, None):
-        own = [name for name in scenarios if row_of(name) is row]
-        count = sum(row_of(name) is row for name in studies)
+        own = [name for name, file in scenarios.items() if row_of(file) is row]
+        count = sum(row_of(file) is row for file in studies.values())
         if own or count:
             title = "Others" if row is None else row.title
             with_studies = f", {count} {'study' if count == 1 else 'studies'}" if count else ""
@@ -63,30 +62,27 @@ def _print_names() -> None:
     )
 
 
-def _names_in(folder: str) -> list[str]:
-    return sorted(path.stem for path in (Path(__file__).parents[2] / folder).glob("*.toml"))
-
-
 def _algorithms(text: str) -> "list[dict[str, Any]]":
     """Return the rows with their scenarios and studies that contain `text`; rows without any are left out."""
     from zwerm.scenario.load import built_in, load
     from zwerm.study.study_tables import built_in as built_in_studies
     from zwerm.study.study_tables import load_study
 
-    entries: list[dict[str, Any]] = []
-    for name in built_in():
+    entries: list[tuple[Algorithm | None, dict[str, Any]]] = []
+    for name, file in built_in().items():
         scenario = load(name)
         count = scenario.robots.count
         size = f"{count} robot{'' if count == 1 else 's'}, {scenario.time.duration_s:g} s"
-        entries.append({"kind": "scenario", "name": name, "size": size, "summary": scenario.summary})
-    for name in built_in_studies():
+        entry = {"kind": "scenario", "name": name, "size": size, "summary": scenario.summary}
+        entries.append((row_of(file), entry))
+    for name, file in built_in_studies().items():
         study = load_study(name)
         size = f"{study.trials} trials"
-        entries.append({"kind": "study", "name": name, "size": size, "summary": study.table.summary})
-    chosen = [each for each in entries if text in each["name"] or text.lower() in each["summary"].lower()]
+        entries.append((row_of(file), {"kind": "study", "name": name, "size": size, "summary": study.table.summary}))
+    chosen = [(row, each) for row, each in entries if text in each["name"] or text.lower() in each["summary"].lower()]
     rows = []
     for row in (*ALGORITHMS, None):
-        own = [each for each in chosen if row_of(each["name"]) is row]
+        own = [each for owner, each in chosen if owner is row]
         if own:
             title, paper = ("Others", "") if row is None else (row.title, row.paper)
             rows.append({"name": row.name if row else "", "title": title, "paper": paper, "entries": own})

@@ -10,8 +10,8 @@ from typing import Any
 from zwerm.scenario.load import validate
 from zwerm.scenario.tables import Scenario
 
-ROOT = Path(__file__).parent.parent
-ROBOTS = Path(__file__).parent / "robots"
+ROOT = Path(__file__).parents[2]
+ROBOTS = ROOT / "tests" / "robots"
 
 # Where Matplotlib keeps its list of fonts. A process with a home of its own would make the list again.
 FONT_CACHE = os.environ.get("MPLCONFIGDIR") or str(Path.home() / ".cache" / "matplotlib")
