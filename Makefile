@@ -64,14 +64,14 @@ docs: dev  ## build the documentation into site/
 bench: dev  ## run the benchmarks, Voronoi coverage compiled where there is a C compiler
 	@if command -v cc >/dev/null && $(BIN)/python -c "import os, sys, sysconfig as s; sys.exit(not os.path.exists(s.get_path('include') + '/Python.h'))"; \
 	then $(MAKE) --no-print-directory compile; else echo "bench: Voronoi coverage is interpreted, there is no C compiler"; fi
-	@for each in benchmarks/bench_*.py; do \
-	  test -e "$$each" || continue; echo "== $$each"; $(BIN)/python "$$each" || exit 1; done
+	@for each in benchmarks/*/bench_*.py; do \
+	  module=$$(echo "$${each%.py}" | tr / .); echo "== $$module"; $(BIN)/python -m "$$module" || exit 1; done
 
 regressions: dev  ## compare the speed with that of the commit before (BASE=revision), and name what is 10 % slower
-	$(BIN)/python benchmarks/regressions.py --base $(BASE)
+	$(BIN)/python -m benchmarks.speed.regressions --base $(BASE)
 
 fidelity: dev  ## hold every model of the radio against its 99 % confidence interval, a million packets each
-	$(BIN)/python benchmarks/bench_fidelity.py
+	$(BIN)/python -m benchmarks.reliability.bench_fidelity
 
 package:  ## build the package, and try it in a fresh environment
 	@.ci/package

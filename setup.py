@@ -1,8 +1,8 @@
 """Parts of the build that pyproject.toml cannot express: the page of the package, links of a source archive, a C extension.
 
-`ZWERM_COMPILE=1` makes a C extension of the one module in which inline swarms spend most of their time (docs/running.md) with
-mypyc, which needs mypy and a C compiler. The source stays the same, and so does every bit of what it computes: products and
-sums are rounded one by one, as Python does it.
+`ZWERM_COMPILE=1` makes a C extension of the one module in which inline swarms spend most of their time
+(docs/how-to/running.md) with mypyc, which needs mypy and a C compiler. The source stays the same, and so does every bit of
+what it computes: products and sums are rounded one by one, as Python does it.
 """
 
 import os

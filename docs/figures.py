@@ -18,7 +18,7 @@ FOLDER: Final = Path(__file__).parent
 LOSS: Final = "compare-small-hall"
 AXIS: Final = "radio.loss+uplink.loss"
 STYLES: Final = {"central": ("#0072B2", "o"), "decentralised": ("#D55E00", "s")}
-SOAK: Final = FOLDER / "images" / "soak.csv"  # as `benchmarks/bench_soak.py --series` writes it
+SOAK: Final = FOLDER / "images" / "soak.csv"  # as `benchmarks/reliability/bench_soak.py --series` writes it
 SOAK_PANELS: Final = {
     "memory of the world [MB]": {"world_mb": "resident", "heap_used_mb": "heap in use"},
     "memory of a robot [MB]": {"old_robot_mb_mean": "mean of those that live on", "robot_mb_max": "largest"},

@@ -1,7 +1,7 @@
 """Draw the pictures of the gallery: `python docs/gallery.py`, or `python docs/gallery.py NAME ...` for some scenarios only.
 
-With `--buildings` it draws instead the runs of `benchmarks/bench_buildings.py` with seed 1 and no noise, one for each kind of
-building.
+With `--buildings` it draws instead the runs of `benchmarks.algorithms.bench_buildings` with seed 1 and no noise, one for each
+kind of building.
 
 Runs each built-in scenario inline with seed 1 and writes its picture, reduced to a small palette, to `docs/images/gallery/`.
 All of them together take about fifteen minutes of processor time. Run `make pages` afterwards: the page lists the pictures that

@@ -88,8 +88,8 @@ def measure(name: str, plan: Mapping[str, Any], seeds: str | None, jobs: int | N
 
 
 def is_benchmark(plan: Mapping[str, Any]) -> bool:
-    """True if a plan runs a script in benchmarks/."""
-    return "command" in plan and plan["command"][0].startswith("benchmarks/")
+    """True if a plan runs a module of benchmarks/."""
+    return "command" in plan and plan["command"][0] == "-m"
 
 
 def shown(plan: Mapping[str, Any], seeds: str | None) -> str:

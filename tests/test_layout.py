@@ -328,8 +328,10 @@ UPPER_BOUND_OF_WALL_TIME = re.compile(
 )
 
 
-def test_no_folder_of_code_has_more_than_15_modules() -> None:
-    folders = Counter(path.parent for path in sources("zwerm", *PARTS, "tests") if path.name != "__init__.py")
+def test_no_folder_has_more_than_15_modules_or_pages() -> None:
+    pages = [page.relative_to(ROOT) for page in (ROOT / "docs").rglob("*.md")]
+    modules = sources("zwerm", *PARTS, "tests", "benchmarks", "docs")
+    folders = Counter(path.parent for path in [*modules, *pages] if path.name != "__init__.py")
     assert {str(folder): count for folder, count in folders.items() if count > MODULES_MAX} == {}
 
 

@@ -152,7 +152,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
         name="computation_free",
         title="Spatial coverage without computation",
         paper="Özdemir, Gauci, Kolling, Hall, Groß 2019",
-        page="computation-free.md",
+        page="papers/computation-free.md",
         controllers={
             ROBOT: {
                 "computation-free": "zwerm.agents.computation_free:ComputationFree",
@@ -180,7 +180,7 @@ ALGORITHMS: Final[Sequence[Algorithm]] = (
     Algorithm(
         name="agreement",
         title="Agreement for teaching: averages, and leaders by leases",
-        page="agreement.md",
+        page="concepts/agreement.md",
         controllers={
             ROBOT: {
                 "averaging": "zwerm.agents.agreement:Averaging",

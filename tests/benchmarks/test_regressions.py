@@ -1,8 +1,8 @@
 """The comparison of speeds between commits: its interval, and what it names a regression."""
 
 import numpy as np
-from regressions import CASES, interval
 
+from benchmarks.speed.regressions import CASES, interval
 from zwerm.scenario.load import load
 
 

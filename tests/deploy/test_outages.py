@@ -27,7 +27,7 @@ def _unavailable() -> str:
 
 
 OUTAGE_S = 2.0
-NAMED_WITHIN_S = OUTAGE_S + 5.0  # the promise of docs/security.md; the exit of the program comes on top
+NAMED_WITHIN_S = OUTAGE_S + 5.0  # the promise of docs/concepts/security.md; the exit of the program comes on top
 EXIT_S = 10.0
 ROBOTS = 12
 

@@ -21,7 +21,7 @@ from zwerm.world.world import World
 ROBOTS = 5
 STRAGGLER_S = 30.0
 SEEDS = range(150)
-NAMED_WITHIN_S = LEASE_S + 5.0  # the promise of docs/security.md
+NAMED_WITHIN_S = LEASE_S + 5.0  # the promise of docs/concepts/security.md
 
 
 def chosen(on_crash: str) -> Scenario:

@@ -17,7 +17,7 @@ from walk import Reader, blocks, part
 
 import zwerm
 
-RECIPES = (ROOT / "docs" / "recipes.md").read_text(encoding="utf-8")
+RECIPES = (ROOT / "docs" / "how-to" / "recipes.md").read_text(encoding="utf-8")
 FOLDERS = ("agents", "coordinator", "deploy", "docs", "scenarios", "studies", "tests", "world", "zwerm")
 # Tests that go through the tables of the catalogue.
 CATALOGUE_TESTS = (

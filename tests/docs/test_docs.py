@@ -192,7 +192,7 @@ def test_every_metric_of_a_deployment_that_is_done_and_of_real_time_is_described
 
 
 def test_every_key_of_the_json_output_is_described() -> None:
-    described = (ROOT / "docs" / "running.md").read_text(encoding="utf-8")
+    described = (ROOT / "docs" / "how-to" / "running.md").read_text(encoding="utf-8")
     result = zwerm.run("computation-free", runner="inline", overrides=["time.duration_s=0.5"]).as_json()
     assert [key for key in (*result, *result["radio"], *result["nodes"]) if f"`{key}`" not in described] == []
 
@@ -203,5 +203,5 @@ def test_the_error_lines_in_the_documentation_are_the_real_ones(tmp_path: Path) 
     check = [sys.executable, "-c", "from zwerm.cli.app import main; main()", "check", "trial.toml"]
     printed = subprocess.run(check, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert printed.returncode == 2
-    assert printed.stderr in (ROOT / "docs" / "running.md").read_text(encoding="utf-8")
+    assert printed.stderr in (ROOT / "docs" / "how-to" / "running.md").read_text(encoding="utf-8")
     assert printed.stderr.count("\n") == 2

@@ -9,7 +9,7 @@ from walk import FILE, Reader, blocks, part
 
 from zwerm import catalogue
 
-RECIPES = (ROOT / "docs" / "recipes.md").read_text(encoding="utf-8")
+RECIPES = (ROOT / "docs" / "how-to" / "recipes.md").read_text(encoding="utf-8")
 ROWS = "A row of the catalogue"
 HEADINGS = [heading for heading in re.findall(r"^## (.*)$", RECIPES, re.MULTILINE) if heading != ROWS]
 

@@ -58,7 +58,9 @@ def test_a_picture_of_the_gallery_is_drawn_by_its_script(tmp_path: Path, monkeyp
 
 
 def test_every_public_name_is_described() -> None:
-    described = "".join((DOCS / name).read_text(encoding="utf-8") for name in ("api.md", "protocol.md"))
+    described = "".join(
+        (DOCS / name).read_text(encoding="utf-8") for name in ("reference/api.md", "reference/protocol.md")
+    )
     errors = {name for name in zwerm.__all__ if name.endswith("Error")}
     own = {"zwerm.run.runner.run", "zwerm.errors"} | {f"zwerm.{name}" for name in zwerm.__all__}
     named = set(re.findall(r"^::: ([\w.]+)$", described, re.MULTILINE))

@@ -70,12 +70,12 @@ class Forks(Controller):
 
 
 class Lingers(Controller):
-    """The process of robot 1 sleeps for 1 s when it exits."""
+    """The process of robot 1 does not end by itself: it sleeps for a minute when it exits."""
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
         if setup.node == 1:
-            Finalize(None, time.sleep, (1.0,), exitpriority=1)
+            Finalize(None, time.sleep, (60.0,), exitpriority=1)
 
     def step(self, observation: Observation) -> Command:
         return Command()

@@ -1,4 +1,4 @@
-"""A small part of the campaign `benchmarks/bench_malformed.py`: mutated messages, scenarios and maps end in no traceback."""
+"""A small part of the campaign `bench_malformed`: mutated messages, scenarios and maps end in no traceback."""
 
 import random
 from collections import Counter
@@ -9,7 +9,7 @@ from support import ROOT, script
 
 from zwerm.errors import ScenarioError
 
-bench_malformed = script(ROOT / "benchmarks" / "bench_malformed.py")
+bench_malformed = script(ROOT / "benchmarks" / "reliability" / "bench_malformed.py")
 
 
 def test_every_decoder_refuses_malformed_messages_with_its_own_errors() -> None:

@@ -94,7 +94,7 @@ def test_a_wheel_speed_beyond_the_motor_is_refused() -> None:
 
 
 def test_the_guides_first_controller_runs_from_the_users_folder_by_the_guides_command(tmp_path: Path) -> None:
-    guide = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
+    guide = (ROOT / "docs" / "how-to" / "controllers.md").read_text(encoding="utf-8")
     (text,) = re.findall(r'^```python title="shy\.py"\n(.*?)^```$', guide, re.M | re.S)
     command = "zwerm run computation-free --set robots.controller=shy:Shy"
     assert f"\n$ {command}\n" in guide

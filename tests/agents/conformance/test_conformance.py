@@ -91,7 +91,7 @@ def test_a_user_sensor_is_read_from_extra() -> None:
 
 def documented() -> dict[str, str]:
     """Return the text of every controller in the documentation and the README, by file name."""
-    guide = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
+    guide = (ROOT / "docs" / "how-to" / "controllers.md").read_text(encoding="utf-8")
     titled = re.findall(r'^```python title="(\w+)\.py"\n(.*?)^```$', guide, re.M | re.S)
     found = {name: text for name, text in titled if "(Controller)" in text}
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -116,7 +116,7 @@ def test_every_controller_of_the_documentation_conforms(shelf: list[type[Any]]) 
 
 
 def test_the_guides_example_shows_the_kits_real_output(shelf: list[type[Any]]) -> None:
-    guide = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
+    guide = (ROOT / "docs" / "how-to" / "controllers.md").read_text(encoding="utf-8")
     (text,) = re.findall(r"^```pycon\n(.*?)^```$", guide, re.M | re.S)
     example = doctest.DocTestParser().get_doctest(text, {}, "the guide", None, None)
     assert doctest.DocTestRunner().run(example) == (0, 5)

@@ -13,7 +13,7 @@ from zwerm.catalogue import RADIO_MODELS
 
 @pytest.fixture(scope="module")
 def fidelity() -> ModuleType:
-    return script(ROOT / "benchmarks" / "bench_fidelity.py")
+    return script(ROOT / "benchmarks" / "reliability" / "bench_fidelity.py")
 
 
 def test_every_model_is_within_its_confidence_interval_over_thirty_thousand_packets(fidelity: ModuleType) -> None:

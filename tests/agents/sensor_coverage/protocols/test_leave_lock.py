@@ -2,7 +2,6 @@
 test_interleavings.py."""
 
 import importlib
-import sys
 from itertools import combinations
 from types import ModuleType
 
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support import ROOT
 
 from zwerm.agents.sensor_coverage.messages.locks import (
     LockDenial,
@@ -285,11 +283,7 @@ def test_every_message_survives_the_wire(message: LockProtocolMessage) -> None:
 @pytest.fixture(scope="module")
 def bench() -> ModuleType:
     """Return the benchmark, which imports another one."""
-    sys.path.insert(0, str(ROOT / "benchmarks"))
-    try:
-        return importlib.import_module("bench_redundancy")
-    finally:
-        sys.path.remove(str(ROOT / "benchmarks"))
+    return importlib.import_module("benchmarks.algorithms.bench_redundancy")
 
 
 @pytest.mark.parametrize("loss", [0.1, 0.4])

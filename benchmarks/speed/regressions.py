@@ -1,0 +1,169 @@
+"""Speed of this source tree beside an earlier commit's: paired runs that alternate, in one go, on one core.
+
+    python -m benchmarks.speed.regressions                  # the commit before this one
+    python -m benchmarks.speed.regressions --base v0.1.0 --case e-pucks-25 --rounds 15
+
+Two processes stay alive, one for each tree. In each round both run the same scenario and seed inline, in an order that
+alternates, and their processor times give one ratio. The result is the median ratio, with its 95 % interval by ranks. A
+regression of over 10 % whose interval excludes 1 is named, and the exit status is 1. Results are appended to a file with
+commits, machine and versions. Both trees run interpreted.
+"""
+
+import argparse
+import csv
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from statistics import median
+
+ROOT = Path(__file__).parents[2]
+STORE = ROOT / "runs" / "regressions.csv"
+REGRESSION = 0.9
+LIBRARIES = ("eclipse-zenoh", "numpy", "pymunk", "scipy", "shapely")
+
+# One scenario of each kind of cost: sensing and physics, the radio, few awake robots, geometry.
+CASES: dict[str, tuple[str, list[str]]] = {
+    "e-pucks-25": ("computation-free", ["time.duration_s=40"]),
+    "e-pucks-100": ("computation-free-scaling", ["robots.count=100", "time.duration_s=12"]),
+    "radio-100": ("beacon", ["robots.count=100", "time.duration_s=6", "arena.size_m=[12, 12]", "radio.range_m=1.5"]),
+    "sensor-coverage": ("sensor-coverage", ["arena.size_m=[2.0, 1.5]", "robots.count=30", "base.pose=[0.2, 0.5, 0.0]"]),
+    "voronoi": ("voronoi-coverage-table1", ["time.duration_s=2.0"]),
+}
+
+WORKER = """
+import json, sys, time
+import zwerm
+for line in sys.stdin:
+    scenario, overrides, seed = json.loads(line)
+    began = time.process_time()
+    result = zwerm.run(scenario, seed=seed, runner="inline", overrides=overrides)
+    print(json.dumps([time.process_time() - began, result.robot_ticks, zwerm.__file__]), flush=True)
+"""
+
+
+class Tree:
+    """A source tree and the process that runs its code."""
+
+    def __init__(self, folder: Path) -> None:
+        environment = os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+        self._folder = folder
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", WORKER],
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def cost_s(self, case: str, seed: int) -> float:
+        """Return the processor time of a robot-tick [s]. Raises RuntimeError where the tree cannot run the case."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(json.dumps([*CASES[case], seed]) + "\n")
+        self._process.stdin.flush()
+        line = self._process.stdout.readline()
+        if not line:
+            raise RuntimeError(f"{case}: the tree {self._folder} cannot run it")
+        spent_s, robot_ticks, file = json.loads(line)
+        if not Path(file).is_relative_to(self._folder):
+            raise RuntimeError(f"{file}: expected the code of {self._folder}")
+        return float(spent_s) / int(robot_ticks)
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.communicate()
+
+
+@contextmanager
+def checkout(revision: str) -> Iterator[Path]:
+    """Yield a temporary folder with the tree of a commit."""
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder) / "tree"
+        subprocess.run(["git", "worktree", "add", "--quiet", "--detach", str(tree), revision], cwd=ROOT, check=True)
+        try:
+            yield tree
+        finally:
+            subprocess.run(["git", "worktree", "remove", "--force", str(tree)], cwd=ROOT, check=True)
+
+
+def commit_of(revision: str) -> str:
+    """Return the short name of a commit."""
+    words = ["git", "rev-parse", "--short=7", revision]
+    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def interval(ratios: list[float]) -> tuple[float, float]:
+    """Return the 95 % interval of the median of ratios, from their ranks; all of them where there are fewer than six."""
+    from scipy.stats import binom
+
+    ordered, n = sorted(ratios), len(ratios)
+    rank = max(int(binom.ppf(0.025, n, 0.5)), 1)
+    return ordered[rank - 1], ordered[n - rank]
+
+
+def main() -> None:
+    """Measure the chosen cases, print and store the ratios, and exit with 1 where one is a regression."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--base", default="HEAD~1", help="the commit to compare with (HEAD~1)")
+    parser.add_argument("--case", action="append", choices=list(CASES), help="a case, instead of all; may be repeated")
+    parser.add_argument("--rounds", type=int, default=9, help="pairs of runs of each case, 6 or more for an interval")
+    parser.add_argument("--store", type=Path, default=STORE, help=f"the file that receives the result ({STORE.name})")
+    options = parser.parse_args()
+    compiled = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "zwerm").glob("*/*.so"))
+    if compiled:
+        parser.error(f"expected interpreted code here too: delete {', '.join(compiled)}")
+    commits = commit_of(options.base), commit_of("HEAD")
+    found = []
+    with checkout(options.base) as folder:
+        base, here = Tree(folder), Tree(ROOT)
+        try:
+            for case in options.case or CASES:
+                ratios: list[float] = []
+                for index in range(-1, options.rounds):  # the round -1 imports and warms up
+                    order = (base, here) if index % 2 else (here, base)
+                    costs = {tree: tree.cost_s(case, max(index, 0) + 1) for tree in order}
+                    if index >= 0:
+                        ratios.append(costs[base] / costs[here])
+                low, high = interval(ratios)
+                regressed = median(ratios) < REGRESSION and high < 1.0
+                print(
+                    f"{case:16} speed of {commits[1]} over {commits[0]}: {median(ratios):.3f} "
+                    f"[{low:.3f}, {high:.3f}], n = {len(ratios)}{'  REGRESSION' if regressed else ''}",
+                    flush=True,
+                )
+                found.append((case, median(ratios), low, high, len(ratios), regressed))
+        finally:
+            base.close()
+            here.close()
+    store(options.store, commits, found)
+    sys.exit(1 if any(each[-1] for each in found) else 0)
+
+
+def store(path: Path, commits: tuple[str, str], found: list[tuple[str, float, float, float, int, bool]]) -> None:
+    """Append the results to a CSV file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = not path.exists()
+    versions = ", ".join([f"Python {platform.python_version()}", *(f"{each} {version(each)}" for each in LIBRARIES)])
+    about = (datetime.now(UTC).isoformat(timespec="seconds"), f"{os.cpu_count()} cores, {platform.machine()}", versions)
+    with path.open("a", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        if fresh:
+            writer.writerow(
+                ["base", "commit", "case", "ratio", "low", "high", "n", "regression", "time", "machine", "versions"]
+            )
+        for case, ratio, low, high, n, regressed in found:
+            writer.writerow([*commits, case, f"{ratio:.4f}", f"{low:.4f}", f"{high:.4f}", n, regressed, *about])
+
+
+if __name__ == "__main__":
+    main()
