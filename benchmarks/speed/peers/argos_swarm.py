@@ -1,6 +1,6 @@
 """The task in ARGoS, where `argos3` is installed (https://www.argos-sim.info): foot-bots with a controller in Lua.
 
-    python benchmarks/peers/argos_swarm.py 100 600
+    python benchmarks/speed/peers/argos_swarm.py 100 600
 
 Foot-bots stand for e-pucks, which are a plug-in of their own: they are larger, so each has 16 times the area. The range and
 bearing sensor gives the bit: a message from straight ahead. The wheels have the e-puck's speeds. The program writes the
