@@ -3,10 +3,12 @@
     python -m benchmarks.speed.regressions                  # the commit before this one
     python -m benchmarks.speed.regressions --base v0.1.0 --case e-pucks-25 --rounds 15
 
-Two processes stay alive, one for each tree. In each round both run the same scenario and seed inline, in an order that
-alternates, and their processor times give one ratio. The result is the median ratio, with its 95 % interval by ranks. A
+Two processes stay alive, one for each tree. In each round both run the same scenario and seed, in an order that alternates,
+and the times of the two runs give one ratio. Inline this is processor time, with robots in processes the time that passes. A
+case `start` measures the processor time of a program. The result is the median ratio, with its 95 % interval by ranks. A
 regression of over 10 % whose interval excludes 1 is named, and the exit status is 1. Results are appended to a file with
-commits, machine and versions. Both trees run interpreted.
+commits, machine and versions. Both trees run interpreted. `--case all` adds the cases that are long or run in processes; a case
+that the other tree cannot run is named and left out.
 """
 
 import argparse
@@ -17,35 +19,87 @@ import platform
 import subprocess
 import sys
 import tempfile
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from statistics import median
+from typing import Final
 
 ROOT = Path(__file__).parents[2]
 STORE = ROOT / "runs" / "regressions.csv"
 REGRESSION = 0.9
 LIBRARIES = ("eclipse-zenoh", "numpy", "pymunk", "scipy", "shapely")
 
+
+@dataclass(frozen=True)
+class Case:
+    """A scenario with overrides and the runner, or, without a scenario, the arguments of a program that starts and ends."""
+
+    scenario: str
+    overrides: tuple[str, ...]
+    runner: str = "inline"
+
+
+RADIO: Final = ("arena.size_m=[12, 12]", "radio.range_m=1.5")
+SMALL_HALL: Final = ("arena.size_m=[2.0, 1.5]", "robots.count=30", "base.pose=[0.2, 0.5, 0.0]")
+FIVE_MODELS: Final = (
+    'radio.models=[{kind="range", range_m=9}, {kind="line_of_sight"}, {kind="loss", fraction=0.1}, '
+    '{kind="gilbert_elliott", loss_fraction=0.1, burst_packets=4}, {kind="delay", jitter_s=0.1, distribution="exponential"}]'
+)
+
 # One scenario of each kind of cost: sensing and physics, the radio, few awake robots, geometry.
-CASES: dict[str, tuple[str, list[str]]] = {
-    "e-pucks-25": ("computation-free", ["time.duration_s=40"]),
-    "e-pucks-100": ("computation-free-scaling", ["robots.count=100", "time.duration_s=12"]),
-    "radio-100": ("beacon", ["robots.count=100", "time.duration_s=6", "arena.size_m=[12, 12]", "radio.range_m=1.5"]),
-    "sensor-coverage": ("sensor-coverage", ["arena.size_m=[2.0, 1.5]", "robots.count=30", "base.pose=[0.2, 0.5, 0.0]"]),
-    "voronoi": ("voronoi-coverage-table1", ["time.duration_s=2.0"]),
+CASES: Final = {
+    "e-pucks-25": Case("computation-free", ("time.duration_s=40",)),
+    "e-pucks-100": Case("computation-free-scaling", ("robots.count=100", "time.duration_s=12")),
+    "radio-100": Case("beacon", ("robots.count=100", "time.duration_s=6", *RADIO)),
+    "sensor-coverage": Case("sensor-coverage", SMALL_HALL),
+    "voronoi": Case("voronoi-coverage-table1", ("time.duration_s=2.0",)),
+}
+MORE: Final = {
+    "e-pucks-1000": Case(
+        "computation-free-scaling",
+        ("robots.count=1000", "time.duration_s=2", "arena.size_m=[9.5, 9.5]", "robots.placement.radius_m=2.2"),
+    ),
+    "radio-1000": Case(
+        "beacon", ("robots.count=1000", "time.duration_s=1", "arena.size_m=[38, 38]", "radio.range_m=1.5")
+    ),
+    "radio-five-models": Case(
+        "beacon", ("robots.count=100", "time.duration_s=4", "arena.size_m=[12, 12]", FIVE_MODELS)
+    ),
+    "sensor-coverage-decentralised": Case("sensor-coverage", (*SMALL_HALL, "services.path=gradient")),
+    "robot-teams": Case("robot-teams", ("time.duration_s=60",)),
+    "landmark-free": Case("landmark-free", ("time.duration_s=60",)),
+    "lock-step-25": Case("computation-free", ("time.duration_s=30",), "processes"),
+    "start-100": Case("computation-free-scaling", ("robots.count=100", "time.duration_s=0.1"), "processes"),
+    "start-help": Case("", ("-m", "zwerm", "--help")),
+    "start-list": Case("", ("-m", "zwerm", "list")),
 }
 
 WORKER = """
-import json, sys, time
-import zwerm
+import json, resource, subprocess, sys, time
+
+def of_programs():
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
 for line in sys.stdin:
-    scenario, overrides, seed = json.loads(line)
-    began = time.process_time()
-    result = zwerm.run(scenario, seed=seed, runner="inline", overrides=overrides)
-    print(json.dumps([time.process_time() - began, result.robot_ticks, zwerm.__file__]), flush=True)
+    scenario, arguments, runner, seed = json.loads(line)
+    import zwerm
+    ticks = 1
+    if not scenario:
+        began = of_programs()
+        subprocess.run([sys.executable, *arguments], capture_output=True, check=True)
+        spent = of_programs() - began
+    else:
+        clock = time.process_time if runner == "inline" else time.perf_counter
+        began = clock()
+        ticks = zwerm.run(scenario, seed=seed, runner=runner, overrides=arguments).robot_ticks
+        spent = clock() - began
+    print(json.dumps([spent, ticks, zwerm.__file__]), flush=True)
 """
 
 
@@ -53,26 +107,31 @@ class Tree:
     """A source tree and the process that runs its code."""
 
     def __init__(self, folder: Path) -> None:
-        environment = os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = os.environ | {"PYTHONPATH": str(folder)}  # both keep bytecode, or a start would compile it
         self._folder = folder
+        self._said = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 (closed in `close`)
         self._process = subprocess.Popen(
             [sys.executable, "-c", WORKER],
             cwd=folder,
             env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            stderr=self._said,
             text=True,
         )
 
     def cost_s(self, case: str, seed: int) -> float:
-        """Return the processor time of a robot-tick [s]. Raises RuntimeError where the tree cannot run the case."""
+        """Return the time of a robot-tick or of a program [s]. Raises RuntimeError where the tree cannot run the case."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps([*CASES[case], seed]) + "\n")
+        given = (CASES | MORE)[case]
+        self._process.stdin.write(json.dumps([given.scenario, given.overrides, given.runner, seed]) + "\n")
         self._process.stdin.flush()
         line = self._process.stdout.readline()
         if not line:
-            raise RuntimeError(f"{case}: the tree {self._folder} cannot run it")
+            self._said.seek(0)
+            *_, reason = self._said.read().splitlines() or [""]
+            raise RuntimeError(f"{self._folder} cannot run it: {textwrap.shorten(reason, 200)}")
         spent_s, robot_ticks, file = json.loads(line)
         if not Path(file).is_relative_to(self._folder):
             raise RuntimeError(f"{file}: expected the code of {self._folder}")
@@ -82,6 +141,7 @@ class Tree:
         """End the process."""
         self._process.kill()
         self._process.communicate()
+        self._said.close()
 
 
 @contextmanager
@@ -111,11 +171,32 @@ def interval(ratios: list[float]) -> tuple[float, float]:
     return ordered[rank - 1], ordered[n - rank]
 
 
+def paired(base_folder: Path, case: str, rounds: int) -> list[float]:
+    """Return the speed of this tree over that of the other, once for each round. Raises RuntimeError where one cannot run."""
+    base, here = Tree(base_folder), Tree(ROOT)
+    try:
+        ratios = []
+        for index in range(-1, rounds):  # the round -1 imports and warms up
+            order = (base, here) if index % 2 else (here, base)
+            costs = {tree: tree.cost_s(case, max(index, 0) + 1) for tree in order}
+            if index >= 0:
+                ratios.append(costs[base] / costs[here])
+        return ratios
+    finally:
+        base.close()
+        here.close()
+
+
 def main() -> None:
     """Measure the chosen cases, print and store the ratios, and exit with 1 where one is a regression."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--base", default="HEAD~1", help="the commit to compare with (HEAD~1)")
-    parser.add_argument("--case", action="append", choices=list(CASES), help="a case, instead of all; may be repeated")
+    parser.add_argument(
+        "--case",
+        action="append",
+        choices=[*CASES, *MORE, "all"],
+        help="a case, instead of the first five; may be repeated",
+    )
     parser.add_argument("--rounds", type=int, default=9, help="pairs of runs of each case, 6 or more for an interval")
     parser.add_argument("--store", type=Path, default=STORE, help=f"the file that receives the result ({STORE.name})")
     options = parser.parse_args()
@@ -123,28 +204,23 @@ def main() -> None:
     if compiled:
         parser.error(f"expected interpreted code here too: delete {', '.join(compiled)}")
     commits = commit_of(options.base), commit_of("HEAD")
+    chosen = [*CASES, *MORE] if "all" in (options.case or ()) else options.case or list(CASES)
     found = []
     with checkout(options.base) as folder:
-        base, here = Tree(folder), Tree(ROOT)
-        try:
-            for case in options.case or CASES:
-                ratios: list[float] = []
-                for index in range(-1, options.rounds):  # the round -1 imports and warms up
-                    order = (base, here) if index % 2 else (here, base)
-                    costs = {tree: tree.cost_s(case, max(index, 0) + 1) for tree in order}
-                    if index >= 0:
-                        ratios.append(costs[base] / costs[here])
-                low, high = interval(ratios)
-                regressed = median(ratios) < REGRESSION and high < 1.0
-                print(
-                    f"{case:16} speed of {commits[1]} over {commits[0]}: {median(ratios):.3f} "
-                    f"[{low:.3f}, {high:.3f}], n = {len(ratios)}{'  REGRESSION' if regressed else ''}",
-                    flush=True,
-                )
-                found.append((case, median(ratios), low, high, len(ratios), regressed))
-        finally:
-            base.close()
-            here.close()
+        for case in chosen:
+            try:
+                ratios = paired(folder, case, options.rounds)
+            except RuntimeError as error:
+                print(f"{case:30} not compared: {error}", flush=True)
+                continue
+            low, high = interval(ratios)
+            regressed = median(ratios) < REGRESSION and high < 1.0
+            print(
+                f"{case:30} speed of {commits[1]} over {commits[0]}: {median(ratios):.3f} "
+                f"[{low:.3f}, {high:.3f}], n = {len(ratios)}{'  REGRESSION' if regressed else ''}",
+                flush=True,
+            )
+            found.append((case, median(ratios), low, high, len(ratios), regressed))
     store(options.store, commits, found)
     sys.exit(1 if any(each[-1] for each in found) else 0)
 
