@@ -20,10 +20,10 @@ import zenoh
 
 from zwerm.wire.refusals import Refusals
 
-# What Zenoh's log holds: every decision of the access control, failed handshakes, and discarded messages.
+# What Zenoh's log holds: every decision of the access control and its effect, failed handshakes, and discarded messages.
 _FILTER: Final = ",".join(
     (
-        "zenoh::net::routing::interceptor::access_control=trace",
+        "zenoh::net::routing::interceptor=trace",
         "zenoh_transport::unicast::establishment::accept=debug",
         "zenoh_transport::unicast::manager=trace",
         "zenoh_transport::unicast::universal::rx=trace",
@@ -49,6 +49,8 @@ _TEXTS: Final = (
     (b"Decode error on link", HANDSHAKE),
     (b"Received invalid message instead of an ", HANDSHAKE),
     (b"Rejecting InitSyn on ", HANDSHAKE),
+    (b"Rejecting OpenSyn on", HANDSHAKE),
+    (b"Decoding cookie failed", HANDSHAKE),
     (b"Max transports reached", FULL),
     (b"Closing link for preventing potential DoS", FULL),
 )
@@ -56,6 +58,9 @@ _TEXTS: Final = (
 _CACHING: Final = re.compile(rb"ACL \(ingress\): caching permissions for `([^`]*)`")
 _DENIAL: Final = re.compile(rb"(Using cached result: )?(\S+)(?: on (.*?))? is unauthorized to (.+) \(ingress\) on (.*)")
 _USER: Final = re.compile(rb"Username\(node-(\d+)\)")
+_DROPPED: Final = b"zenoh::net::routing::interceptor: Msg intercepted!"
+_THREAD: Final = re.compile(rb"ThreadId\((\d+)\)")
+_DROPPED_OF_FOREIGN: Final = "a message of a session that has no permissions"
 
 # Bytes of the log that one read takes, and the longest time that reading all of it may take [s].
 _READ_BYTES: Final = 1 << 18
@@ -74,8 +79,9 @@ class RefusalParser:
     """Finds refusals in the lines of Zenoh's log.
 
     When the router first meets a key, it evaluates all operations on it in advance, and logs each result as if it had been
-    tried. The parser skips one such line for each operation that follows the announcement of a key. Keys and session ids are
-    what a session chose to send: a hostile one can add false lines, but cannot take back true ones.
+    tried. The parser skips one such line for each operation that follows the announcement of a key. A message that is dropped
+    without a line before it, by the same thread, is that of a session without permissions: the router does not say which.
+    Keys and session ids are what a session chose to send: a hostile one can add false lines, but cannot take back true ones.
     """
 
     def __init__(self) -> None:
@@ -84,11 +90,17 @@ class RefusalParser:
         self._key = b""
         self._evaluated: set[bytes] = set()
         self._node_of: dict[bytes, int] = {}  # by session
+        self._deciding: set[bytes] = set()  # threads whose newest line denies an operation
 
     def parse(self, line: bytes) -> RouterEvent | None:
         """Return the refusal that a line reports, or None."""
         if b"unauthorized" in line:
+            self._deciding |= _threads_of(line)
             return self._denial(line)
+        if line.endswith(_DROPPED):
+            known = self._deciding & _threads_of(line)
+            self._deciding -= known
+            return None if known else RouterEvent(DENIED, -1, _DROPPED_OF_FOREIGN)
         if announced := _CACHING.search(line):
             self._key, self._evaluated = announced[1], set()
             return None
@@ -112,6 +124,11 @@ class RefusalParser:
         tried = f"session {_text(session)}: {_text(operation)} on {_text(key)}"
         node = self._node_of.get(session)
         return RouterEvent(DENIED, self.node_of_session(_text(session)) if node is None else node, tried)
+
+
+def _threads_of(line: bytes) -> set[bytes]:
+    """Return the thread that wrote a line of the log."""
+    return {found[1]} if (found := _THREAD.search(line)) else set()
 
 
 def _text(part: bytes) -> str:

@@ -1,10 +1,12 @@
 """Intruders that flood a world over TCP: floods of messages, oversized messages, idle connections, and reads of everything.
 
 Before robots join, a session with the credential of node 1 attacks the other nodes. While robots join and run, a session with
-its password but a Zenoh id of its own, sessions with wrong or without passwords, raw connections that send junk, and
-connections that never speak attack the router. The run is interrupted when the attacks are over. A second run, of
-`zwerm run`, has connections that never speak on its Unix socket. The traces must be those of an inline run of as many ticks,
-no intruder may receive a message, and the worlds must count what they refused.
+its password but a Zenoh id of its own, repeated handshakes of node 1, sessions with wrong or without passwords, raw
+connections that send junk, and connections that never speak attack the router. Zenoh's library sends nothing of a session
+that may know no subscriber, so the flood with another id goes by `frame_proxy`: frames of node 1, in that session. The run
+is interrupted when the attacks are over. A second run, of `zwerm run`, has connections that never speak on its Unix socket.
+The traces must be those of an inline run of as many ticks, no intruder may receive a message, and the worlds must count what
+they refused.
 """
 
 import argparse
@@ -25,6 +27,7 @@ import msgspec
 import zenoh
 
 from benchmarks.common.csv_rows import add_csv_option, write_csv
+from tests.helpers.frame_proxy import BATCH_BYTES_MAX, FrameProxy, replay
 from tests.helpers.waiting import DEADLINE_S, until
 from zwerm.deploy.identity import load
 from zwerm.errors import LinkError
@@ -39,8 +42,10 @@ _LEASE: Final = "transport/link/tx/lease"  # [ms]
 _PATIENCE: Final = "transport/link/tx/queue/congestion_control/block/wait_before_close"  # [us]
 READS: Final = ("**", "@/**", "@/*/router/**", "@/*/router/config/**")
 WRONG_PASSWORDS: Final = 10
+HANDSHAKES: Final = 100  # of each kind
 GUESS_MS: Final = 4_000
 LONG_S: Final = 600.0
+MARK: Final = b"captured"
 ENDLESS_S: Final = 1e6
 LOCAL_DURATION_S: Final = 1_000.0
 TICK_S: Final = 0.1  # of the scenario
@@ -48,8 +53,6 @@ INTERRUPTED: Final = 130
 JUNK_BYTES: Final = 64
 JUNK_FRAMES: Final = 10
 NO_MESSAGE: Final = 0x1F
-CLOSE_WAIT: Final = "08"  # in /proc/net/tcp
-QUIET_SAMPLES: Final = 100
 
 
 def session(endpoint: str, credential: Credential | None, timeout_ms: int = 60_000) -> zenoh.Session:
@@ -93,41 +96,26 @@ def flood(intruder: zenoh.Session, key: str, messages: int) -> int:
     return sent
 
 
-class Connections:
-    """The connections of this process to a port of this machine. Those of the robots are others, and never quiet."""
+def capture(port: int, credential: Credential, key: str) -> FrameProxy:
+    """Return a closed proxy with the handshake of a session, and the frame of one message that it sent on `key`."""
+    with FrameProxy(port) as proxy, session(proxy.endpoint, credential) as victim:
+        victim.put(key, MARK, congestion_control=zenoh.CongestionControl.BLOCK)
+        until(lambda: any(MARK in frame.messages for frame in list(proxy.frames)), "a frame was captured")
+    return proxy
 
-    def __init__(self, port: int) -> None:
-        self._port = f"{port:04X}"
-        self._ends: set[str] = set()  # this process's ends: hexadecimal addresses
 
-    def note(self) -> None:
-        """Remember the connections that are open."""
-        sockets = {link.readlink().name for link in Path("/proc/self/fd").iterdir() if link.is_symlink()}
-        for local, remote, _, inode in self._table():
-            if remote[-4:] == self._port and f"socket:[{inode}]" in sockets:
-                self._ends.add(local)
-
-    def await_reading(self) -> None:
-        """Wait until the router has read all that was sent: an intruder gets no answer that could tell so."""
-        quiet = 0
-
-        def is_quiet() -> bool:
-            nonlocal quiet
-            waiting = sum(queued for local, remote, queued, _ in self._table() if self._ends & {local, remote})
-            quiet = 0 if waiting else quiet + 1
-            return quiet > QUIET_SAMPLES
-
-        until(is_quiet, "the router has read everything", LONG_S)
-
-    def _table(self) -> list[tuple[str, str, int, str]]:
-        """Return both ends, the bytes that wait to be sent or read, and the inode, of each connection of this machine."""
-        rows = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
-        found = []
-        for _, local, remote, state, queues, _, _, _, _, inode, *_ in rows:
-            waiting = sum(int(each, 16) for each in queues.split(":"))
-            # The end of a connection waits to be read as one byte.
-            found.append((local, remote, waiting - (state == CLOSE_WAIT), inode))
-        return found
+def flood_by_frames(port: int, credential: Credential, captured: FrameProxy, messages: int) -> int:
+    """Send a captured message many times in a session of another credential, and return how often."""
+    channel, message = captured.message_with(MARK)
+    most = BATCH_BYTES_MAX // 2 // len(message)
+    sent = 0
+    with FrameProxy(port) as proxy, session(proxy.endpoint, credential):
+        while sent < messages:
+            count = min(most, messages - sent)
+            proxy.send(channel, message * count)
+            sent += count
+        proxy.close_session()
+    return sent
 
 
 def junk(port: int, connections: int, frames: int) -> int:
@@ -206,7 +194,6 @@ def main() -> None:
         probe.bind(("127.0.0.1", 0))
         port = int(probe.getsockname()[1])
     endpoint, big = f"tcp/127.0.0.1:{port}", bytes(options.mebibytes << 20)
-    connections = Connections(port)
     tried: dict[str, int] = {}
     received: list[int] = [0]
     with TemporaryDirectory() as name, contextlib.ExitStack() as stack:
@@ -237,6 +224,7 @@ def main() -> None:
         def hear(sample: zenoh.Sample) -> None:
             received[0] += 1
 
+        captured = capture(port, own, command_key(run, 0))
         with session(endpoint, own) as insider:
             insider.declare_subscriber("**", hear, allowed_origin=zenoh.Locality.REMOTE)
             tried["flood with the credential of another node"] = flood(insider, command_key(run, 0), options.messages)
@@ -253,11 +241,15 @@ def main() -> None:
 
         def steal() -> None:
             received[0] += read_all(thief, run)
-            # The end of a session sends what waits in it.
-            with session(endpoint, msgspec.structs.replace(own, zid="def")) as flooding:
-                connections.note()
-                count = flood(flooding, command_key(run, 0), options.messages)
-            tried["flood with the password and another id"] = count
+            other = msgspec.structs.replace(own, zid="def")
+            tried["flood with the password and another id"] = flood_by_frames(port, other, captured, options.messages)
+
+        def repeat() -> None:
+            for fresh in (False, True):
+                for _ in range(HANDSHAKES):
+                    received[0] += replay(port, captured.handshake, fresh_cookie=fresh)
+            tried["captured handshakes, repeated"] = HANDSHAKES
+            tried["captured handshakes, repeated with the cookie of the new connection"] = HANDSHAKES
 
         def raw() -> None:
             tried["connections with junk instead of a handshake"] = junk(port, options.connections, JUNK_FRAMES)
@@ -270,9 +262,8 @@ def main() -> None:
                 tried["sessions with a wrong password or none"] = number + 1
 
         robots = start("robot", "--connect", endpoint, "--credentials", str(keys))
-        for attack in (steal, raw, guess):
+        for attack in (steal, repeat, raw, guess):
             attack()
-        connections.await_reading()
         world.send_signal(signal.SIGINT)
         out, err = world.communicate(timeout=LONG_S)
         _, said = robots.communicate(timeout=DEADLINE_S)
@@ -291,15 +282,15 @@ def main() -> None:
         "denied": f">= {2 * options.messages}",  # both floods
         "foreign-session": "2",
         "schema": "1",  # the hello after the flood
-        "handshake": str(options.connections),
+        "handshake": str(options.connections + HANDSHAKES),
         "oversized": str(options.oversized),
-        "password": f">= {WRONG_PASSWORDS}",
+        "password": f">= {WRONG_PASSWORDS + HANDSHAKES}",
         "silent": str(options.idle),
     }
     rows = [
         *((what, str(count), "") for what, count in tried.items()),
         ("ticks of the run", str(found["ticks"]), ">= 1"),
-        ("messages that intruders received", str(received[0]), "0"),
+        ("messages that intruders received, and sessions that they opened without a password", str(received[0]), "0"),
         ("trace", "equal" if found["trace"] == trace else "different", "equal"),
         ("trace of the local run", "equal" if local["trace"] == local_trace else "different", "equal"),
         ("lost by the middleware", str(found["middleware_lost"] + local["middleware_lost"]), "0"),

@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 import pytest
 from command_line import zwerm
+from frame_proxy import FrameProxy, replay
 from network import free_port
 from support import ROBOTS, ROOT, ZWERM, scenario
 from waiting import until
@@ -25,6 +26,7 @@ from zwerm.run.runner import run
 from zwerm.wire.keys import command_key
 
 LOG = b"2026-01-01T00:00:00.000000Z TRACE  rx-0 ThreadId(07) zenoh::net::routing::interceptor::access_control: "
+FOREIGN = 7  # messages of a session with a stolen password and another id
 SUBJECT = b"f32e on Username(node-1)+Transport(UnixsockStream)+f32e"
 
 
@@ -53,6 +55,21 @@ def test_only_what_a_session_tried_is_a_denial_and_not_what_the_router_evaluates
         RouterEvent("denied", 1, "session f32e: Put on k"),
         RouterEvent("denied", 1, "session f32e: Query on other"),
     ]
+
+
+def test_a_message_that_is_dropped_without_a_decision_is_a_denial_of_an_unknown_node() -> None:
+    dropped = LOG.replace(b"interceptor::access_control", b"interceptor") + b"Msg intercepted!"
+    elsewhere = dropped.replace(b"ThreadId(07)", b"ThreadId(08)")
+    parser = RefusalParser()
+    said = [
+        LOG + SUBJECT + b" is unauthorized to Put (ingress) on k",
+        elsewhere,  # another thread, for a session without permissions
+        dropped,  # the effect of the denial
+        dropped,
+    ]
+    found = [event for line in said if (event := parser.parse(line)) is not None]
+    unknown = RouterEvent("denied", -1, "a message of a session that has no permissions")
+    assert found == [RouterEvent("denied", 1, "session f32e: Put on k"), unknown, unknown]
 
 
 def test_the_payload_of_a_message_is_no_report_of_a_refusal() -> None:
@@ -124,12 +141,12 @@ def test_intruders_are_counted_by_reason_and_node_in_the_result_and_the_log(tmp_
         text=True,
     )
 
-    def session(credential: Credential) -> Any:
+    def session(credential: Credential, place: str = endpoint) -> Any:
         return open_session(
             {
                 "mode": "client",
                 "id": credential.zid,
-                "connect/endpoints": [endpoint],
+                "connect/endpoints": [place],
                 "connect/timeout_ms": 1000,
                 "connect/exit_on_failure": True,
                 "transport/auth/usrpwd": {"user": credential.user, "password": credential.password},
@@ -148,8 +165,18 @@ def test_intruders_are_counted_by_reason_and_node_in_the_result_and_the_log(tmp_
                     pass
         with pytest.raises(LinkError, match=r"^no session: "):
             session(msgspec.structs.replace(own, password="guess"))
-        with session(msgspec.structs.replace(own, zid="abc")) as stolen:
-            stolen.put(command_key(run_id, 1), b"forged")
+        with FrameProxy(endpoint_address[1]) as proxy, session(own, proxy.endpoint) as stolen:
+            stolen.put(command_key(run_id, 0), b"forged")
+            until(lambda: proxy.frames, "a frame was captured")
+        captured = proxy.message_with(b"forged")
+        with (
+            FrameProxy(endpoint_address[1]) as proxy,
+            session(msgspec.structs.replace(own, zid="abc"), proxy.endpoint),
+        ):
+            for _ in range(FOREIGN):
+                proxy.send(*captured)
+            proxy.close_session()
+        assert not replay(endpoint_address[1], proxy.handshake, fresh_cookie=False)
         with session(own) as intruder:
             intruder.put(command_key(run_id, 0), b"forged")
             intruder.put(command_key(run_id, 0), b"forged again")
@@ -162,14 +189,14 @@ def test_intruders_are_counted_by_reason_and_node_in_the_result_and_the_log(tmp_
         world.communicate()
     assert (world.returncode, robots.returncode) == (0, 0), (err, robots.stderr)
     refused = json.loads(out)["refused"]
-    assert refused["nodes"]["1"] == {"denied": 2, "not-joined": 1}
+    assert refused["nodes"]["1"] == {"denied": 3, "not-joined": 1}
     unknown = refused["nodes"].pop("unknown")
     assert unknown.pop("password") >= 1  # Zenoh tries again within the timeout of the session
-    assert unknown == {"foreign-session": 1, "handshake": 3, "oversized": 1}
+    assert unknown == {"denied": FOREIGN, "foreign-session": 1, "handshake": 4, "oversized": 1}
     *lines, last = lines_of(tmp_path / "log")
-    assert last["counts"]["1"] == {"denied": 2, "not-joined": 1}
-    denied = [line["detail"] for line in lines if line["reason"] == "denied"]
-    assert denied == [f"session {own.zid.lstrip('0')}: Put on {command_key(run_id, 0)}"] * 2
+    assert last["counts"]["1"] == {"denied": 3, "not-joined": 1}
+    denied = [line["detail"] for line in lines if line["reason"] == "denied" and line["node"] == 1]
+    assert denied == [f"session {own.zid.lstrip('0')}: Put on {command_key(run_id, 0)}"] * 3
 
 
 @pytest.mark.parametrize("log", [True, False])
