@@ -21,6 +21,8 @@ from zwerm.world.scene import Floats, Ints
 _QUARTER_SIDES = 64
 # A wall's shadow is cut into pieces that span at most this much of the view [rad].
 _PIECE_RAD = 0.5
+# Side of a square of places whose polygons are united first, in ranges.
+_SQUARE_RANGES = 2.0
 # Bodies in contact may overlap a wall by a little.
 _INSIDE = 0.98
 # Grids [m] for overlays that fail on nearly coincident edges, one after the other.
@@ -33,24 +35,54 @@ def hexagonal_packing_robots(arena: Arena, range_m: float) -> float:
 
 
 class SeenArea:
-    """The part of an arena that robots see. The visible polygon of a place is stored while a robot stands there."""
+    """The part of an arena that robots see. The visible polygon of a place is stored while a robot stands there.
+
+    So are unions of polygons: those of places in one square of a grid, and those of four squares, level by level. Where few
+    robots have moved since the last call, few unions are made anew.
+    """
 
     def __init__(self, arena: Arena, range_m: float) -> None:
         self.arena, self.range_m = arena, range_m
         self._from: dict[tuple[float, ...], shapely.Geometry] = {}
+        self._corner: Floats = np.array(shapely.bounds(arena.free)[:2])
+        self._unions: dict[tuple[int, int, int], tuple[list[shapely.Geometry], shapely.Geometry]] = {}
 
     def area(self, position: Floats) -> shapely.Geometry:
         """Return the area that is seen from any of position (n, 2)."""
+        return robust(shapely.intersection, self._united(position), self.arena.free)
+
+    def fraction(self, position: Floats) -> float:
+        """Return the fraction of the arena that is seen from any of position (n, 2)."""
+        return min(1.0, float(self._united(position).area / self.arena.area_m2)) if len(position) else 0.0
+
+    def _united(self, position: Floats) -> shapely.Geometry:
+        """Return the union of what is seen from each of position (n, 2)."""
         self._from = {
             tuple(each.tolist()): self._from.get(tuple(each.tolist())) or seen_from(each, self.range_m, self.arena)
             for each in position
         }
-        seen = robust(shapely.union_all, list(self._from.values()))
-        return robust(shapely.intersection, seen, self.arena.free)
+        squares: dict[tuple[int, int], list[shapely.Geometry]] = {}
+        for place, seen in self._from.items():
+            column, row = np.maximum((np.array(place) - self._corner) // (_SQUARE_RANGES * self.range_m), 0.0).tolist()
+            squares.setdefault((int(column), int(row)), []).append(seen)
+        unions, level = {}, 0
+        while True:
+            wider: dict[tuple[int, int], list[shapely.Geometry]] = {}
+            for (column, row), parts in squares.items():
+                before = self._unions.get((level, column, row))
+                if before is None or not _same(before[0], parts):
+                    before = parts, parts[0] if len(parts) == 1 else robust(shapely.union_all, parts)
+                unions[level, column, row] = before
+                wider.setdefault((column // 2, row // 2), []).append(before[1])
+            if len(squares) <= 1:
+                self._unions = unions
+                return next(iter(wider.values()))[0] if wider else shapely.Polygon()
+            squares, level = wider, level + 1
 
-    def fraction(self, position: Floats) -> float:
-        """Return the fraction of the arena that is seen from any of position (n, 2)."""
-        return min(1.0, float(self.area(position).area / self.arena.area_m2)) if len(position) else 0.0
+
+def _same(some: Sequence[shapely.Geometry], others: Sequence[shapely.Geometry]) -> bool:
+    """Return whether two sequences hold the same objects."""
+    return len(some) == len(others) and all(one is other for one, other in zip(some, others, strict=True))
 
 
 def reachable(arena: Arena, radius_m: float, position: Floats) -> shapely.Geometry:

@@ -94,7 +94,7 @@ class SightCoverage(Metric):
         seen = self._sight.area(position)
         inside = reachable(self._arena, radius_m, position)
         return {
-            "coverage_fraction": min(1.0, float(seen.area / self._arena.area_m2)),
+            "coverage_fraction": self._sight.fraction(position),
             "reachable_coverage_fraction": min(1.0, float(shapely.intersection(seen, inside).area / inside.area)),
         }
 

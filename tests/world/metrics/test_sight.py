@@ -13,7 +13,7 @@ from zwerm.run.runner import run
 from zwerm.scenario.tables import ArenaTable
 from zwerm.view.layers.sensor_coverage import snapshots
 from zwerm.world.arena.arena import Arena
-from zwerm.world.metrics.sight import SeenArea, hexagonal_packing_robots, holes, obstacles, reachable, robust
+from zwerm.world.metrics.sight import SeenArea, hexagonal_packing_robots, holes, obstacles, reachable, robust, seen_from
 
 
 def arena(**table: object) -> Arena:
@@ -187,3 +187,18 @@ def test_an_overlay_that_fails_in_floating_point_is_computed_on_a_grid(finest_m:
 
     left = robust(fails, shapely.box(0.0, 0.0, 2.0, 1.0), shapely.box(1.0, 0.0, 2.0, 1.0))
     assert left.symmetric_difference(shapely.box(0.0, 0.0, 1.0, 1.0)).area < 1e-4
+
+
+def test_the_seen_area_is_the_union_of_what_is_seen_from_each_place_wherever_robots_move_to() -> None:
+    hall = arena(size_m=[14.0, 9.0], walls=[[[5.0, 0.0], [5.0, 6.0]], [[9.0, 9.0], [9.0, 2.0]]])
+    sight = SeenArea(hall, 1.0)
+    random = np.random.Generator(np.random.Philox(7))
+    position = random.uniform((0.1, 0.1), (13.9, 8.9), (60, 2))
+    for _ in range(12):
+        expected = shapely.union_all([seen_from(each, 1.0, hall) for each in position])
+        assert sight.area(position).symmetric_difference(expected).area == pytest.approx(0.0, abs=1e-9)
+        assert sight.fraction(position) == pytest.approx(expected.area / hall.area_m2, abs=1e-9)
+        moved = random.choice(len(position), 4, replace=False)
+        position = np.delete(position, moved[0], axis=0)
+        position[moved[1:] % len(position)] = random.uniform((0.1, 0.1), (13.9, 8.9), (3, 2))
+    assert sight.fraction(position[:0]) == 0.0
