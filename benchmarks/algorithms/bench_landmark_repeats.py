@@ -6,7 +6,7 @@ the whole map with that of a map without repeated observations. With `--idle loo
 while their map has an open one. A place is *open* if no robot saw all its landmarks together, and a robot that did would open
 a frontier.
 
-    python benchmarks/bench_landmark_repeats.py --rows rows.csv --seeds 1 20
+    python -m benchmarks.algorithms.bench_landmark_repeats --rows rows.csv --seeds 1 20
 """
 
 import argparse
@@ -18,9 +18,9 @@ from unittest.mock import patch
 
 import msgspec
 import numpy as np
-from campaign import add_campaign_options, carry_out
-from csv_rows import write_csv
 
+from benchmarks.common.campaign import add_campaign_options, carry_out
+from benchmarks.common.csv_rows import write_csv
 from zwerm import RunResult, run
 from zwerm.agents.landmark_exploration import Explorer
 from zwerm.agents.landmark_exploration.mapping.frontier_status import UNKNOWN
