@@ -102,6 +102,35 @@ def test_utility_counts_each_frontier_that_shares_a_landmark_once() -> None:
     assert frontiers.sharing(key_of(5, 6)) == 1
 
 
+def crossed(landmarks: list[tuple[float, float]], a: int, b: int, along: float) -> Frontiers:
+    """Return the frontiers after one step of 0.05 r over the line between two landmarks, at a fraction of its length."""
+    (ax, ay), (bx, by) = landmarks[a], landmarks[b]
+    length = math.hypot(bx - ax, by - ay)
+    x = ax + along * (bx - ax) - 0.05 * (by - ay) / length
+    y = ay + along * (by - ay) + 0.05 * (bx - ax) / length
+    near = {n: each for n, each in enumerate(landmarks) if math.hypot(each[0] - x, each[1] - y) <= 1.0}
+    frontiers = Frontiers()
+    frontiers.note(seen_from(x, y, near))
+    return frontiers
+
+
+@pytest.mark.parametrize("along", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_with_the_landmarks_of_figure_6a_one_step_over_a_line_clears_its_frontier(along: float) -> None:
+    """Landmarks on a triangular lattice of side r: from everywhere on a line the landmark behind it is visible."""
+    lattice = [(x + 0.5 * y, 0.5 * math.sqrt(3.0) * y) for y in range(3) for x in range(3)]
+    frontiers = crossed(lattice, 0, 1, along)
+    assert frontiers.status(0, 1) == CLEAR
+    assert frontiers.status(1, 0) == UNEXPLORED
+
+
+def test_with_the_landmarks_of_figure_6c_one_step_over_a_line_clears_nothing() -> None:
+    """Lines of landmarks that are farther apart than r: on one line no landmark of the next one is visible."""
+    lines = [(0.3 * x, 1.1 * y) for y in range(2) for x in range(6)]
+    frontiers = crossed(lines, 2, 3, 0.5)
+    assert CLEAR not in frontiers.statuses.values()
+    assert frontiers.is_open(2, 3)
+
+
 snapshots = st.lists(st.tuples(st.integers(0, 8), st.integers(0, STEPS - 1)), max_size=7).map(
     lambda pairs: BearingSnapshot(tuple(sorted(dict(pairs))), tuple(dict(pairs)[key] for key in sorted(dict(pairs))))
 )

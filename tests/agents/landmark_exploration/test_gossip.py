@@ -8,7 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
-from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, BOUNDARY, TIMED_OUT, UNEXPLORED, key_of
+from zwerm.agents.landmark_exploration.mapping.frontier_status import (
+    ABANDONED,
+    BOUNDARY,
+    REOPENED,
+    TIMED_OUT,
+    UNEXPLORED,
+    key_of,
+)
 from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, Register, RegisterBeacon, Vector
@@ -243,6 +250,67 @@ def test_no_packet_is_longer_than_the_cap_for_any_identifiers(
     outgoing = gossip.tick(1, lambda: Register(me, 300, 10**7, claim, frozen))
     assert {type(each.message) for each in outgoing} == {Entries, Vector, RegisterBeacon}
     assert max(len(messages.write(each.message)) for each in outgoing) <= messages.SMALL_BYTES
+
+
+# Entries of every kind, of few landmarks, so that logs of several robots concern the same frontiers.
+keys = st.tuples(st.integers(0, 4), st.integers(0, 4)).filter(lambda pair: pair[0] != pair[1]).map(lambda p: key_of(*p))
+observed = st.dictionaries(st.integers(0, 4), st.integers(0, 255), min_size=1).map(
+    lambda seen: observation_entries(BearingSnapshot(tuple(sorted(seen)), tuple(seen[each] for each in sorted(seen))))
+)
+entries = st.one_of(
+    observed,
+    keys.map(lambda key: [failure_entry(key)]),
+    st.tuples(st.lists(keys, min_size=1, max_size=3), st.sampled_from([TIMED_OUT, REOPENED, ABANDONED, BOUNDARY])).map(
+        lambda some: status_entries(*some)
+    ),
+)
+logs = st.dictionaries(
+    st.integers(0, 2),
+    st.lists(entries, max_size=4).map(lambda some: [each for part in some for each in part]),
+    max_size=3,
+)
+
+
+class Mapped:
+    """A replica and the map that is read from it."""
+
+    def __init__(self, *others: "Mapped") -> None:
+        self.replica, self.map = Replica(), LandmarkMap()
+        for other in others:
+            self.merge(other)
+
+    def merge(self, other: "Mapped") -> "Mapped":
+        for stretch in stretches_of(other.replica):
+            held = self.replica.vector.get(stretch.origin, 0)
+            new = self.replica.extend(stretch)
+            if new:
+                self.map.read(Stretch(stretch.origin, held, tuple(new)), held)
+        return self
+
+    def cut(self, random_: random.Random) -> "Mapped":
+        """Return a node that has received a part of this one's logs."""
+        part = Mapped()
+        for origin, log in self.replica.logs.items():
+            held = log[: random_.randint(0, len(log))]
+            if part.replica.extend(Stretch(origin, 0, tuple(held))):
+                part.map.read(Stretch(origin, 0, tuple(held)), 0)
+        return part
+
+
+@given(logs, st.randoms(use_true_random=False))
+def test_merging_maps_is_commutative_associative_and_idempotent(
+    some: dict[int, list[bytes]], fate: random.Random
+) -> None:
+    whole = Mapped()
+    for origin, log in some.items():
+        if log:
+            whole.replica.append(origin, log)
+            whole.map.read(Stretch(origin, 0, tuple(log)), 0)
+    a, b, c = (whole.cut(fate) for _ in range(3))
+    assert Mapped(a, b).map.content() == Mapped(b, a).map.content()
+    assert Mapped(Mapped(a, b), c).map.content() == Mapped(a, Mapped(b, c)).map.content()
+    assert Mapped(a).merge(a).map.content() == a.map.content()
+    assert Mapped(a, b, c, whole).map.content() == whole.map.content()
 
 
 @given(st.permutations(range(5)))

@@ -20,6 +20,7 @@ from zwerm.scenario.tables import Scenario
 # A hall of 4 x 3 ranges with one pillar; four robots.
 HALL = {"size_m": [4.0, 3.0], "obstacles": [[[1.4, 1.0], [2.6, 1.0], [2.6, 2.0], [1.4, 2.0]]]}
 GOSSIP = {"map": "gossip", "assignment": "claims"}
+MIXED = [{"map": "coordinator", "assignment": "claims"}, {"map": "gossip", "assignment": "coordinator"}]
 
 
 def hall(services: dict[str, str] | None = None, **tables: Any) -> Scenario:
@@ -50,10 +51,10 @@ def test_every_combination_of_services_explores_everything_and_ends(map_: str, a
     assert result.metrics.get("concluded_early", 0.0) == 0.0
 
 
-@pytest.mark.parametrize("services", [None, GOSSIP])
+@pytest.mark.parametrize("services", [None, GOSSIP, *MIXED])
 def test_with_half_of_all_messages_lost_all_is_explored(services: dict[str, str] | None) -> None:
     lossy: dict[str, Any] = {"radio": {"loss": 0.5}}
-    if services is None:
+    if services is not GOSSIP:
         lossy["uplink"] = {"loss": 0.5}
     result = ran(hall(services, **lossy))
     assert result.outcome == "completed"

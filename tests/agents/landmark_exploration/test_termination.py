@@ -6,9 +6,14 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from zwerm.agents.landmark_exploration import Explorer
+from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
+from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, CLEAR, REOPENED, TIMED_OUT, key_of
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Register
 from zwerm.agents.landmark_exploration.sharing.registers import SETTLE_TICKS, Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
+from zwerm.agents.runtime.contract import Body, Setup
+from zwerm.wire.messages import Observation
 
 LEASE, DEAD = 150, 1_500
 
@@ -76,6 +81,26 @@ def test_a_robot_that_lost_its_memory_is_received_before_all_agree_for_long_enou
     registers.merge(Register(1, 2, 2, frozen=8), 2 + SETTLE_TICKS)
     assert not registers.concluded(7, 2 + SETTLE_TICKS)
     assert registers.concluded(7, 2 + 2 * SETTLE_TICKS)
+
+
+def test_a_robot_alone_explores_a_frontier_that_no_boundary_continues_once_more_before_it_freezes() -> None:
+    """Without a coordinator the robot itself traces the 1-skeleton, and reopens what is inconsistent (section IV-A)."""
+    body, services = Body("holonomic", 0.04, 0.5, 1.0), {"map": "gossip", "assignment": "claims"}
+    robot = Explorer(Setup(0, "robot", 0.1, Explorer.sensors, bytes(16), body, ("robots",), services=services))
+    robot.map.observe(BearingSnapshot((1, 2, 3), (0, 85, 170)))
+    left = key_of(2, 1)
+    robot.map.raise_all([key for key in robot.map.frontiers.open if key != left], CLEAR)
+    robot.map.raise_all([left], TIMED_OUT)
+    freeze_ticks = robot.parameters.freeze_ticks
+    for tick in range(freeze_ticks):
+        robot.step(Observation(tick, 0.1 * tick))
+    assert robot.map.frontiers.statuses[left] == REOPENED
+    assert list(robot.map.frontiers.open) == [left]
+    robot.map.raise_all([left], ABANDONED)
+    ends = [robot.step(Observation(tick, 0.1 * tick)).done for tick in range(freeze_ticks, 2 * freeze_ticks + 100)]
+    assert robot.map.frontiers.statuses[left] == ABANDONED
+    assert ends[0] is False
+    assert ends[-1] is True
 
 
 # --- model checking ----------------------------------------------------------------------------------------------------

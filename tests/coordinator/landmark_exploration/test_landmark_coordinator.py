@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.cost_utility import Offer, cost_utility
-from zwerm.agents.landmark_exploration.mapping.frontier_status import CLEAR, REOPENED, TIMED_OUT, key_of
+from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, CLEAR, REOPENED, TIMED_OUT, key_of
 from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
-from zwerm.agents.landmark_exploration.sharing.exploration_tasks import landmark_bytes, read_task
+from zwerm.agents.landmark_exploration.sharing.exploration_tasks import ExplorationTask, landmark_bytes, read_task
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, TaskPart, TaskReport, Vector
 from zwerm.agents.runtime.contract import Setup
 from zwerm.coordinator.landmark_exploration import LandmarkCoordinator
@@ -125,3 +125,27 @@ def test_a_frontier_that_opens_goes_to_the_nearest_robot_although_that_one_waits
     assert assigned(1, {1: (5, 6, 7)}) == {}, "robot 1 finds no free frontier, and waits"
     node.map.raise_all([there], REOPENED)
     assert assigned(2, {2: (1, 2, 3)}) == {1: there}, "robot 2 is considered for the first time, but is far"
+
+
+def test_a_timed_out_frontier_that_no_boundary_continues_is_explored_once_more_before_the_end() -> None:
+    """Section IV-A: after the exploration the 1-skeleton is traced, and inconsistent frontiers are explored again."""
+    node = LandmarkCoordinator(Setup(1, "coordinator", 0.1, (), bytes(16), channels=("uplink",)))
+    node.map.observe(BearingSnapshot((1, 2, 3), (0, 85, 170)))
+    left = key_of(2, 1)
+    node.map.raise_all([key for key in node.map.frontiers.open if key != left], CLEAR)
+    node.map.raise_all([left], TIMED_OUT)
+    assert not node.map.frontiers.open
+
+    def step(tick: int, of: tuple[int, int]) -> tuple[list[ExplorationTask], bool]:
+        report = TaskReport(1, *of, True, True, 0, landmark_bytes((1, 2, 3)))
+        command = node.step(Observation(tick, 0.1 * tick, (Packet("uplink", messages.write(report), 0),)))
+        parts = [messages.read(each.payload) for each in command.outbox]
+        return [read_task(part.bytes_) for part in parts if isinstance(part, TaskPart)], command.done
+
+    assert step(0, (0, 0)) == ([], False), "the frontier is reopened"
+    ((task,), done) = step(1, (0, 0))
+    assert (task.key, task.status, done) == (left, ABANDONED, False)
+    node.map.raise_all([left], ABANDONED)
+    ((halt,), done) = step(2, (1, 1))
+    assert (halt.key, halt.walk, done) == (None, False, False)
+    assert step(3, (1, 2)) == ([], True)
