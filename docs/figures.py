@@ -149,30 +149,36 @@ def _draw_scaling(axes: Any, found: dict[int, list[float]], label: str, colour: 
 
 
 def dispersion_figure() -> Figure:
-    """Return the completion with minimal effort by the dispersion of landmarks, as boxes (Fig. 14 of the paper)."""
+    """Return completion and iterations with minimal effort by the dispersion of landmarks (Fig. 14 of the paper)."""
     rows = _single_runs("landmark-dispersion")
     paper = {
         float(row["scatter.dispersion_m"]): float(row["paper"])
         for row in _measured.load("landmark-dispersion").rows
         if row["metric"] == "completion_fraction"
     }
-    figure = Figure(figsize=(5.6, 3.8), layout="constrained")
-    axes = figure.subplots()
-    boxes = {
-        level: [float(row["completion_fraction"]) for row in rows if float(row["dispersion_m"]) == level]
-        for level in sorted(paper)
-    }
-    axes.boxplot(
-        list(boxes.values()), tick_labels=[f"{level:.2f} r" for level in boxes], medianprops={"color": "#D55E00"}
+    levels = sorted(paper)
+    figure = Figure(figsize=(8.6, 3.8), layout="constrained")
+    completion, iterations = figure.subplots(1, 2)
+    for axes, metric in ((completion, "completion_fraction"), (iterations, "iterations")):
+        # A run that was stopped has no end.
+        wanted = ("completed",) if metric == "iterations" else ("completed", "time-limit")
+        some = [row for row in rows if row["outcome"] in wanted]
+        axes.boxplot(
+            [[float(row[metric]) for row in some if float(row["dispersion_m"]) == level] for level in levels],
+            tick_labels=[f"{level:.2f} r" for level in levels],
+            medianprops={"color": "#D55E00"},
+        )
+        axes.set_title(EXPLORATION[metric], loc="left", fontsize=10)
+        axes.set_xlabel("dispersion of the landmarks")
+        axes.set_ylim(bottom=0.0)
+        axes.grid(alpha=0.3, axis="y")
+    places = range(1, len(levels) + 1)
+    completion.plot(
+        places, [paper[each] for each in levels], "x", color="#0072B2", label="mean of the paper", markersize=8
     )
-    places = range(1, len(boxes) + 1)
-    axes.plot(places, [paper[level] for level in boxes], "x", color="#0072B2", label="mean of the paper", markersize=8)
-    axes.set_xlabel("dispersion of the landmarks")
-    axes.set_ylabel("completion")
-    axes.set_ylim(0.0, 1.02)
-    axes.grid(alpha=0.3, axis="y")
-    axes.legend(frameon=False, loc="lower left")
-    axes.set_title(f"Minimal effort, {len(rows) // len(boxes)} runs a box", loc="left", fontsize=10)
+    completion.set_ylim(top=1.02)
+    completion.legend(frameon=False, loc="lower left")
+    figure.suptitle(f"Minimal effort, {len(rows) // len(levels)} runs a box", x=0.01, ha="left", fontsize=10)
     return figure
 
 

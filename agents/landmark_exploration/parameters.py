@@ -23,8 +23,9 @@ class ExplorerParameters(Struct, frozen=True, forbid_unknown_fields=True):
     been silent for `lease_ticks`; a robot silent for `dead_ticks` is presumed dead. A robot without an open frontier for
     `freeze_ticks` freezes: it adds no entry to the map. `robots_expected` robots must agree that exploration is complete. A
     robot that never sent a message counts as silent from the start. `turn_sd_rad` is the deviation of the random walk's turn
-    in a tick. With `presence_only` no bearing is used: robots know which landmarks they see, and stop when no observation
-    was new for `stagnation_ticks`.
+    in a tick. With `look_idle` a robot without a frontier adds what it sees to the map while a frontier is open: the map
+    is more complete, and large halls take longer. With `presence_only` no bearing is used: robots know which landmarks they
+    see, and stop when no observation was new for `stagnation_ticks`.
     """
 
     beta: NonNegative = 10.0
@@ -37,5 +38,6 @@ class ExplorerParameters(Struct, frozen=True, forbid_unknown_fields=True):
     freeze_ticks: Ticks = 40
     robots_expected: Annotated[int, Meta(ge=1, le=100_000)] = 1
     turn_sd_rad: NonNegative = 0.05
+    look_idle: bool = False
     presence_only: bool = False
     stagnation_ticks: Ticks = 60

@@ -2,9 +2,8 @@
 
 A robot observes while it has a frontier to explore. Each observation is *repeated* if the robots together already knew that
 frontier to be closed, or another robot explored it before; the robot had not received that. A row compares the completion of
-the whole map with that of a map without repeated observations. With `--idle look` robots without a frontier observe too,
-while their map has an open one. A place is *open* if no robot saw all its landmarks together, and a robot that did would open
-a frontier.
+the whole map with that of a map without repeated observations. With `--idle look` robots have the parameter `look_idle`. A
+place is *open* if no robot saw all its landmarks together, and a robot that did would open a frontier.
 
     python -m benchmarks.algorithms.bench_landmark_repeats --rows rows.csv --seeds 1 20
 """
@@ -32,7 +31,7 @@ from zwerm.world.metrics.landmark_exploration import PLACES_PER_RANGE, MapComple
 
 SETTINGS: Final = ("services.map=gossip", "services.assignment=claims", "time.duration_s=2000")
 RANGES: Final = {"whole hall": (), "0.7 r": ("radio.range_m=0.7",)}
-IDLE: Final = ("wait", "look")
+IDLE: Final = {"wait": (), "look": ("robots.parameters.look_idle=true",)}
 
 
 class Case(msgspec.Struct, frozen=True):
@@ -74,10 +73,10 @@ class Recorder:
 
 
 @contextmanager
-def recorded(idle_look: bool) -> Iterator[Recorder]:
-    """Record the robots of the runs within; with `idle_look` those without a frontier observe, too."""
+def recorded() -> Iterator[Recorder]:
+    """Record the robots of the runs within."""
     recorder = Recorder()
-    observe, write, looks = Explorer._observe, Explorer._write, Explorer._looks
+    observe, write = Explorer._observe, Explorer._write
 
     def recording_observe(self: Explorer) -> None:
         recorder.observed(self)
@@ -87,14 +86,7 @@ def recorded(idle_look: bool) -> Iterator[Recorder]:
         recorder.wrote(self._origin, self.replica.vector.get(self._origin, 0), entries)
         write(self, entries)
 
-    def looking(self: Explorer) -> bool:
-        return looks(self) or (not self._frozen and bool(self.map.frontiers.open))
-
-    with (
-        patch.object(Explorer, "_observe", recording_observe),
-        patch.object(Explorer, "_write", recording_write),
-        patch.object(Explorer, "_looks", looking if idle_look else looks),
-    ):
+    with patch.object(Explorer, "_observe", recording_observe), patch.object(Explorer, "_write", recording_write):
         yield recorder
 
 
@@ -126,8 +118,8 @@ def completion(result: RunResult, seed: int, recorder: Recorder) -> dict[str, st
 
 def one_run(case: Case, more: Sequence[str]) -> dict[str, str]:
     """Carry out one run, and return its row."""
-    with recorded(case.idle == "look") as recorder:
-        result = run(case.hall, int(case.seed), "inline", [*SETTINGS, *RANGES[case.radio], *more])
+    with recorded() as recorder:
+        result = run(case.hall, int(case.seed), "inline", [*SETTINGS, *RANGES[case.radio], *IDLE[case.idle], *more])
     busy = [repeated for _, repeated, has_frontier in recorder.log if has_frontier]
     return {
         **msgspec.structs.asdict(case),
@@ -162,7 +154,9 @@ def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
             "iterations": spread(group, "iterations", 0),
             "concluded early": str(sum(row["concluded_early"] != "0" for row in group)),
         }
-        for (hall, radio, idle), group in sorted(groups.items(), key=lambda each: (each[0][0], each[0][2] != IDLE[0]))
+        for (hall, radio, idle), group in sorted(
+            groups.items(), key=lambda each: (each[0][0], list(IDLE).index(each[0][2]))
+        )
     ]
 
 

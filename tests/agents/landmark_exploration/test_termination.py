@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from zwerm.agents.landmark_exploration import Explorer
+from zwerm.agents.landmark_exploration.explorer import LOOK_TICKS, Explorer
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
 from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, CLEAR, REOPENED, TIMED_OUT, key_of
 from zwerm.agents.landmark_exploration.sharing.landmark_messages import Register
 from zwerm.agents.landmark_exploration.sharing.registers import SETTLE_TICKS, Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 from zwerm.agents.runtime.contract import Body, Setup
-from zwerm.wire.messages import Observation
+from zwerm.wire.messages import LandmarkBearing, Observation
 
 LEASE, DEAD = 150, 1_500
 
@@ -83,10 +83,15 @@ def test_a_robot_that_lost_its_memory_is_received_before_all_agree_for_long_enou
     assert registers.concluded(7, 2 + 2 * SETTLE_TICKS)
 
 
+def explorer(parameters: dict[str, object]) -> Explorer:
+    """Return robot 0, which shares its map by gossip and claims frontiers."""
+    body, services = Body("holonomic", 0.04, 0.5, 1.0), {"map": "gossip", "assignment": "claims"}
+    return Explorer(Setup(0, "robot", 0.1, Explorer.sensors, bytes(16), body, ("robots",), parameters, (), services))
+
+
 def test_a_robot_alone_explores_a_frontier_that_no_boundary_continues_once_more_before_it_freezes() -> None:
     """Without a coordinator the robot itself traces the 1-skeleton, and reopens what is inconsistent (section IV-A)."""
-    body, services = Body("holonomic", 0.04, 0.5, 1.0), {"map": "gossip", "assignment": "claims"}
-    robot = Explorer(Setup(0, "robot", 0.1, Explorer.sensors, bytes(16), body, ("robots",), services=services))
+    robot = explorer({})
     robot.map.observe(BearingSnapshot((1, 2, 3), (0, 85, 170)))
     left = key_of(2, 1)
     robot.map.raise_all([key for key in robot.map.frontiers.open if key != left], CLEAR)
@@ -101,6 +106,25 @@ def test_a_robot_alone_explores_a_frontier_that_no_boundary_continues_once_more_
     assert robot.map.frontiers.statuses[left] == ABANDONED
     assert ends[0] is False
     assert ends[-1] is True
+
+
+@pytest.mark.parametrize(
+    ("look_idle", "is_open", "looks"), [(False, True, False), (True, True, True), (True, False, False)]
+)
+def test_a_robot_without_a_frontier_looks_if_asked_to_while_another_explores_one(
+    look_idle: bool, is_open: bool, looks: bool
+) -> None:
+    robot = explorer({"look_idle": look_idle})
+    robot.map.observe(BearingSnapshot((1, 2, 3), (0, 85, 170)))
+    for node, key in enumerate(list(robot.map.frontiers.open), start=1):
+        robot.registers.merge(Register(node, 1, 1, claim=key + 1), 0)
+        if not is_open:
+            robot.map.raise_all([key], CLEAR)
+    for tick in range(LOOK_TICKS):
+        robot.step(Observation(tick, 0.1 * tick))
+    seen = tuple(LandmarkBearing(landmark, 2.0 * landmark) for landmark in (2, 3, 4))
+    robot.step(Observation(LOOK_TICKS, 0.1 * LOOK_TICKS, landmarks=seen))
+    assert robot.map.complex.contains((2, 3, 4)) is looks
 
 
 # --- model checking ----------------------------------------------------------------------------------------------------
