@@ -33,9 +33,9 @@ ACCEPT_TIMEOUT_MS: Final = 5_000
 # The router discards a longer message. The receiver refuses and counts messages between MESSAGE_BYTES_MAX and this size.
 _MESSAGE_BYTES_MAX: Final = 16 * MESSAGE_BYTES_MAX
 
-# Batches of 64 KiB that can wait to be sent to a node: a world that is delayed fills all of them, for every node. A thread
-# of its own sends them, so that a long message waits only for that.
-_BATCHES: Final = 4
+# Batches of 64 KiB that can wait to be sent to a node: a world that is delayed fills all of them, for every node, and the
+# middleware keeps them. A thread of its own sends them, so that a long message waits only for that.
+_BATCHES: Final = 2
 
 # Operations allowed to a node on its keys: (key, message, flow seen from the router).
 _PERMISSIONS: Final = (

@@ -21,8 +21,9 @@ from zwerm.world.world import World
 
 EXIT_CODE_S: Final = 0.05  # how long a tick may wait for the exit code of a lost node's process
 
-# The unanswered observations at which a node is no longer observed: their number, and their total size in bytes.
-UNANSWERED_MAX: Final = 64
+# The unanswered observations at which a node is no longer observed: their number, and their total size in bytes. All fit into
+# a Unix socket of 208 KiB and the batches of the link: 51 of 2 KB (measured).
+UNANSWERED_MAX: Final = 48
 UNANSWERED_BYTES_MAX: Final = 131_072
 
 

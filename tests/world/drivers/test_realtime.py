@@ -1,5 +1,6 @@
 """In real time the driver waits for no program: neither for one that starts nor for one that hangs."""
 
+import math
 import os
 import signal
 import subprocess
@@ -7,21 +8,26 @@ import sys
 import threading
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
+import pytest
 from support import ROOT, ZWERM, scenario
 from waiting import until
 
 from zwerm.agents.runtime.node import Node
+from zwerm.deploy import swarm as swarm_module
+from zwerm.deploy.identity import router_settings
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.deploy.runtime_directory import private_directory
 from zwerm.deploy.swarm import LocalSwarm
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
 from zwerm.run.runner import new_run_id
-from zwerm.world.drivers.realtime import UNANSWERED_MAX, RealTime
+from zwerm.world.drivers.realtime import UNANSWERED_BYTES_MAX, UNANSWERED_MAX, RealTime
 from zwerm.world.world import World
 
 SOON_S = 30.0
+WAIT_BEFORE_CLOSE_US = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 
 
 def test_the_world_goes_on_while_a_program_starts_and_observes_it_once_it_has() -> None:
@@ -84,6 +90,34 @@ def test_a_hung_robot_gets_a_bounded_number_of_observations_and_is_observed_agai
         assert observed[0] == observed[1] == observed[3] == 200
         assert 10 + UNANSWERED_MAX < observed[2] < 200
         assert driver.deadman_stops >= 1
+
+
+@pytest.mark.parametrize("size_bytes", [100, 2_100, 3_750, 20_000, 60_000])
+def test_all_unanswered_observations_of_a_hung_robot_fit_into_the_buffers_of_the_link(
+    nothing_left: None, size_bytes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def patient(*arguments: Any) -> dict[str, Any]:
+        return router_settings(*arguments) | {WAIT_BEFORE_CLOSE_US: round(4e6 * SOON_S)}
+
+    # The middleware would drop what does not fit after 5 s.
+    monkeypatch.setattr(swarm_module, "router_settings", patient)
+    most = min(UNANSWERED_MAX, math.ceil(UNANSWERED_BYTES_MAX / size_bytes))
+    with LocalSwarm(new_run_id(), node_specs(scenario(robots={"count": 1}), 1), paced=True) as swarm:
+        swarm.pause(0)
+        status = Path(f"/proc/{swarm.supervisor.pids[0]}/status")
+        until(lambda: "\nState:\tT" in status.read_text(), "stopped")
+
+        def send_all() -> None:
+            for _ in range(most):
+                swarm.link.send(0, bytes(size_bytes))
+
+        sending = threading.Thread(target=send_all, daemon=True)
+        sending.start()
+        sending.join(SOON_S)
+        blocked = sending.is_alive()
+        swarm.kill(0)
+        sending.join()
+        assert not blocked
 
 
 def test_a_run_removes_the_directories_of_killed_runs_and_not_those_of_living_ones(private_tmp: Path) -> None:
