@@ -145,7 +145,8 @@ def _mistakes(scenario: Scenario) -> list[str]:
     if kinds != ["line_of_sight"] or robots.sensors[0].parameters.get("range_m") is not None:
         found.append(f"robots.sensors: expected line_of_sight alone, without range_m, got {', '.join(kinds)}")
     if body.kind != "differential" or body.friction or not body.collide or body.continuous_collision:
-        found.append("robots.body: expected kind = 'differential', friction = 0, collide = true and discrete collision")
+        expected = "kind = 'differential', friction = 0, collide = true, continuous_collision = false"
+        found.append(f"robots.body: expected {expected}")
     if body.max_speed_m_s / body.wheel_base_m * scenario.time.dt_s > HALF_TURN_MAX_RAD:
         found.append(f"robots.body: expected turns of at most {2 * HALF_TURN_MAX_RAD:g} rad in a tick")
     absent = ("base", "coordinator", "radio", "uplink", "field", "scatter", "random_faults")
