@@ -45,7 +45,7 @@ def slices_of(nodes: Sequence[int], hosts: Sequence[str]) -> dict[str, list[int]
         name, equals, ids = host.partition("=")
         if not equals or not name.replace("-", "").replace("_", "").isalnum() or name == WORLD or name in slices:
             raise LinkError(f"--host: expected a new name and its nodes, such as left=0-24, got {host!r:.80}")
-        slices[name] = parse_ids(ids)
+        slices[name] = parse_ids(ids, f"--host {name}")
         for node in slices[name]:
             if node not in left:
                 raise LinkError(f"--host: {host!r:.80}: the run has no node {node}, or another host has it")

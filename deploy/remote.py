@@ -1,5 +1,6 @@
 """Run some of a swarm's robots on this machine, for a world on another machine."""
 
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -14,19 +15,19 @@ from zwerm.errors import LinkError
 # The largest id that is looked up. A longer range could fill the memory.
 ID_MAX: Final = 99_999
 _DIGITS_MAX: Final = 9
+_RANGE: Final = re.compile(r"([0-9]+)(?:-([0-9]+))?")
 
 
-def parse_ids(text: str) -> list[int]:
-    """Return the ids in `3`, `0-24` or `0-4,10-14`, ascending. Raises LinkError for anything else."""
+def parse_ids(text: str, place: str = "--ids") -> list[int]:
+    """Return the ids in `3`, `0-24` or `0-4,10-14`, ascending. Raises LinkError for anything else, led by `place`."""
     ids: set[int] = set()
     for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        if not first.isdigit() or (dash and not last.isdigit()):
-            raise LinkError(f"--ids: expected ids such as 3, 0-24 or 0-4,10-14, got {text!r:.80}")
-        if max(len(first), len(last)) > _DIGITS_MAX or max(int(first), int(last or first)) > ID_MAX:
-            raise LinkError(f"--ids: expected ids of at most {ID_MAX}, got {text!r:.80}")
-        if dash and int(last) < int(first):
-            raise LinkError(f"--ids: expected ids such as 3, 0-24 or 0-4,10-14, got {text!r:.80}")
+        found = _RANGE.fullmatch(part.strip())
+        first, last = found.groups() if found else ("", None)
+        if found and (max(map(len, (first, last or ""))) > _DIGITS_MAX or max(int(first), int(last or first)) > ID_MAX):
+            raise LinkError(f"{place}: expected ids of at most {ID_MAX}, got {text!r:.80}")
+        if not found or int(last or first) < int(first):
+            raise LinkError(f"{place}: expected ids such as 3, 0-24 or 0-4,10-14, got {text!r:.80}")
         ids.update(range(int(first), int(last or first) + 1))
     return sorted(ids)
 

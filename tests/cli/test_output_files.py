@@ -46,6 +46,16 @@ def test_every_file_that_cannot_be_written_is_one_line(tmp_path: Path, monkeypat
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.parametrize("size", ["0x3", "0.01x3", "3x51", "99999x99999", "3", "ax3", "9" * 400 + "x3"])
+def test_a_size_that_cannot_be_drawn_is_refused_before_the_run(tmp_path: Path, size: str) -> None:
+    ran = zwerm(*SHORT, "--size", size, cwd=tmp_path)
+    assert (ran.returncode, ran.stdout) == (2, "")
+    assert ran.stderr.startswith(
+        "zwerm: --size: expected WIDTHxHEIGHT in inches, such as 3.4x3, each from 0.5 to 50, got "
+    )
+    assert len(ran.stderr.splitlines()) == 1
+
+
 def test_files_are_checked_before_the_run_and_all_at_once(tmp_path: Path) -> None:
     ran = zwerm(*SHORT, "--picture", "a.txt", "--record", "b.bag", "--picture-at", "soon", cwd=tmp_path)
     assert ran.returncode == 2

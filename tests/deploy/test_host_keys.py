@@ -155,7 +155,9 @@ def test_credentials_for_tls_are_not_used_over_tcp(keys: Path) -> None:
         (["world=0-3"], "expected a new name"),
         (["../x=0-3"], "expected a new name"),
         (["a"], "expected a new name"),
-        (["a=0-999999999999"], "expected ids of at most 99999"),
+        (["a=0-999999999999"], "^--host a: expected ids of at most 99999"),
+        (["a=\u00b2"], "^--host a: expected ids such as 3"),  # a digit that is no decimal
+        (["a=3-1"], "^--host a: expected ids such as 3"),
     ],
 )
 def test_hosts_that_do_not_fit_the_run_are_an_error_of_one_line(hosts: list[str], error: str) -> None:

@@ -144,6 +144,7 @@ def test_a_working_directory_that_is_deleted_in_the_start_of_a_run_is_an_error_o
 
 
 def test_no_text_of_a_robot_reaches_the_terminal_with_control_characters() -> None:
+    assert printable("a \u202eb\u2066c\u2028d") == "a \\u202eb\\u2066c\\u2028d"
     assert printable("\x1b[2J\x07\x9b1m\udcff\tok\n") == "\\x1b[2J\\x07\\x9b1m\\udcff\tok\n"
     result = run(scenario(robots={"controller": "ends:Escapes"}), runner="inline")
     assert "\x1b" not in result.reason + "".join(result.tracebacks.values())

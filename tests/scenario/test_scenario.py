@@ -10,6 +10,7 @@ from zwerm.errors import ScenarioError
 from zwerm.run.validation import scenario_mistakes
 from zwerm.scenario.load import built_in, load, locate
 from zwerm.scenario.overrides import _short
+from zwerm.study.study_tables import load_study
 
 GOOD = """
 [arena]
@@ -158,6 +159,15 @@ def test_an_unknown_scenario_is_one_line_with_the_known_ones() -> None:
     assert caught.value.mistakes == ["gone.toml: expected a scenario file or the name of a built-in one"]
 
 
+def test_the_file_of_a_study_in_place_of_a_scenario_is_one_line_with_the_command(tmp_path: Path) -> None:
+    path = written(tmp_path, 'scenario = "computation-free"\nseeds = 2\nmetrics = ["robots_in_arena"]\n')
+    assert scenario_mistakes(path, ()) == [f"{path}: is a study and no scenario; run it with: zwerm study {path}"]
+    scenario = written(tmp_path, GOOD)
+    with pytest.raises(ScenarioError) as caught:
+        load_study(str(scenario))
+    assert caught.value.mistakes == [f"{scenario}: is a scenario and no study; run it with: zwerm run {scenario}"]
+
+
 def test_a_mistake_of_an_override_names_the_command_line_and_another_names_the_file(tmp_path: Path) -> None:
     path = written(tmp_path, GOOD + "cuont = 3\n")
     with pytest.raises(ScenarioError) as caught:
@@ -217,6 +227,10 @@ def test_an_override_is_toml_or_else_a_bare_string(tmp_path: Path) -> None:
         (
             "robots.sensors.first=pose",
             "--set robots.sensors.first=pose: robots.sensors.first: expected an index below 1, got first",
+        ),
+        (
+            "robots.sensors.\u00b2.kind=pose",  # a digit that is no decimal
+            "--set robots.sensors.\u00b2.kind=pose: robots.sensors.\u00b2: expected an index below 1, got \u00b2",
         ),
         ("arena.size_m.0.x=3", "--set arena.size_m.0.x=3: arena.size_m.0 is no table"),
         ("robots.count.x.y=3", "--set robots.count.x.y=3: robots.count.x is in no table"),

@@ -20,7 +20,11 @@ from zwerm.run.result import RunResult
 
 NO_PICTURE: Final = "no picture is drawn: matplotlib is not installed; pip install matplotlib"
 
-_SIZE: Final = re.compile(r"\d+(\.\d+)?x\d+(\.\d+)?")
+_SIZE: Final = re.compile(r"[0-9]+(\.[0-9]+)?x[0-9]+(\.[0-9]+)?")
+
+# Sides of the arena in a picture [inches]. The largest picture takes about 300 MB.
+_SIDE_MIN_IN: Final = 0.5
+_SIDE_MAX_IN: Final = 50.0
 _MOMENT: Final = re.compile(r"(?P<cycle>\d+)|(?P<at_s>\d+(\.\d+)?)s")
 
 
@@ -49,8 +53,11 @@ class RunOutput:
             for each in self.moments
             if not _MOMENT.fullmatch(each)
         ]
-        if self.size is not None and (not _SIZE.fullmatch(self.size) or 0.0 in self._style["size_in"]):
-            diagnostics.append(f"--size: expected WIDTHxHEIGHT in inches, such as 3.4x3, got {self.size!r}")
+        if self.size is not None and not (
+            _SIZE.fullmatch(self.size) and all(_SIDE_MIN_IN <= side <= _SIDE_MAX_IN for side in self._style["size_in"])
+        ):
+            rule = f"WIDTHxHEIGHT in inches, such as 3.4x3, each from {_SIDE_MIN_IN:g} to {_SIDE_MAX_IN:g}"
+            diagnostics.append(f"--size: expected {rule}, got {self.size!r:.80}")
         files = [
             OutputFile("--picture", self.picture, PICTURES, "matplotlib", "all"),
             OutputFile("--animate", self.animation, ANIMATIONS, "matplotlib", "all"),

@@ -4,7 +4,7 @@ import copy
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -17,6 +17,10 @@ from zwerm.scenario.renamed import rename
 from zwerm.scenario.tables import Scenario
 from zwerm.scenario.toml_text import parse_toml
 from zwerm.scenario.types import OpenTable, is_file
+
+# Tables that every scenario has and no study, and keys that every study has one of and no scenario.
+SCENARIO_KEYS: Final = frozenset({"time", "arena", "robots"})
+STUDY_KEYS: Final = frozenset({"scenario", "variants"})
 
 
 def built_in() -> Mapping[str, Path]:
@@ -76,6 +80,8 @@ def tables_of(name: str, overrides: tuple[str, ...] = ()) -> tuple[dict[str, Any
     validate."""
     path = locate(name)
     tables = read(path)
+    if STUDY_KEYS & tables.keys() and not SCENARIO_KEYS & tables.keys():
+        raise ScenarioError([f"{name}: is a study and no scenario; run it with: zwerm study {name}"])
     rename(tables, str(path))
     tables.setdefault("name", path.stem)
     for assignment in overrides:

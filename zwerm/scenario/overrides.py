@@ -71,6 +71,9 @@ def _enter(place: Any, part: str, path: str, assignment: str) -> Any:
 
 
 def _index(place: list[Any], part: str, path: str, assignment: str) -> int:
-    if not part.isdigit() or int(part) >= len(place):
-        raise ScenarioError([f"--set {assignment}: {path}: expected an index below {len(place)}, got {part}"])
-    return int(part)
+    indices = {str(index): index for index in range(len(place))}
+    if part not in indices:
+        raise ScenarioError(
+            [f"--set {assignment:.80}: {path:.80}: expected an index below {len(place)}, got {part:.80}"]
+        )
+    return indices[part]

@@ -16,8 +16,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from zwerm.catalogue import shipped
 from zwerm.errors import ScenarioError
 from zwerm.scenario.diagnostics import mistakes
+from zwerm.scenario.load import SCENARIO_KEYS, STUDY_KEYS, read, suggestion
 from zwerm.scenario.load import built_in as built_in_scenarios
-from zwerm.scenario.load import read, suggestion
 from zwerm.scenario.types import Finite, NonNegative, Table
 
 Setting = bool | int | float | str
@@ -185,6 +185,8 @@ def load_study(name: str) -> Study:
         hint = "" if path.suffix == ".toml" else suggestion(name, built_in(), "zwerm list")
         raise ScenarioError([f"{name}: expected a study's file or the name of a built-in one{hint}"])
     tables = read(path)
+    if SCENARIO_KEYS & tables.keys() and not STUDY_KEYS & tables.keys():
+        raise ScenarioError([f"{name}: is a scenario and no study; run it with: zwerm run {name}"])
     tables.setdefault("name", path.stem)
     return check_study(tables, path)
 

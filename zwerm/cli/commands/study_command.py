@@ -66,7 +66,7 @@ def study(
 
     [bold]zwerm study my-study.toml --seeds 501-1000 --out second-half.parquet[/bold]
 
-    [bold]zwerm study my-study.toml --shard 3/8[/bold], and then [bold]zwerm merge runs/my-study-shard-*.parquet[/bold]
+    [bold]zwerm study my-study.toml --shard 3/8[/bold]
 
     [bold]zwerm study my-study.toml --cluster tcp://10.0.0.5:8786[/bold]
     """
