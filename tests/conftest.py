@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import hypothesis
 import pytest
 from support import ROBOTS, robots_of_this_process
 
@@ -18,6 +19,10 @@ if TYPE_CHECKING:  # most tests need no study
 # A shell makes its background processes ignore SIGINT, and Python and its children inherit this. Tests that send SIGINT would
 # then wait without end.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Hypothesis fails an example that takes more than 200 ms, by the clock: on a busy machine any example may.
+hypothesis.settings.register_profile("no deadline", deadline=None)
+hypothesis.settings.load_profile("no deadline")
 
 # The files that take longest, the longest first. They start first, so that no worker ends with a long one.
 LONG = (
