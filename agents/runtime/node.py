@@ -96,7 +96,7 @@ class Node:
         return encode(
             Failure(
                 tick,
-                printable(f"{type(error).__name__}: {error}")[:ERROR_CHARS_MAX] + self._place(error),
+                printable(f"{type(error).__name__}: {_text_of(error)}")[:ERROR_CHARS_MAX] + self._place(error),
                 printable("".join(_formatted(error)))[-TRACEBACK_CHARS_MAX:],
             )
         )
@@ -108,6 +108,14 @@ class Node:
         if not frames:
             return step_place(type(self._controller))
         return f" ({Path(own).name}:{frames[-1].lineno}, in {frames[-1].name})"
+
+
+def _text_of(error: BaseException) -> str:
+    """Return the text of an error; the class of a controller's own may raise instead."""
+    try:
+        return str(error)
+    except Exception:
+        return "its text cannot be made"
 
 
 def _formatted(error: BaseException) -> list[str]:

@@ -59,6 +59,22 @@ def test_a_robot_with_a_user_of_its_own_reaches_nothing_of_the_worlds_user(nothi
 
 @linux
 @root
+def test_no_code_of_a_controller_with_a_user_of_its_own_runs_as_the_worlds_user(nothing_left: None) -> None:
+    tables = scenario(robots={"controller": "untrusted:Untrusted", "count": 2}, time={"duration_s": 0.3})
+    with pytest.raises(ScenarioError, match="root runs the code of a controller"):
+        run(tables)
+    result = run(tables, confinement=Confinement(first_user=FIRST_USER))
+    assert result.ok, result.reason
+    assert set(result.telemetry.value.tolist()) == {FIRST_USER, FIRST_USER + 1.0}
+    with pytest.raises(LinkError, match=r"^node 0 ended with exit code 2 before it joined$"):
+        run(
+            scenario(robots={"controller": "no_such_module:Missing", "count": 1}),
+            confinement=Confinement(first_user=FIRST_USER),
+        )
+
+
+@linux
+@root
 def test_a_robot_starts_no_more_processes_than_allowed_and_all_end_with_the_run(nothing_left: None) -> None:
     result = attacked("Forks", Confinement(first_user=FIRST_USER + 100, processes=5))
     assert reported(result) == {"started": 5.0}

@@ -56,6 +56,20 @@ class Escapes(Controller):
         raise ValueError("\x1b[2J gone")
 
 
+class NoTextError(Exception):
+    """An error whose text cannot be made."""
+
+    def __str__(self) -> str:
+        raise RuntimeError("no text")
+
+
+class RaisesWithoutText(Controller):
+    """Raises an error whose text cannot be made."""
+
+    def step(self, observation: Observation) -> Command:
+        raise NoTextError
+
+
 class Forks(Controller):
     """Starts two processes that never end, by fork and as a command, and writes their ids."""
 

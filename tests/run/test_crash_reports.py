@@ -20,6 +20,13 @@ def test_of_several_crashes_at_one_tick_the_lowest_node_is_named(runner: Runner,
     assert result.crashed == [0, 1, 2, 3]
 
 
+@pytest.mark.parametrize("runner", ["inline", "processes"])
+def test_an_error_whose_text_cannot_be_made_is_named_by_its_kind(runner: Runner, nothing_left: None) -> None:
+    result = run(scenario(robots={"controller": "ends:RaisesWithoutText"}), runner=runner)
+    assert result.reason.startswith("node 0 crashed at tick 0: NoTextError: its text cannot be made (ends.py:")
+    assert result.crashed == [0, 1, 2, 3]
+
+
 def test_a_run_that_loses_every_robot_has_failed() -> None:
     lost = run(scenario(robots={"controller": "ends:AllRaise", "on_crash": "continue"}), runner="inline")
     assert (lost.outcome, lost.reason, lost.ticks) == ("failed", "every robot was lost", 5)

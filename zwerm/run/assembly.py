@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from zwerm.agents.runtime.controllers import find, parameters_of, step_place
-from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role
+from zwerm.catalogue import BASE, COORDINATOR, ROBOT, Role, controller_classes
 from zwerm.deploy.node_specs import controller_for, node_specs
 from zwerm.errors import ControllerError, ScenarioError
 from zwerm.scenario.diagnostics import struct_mistakes
@@ -34,18 +34,21 @@ def assemble(scenario: Scenario, seed: int) -> World:
     return assemble_run(scenario, seed)[0]
 
 
-def assemble_run(scenario: Scenario, seed: int) -> tuple[World, Observers]:
+def assemble_run(scenario: Scenario, seed: int, *, import_controllers: bool = True) -> tuple[World, Observers]:
     """Return the world of `scenario` for `seed`, and the observers that measure its run.
 
-    Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the faults and the placement.
+    Without `import_controllers` no code of controllers that are not in the catalogue runs in this process; then they
+    are not checked. Raises ScenarioError with every mistake that `prepare` finds; or, where there is none, in the faults
+    and the placement.
     """
     scenario = _with_landmarks(scenario, seed)
-    arena, sensors, observers = prepare(scenario)
+    arena, sensors, observers = prepare(scenario, import_controllers=import_controllers)
     mistakes: list[str] = []
     world = _attempt(lambda: World(scenario, seed, arena, sensors), scenario, mistakes)
     if world is None:
         raise ScenarioError(blame(mistakes, scenario.place, scenario.overrides))
-    world.place_of = lambda node: step_place(find(node_specs(scenario, seed)[node][0]))
+    if import_controllers:
+        world.place_of = lambda node: step_place(find(node_specs(scenario, seed)[node][0]))
     return world, observers
 
 
@@ -64,10 +67,11 @@ def observers_of(scenario: Scenario, arena: Arena) -> Observers:
     return make_observers(scenario, arena, field)
 
 
-def prepare(scenario: Scenario) -> Prepared:
+def prepare(scenario: Scenario, *, import_controllers: bool = True) -> Prepared:
     """Return the arena, the sensors and the observers of `scenario`.
 
     Raises ScenarioError with every mistake in the arena, the field, the sensors, the metrics and the controller.
+    Without `import_controllers` only controllers of the catalogue are checked.
     """
     search_first(scenario.folder)
     scenario = _with_landmarks(scenario, 1)
@@ -76,7 +80,7 @@ def prepare(scenario: Scenario) -> Prepared:
     sensors, observers = None, None
     arena = _attempt(lambda: Arena.from_table(scenario.arena, scenario.folder), scenario, mistakes)
     _attempt(lambda: check_drive(scenario), scenario, mistakes)
-    _attempt(lambda: check_controllers(scenario), scenario, mistakes)
+    _attempt(lambda: check_controllers(scenario, import_own=import_controllers), scenario, mistakes)
     if arena is not None and table is not None:
         bounds = arena.bounds
         field = _attempt(lambda: make_field(table, bounds, scenario.folder, scenario.place), scenario, mistakes)
@@ -124,24 +128,33 @@ def check_drive(scenario: Scenario) -> None:
         raise ScenarioError([f"robots.body.kind: {error}"]) from None
 
 
-def check_controllers(scenario: Scenario) -> None:
+def check_controllers(scenario: Scenario, *, import_own: bool = True) -> None:
     """Find the controllers of robots, base and coordinator, and check what each is given against what it needs.
 
-    Raises ScenarioError with every mistake.
+    Without `import_own` those that are not in the catalogue are left out. Raises ScenarioError with every mistake.
     """
     robots, base, coordinator = scenario.robots, scenario.base, scenario.coordinator
     kinds = [table.kind for table in robots.sensors]
     # A controller may name what it needs by the sensor's kind or by the field of the observation that it fills.
     given = [*kinds, *filter(None, map(_field_of, kinds))]
-    mistakes = _controller_mistakes(scenario, "robots", ROBOT, robots.controller, robots.parameters, given)
+    mistakes: list[str] = []
+
+    def check(table: str, role: Role, name: str, parameters: dict[str, Any], sensors: Sequence[str]) -> None:
+        if import_own or is_of_catalogue(name):
+            mistakes.extend(_controller_mistakes(scenario, table, role, name, parameters, sensors))
+
+    check("robots", ROBOT, robots.controller, robots.parameters, given)
     if base is not None:
-        mistakes += _controller_mistakes(scenario, "base", BASE, base.controller, base.parameters, given)
+        check("base", BASE, base.controller, base.parameters, given)
     if coordinator is not None:
-        mistakes += _controller_mistakes(
-            scenario, "coordinator", COORDINATOR, coordinator.controller, coordinator.parameters, []
-        )
+        check("coordinator", COORDINATOR, coordinator.controller, coordinator.parameters, [])
     if mistakes:
         raise ScenarioError(list(dict.fromkeys(mistakes)))
+
+
+def is_of_catalogue(controller: str) -> bool:
+    """Return whether a controller is Zwerm's own: a name without a module, or a class of the catalogue."""
+    return ":" not in controller or controller in controller_classes()
 
 
 def _field_of(kind: str) -> str | None:

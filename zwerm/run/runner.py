@@ -85,7 +85,9 @@ def run(
             raise ScenarioError([f"overrides: a scenario that is already loaded takes none, got {list(overrides)}"])
     else:
         scenario = load(str(scenario), tuple(overrides))
-    world, metrics = assemble_run(scenario, seed)
+    # A robot with a user of its own is not trusted: its code must not run as the user of the world.
+    trusted = confinement.first_user is None
+    world, metrics = assemble_run(scenario, seed, import_controllers=trusted)
     members = node_specs(scenario, seed)
     watcher = watcher or NullProgress()
     if runner == "inline":
@@ -102,7 +104,8 @@ def run(
             guard = DenialGuard(security)
             return drive(world, link, seed, runner, realtime, watcher, record, link, metrics, guard)
     _refuse_main(members)
-    _try_controllers(members)
+    if trusted:
+        _try_controllers(members)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
     with _security(security_log) as security:
