@@ -59,7 +59,7 @@ class Wakes:
     def sleep(self, node: int, wake: Wake, tick: int) -> None:
         """Let a node sleep until `wake`; a time in the past means the next tick."""
         self._catch_up()
-        due = NEVER if wake.at_s is None else float(np.ceil(wake.at_s / self._dt_s - 1e-9))
+        due = NEVER if wake.at_s is None else float(math.ceil(wake.at_s / self._dt_s - 1e-9))
         self._due[node] = max(due, tick + 1)
         self._on_packet[node] = wake.on_packet
         for field, event in self.events.items():

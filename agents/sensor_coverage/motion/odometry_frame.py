@@ -46,8 +46,11 @@ class OdometryFrame:
             self.turned_rad += moved.turn_rad
         turned = self.turned_rad
         self.seen = {each.node: each.bearing_rad + turned for each in observation.bearings or ()}
-        self.contacts = tuple(self._contact(each, turned) for each in observation.touch or ())
-        self.touched = tuple(each.bearing_rad for each in self.contacts if each.node is None)
+        if observation.touch:
+            self.contacts = tuple(self._contact(each, turned) for each in observation.touch)
+            self.touched = tuple(each.bearing_rad for each in self.contacts if each.node is None)
+        else:
+            self.contacts = self.touched = ()
 
     def _contact(self, contact: Contact, turned: float) -> Touched:
         """Return what a closed switch faces: the visible robot nearest to its direction, or a wall."""

@@ -172,7 +172,12 @@ class Situation:
         if not self.local_map.samples or not self.local_map.seen.keys() <= frame.seen.keys():
             return True
         wanted = 1 if motion.bearing_noise_rad is None else motion.samples
-        return any(frame.count(node) < wanted for node in self._standing())
+        states = self.local_map.states
+        for node in frame.seen:
+            state = states.get(node)
+            if (state is None or not state.moving) and frame.count(node) < wanted:
+                return True
+        return False
 
     def _standing(self) -> list[int]:
         """Return the visible robots that are not known to move."""

@@ -102,15 +102,17 @@ class PathVectorProtocol:
         taken.
         """
         self.claim(slot, cost, tick)
-        best = self.route
+        best: Route | None = None
+        least = None if self.route is None else _key(self.route)
         for beside, weight in weights.items():
             route = self._routes.get(beside)
             if route is None or slot in route.slots or beside == BASE or not self._lasts(route):
                 continue
-            found = Route(route.cost + weight, (slot, *route.slots), route.claim)
-            if best is None or _key(found) < _key(best):
-                best = found
-        self.route = best
+            key = route.cost + weight, route.slots[-1], (slot, *route.slots)
+            if least is None or key < least:
+                best, least = route, key
+        if best is not None and least is not None:
+            self.route = Route(least[0], least[2], best.claim)
 
     def _own(self, slot: int) -> Route | None:
         """Return the claim at this slot, if there is one."""
@@ -127,7 +129,9 @@ class PathVectorProtocol:
 
     def _end(self, slot: int, claim: int) -> None:
         """Record that a claim of a slot, and all before it, have ended."""
-        self._claims[slot] = max(claim, self.newest_claim(slot))
+        newest = self._claims.get(slot)
+        if newest is None or claim > newest:
+            self._claims[slot] = max(claim, 0)
         if claim > self._ended.get(slot, -1):
             self._ended.pop(slot, None)
             self._ended[slot] = claim

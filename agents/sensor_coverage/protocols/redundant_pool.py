@@ -126,7 +126,12 @@ def _hops_to_base(local_map: LocalMap) -> int:
     homes = local_map.path_vectors.homes
     if local_map.slot == 0:
         return 0
-    return min([FAR, *(1 + homes.get(state.slot, FAR) for state in local_map.mutual().values())])
+    nearest = FAR
+    for state in local_map.mutual().values():
+        hops = 1 + homes.get(state.slot, FAR)
+        if hops < nearest:
+            nearest = hops
+    return nearest
 
 
 def _neighbour_nearest_to_base(local_map: LocalMap) -> int | None:

@@ -50,5 +50,7 @@ class LossEstimate:
         kept = MEMORY**packets
         self._lost = max(0.0, self._lost * kept + lost)
         self._packets = self._packets * kept + packets
-        fraction = self.fraction
-        self.copies = next((n for n in range(1, COPIES_MAX) if fraction**n <= LOST_FRACTION_MAX), COPIES_MAX)
+        fraction, copies = self.fraction, 1
+        while copies < COPIES_MAX and fraction**copies > LOST_FRACTION_MAX:
+            copies += 1
+        self.copies = copies
