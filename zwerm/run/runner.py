@@ -3,7 +3,7 @@
 import gc
 import secrets
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, Protocol, get_args
@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Final, Literal, Protocol, get_args
 import numpy as np
 
 from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
-from zwerm.agents.runtime.contract import Setup
-from zwerm.agents.runtime.controllers import make
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import ScenarioError, StragglerError
@@ -20,6 +18,7 @@ from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
 from zwerm.run.assembly import assemble_run, observers_of
+from zwerm.run.controller_checks import check_controllers
 from zwerm.run.denial_guard import DenialGuard
 from zwerm.run.hang_guard import hang_guard
 from zwerm.run.kept_result import KeptResult
@@ -103,9 +102,7 @@ def run(
         with hang_guard(scenario.time.straggler_s), _security(security_log, router=False) as security:
             guard = DenialGuard(security)
             return drive(world, link, seed, runner, realtime, watcher, record, link, metrics, guard)
-    _refuse_main(members)
-    if trusted:
-        _try_controllers(members)
+    check_controllers(members, trusted)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
     with _security(security_log) as security:
@@ -132,24 +129,6 @@ def _security(path: Path | None, router: bool = True) -> "AbstractContextManager
     from zwerm.deploy.security_log import SecurityLog
 
     return SecurityLog(path, router)
-
-
-def _refuse_main(specs: Mapping[int, tuple[str, Setup]]) -> None:
-    """Raise ScenarioError where a controller is in the program itself: the processes of robots do not run that."""
-    for name in dict.fromkeys(controller for controller, _ in specs.values()):
-        if name.startswith("__main__:"):
-            raise ScenarioError(
-                [f"{name}: robot processes do not import the program itself: move the class to a module, or run inline"]
-            )
-
-
-def _try_controllers(specs: Mapping[int, tuple[str, Setup]]) -> None:
-    """Make one controller of each kind. Raises ControllerError, which each robot's process would report apart."""
-    firsts: dict[str, Setup] = {}
-    for name, setup in specs.values():
-        firsts.setdefault(name, setup)
-    for name, setup in firsts.items():
-        make(name, setup)
 
 
 def serve(
