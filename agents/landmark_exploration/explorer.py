@@ -44,8 +44,8 @@ BUSY_REPORT_TICKS: Final = 50
 # Up to this many free frontiers a robot considers them at once when another one opens. With more, some are near.
 FEW_FREE: Final = 48
 # A robot adds observations to its map in its first LOOK_TICKS, and then only while it explores: observations of idle
-# robots open frontiers, and large halls take longer (`look_idle`). It does so again if no path led to any free frontier
-# for CUT_OFF_TICKS.
+# robots open frontiers, and large halls may take longer (`look_idle`). It does so again if no path led to any free
+# frontier for CUT_OFF_TICKS.
 LOOK_TICKS: Final = 5
 CUT_OFF_TICKS: Final = 200
 # Ticks for which a robot does not choose a frontier that it did not reach.

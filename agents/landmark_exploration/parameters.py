@@ -24,7 +24,7 @@ class ExplorerParameters(Struct, frozen=True, forbid_unknown_fields=True):
     `freeze_ticks` freezes: it adds no entry to the map. `robots_expected` robots must agree that exploration is complete. A
     robot that never sent a message counts as silent from the start. `turn_sd_rad` is the deviation of the random walk's turn
     in a tick. With `look_idle` a robot without a frontier adds what it sees to the map while a frontier is open: the map
-    is more complete, and large halls take longer. With `presence_only` no bearing is used: robots know which landmarks they
+    is more complete, and large halls may take longer. With `presence_only` no bearing is used: robots know which landmarks they
     see, and stop when no observation was new for `stagnation_ticks`.
     """
 

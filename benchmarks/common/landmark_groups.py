@@ -48,7 +48,7 @@ GROUPS: Final[dict[str, tuple[str, tuple[str, ...], int]]] = {
     "complex-random-walk": (
         "landmark-complex",
         ("time.duration_s=350", *GOSSIP, "robots.parameters.strategy=random-walk", BEST_TURN),
-        2,
+        1,
     ),
     "navigate": ("landmark-navigate", (), 1),
     "navigate-presence": (
