@@ -70,6 +70,26 @@ class RaisesWithoutText(Controller):
         raise NoTextError
 
 
+class NeverMade(Controller):
+    """Its constructor does not return, from an incarnation on."""
+
+    made = 0
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        while setup.incarnation > self.made:
+            pass
+
+    def step(self, observation: Observation) -> Command:
+        return Command()
+
+
+class NeverMadeAgain(NeverMade):
+    """Its constructor does not return after a restart."""
+
+    made = 1
+
+
 class Forks(Controller):
     """Starts two processes that never end, by fork and as a command, and writes their ids."""
 

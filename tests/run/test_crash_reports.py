@@ -3,8 +3,11 @@
 import pytest
 from support import scenario
 
+from zwerm.errors import ZwermError
+from zwerm.run import hang_guard
 from zwerm.run.runner import Runner, run
 
+NOT_MADE = r"^a controller was not made within 0\.2 s: it runs .*ends\.py:\d+, in __init__$"
 EVERYBODY = [{"kind": "crash", "nodes": [0, 1, 2, 3], "at_s": 0.5}]
 
 
@@ -34,6 +37,31 @@ def test_a_run_that_loses_every_robot_has_failed() -> None:
     assert (killed.outcome, killed.reason) == ("failed", "every robot was lost")
     restarted = run(scenario(faults=[EVERYBODY[0] | {"for_s": 0.5}]), runner="inline")
     assert restarted.outcome == "time-limit", "robots that return are not lost"
+
+
+@pytest.fixture
+def made_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hang_guard, "MADE_S_MAX", 0.2)
+
+
+@pytest.mark.parametrize("runner", ["inline", "processes"])
+def test_a_constructor_that_does_not_return_is_named_with_its_line(
+    runner: Runner, nothing_left: None, made_soon: None
+) -> None:
+    with pytest.raises(ZwermError, match=NOT_MADE):
+        run(scenario(robots={"controller": "ends:NeverMade"}), runner=runner)
+
+
+def test_a_constructor_that_does_not_return_after_a_restart_is_named_with_its_line(made_soon: None) -> None:
+    restart = [{"kind": "restart", "nodes": [1], "at_s": 0.5}]
+    with pytest.raises(ZwermError, match=NOT_MADE):
+        run(scenario(robots={"controller": "ends:NeverMadeAgain"}, faults=restart), runner="inline")
+
+
+def test_a_controller_that_hangs_inline_after_a_restart_is_named() -> None:
+    restart = [{"kind": "restart", "nodes": [0], "at_s": 0.1}]
+    tables = scenario(robots={"controller": "ends:HangsInline"}, time={"straggler_s": 0.2}, faults=restart)
+    assert run(tables, runner="inline").reason.startswith("node 1 crashed at tick 3: HangError: no answer within 0.2 s")
 
 
 def test_a_controller_that_hangs_inline_is_interrupted_and_named_with_its_line() -> None:

@@ -1,10 +1,12 @@
-"""Checks of controllers before robots start in processes of their own."""
+"""Controllers in the world's process: checked before robots start in processes of their own, and made again inline."""
 
 from collections.abc import Mapping
 
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import make
+from zwerm.agents.runtime.node import Node
 from zwerm.errors import ScenarioError
+from zwerm.run.hang_guard import constructors_guarded
 
 
 def check_controllers(specs: Mapping[int, tuple[str, Setup]], trusted: bool = True) -> None:
@@ -21,5 +23,12 @@ def check_controllers(specs: Mapping[int, tuple[str, Setup]], trusted: bool = Tr
             rule = "robot processes do not import the program itself: move the class to a module, or run inline"
             raise ScenarioError([f"{name}: {rule}"])
     if trusted:
-        for name, setup in firsts.items():
-            make(name, setup)
+        with constructors_guarded():
+            for name, setup in firsts.items():
+                make(name, setup)
+
+
+def make_again(controller: str, setup: Setup) -> Node:
+    """Return a node that is made while an inline run goes on. Raises ControllerError where that takes too long."""
+    with constructors_guarded():
+        return Node(controller, setup)

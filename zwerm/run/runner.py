@@ -18,9 +18,9 @@ from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
 from zwerm.run.assembly import assemble_run, observers_of
-from zwerm.run.controller_checks import check_controllers
+from zwerm.run.controller_checks import check_controllers, make_again
 from zwerm.run.denial_guard import DenialGuard
-from zwerm.run.hang_guard import hang_guard
+from zwerm.run.hang_guard import constructors_guarded, hang_guard
 from zwerm.run.kept_result import KeptResult
 from zwerm.run.measurement import measure, truth_of
 from zwerm.run.progress import NullProgress, ProgressListener
@@ -86,17 +86,19 @@ def run(
         scenario = load(str(scenario), tuple(overrides))
     # A robot with a user of its own is not trusted: its code must not run as the user of the world.
     trusted = confinement.first_user is None
-    world, metrics = assemble_run(scenario, seed, import_controllers=trusted)
+    with constructors_guarded():
+        world, metrics = assemble_run(scenario, seed, import_controllers=trusted)
     members = node_specs(scenario, seed)
     watcher = watcher or NullProgress()
     if runner == "inline":
         if confinement != UNCONFINED:
             raise ScenarioError(["runner: only robots that are processes can be confined, got 'inline'"])
-        nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
+        with constructors_guarded():
+            nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
         watcher.joined(len(nodes), len(nodes))
         link = MemoryLink(
             {node: each.answer for node, each in nodes.items()},
-            lambda node, incarnation: Node(*restart_spec(scenario, seed, node, incarnation)).answer,
+            lambda node, incarnation: make_again(*restart_spec(scenario, seed, node, incarnation)).answer,
             world.schedule.late_joiners,
         )
         with hang_guard(scenario.time.straggler_s), _security(security_log, router=False) as security:
