@@ -1,0 +1,191 @@
+"""Sensor coverage in given arenas: scenario files of buildings and maps that nobody drew for this algorithm.
+
+A run is *right* if it is `completed` with a reachable coverage of at least 0.98, and *false* if it is `completed` with
+less. Every other run ended as `failed`, with its reason, at the time limit, or in a traceback.
+
+    python benchmarks/bench_arenas.py --arenas folder --rows rows.csv --variant central decentralised
+    python benchmarks/bench_arenas.py --arenas folder --rows rows.csv --faults one-by-one at-once base restart --part 1 2
+
+The files are named KIND-NUMBER.toml. Numbers are the slowest index and kinds the fastest, so that a part of a campaign is a
+fair sample. The seed of a run is 100 and the number: it draws the place and the heading of the base, and all noise.
+`--noise alternate` gives a half of the arenas bearings without noise, and the others a noise of pi/72.
+
+With `--faults` a tenth of the robots that are out dies, one by one or at once, at times that the seed draws; or all robots
+in sight of the base; or one robot crashes and returns after 10 s. `-and-loss` adds a loss of 0.3 of all messages.
+
+With `--rows FILE` each run is stored when it ends, and runs that are stored are not repeated.
+"""
+
+import argparse
+import math
+import re
+import subprocess
+import time
+import traceback
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from statistics import mean
+from typing import Final
+
+import msgspec
+from campaign import add_campaign_options, carry_out
+from csv_rows import write_csv
+
+from zwerm import run
+
+ENOUGH: Final = 0.98
+WELL: Final = 0.99
+VARIANTS: Final = {"central": (), "decentralised": ("services.path=gradient",)}
+NOISES_RAD: Final = {"0": 0.0, "pi/72": math.pi / 72}
+ALTERNATE: Final = "alternate"
+FIRST_SEED: Final = 100
+# Robots in the depot: the deployment of 16 m2 without a coordinator needs up to 4.5 for each square metre.
+ROBOTS: Final = 80
+# Times of deaths [s] lie before this: small arenas are covered then.
+LATEST_S: Final = 400.0
+DEATH: Final = f'{{kind="crash", fraction=0.001, between_s=[10.0, {LATEST_S}]}}'
+FAULTS: Final = {
+    "none": "",
+    "one-by-one": ",".join([DEATH] * 4),
+    "at-once": f'{{kind="crash", fraction=0.1, between_s=[10.0, {LATEST_S}]}}',
+    "base": '{kind="bench_deaths:CrashBesideBase", at_s=AT}',
+    "restart": f'{{kind="crash", fraction=0.001, between_s=[10.0, {LATEST_S}], for_s=10.0}}',
+}
+AND_LOSS: Final = "-and-loss"
+LOSSY: Final = {"central": ("radio.loss=0.3", "uplink.loss=0.3"), "decentralised": ("radio.loss=0.3",)}
+
+
+class Case(msgspec.Struct, frozen=True):
+    """One run: its variant, the kind and number of its arena, its noise of bearings and its faults."""
+
+    variant: str
+    kind: str
+    number: str
+    noise: str
+    faults: str
+
+
+def cases(asked: argparse.Namespace) -> Iterator[Case]:
+    """Yield the runs that are asked for, with the number of the arena as the slowest index."""
+    found = sorted(
+        (int(match[2]), match[1])
+        for each in asked.arenas.glob("*.toml")
+        if (match := re.fullmatch(r"(.+)-(\d+)", each.stem)) and (asked.kind is None or match[1] in asked.kind)
+    )
+    kinds = sorted({kind for _, kind in found})
+    drawn = [
+        Case(variant, kind, str(number), noise, faults)
+        for number, kind in found
+        if asked.seeds[0] <= number <= asked.seeds[1]
+        for variant in asked.variant
+        for noise in _noises(asked.noise, number + kinds.index(kind))
+        for faults in _faults(asked.faults, number + kinds.index(kind), asked.each_fault)
+    ]
+    yield from drawn[asked.part[0] - 1 :: asked.part[1]]
+
+
+def _noises(asked: Sequence[str], index: int) -> list[str]:
+    """Return the noises of one arena."""
+    return [list(NOISES_RAD)[index % 2]] if asked == [ALTERNATE] else list(asked)
+
+
+def _faults(asked: Sequence[str], index: int, each: bool) -> list[str]:
+    """Return the faults of one arena: all that are asked for, or one of them in turn."""
+    return list(asked) if each else [asked[index % len(asked)]]
+
+
+def one_run(case: Case, folder: Path, robots: int, more: Sequence[str]) -> dict[str, str]:
+    """Carry out one run, and return its row."""
+    path = folder / f"{case.kind}-{case.number}.toml"
+    seed = FIRST_SEED + int(case.number)
+    loss = LOSSY[case.variant] if case.faults.endswith(AND_LOSS) else ()
+    faults = FAULTS[case.faults.removesuffix(AND_LOSS)].replace("AT", str(drawn_time_s(seed)))
+    settings = [
+        *VARIANTS[case.variant],
+        *loss,
+        f"robots.count={robots}",
+        f"robots.sensors.0.sd_rad={NOISES_RAD[case.noise]}",
+        f"faults=[{faults}]",
+        *more,
+    ]
+    if case.variant == "central" and case.faults != "none":
+        settings.append(f"coordinator.parameters.watch_until_s={LATEST_S + 20.0}")
+    row = {**msgspec.structs.asdict(case), "seed": str(seed), "commit": commit_now(), "robots_given": str(robots)}
+    began, cpu = time.perf_counter(), time.process_time()
+    try:
+        result = run(path, seed=seed, runner="inline", overrides=settings)
+    except Exception as error:  # a traceback is a result of the campaign
+        traceback.print_exc()
+        found, outcome, reason, sim_s = dict[str, float](), "traceback", repr(error)[:200], math.nan
+    else:
+        found, outcome, reason, sim_s = result.metrics, result.outcome, result.reason, result.sim_s
+    seen = found.get("reachable_coverage_fraction", math.nan)
+    if outcome == "completed":
+        outcome = "right" if seen >= ENOUGH else "false"
+    return row | {
+        "verdict": outcome,
+        "reachable_coverage": f"{seen:.4f}",
+        "robots": f"{found.get('robots_deployed', math.nan):g}",
+        "robots_over_hexagonal": f"{found.get('robots_over_hexagonal', math.nan):.3f}",
+        "duration_s": f"{sim_s:.1f}",
+        "reason": reason,
+        "wall_s": f"{time.perf_counter() - began:.1f}",
+        "cpu_s": f"{time.process_time() - cpu:.1f}",
+    }
+
+
+def drawn_time_s(seed: int) -> float:
+    """Return a time [s] that the seed draws, spread evenly over successive seeds."""
+    return round(10.0 + (LATEST_S - 10.0) * (seed * (math.sqrt(5.0) - 1.0) / 2.0 % 1.0), 1)
+
+
+def commit_now() -> str:
+    """Return the commit of this copy of the code."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--exclude=*"]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
+    """Return one row for each variant, kind of arena and noise; with faults, for each variant and kind of faults."""
+    columns = ("variant", "faults") if any(row["faults"] != "none" for row in rows) else ("variant", "kind", "noise")
+    groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[each] for each in columns), []).append(row)
+    return [
+        {
+            **dict(zip(columns, key, strict=True)),
+            "runs": str(len(group)),
+            "completed": str(sum(row["verdict"] in ("right", "false") for row in group)),
+            "completed falsely": str(sum(row["verdict"] == "false" for row in group)),
+            f"coverage of {ENOUGH:g} or more": str(sum(float(row["reachable_coverage"]) >= ENOUGH for row in group)),
+            f"coverage of {WELL:g} or more": str(sum(float(row["reachable_coverage"]) >= WELL for row in group)),
+            "least coverage": min(row["reachable_coverage"] for row in group),
+            "robots over packing": f"{mean(float(row['robots_over_hexagonal']) for row in group):.2f}",
+            "duration [s]": f"{mean(float(row['duration_s']) for row in group):.0f}",
+        }
+        for key, group in sorted(groups.items())
+    ]
+
+
+def main() -> None:
+    """Run every arena, and print a row each."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--arenas", type=Path, required=True, metavar="FOLDER", help="of scenario files")
+    parser.add_argument("--variant", choices=VARIANTS, nargs="+", default=["central"])
+    parser.add_argument("--kind", nargs="+", help="kinds of arenas (default: all)")
+    parser.add_argument("--noise", choices=[*NOISES_RAD, ALTERNATE], nargs="+", default=[ALTERNATE])
+    faults = [*FAULTS, *(f"{each}{AND_LOSS}" for each in FAULTS)]
+    parser.add_argument("--faults", choices=faults, nargs="+", default=["none"])
+    parser.add_argument("--each-fault", action="store_true", help="every fault in every arena, not one in turn")
+    parser.add_argument(
+        "--part", type=int, nargs=2, default=[1, 1], metavar=("K", "N"), help="each N-th run, from the K-th"
+    )
+    parser.add_argument("--robots", type=int, default=ROBOTS, help="in the depot")
+    add_campaign_options(parser, last_seed=34)
+    asked = parser.parse_args()
+    rows = carry_out(asked, cases(asked), lambda case: one_run(case, asked.arenas, asked.robots, asked.set))
+    write_csv(asked.csv, summary(rows))
+
+
+if __name__ == "__main__":
+    main()
