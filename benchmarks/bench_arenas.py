@@ -32,6 +32,7 @@ from campaign import add_campaign_options, carry_out
 from csv_rows import write_csv
 
 from zwerm import run
+from zwerm.scenario.load import load
 
 ENOUGH: Final = 0.98
 WELL: Final = 0.99
@@ -39,8 +40,6 @@ VARIANTS: Final = {"central": (), "decentralised": ("services.path=gradient",)}
 NOISES_RAD: Final = {"0": 0.0, "pi/72": math.pi / 72}
 ALTERNATE: Final = "alternate"
 FIRST_SEED: Final = 100
-# Robots in the depot: the deployment of 16 m2 without a coordinator needs up to 4.5 for each square metre.
-ROBOTS: Final = 80
 # Times of deaths [s] lie before this: small arenas are covered then.
 LATEST_S: Final = 400.0
 DEATH: Final = f'{{kind="crash", fraction=0.001, between_s=[10.0, {LATEST_S}]}}'
@@ -94,7 +93,7 @@ def _faults(asked: Sequence[str], index: int, each: bool) -> list[str]:
     return list(asked) if each else [asked[index % len(asked)]]
 
 
-def one_run(case: Case, folder: Path, robots: int, more: Sequence[str]) -> dict[str, str]:
+def one_run(case: Case, folder: Path, more: Sequence[str]) -> dict[str, str]:
     """Carry out one run, and return its row."""
     path = folder / f"{case.kind}-{case.number}.toml"
     seed = FIRST_SEED + int(case.number)
@@ -103,14 +102,14 @@ def one_run(case: Case, folder: Path, robots: int, more: Sequence[str]) -> dict[
     settings = [
         *VARIANTS[case.variant],
         *loss,
-        f"robots.count={robots}",
         f"robots.sensors.0.sd_rad={NOISES_RAD[case.noise]}",
         f"faults=[{faults}]",
         *more,
     ]
     if case.variant == "central" and case.faults != "none":
         settings.append(f"coordinator.parameters.watch_until_s={LATEST_S + 20.0}")
-    row = {**msgspec.structs.asdict(case), "seed": str(seed), "commit": commit_now(), "robots_given": str(robots)}
+    given = load(str(path), tuple(settings)).robots.count
+    row = {**msgspec.structs.asdict(case), "seed": str(seed), "commit": commit_now(), "robots_given": str(given)}
     began, cpu = time.perf_counter(), time.process_time()
     try:
         result = run(path, seed=seed, runner="inline", overrides=settings)
@@ -180,10 +179,9 @@ def main() -> None:
     parser.add_argument(
         "--part", type=int, nargs=2, default=[1, 1], metavar=("K", "N"), help="each N-th run, from the K-th"
     )
-    parser.add_argument("--robots", type=int, default=ROBOTS, help="in the depot")
     add_campaign_options(parser, last_seed=34)
     asked = parser.parse_args()
-    rows = carry_out(asked, cases(asked), lambda case: one_run(case, asked.arenas, asked.robots, asked.set))
+    rows = carry_out(asked, cases(asked), lambda case: one_run(case, asked.arenas, asked.set))
     write_csv(asked.csv, summary(rows))
 
 
