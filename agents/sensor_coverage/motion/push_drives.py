@@ -25,6 +25,13 @@ STUCK_FRACTION: Final = 0.2
 HOP_TOLERANCE_M: Final = 1e-3
 # A move with noisy bearings stops this close [m] to the goal and averages.
 NOISY_NEAR_M: Final = 0.06
+# Longest step [m] between two averages there. Where a wall has stopped the move far from its goal, the landmarks give the
+# direction of the goal, but not its distance.
+NOISY_STEP_M: Final = 0.1
+# A move that a wall stops further from the goal than this [m] goes on by odometry: it may pass the wall on its straight way.
+STOPPED_M: Final = 0.15
+# It is in touch with the wall if it was so in one of this many ticks: it may bounce.
+TOUCH_TICKS: Final = 3
 # A move drives back after this many ticks without a visible robot.
 LOST_TICKS: Final = 20
 # Fraction of the offset to drive in the second half of a move.
@@ -106,6 +113,7 @@ def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequen
     near_m = NOISY_NEAR_M if noisy else p.tolerance_m
     lost = 0
     target = TargetPoint(0.0, 0.0)
+    passing = _Passing(motion)
     for _ in range(p.drive_ticks_max):
         target = target_point(landmarks, frame.seen, _offset(motion, goal), scale_m)
         if target.distance_m < near_m:
@@ -117,6 +125,8 @@ def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequen
         far_m = math.hypot(frame.x_m - start[0], frame.y_m - start[1])
         gain = 1.0 if far_m < 0.5 * hop_m else LATE_GAIN
         x, y = slide(gain * target.x, gain * target.y, frame.touched)
+        if passing.by_odometry(_offset(motion, goal), target.distance_m, math.hypot(x, y) < p.tolerance_m):
+            x, y = slide(*_offset(motion, goal), frame.touched)
         if math.hypot(x, y) < p.tolerance_m:
             break  # a wall is in the way
         yield motion.velocity(x, y)
@@ -126,6 +136,38 @@ def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequen
     if noisy and not target.used_moving_landmarks:
         target = yield from _approach(motion, landmarks, goal, scale_m)
     return DriveResult(True, target.used_odometry, target.used_moving_landmarks)
+
+
+class _Passing:
+    """Whether a wall has stopped a move on the way that its landmarks show, and it goes on by odometry, once."""
+
+    def __init__(self, motion: Locomotion) -> None:
+        self._motion = motion
+        self._nearest_m = math.inf
+        self._stuck = self._untouched = 0
+        self._ways = 0  # 1 while the move goes on by odometry, 2 after that
+
+    def by_odometry(self, by_odometry: Vector, target_m: float, stopped: bool) -> bool:
+        """Return whether to go on by odometry.
+
+        Takes the offset [m] to the goal by odometry, the distance [m] by landmarks, and whether a wall stops the way there.
+        """
+        away_m = math.hypot(*by_odometry)
+        goes_on = away_m < self._nearest_m - STUCK_FRACTION * self._motion.step_m
+        self._stuck = 0 if goes_on else self._stuck + 1
+        self._nearest_m = min(self._nearest_m, away_m)
+        self._untouched = 0 if self._motion.frame.touched else self._untouched + 1
+        is_stuck = self._stuck > STUCK_TICKS
+        if self._ways == 1 and (is_stuck or away_m < NOISY_NEAR_M):
+            self._ways = 2
+        elif (
+            self._ways == 0
+            and (is_stuck or stopped)
+            and self._untouched < TOUCH_TICKS
+            and min(target_m, away_m) > STOPPED_M
+        ):
+            self._ways, self._stuck = 1, 0
+        return self._ways == 1
 
 
 def _approach(
@@ -151,7 +193,8 @@ def _approach(
         if enough and stop > 1 and math.hypot(sx, sy) < p.tolerance_m:
             break
         x, y = motion.position
-        yield from motion.drive_to((x + sx, y + sy), 0.3 * p.tolerance_m)
+        part = min(1.0, NOISY_STEP_M / max(math.hypot(sx, sy), NOISY_STEP_M))
+        yield from motion.drive_to((x + part * sx, y + part * sy), 0.3 * p.tolerance_m)
         ex, ey = ex - (frame.x_m - x), ey - (frame.y_m - y)
         if enough and stop > 1:
             break

@@ -1,0 +1,96 @@
+"""Drives of a push beside obstacles: the robot reaches its slot past a corner, and stays close to one that it cannot reach."""
+
+import math
+from typing import Final
+
+import pytest
+import shapely
+
+from zwerm.agents.runtime.contract import Body, Setup
+from zwerm.agents.sensor_coverage.messages.commands import Landmark
+from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
+from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
+from zwerm.agents.sensor_coverage.motion.push_drives import move
+from zwerm.wire.messages import BodyVelocity
+
+RADIUS_M: Final = 0.07
+SWITCH_RAD: Final = math.tau / 12
+# A switch is closed by a wall in a direction within this angle [rad].
+CLOSED_RAD: Final = math.radians(25.0)
+START: Final = 1.58, 1.58
+STOPPED: Final = 1.37, 2.0
+GOAL: Final = 1.3, 2.48
+CORNER: Final = shapely.Polygon([(1.34, 2.12), (1.07, 1.84), (0.5, 1.84), (0.5, 2.6), (1.08, 2.36)])
+ROBOTS: Final = {8: (1.47, 3.36), 9: (1.83, 2.33), 13: START}
+
+
+class BesideCorner(Locomotion):
+    """A robot without noise of odometry, among robots that stand, beside a thing that its body does not pass.
+
+    `at` is its true position [m]. Its switches are turned by `switches_rad`.
+    """
+
+    def __init__(
+        self, thing: shapely.Polygon, noise_rad: float, switches_rad: float, at: tuple[float, float] = START
+    ) -> None:
+        body = Body("holonomic", RADIUS_M, 0.5, 0.0)
+        super().__init__(RobotParameters(), Setup(1, "robot", 0.1, ("bearings",), b"", body))
+        self.bearing_noise_rad = noise_rad
+        self.at = at
+        self._thing = thing
+        self._switches_rad = switches_rad
+        self._read()
+
+    def go(self, velocity: BodyVelocity) -> None:
+        """Move for one tick."""
+        x, y = (self.at[0] + 0.1 * velocity.forward_m_s, self.at[1] + 0.1 * velocity.left_m_s)
+        nearest = self._nearest((x, y))
+        apart_m = math.dist((x, y), nearest)
+        if apart_m < RADIUS_M:
+            x, y = (c + (each - c) * RADIUS_M / apart_m for c, each in zip(nearest, (x, y), strict=True))
+        self.frame.x_m += x - self.at[0]
+        self.frame.y_m += y - self.at[1]
+        self.at = x, y
+        self._read()
+
+    def _read(self) -> None:
+        self.frame.seen = {
+            node: bearing(self.at, there) for node, there in ROBOTS.items() if math.dist(self.at, there) < 1.0
+        }
+        nearest = self._nearest(self.at)
+        normal_rad = bearing(self.at, nearest)
+        is_near = math.dist(self.at, nearest) < RADIUS_M + 0.01
+        switches = (self._switches_rad + number * SWITCH_RAD for number in range(12))
+        self.frame.touched = tuple(
+            each for each in switches if is_near and abs(math.remainder(each - normal_rad, math.tau)) < CLOSED_RAD
+        )
+
+    def _nearest(self, here: tuple[float, float]) -> tuple[float, float]:
+        there = shapely.shortest_line(self._thing, shapely.Point(here)).coords[0]
+        return float(there[0]), float(there[1])
+
+
+def bearing(here: tuple[float, float], there: tuple[float, float]) -> float:
+    return math.atan2(there[1] - here[1], there[0] - here[0])
+
+
+def end_of_move(robot: BesideCorner, hop_m: float) -> tuple[float, float]:
+    """Return the place [m] where a move to the goal ends, `hop_m` away by the memory of the slot."""
+    landmarks = [Landmark(node, bearing(GOAL, there), True) for node, there in ROBOTS.items()]
+    for velocity in move(robot, bearing(START, GOAL), hop_m, landmarks):
+        robot.go(velocity)
+    return robot.at
+
+
+@pytest.mark.parametrize("switches_deg", [0.0, 25.0])
+def test_a_robot_that_a_corner_stops_passes_it_on_its_straight_way(switches_deg: float) -> None:
+    """The bearings alone lead it to the wall beside the corner."""
+    robot = BesideCorner(CORNER, 0.0, math.radians(switches_deg))
+    assert math.dist(end_of_move(robot, math.dist(START, GOAL)), GOAL) < 0.05
+
+
+def test_a_robot_that_stands_far_from_its_slot_moves_there_in_short_steps() -> None:
+    """Bearings show the direction of a goal, and not how far it is: one long step could end out of sight."""
+    end = end_of_move(BesideCorner(CORNER, math.pi / 72, 0.0, STOPPED), 0.0)
+    assert math.dist(end, STOPPED) < 0.5
+    assert math.dist(end, GOAL) < 0.2
