@@ -29,7 +29,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Waypoint,
 )
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
-from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, FEEL_M, IDLE_LEGS_MAX, LEG_M
+from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, FEEL_M, FIRST_HOP_M, IDLE_LEGS_MAX, LEG_M
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
 from zwerm.coordinator.sensor_coverage.sources import Sources
@@ -46,8 +46,6 @@ AXIS_BEARINGS_RAD: Final = tuple(math.radians(each) for each in (180, -90, 90, 0
 LINE_POINTS_MIN: Final = 4
 LINE_OFF_M: Final = 0.02
 LINE_ALONG_M: Final = 0.1
-# Longest way [m] of a station's first robot to a wall.
-FIRST_HOP_M: Final = 0.95
 # Rays to a robot that must differ by this [rad] to determine its distance.
 RAYS_RAD_MIN: Final = 0.3
 

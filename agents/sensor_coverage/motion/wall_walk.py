@@ -50,6 +50,8 @@ SAME_WALL_RAD: Final = math.radians(35.0)
 CORNER_RAD: Final = math.radians(125.0)
 # Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
 LEG_M: Final = 3.0
+# Longest way [m] of a station's first robot to a wall.
+FIRST_HOP_M: Final = 0.95
 # Number of consecutive legs that closed nothing after which a walk ends.
 IDLE_LEGS_MAX: Final = 2
 
@@ -142,6 +144,24 @@ class WallWalk:
             self._trail.append(motion.position)
             near.append(self._near_point())
         return WalkResult(STRETCH, done, touched, near=arcs_around(start, near, hand, motion.radius_m))
+
+    def away_from(
+        self, station: int, bearings_rad: Iterable[float], hop_m: float, clear_m: float, margin_m: float
+    ) -> DriveToWalk:
+        """Follow the walls that are met along these bearings, one after the other, as far as a station is in sight.
+
+        Ends as `along` does, with the first way that is longer than `clear_m`, or with the last one.
+        """
+        walked = WalkResult(SHUT)
+        for bearing in bearings_rad:
+            yield from self.to_wall(bearing, hop_m, 0.0, 0.0, -1)
+            for hand in (1, -1):
+                walked = yield from self.along(hand, LEG_M, (station,), (), margin_m)
+                if walked.end == LOST:
+                    break
+            if walked.driven_m > clear_m:
+                break
+        return walked
 
     def along(
         self, hand: int, length_m: float, keep: Collection[int], meet: Collection[int], margin_m: float

@@ -1,7 +1,7 @@
 """One decentralised robot's situation, which its components share: readings, activity, local map, and mailbox."""
 
 import math
-from collections.abc import Callable, Collection, Generator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -18,6 +18,7 @@ from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult, DriveTo
 from zwerm.agents.sensor_coverage.motion.wall_walk import (
     CLEAR_M,
     FEEL_M,
+    FIRST_HOP_M,
     LEG_M,
     DriveToWalk,
     WalkResult,
@@ -214,6 +215,11 @@ class Situation:
     def follow_wall(self, hand: int, keep: Collection[int]) -> None:
         """Begin to follow the wall in touch, in sight of a robot of `keep`, or of any robot if `keep` is empty."""
         self._drive(self.wall_walk.along(hand, LEG_M, keep, (), self.motion.parameters.margin_m))
+
+    def leave_station(self, station: int, bearings_rad: Iterable[float]) -> None:
+        """Begin to follow the walls that are met along these bearings, as far as the station is in sight."""
+        walk, margin_m = self.wall_walk, self.motion.parameters.margin_m
+        self._drive(walk.away_from(station, bearings_rad, FIRST_HOP_M, CLEAR_M, margin_m))
 
     def stand(self) -> None:
         """End a drive: the robot stands still, for neighbours to average its bearing."""

@@ -38,8 +38,8 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     TakeSlot,
 )
 from zwerm.agents.sensor_coverage.motion.push_drives import AHEAD_RAD, DriveResult
-from zwerm.agents.sensor_coverage.motion.push_geometry import direction_to
-from zwerm.agents.sensor_coverage.motion.wall_walk import WalkResult
+from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
+from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
@@ -196,6 +196,10 @@ class TokenPush(PushPart, WallPush):
             del self._first_bearings[0]
             self._deploy()
             return
+        elif self._first_bearings and self._map.parameters.walls == "followed" and self._back is not None:
+            self._enter("leaving")
+            self._situation.leave_station(self._back, FIRST_BEARINGS_RAD)
+            return
         self._situation.stand()
         self.close(PushAborted(self.id, True))
 
@@ -213,6 +217,16 @@ class TokenPush(PushPart, WallPush):
         row = [node for node in dead if angle_between(seen[node], bearing_rad) < BODY_BESIDE_RAD]
         at_wall = body in dead and away_rad < AHEAD_RAD and len(row) <= PUSHED_MAX
         return None if at_wall else body
+
+    def _left_station(self, result: WalkResult) -> None:
+        """Stand at the new slot where the first robot got away from the base along a wall, or end the push."""
+        if result.driven_m > CLEAR_M:
+            self._map.occupy(self._fresh)
+            self._map.heading = 0.0
+            self._settled()
+        else:
+            self._situation.stand()
+            self.close(PushAborted(self.id, True))
 
     def _find_anchors(self) -> tuple[Sighting, ...]:
         """Return the robots that determine the leader's distance, with their approximate bearings."""
@@ -359,6 +373,7 @@ PHASES: Final[Mapping[str, Phase]] = {
     "holding": Phase(((TokenPush._may_offer, TokenPush._offer),), wake=TokenPush._next_tick),
     "offering": Phase(),
     "deploying": Phase(arrived=TokenPush._deployed),
+    "leaving": Phase(arrived=TokenPush._left_station),
     "approaching": Phase(arrived=TokenPush._approached),
     "out": Phase(((TokenPush._settled_behind, TokenPush._go_on),), wake=TokenPush._wake_for_behind),
     "walking": Phase(arrived=TokenPush._walked),

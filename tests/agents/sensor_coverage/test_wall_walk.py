@@ -173,6 +173,14 @@ def test_robots_without_a_coordinator_miss_the_door_by_the_rules_of_the_paper() 
     assert result.metrics["falsely_completed"] == 1.0
 
 
+def test_robots_without_a_coordinator_leave_a_niche() -> None:
+    """No straight drive of a whole hop leads out of it: the first robot follows the wall."""
+    niche = "arena.polygon=[[0,0],[0.24,0],[0.24,0.3],[0.6,0.3],[0.6,-0.4],[1.4,-0.4],[1.4,0.54],[0,0.54]]"
+    settings = (niche, "base.pose=[0.12,0.1,0.4]", "robots.count=20", "services.path=gradient")
+    result = run("sensor-coverage-narrow", 101, "inline", (*settings, "time.duration_s=300.0"))
+    assert result.metrics["reachable_coverage_fraction"] > 0.99
+
+
 @pytest.mark.parametrize("heading_deg", [16.1, 71.2, 79.7, -146.4])
 def test_the_first_robot_goes_away_from_a_wall_at_a_right_angle(heading_deg: float) -> None:
     """So the lattice is parallel to the wall, whatever the heading of the station."""
