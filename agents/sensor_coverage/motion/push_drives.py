@@ -14,6 +14,7 @@ from zwerm.agents.sensor_coverage.motion.homing import Vector, slide, unit
 from zwerm.agents.sensor_coverage.motion.landmark_target import TargetPoint, target_point
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Locomotion
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
+from zwerm.agents.sensor_coverage.motion.wall_heading import PRESS_RAD, TURN_RAD, swept
 from zwerm.wire.messages import BodyVelocity
 
 # A contact within this angle of the heading is ahead.
@@ -32,6 +33,9 @@ NOISY_STEP_M: Final = 0.1
 STOPPED_M: Final = 0.15
 # It is in touch with the wall if it was so in one of this many ticks: it may bounce.
 TOUCH_TICKS: Final = 3
+# If a wall stops that way, too, the robot follows the wall for this many ticks, until it is nearer to the goal by this [m].
+CORNER_TICKS: Final = 12
+CORNER_NEARER_M: Final = 0.1
 # A move drives back after this many ticks without a visible robot.
 LOST_TICKS: Final = 20
 # Fraction of the offset to drive in the second half of a move.
@@ -127,6 +131,12 @@ def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequen
         x, y = slide(gain * target.x, gain * target.y, frame.touched)
         if passing.by_odometry(_offset(motion, goal), target.distance_m, math.hypot(x, y) < p.tolerance_m):
             x, y = slide(*_offset(motion, goal), frame.touched)
+            if math.hypot(x, y) < p.tolerance_m:
+                passing.stop(_offset(motion, goal), target.distance_m)
+        if passing.is_stopped and hop_m > 0.0:
+            passing.is_stopped = False
+            yield from _round_corner(motion, goal)
+            continue
         if math.hypot(x, y) < p.tolerance_m:
             break  # a wall is in the way
         yield motion.velocity(x, y)
@@ -145,6 +155,7 @@ class _Passing:
         self._motion = motion
         self._nearest_m = math.inf
         self._stuck = self._untouched = 0
+        self.is_stopped = False  # a wall stops the way by odometry, too
         self._ways = 0  # 1 while the move goes on by odometry, 2 after that
 
     def by_odometry(self, by_odometry: Vector, target_m: float, stopped: bool) -> bool:
@@ -159,7 +170,7 @@ class _Passing:
         self._untouched = 0 if self._motion.frame.touched else self._untouched + 1
         is_stuck = self._stuck > STUCK_TICKS
         if self._ways == 1 and (is_stuck or away_m < NOISY_NEAR_M):
-            self._ways = 2
+            self.stop(by_odometry, target_m)
         elif (
             self._ways == 0
             and (is_stuck or stopped)
@@ -168,6 +179,32 @@ class _Passing:
         ):
             self._ways, self._stuck = 1, 0
         return self._ways == 1
+
+    def stop(self, by_odometry: Vector, target_m: float) -> None:
+        """Go on by odometry no more: the goal is near, or a wall stops this way, too."""
+        self._ways = 2
+        self.is_stopped = min(target_m, math.hypot(*by_odometry)) > STOPPED_M
+
+
+def _round_corner(motion: Locomotion, goal: Vector) -> Generator[BodyVelocity, None, None]:
+    """Follow the wall in touch with either hand, until the goal [m] is nearer by odometry; else return."""
+    frame, start = motion.frame, motion.position
+    start_m = math.hypot(*_offset(motion, goal))
+    for hand in (1, -1):
+        x, y = _offset(motion, goal)
+        wall_rad = math.atan2(y, x)
+        for _ in range(CORNER_TICKS):
+            if math.hypot(*_offset(motion, goal)) < start_m - CORNER_NEARER_M:
+                return
+            if frame.contacts:
+                heading = swept(wall_rad, frame.contacts, hand)
+                wall_rad = heading + hand * (math.pi / 2.0 - PRESS_RAD)
+            else:
+                wall_rad += hand * TURN_RAD
+                heading = wall_rad - hand * (math.pi / 2.0 - PRESS_RAD)
+            ux, uy = unit(heading)
+            yield motion.velocity(ux * motion.step_m, uy * motion.step_m)
+        yield from motion.drive_to(start)
 
 
 def _approach(

@@ -14,12 +14,9 @@ from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
+from zwerm.agents.sensor_coverage.motion.wall_heading import PRESS_RAD, TURN_RAD, swept
 from zwerm.wire.messages import BodyVelocity
 
-# The robot drives this much towards the wall, so that it stays in touch; half a switch's sector is 15 degrees.
-PRESS_RAD: Final = math.radians(20.0)
-# Turn towards the hand in each tick without a contact: a step of 0.05 m about a corner at a body's radius of 0.07 m.
-TURN_RAD: Final = math.radians(40.0)
 # The robot is lost in free space after so much turning without a contact.
 TURNS_RAD_MAX: Final = 3.0 * math.tau
 # A contact within this angle of the heading stops the way to the wall. It is less than the angle that a touched wall
@@ -338,29 +335,6 @@ def _between(start: Vector, a: Vector, b: Vector) -> tuple[float, float]:
     """Return the direction [rad] of a point from the start, and the angle from there to another point."""
     first, second = (math.atan2(y - start[1], x - start[0]) for x, y in (a, b))
     return first, math.remainder(second - first, math.tau)
-
-
-def swept(wall_rad: float, contacts: Sequence[Touched], hand: int) -> float:
-    """Return the heading [rad] that turns most towards the hand and that no contact blocks.
-
-    The sweep begins at the direction of the wall and turns away from the hand. A contact blocks the directions within
-    a right angle of it, less PRESS_RAD at a wall.
-    """
-    heading, turned = wall_rad, 0.0
-    for _ in range(2 * len(contacts) + 1):
-        jump = 0.0
-        for each in contacts:
-            limit = math.pi / 2.0 - (PRESS_RAD if each.node is None else 0.0)
-            off = math.remainder(each.bearing_rad - heading, math.tau)
-            if abs(off) < limit - 1e-6:
-                jump = max(jump, limit - hand * off)
-        if jump <= 0.0:
-            break
-        heading -= hand * jump
-        turned += jump
-        if turned > math.tau:
-            break
-    return heading
 
 
 def _hands(contacts: Iterable[Touched]) -> tuple[object, ...]:

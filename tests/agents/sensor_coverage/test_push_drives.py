@@ -10,6 +10,7 @@ from zwerm.agents.runtime.contract import Body, Setup
 from zwerm.agents.sensor_coverage.messages.commands import Landmark
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
+from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
 from zwerm.agents.sensor_coverage.motion.push_drives import move
 from zwerm.wire.messages import BodyVelocity
 
@@ -64,6 +65,7 @@ class BesideCorner(Locomotion):
         self.frame.touched = tuple(
             each for each in switches if is_near and abs(math.remainder(each - normal_rad, math.tau)) < CLOSED_RAD
         )
+        self.frame.contacts = tuple(Touched(each, None) for each in self.frame.touched)
 
     def _nearest(self, here: tuple[float, float]) -> tuple[float, float]:
         there = shapely.shortest_line(self._thing, shapely.Point(here)).coords[0]
@@ -94,3 +96,14 @@ def test_a_robot_that_stands_far_from_its_slot_moves_there_in_short_steps() -> N
     end = end_of_move(BesideCorner(CORNER, math.pi / 72, 0.0, STOPPED), 0.0)
     assert math.dist(end, STOPPED) < 0.5
     assert math.dist(end, GOAL) < 0.2
+
+
+@pytest.mark.parametrize("switches_deg", [0.0, 25.0])
+def test_a_robot_goes_round_a_corner_on_its_straight_way(switches_deg: float) -> None:
+    start, goal = (1.55, 1.79), (1.1, 2.46)
+    robot = BesideCorner(CORNER, 0.0, math.radians(switches_deg), start)
+    for velocity in move(
+        robot, bearing(start, goal), math.dist(start, goal), [Landmark(13, bearing(goal, START), True)]
+    ):
+        robot.go(velocity)
+    assert math.dist(robot.at, goal) < 0.05

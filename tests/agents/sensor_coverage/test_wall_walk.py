@@ -10,7 +10,8 @@ from zwerm.agents.sensor_coverage.messages.commands import SHUT
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
-from zwerm.agents.sensor_coverage.motion.wall_walk import WEDGED_TICKS, NearPoint, WallWalk, arcs_around, swept
+from zwerm.agents.sensor_coverage.motion.wall_heading import swept
+from zwerm.agents.sensor_coverage.motion.wall_walk import WEDGED_TICKS, NearPoint, WallWalk, arcs_around
 from zwerm.run.runner import run
 from zwerm.wire.messages import BodyVelocity
 
