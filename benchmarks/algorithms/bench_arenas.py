@@ -3,8 +3,8 @@
 A run is *right* if it is `completed` with a reachable coverage of at least 0.98, and *false* if it is `completed` with
 less. Every other run ended as `failed`, with its reason, at the time limit, or in a traceback.
 
-    python benchmarks/bench_arenas.py --arenas folder --rows rows.csv --variant central decentralised
-    python benchmarks/bench_arenas.py --arenas folder --rows rows.csv --faults one-by-one at-once base restart --part 1 2
+    python -m benchmarks.algorithms.bench_arenas --arenas folder --rows rows.csv --variant central decentralised
+    python -m benchmarks.algorithms.bench_arenas --arenas folder --faults one-by-one at-once base restart --part 1 2
 
 The files are named KIND-NUMBER.toml. Numbers are the slowest index and kinds the fastest, so that a part of a campaign is a
 fair sample. The seed of a run is 100 and the number: it draws the place and the heading of the base, and all noise.
@@ -22,15 +22,16 @@ import re
 import subprocess
 import time
 import traceback
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from statistics import mean
 from typing import Final
 
 import msgspec
-from campaign import add_campaign_options, carry_out
-from csv_rows import write_csv
 
+from benchmarks.common.campaign import add_campaign_options, carry_out
+from benchmarks.common.csv_rows import write_csv
 from zwerm import run
 from zwerm.scenario.load import load
 
@@ -47,7 +48,7 @@ FAULTS: Final = {
     "none": "",
     "one-by-one": ",".join([DEATH] * 4),
     "at-once": f'{{kind="crash", fraction=0.1, between_s=[10.0, {LATEST_S}]}}',
-    "base": '{kind="bench_deaths:CrashBesideBase", at_s=AT}',
+    "base": '{kind="benchmarks.algorithms.bench_deaths:CrashBesideBase", at_s=AT}',
     "restart": f'{{kind="crash", fraction=0.001, between_s=[10.0, {LATEST_S}], for_s=10.0}}',
 }
 AND_LOSS: Final = "-and-loss"
@@ -145,8 +146,9 @@ def commit_now() -> str:
 
 
 def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
-    """Return one row for each variant, kind of arena and noise; with faults, for each variant and kind of faults."""
-    columns = ("variant", "faults") if any(row["faults"] != "none" for row in rows) else ("variant", "kind", "noise")
+    """Return one row for each commit, variant, kind of arena and noise; with faults, for each commit, variant and faults."""
+    with_faults = any(row["faults"] != "none" for row in rows)
+    columns = ("variant", "commit", *(("faults",) if with_faults else ("kind", "noise")))
     groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
     for row in rows:
         groups.setdefault(tuple(row[each] for each in columns), []).append(row)
@@ -159,11 +161,18 @@ def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
             f"coverage of {ENOUGH:g} or more": str(sum(float(row["reachable_coverage"]) >= ENOUGH for row in group)),
             f"coverage of {WELL:g} or more": str(sum(float(row["reachable_coverage"]) >= WELL for row in group)),
             "least coverage": min(row["reachable_coverage"] for row in group),
+            "ended with": _reasons(group),
             "robots over packing": f"{mean(float(row['robots_over_hexagonal']) for row in group):.2f}",
             "duration [s]": f"{mean(float(row['duration_s']) for row in group):.0f}",
         }
         for key, group in sorted(groups.items())
     ]
+
+
+def _reasons(group: Sequence[dict[str, str]]) -> str:
+    """Return the reasons of the runs that failed, with their numbers."""
+    found = Counter(row["reason"].split(": ")[1] for row in group if row["verdict"] == "failed")
+    return ", ".join(f"{count} {reason}" for reason, count in sorted(found.items()))
 
 
 def main() -> None:
