@@ -59,6 +59,7 @@ def test_the_result_is_printed_although_a_hang_up_comes_while_robots_leave(tmp_p
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # `nohup` ignores it, also for its children
     ) as running:
         until(lambda: record.exists() and record.read_bytes()[99:].endswith(MCAP_END), "the run ends")
         running.send_signal(signal.SIGHUP)
