@@ -19,25 +19,21 @@ With `--rows FILE` each run is stored when it ends, and runs that are stored are
 import argparse
 import math
 import re
-import subprocess
 import time
 import traceback
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from statistics import mean
 from typing import Final
 
 import msgspec
 
-from benchmarks.common.campaign import add_campaign_options, carry_out
+from benchmarks.algorithms.bench_buildings import ENOUGH, VARIANTS, numbers_of
+from benchmarks.common.campaign import add_campaign_options, carry_out, commit_of_copy, grouped
 from benchmarks.common.csv_rows import write_csv
 from zwerm import run
 from zwerm.scenario.load import load
 
-ENOUGH: Final = 0.98
-WELL: Final = 0.99
-VARIANTS: Final = {"central": (), "decentralised": ("services.path=gradient",)}
 NOISES_RAD: Final = {"0": 0.0, "pi/72": math.pi / 72}
 ALTERNATE: Final = "alternate"
 FIRST_SEED: Final = 100
@@ -110,7 +106,7 @@ def one_run(case: Case, folder: Path, more: Sequence[str]) -> dict[str, str]:
     if case.variant == "central" and case.faults != "none":
         settings.append(f"coordinator.parameters.watch_until_s={LATEST_S + 20.0}")
     given = load(str(path), tuple(settings)).robots.count
-    row = {**msgspec.structs.asdict(case), "seed": str(seed), "commit": commit_now(), "robots_given": str(given)}
+    row = {**msgspec.structs.asdict(case), "seed": str(seed), "commit": commit_of_copy(), "robots_given": str(given)}
     began, cpu = time.perf_counter(), time.process_time()
     try:
         result = run(path, seed=seed, runner="inline", overrides=settings)
@@ -139,33 +135,18 @@ def drawn_time_s(seed: int) -> float:
     return round(10.0 + (LATEST_S - 10.0) * (seed * (math.sqrt(5.0) - 1.0) / 2.0 % 1.0), 1)
 
 
-def commit_now() -> str:
-    """Return the commit of this copy of the code."""
-    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--exclude=*"]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
-
-
 def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
     """Return one row for each commit, variant, kind of arena and noise; with faults, for each commit, variant and faults."""
     with_faults = any(row["faults"] != "none" for row in rows)
     columns = ("variant", "commit", *(("faults",) if with_faults else ("kind", "noise")))
-    groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
-    for row in rows:
-        groups.setdefault(tuple(row[each] for each in columns), []).append(row)
     return [
         {
             **dict(zip(columns, key, strict=True)),
-            "runs": str(len(group)),
-            "completed": str(sum(row["verdict"] in ("right", "false") for row in group)),
-            "completed falsely": str(sum(row["verdict"] == "false" for row in group)),
+            **numbers_of(group),
             f"coverage of {ENOUGH:g} or more": str(sum(float(row["reachable_coverage"]) >= ENOUGH for row in group)),
-            f"coverage of {WELL:g} or more": str(sum(float(row["reachable_coverage"]) >= WELL for row in group)),
-            "least coverage": min(row["reachable_coverage"] for row in group),
             "ended with": _reasons(group),
-            "robots over packing": f"{mean(float(row['robots_over_hexagonal']) for row in group):.2f}",
-            "duration [s]": f"{mean(float(row['duration_s']) for row in group):.0f}",
         }
-        for key, group in sorted(groups.items())
+        for key, group in sorted(grouped(rows, *columns).items())
     ]
 
 

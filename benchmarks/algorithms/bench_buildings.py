@@ -22,7 +22,7 @@ from typing import Final
 
 import msgspec
 
-from benchmarks.common.campaign import add_campaign_options, carry_out
+from benchmarks.common.campaign import add_campaign_options, carry_out, grouped
 from benchmarks.common.csv_rows import write_csv
 from tests.helpers.random_buildings import KINDS, random_building
 from zwerm import run
@@ -96,24 +96,16 @@ def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
     """Return one row for each variant, kind of building and noise; with faults, for each variant and kind of faults."""
     if any(row["faults"] != "none" for row in rows):
         return [
-            {"variant": variant, "faults": faults, **_numbers(group)}
-            for (variant, faults), group in sorted(_grouped(rows, "variant", "faults").items())
+            {"variant": variant, "faults": faults, **numbers_of(group)}
+            for (variant, faults), group in sorted(grouped(rows, "variant", "faults").items())
         ]
     return [
-        {"variant": variant, "building": kind, "noise of bearings [rad]": noise, **_numbers(group)}
-        for (variant, kind, noise), group in sorted(_grouped(rows, "variant", "kind", "noise_rad").items())
+        {"variant": variant, "building": kind, "noise of bearings [rad]": noise, **numbers_of(group)}
+        for (variant, kind, noise), group in sorted(grouped(rows, "variant", "kind", "noise_rad").items())
     ]
 
 
-def _grouped(rows: Sequence[dict[str, str]], *columns: str) -> dict[tuple[str, ...], list[dict[str, str]]]:
-    """Return the rows by their values in some columns."""
-    groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
-    for row in rows:
-        groups.setdefault(tuple(row[each] for each in columns), []).append(row)
-    return groups
-
-
-def _numbers(group: Sequence[dict[str, str]]) -> dict[str, str]:
+def numbers_of(group: Sequence[dict[str, str]]) -> dict[str, str]:
     """Return what a table says about a group of runs."""
     return {
         "runs": str(len(group)),

@@ -16,7 +16,6 @@ carried out in parts. Kinds of faults, halls and losses alternate, so each part 
 """
 
 import argparse
-import subprocess
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
@@ -24,7 +23,7 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
-from benchmarks.common.campaign import add_campaign_options, carry_out
+from benchmarks.common.campaign import add_campaign_options, carry_out, commit_of_copy, grouped
 from benchmarks.common.csv_rows import write_csv
 from zwerm import RunResult, run
 from zwerm.scenario.tables import Scenario
@@ -148,16 +147,13 @@ def one_run(case: Case, more: Sequence[str]) -> dict[str, str]:
         "reason": result.reason,
         "faults_missed": f"{found['faults_missed']:g}",
         "schedule": tables,
-        "commit": _commit(),
+        "commit": commit_of_copy(),
         "cpu_s": f"{time.process_time() - began:.1f}",
     }
 
 
 def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
     """Return one row for each variant, hall, kind of schedule and loss: how many runs were right, honest or wrong."""
-    groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
-    for row in rows:
-        groups.setdefault((row["variant"], row["hall"], row["faults"], row["loss"]), []).append(row)
     return [
         {
             "variant": variant,
@@ -170,15 +166,8 @@ def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
             "mean duration [s]": f"{np.mean([float(row['duration_s']) for row in group]):.0f}",
             "faults too late": str(sum(row["faults_missed"] != "0" for row in group)),
         }
-        for (variant, hall, kind, loss), group in sorted(groups.items())
+        for (variant, hall, kind, loss), group in sorted(grouped(rows, "variant", "hall", "faults", "loss").items())
     ]
-
-
-def _commit() -> str:
-    done = subprocess.run(
-        ["git", "describe", "--always", "--dirty", "--exclude=*"], capture_output=True, text=True, check=False
-    )
-    return done.stdout.strip()
 
 
 def _toml(value: Any) -> str:

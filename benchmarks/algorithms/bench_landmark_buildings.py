@@ -19,7 +19,7 @@ from typing import Final
 
 import msgspec
 
-from benchmarks.common.campaign import add_campaign_options, carry_out
+from benchmarks.common.campaign import add_campaign_options, carry_out, grouped
 from benchmarks.common.csv_rows import write_csv
 from tests.helpers.random_buildings import KINDS, random_building
 from zwerm import run
@@ -81,9 +81,6 @@ def one_run(case: Case, area: float, more: Sequence[str]) -> dict[str, str]:
 
 def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
     """Return one row for each kind of building and variant."""
-    groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
-    for row in rows:
-        groups.setdefault((row["building"], row["variant"]), []).append(row)
     return [
         {
             "building": building,
@@ -97,7 +94,7 @@ def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
             "holes equal obstacles": str(sum(row["holes"] == row["obstacles"] for row in group)),
             "iterations": f"{mean(float(row['iterations']) for row in group):.0f}",
         }
-        for (building, variant), group in sorted(groups.items())
+        for (building, variant), group in sorted(grouped(rows, "building", "variant").items())
     ]
 
 

@@ -18,7 +18,7 @@ from unittest.mock import patch
 import msgspec
 import numpy as np
 
-from benchmarks.common.campaign import add_campaign_options, carry_out
+from benchmarks.common.campaign import add_campaign_options, carry_out, grouped
 from benchmarks.common.csv_rows import write_csv
 from zwerm import RunResult, run
 from zwerm.agents.landmark_exploration import Explorer
@@ -27,7 +27,13 @@ from zwerm.agents.landmark_exploration.mapping.landmark_map import LandmarkMap
 from zwerm.agents.landmark_exploration.sharing.replica import Stretch
 from zwerm.maths.statistics import condense
 from zwerm.world.arena.scatter import with_landmarks
-from zwerm.world.metrics.landmark_exploration import PLACES_PER_RANGE, MapCompletion, landmark_range_m, visible
+from zwerm.world.metrics.landmark_exploration import (
+    PLACES_PER_RANGE,
+    MapCompletion,
+    landmark_range_m,
+    places_in,
+    visible,
+)
 
 SETTINGS: Final = ("services.map=gossip", "services.assignment=claims", "time.duration_s=2000")
 RANGES: Final = {"whole hall": (), "0.7 r": ("radio.range_m=0.7",)}
@@ -100,12 +106,8 @@ def completion(result: RunResult, seed: int, recorder: Recorder) -> dict[str, st
     whole, once = (MapCompletion(arena, landmarks, range_m) for _ in range(2))
     whole.add({seen for seen, _, _ in recorder.log})
     once.add({seen for seen, repeated, _ in recorder.log if not repeated})
-    xmin, ymin, xmax, ymax = arena.bounds
-    step_m = range_m / PLACES_PER_RANGE
-    x, y = np.meshgrid(np.arange(xmin + step_m / 2.0, xmax, step_m), np.arange(ymin + step_m / 2.0, ymax, step_m))
-    places = np.column_stack([x.ravel(), y.ravel()])
     frontiers, complex_ = recorder.map.frontiers, recorder.map.complex
-    left = [seen for seen in visible(arena, landmarks, range_m, places[arena.contains(places)]) if seen]
+    left = [seen for seen in visible(arena, landmarks, range_m, places_in(arena, range_m / PLACES_PER_RANGE)) if seen]
     left = [seen for seen in left if not complex_.contains(seen)]
     open_ = [seen for seen in left if any(frontiers.status(a, b) == UNKNOWN for a in seen for b in seen if a != b)]
     return {
@@ -133,9 +135,7 @@ def one_run(case: Case, more: Sequence[str]) -> dict[str, str]:
 
 def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
     """Return one row for each hall, range and rule."""
-    groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
-    for row in rows:
-        groups.setdefault((row["hall"], row["radio"], row["idle"]), []).append(row)
+    groups = grouped(rows, "hall", "radio", "idle")
 
     def spread(group: Sequence[dict[str, str]], column: str, digits: int) -> str:
         found = condense([float(row[column]) for row in group])

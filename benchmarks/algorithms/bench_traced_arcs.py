@@ -14,7 +14,7 @@ from msgspec import Struct
 from shapely.geometry import Point, Polygon, box
 
 from benchmarks.algorithms.bench_robot_teams import DRAWN, scenario
-from benchmarks.common.campaign import add_campaign_options, carry_out
+from benchmarks.common.campaign import add_campaign_options, carry_out, grouped
 from benchmarks.common.csv_rows import write_csv
 from tests.helpers.random_arenas import BODY_M, ORIGIN_M, SPACING_M
 from zwerm.agents.robot_teams.mapping.facts import TracedArc
@@ -81,9 +81,6 @@ def main() -> None:
     seeds = range(asked.seeds[0], asked.seeds[1] + 1)
     cases = [Case(arena, robots, str(seed)) for arena in asked.arenas for robots in asked.robots for seed in seeds]
     rows = carry_out(asked, cases, measure)
-    groups: dict[tuple[str, str], list[dict[str, str]]] = {}
-    for row in rows:
-        groups.setdefault((row["arena"], row["robots"]), []).append(row)
     summary = [
         {
             "arena": arena,
@@ -93,7 +90,7 @@ def main() -> None:
             "traced arcs": str(sum(int(row["arcs"]) for row in runs)),
             "wrong": str(sum(int(row["wrong_arcs"]) for row in runs)),
         }
-        for (arena, robots), runs in groups.items()
+        for (arena, robots), runs in grouped(rows, "arena", "robots").items()
     ]
     for row in summary:
         print(*row.values(), sep="\t")

@@ -1,8 +1,9 @@
-"""Campaigns of runs that are carried out in parts: their options, and the loop over the runs that are not stored yet."""
+"""Campaigns of runs that are carried out in parts: options, the loop over runs that are not stored yet, groups of rows."""
 
 import argparse
+import subprocess
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -42,3 +43,17 @@ def carry_out(
             append_row(asked.rows, rows[-1])
             print(*rows[-1].values(), sep="\t", flush=True)
     return rows
+
+
+def grouped(rows: Sequence[dict[str, str]], *columns: str) -> dict[tuple[str, ...], list[dict[str, str]]]:
+    """Return the rows by their values in some columns."""
+    groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[each] for each in columns), []).append(row)
+    return groups
+
+
+def commit_of_copy() -> str:
+    """Return the commit of this copy of the code, marked where files differ from it; "" outside a repository."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--exclude=*"]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
