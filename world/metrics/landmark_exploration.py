@@ -39,7 +39,7 @@ class MapCompletion:
     """The places that the complex does not cover yet; a new simplex never uncovers a place."""
 
     def __init__(self, arena: Arena, landmarks: Floats, range_m: float) -> None:
-        places = _places(arena, range_m / PLACES_PER_RANGE)
+        places = places_in(arena, range_m / PLACES_PER_RANGE)
         self.places = len(places)
         self._covered = 0
         # By the smallest landmark of a set: a bit for each landmark seen together with it, and the number of places of each set
@@ -74,7 +74,8 @@ class MapCompletion:
         return self._covered / self.places if self.places else 0.0
 
 
-def _places(arena: Arena, spacing_m: float) -> Floats:
+def places_in(arena: Arena, spacing_m: float) -> Floats:
+    """Return the places (n, 2) of a square grid that are in free space."""
     xmin, ymin, xmax, ymax = arena.bounds
     x, y = np.meshgrid(
         np.arange(xmin + spacing_m / 2.0, xmax, spacing_m), np.arange(ymin + spacing_m / 2.0, ymax, spacing_m)

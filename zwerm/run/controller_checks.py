@@ -9,7 +9,7 @@ from zwerm.errors import ScenarioError
 from zwerm.run.hang_guard import constructors_guarded
 
 
-def check_controllers(specs: Mapping[int, tuple[str, Setup]], trusted: bool = True) -> None:
+def try_controllers(specs: Mapping[int, tuple[str, Setup]], trusted: bool = True) -> None:
     """Check the controller of each node by `specs`, its name and its setup; make one of each kind if they are `trusted`.
 
     Raises ScenarioError for a controller in the program itself, which the processes of robots do not run, and

@@ -18,7 +18,7 @@ from zwerm.link import NodeProcesses, WorldLink
 from zwerm.link.memory import MemoryLink
 from zwerm.record.history import History
 from zwerm.run.assembly import assemble_run, observers_of
-from zwerm.run.controller_checks import check_controllers, make_again
+from zwerm.run.controller_checks import make_again, try_controllers
 from zwerm.run.denial_guard import DenialGuard
 from zwerm.run.hang_guard import constructors_guarded, hang_guard
 from zwerm.run.kept_result import KeptResult
@@ -104,7 +104,7 @@ def run(
         with hang_guard(scenario.time.straggler_s), _security(security_log, router=False) as security:
             guard = DenialGuard(security)
             return drive(world, link, seed, runner, realtime, watcher, record, link, metrics, guard)
-    check_controllers(members, trusted)
+    try_controllers(members, trusted)
     from zwerm.deploy.swarm import LocalSwarm  # not above: an inline run needs no transport
 
     with _security(security_log) as security:

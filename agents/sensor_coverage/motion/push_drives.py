@@ -14,7 +14,7 @@ from zwerm.agents.sensor_coverage.motion.homing import Vector, slide, unit
 from zwerm.agents.sensor_coverage.motion.landmark_target import TargetPoint, target_point
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Locomotion
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
-from zwerm.agents.sensor_coverage.motion.wall_heading import PRESS_RAD, TURN_RAD, swept
+from zwerm.agents.sensor_coverage.motion.wall_heading import hand_on_wall
 from zwerm.wire.messages import BodyVelocity
 
 # A contact within this angle of the heading is ahead.
@@ -196,12 +196,7 @@ def _round_corner(motion: Locomotion, goal: Vector) -> Generator[BodyVelocity, N
         for _ in range(CORNER_TICKS):
             if math.hypot(*_offset(motion, goal)) < start_m - CORNER_NEARER_M:
                 return
-            if frame.contacts:
-                heading = swept(wall_rad, frame.contacts, hand)
-                wall_rad = heading + hand * (math.pi / 2.0 - PRESS_RAD)
-            else:
-                wall_rad += hand * TURN_RAD
-                heading = wall_rad - hand * (math.pi / 2.0 - PRESS_RAD)
+            heading, wall_rad = hand_on_wall(wall_rad, frame.contacts, hand)
             ux, uy = unit(heading)
             yield motion.velocity(ux * motion.step_m, uy * motion.step_m)
         yield from motion.drive_to(start)

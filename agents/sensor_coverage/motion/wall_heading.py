@@ -12,6 +12,18 @@ PRESS_RAD: Final = math.radians(20.0)
 TURN_RAD: Final = math.radians(40.0)
 
 
+def hand_on_wall(wall_rad: float, contacts: Sequence[Touched], hand: int) -> tuple[float, float]:
+    """Return the heading [rad] of the next step with a hand on the wall at `wall_rad`, and the wall's direction [rad] then.
+
+    Without a contact the robot turns towards the hand, about a corner.
+    """
+    if contacts:
+        heading = swept(wall_rad, contacts, hand)
+        return heading, heading + hand * (math.pi / 2.0 - PRESS_RAD)
+    turned = wall_rad + hand * TURN_RAD
+    return turned - hand * (math.pi / 2.0 - PRESS_RAD), turned
+
+
 def swept(wall_rad: float, contacts: Sequence[Touched], hand: int) -> float:
     """Return the heading [rad] that turns most towards the hand and that no contact blocks.
 

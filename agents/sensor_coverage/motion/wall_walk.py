@@ -14,7 +14,7 @@ from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
-from zwerm.agents.sensor_coverage.motion.wall_heading import PRESS_RAD, TURN_RAD, swept
+from zwerm.agents.sensor_coverage.motion.wall_heading import TURN_RAD, hand_on_wall
 from zwerm.wire.messages import BodyVelocity
 
 # The robot is lost in free space after so much turning without a contact.
@@ -213,10 +213,8 @@ class WallWalk:
         """Return the velocity of the next step, and keep the direction of the wall."""
         motion, contacts = self._motion, self._motion.frame.contacts
         if not contacts:
-            self._wall_rad += hand * TURN_RAD
             self._blind_rad += TURN_RAD
             self._was_in_touch = False
-            heading = self._wall_rad - hand * (math.pi / 2.0 - PRESS_RAD)
         else:
             walls = [each.bearing_rad for each in contacts if each.node is None]
             if self._was_in_touch:
@@ -225,8 +223,7 @@ class WallWalk:
                 # There is no wall at the hand: the robot circles, and touches another wall once in each turn.
                 self._wall_rad = min(walls, key=lambda each: _apart(each, self._wall_rad))
             self._was_in_touch = True
-            heading = swept(self._wall_rad, contacts, hand)
-            self._wall_rad = heading + hand * (math.pi / 2.0 - PRESS_RAD)
+        heading, self._wall_rad = hand_on_wall(self._wall_rad, contacts, hand)
         ux, uy = unit(heading)
         return motion.velocity(ux * motion.step_m, uy * motion.step_m)
 
