@@ -16,6 +16,10 @@ def main() -> None:
             raise
         sys.stderr.write("zwerm: interrupted\n")
         sys.exit(130)
+    finally:
+        # Python ends itself by SIGINT, with another exit status, if an interrupt came while it executed a text, as libraries
+        # do to make classes, although it was handled. The next text that it executes undoes that.
+        exec("")
 
 
 if __name__ == "__main__":

@@ -151,6 +151,15 @@ def test_an_interrupt_while_the_program_is_still_loading_exits_130_without_a_tra
     assert not any("Traceback" in each for each in printed)
 
 
+def test_an_interrupt_while_a_library_makes_a_class_exits_130(tmp_path: Path) -> None:
+    (tmp_path / "typer.py").write_text("exec('raise KeyboardInterrupt')\n")
+    path = os.pathsep.join((str(tmp_path), str(ROOT)))
+    ran = subprocess.run(
+        [sys.executable, "-m", "zwerm", "list"], env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True
+    )
+    assert (ran.returncode, ran.stderr) == (130, "zwerm: interrupted\n")
+
+
 def test_a_failed_run_exits_1_and_prints_its_traceback_and_reason() -> None:
     running = start("run", "computation-free", "--inline", "--json", "--set", "robots.controller=troubled:Raises")
     out, err = running.communicate(timeout=60)
