@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 from network import free_port, tick
-from support import ROBOTS, ROOT, children_of, gone
+from support import ROBOTS, ROOT, children_of, gone, stop
 from waiting import until
 
 from zwerm.agents.runtime.contract import Setup
@@ -93,7 +93,7 @@ def test_the_error_names_the_node_that_does_not_join_in_time(nothing_left: None)
 def test_a_server_of_robots_that_does_not_answer_is_ended_and_named_and_another_one_starts(nothing_left: None) -> None:
     prepare(1)
     server: int = vars(forkserver)["_forkserver"]._forkserver_pid
-    os.kill(server, signal.SIGSTOP)
+    stop(server)
     with pytest.raises(LinkError, match=r"^the server that robots are forked from has ended or does not answer: "):
         LocalSwarm("run", members(2), deadline_s=1.0).__enter__()
     with LocalSwarm("run", members(2)) as swarm:
@@ -107,7 +107,7 @@ def test_a_swarm_whose_server_is_stopped_leaves_no_process(nothing_left: None, m
     with LocalSwarm("run", members(2)) as swarm:
         robots = set(swarm.supervisor.pids.values())
         server: int = vars(forkserver)["_forkserver"]._forkserver_pid
-        os.kill(server, signal.SIGSTOP)
+        stop(server)
     assert gone({server, *robots})
     assert sorted(swarm.supervisor.exit_codes) == [0, 1], "nothing waits for them when this program ends"
 
@@ -159,9 +159,7 @@ def test_a_router_of_other_hosts_that_takes_no_more_sessions_is_named(
 def test_the_failure_of_a_controller_arrives_and_its_process_exits_with_1(nothing_left: None) -> None:
     with LocalSwarm("run", {**members(2), 1: members(2, "small_controllers:Wordy")[1]}) as swarm:
         # The other node answers after everything else, as it may under load.
-        swarm.supervisor.send_signal(0, signal.SIGSTOP)
-        status = Path(f"/proc/{swarm.supervisor.pids[0]}/stat")
-        until(lambda: status.read_text().rpartition(")")[2].split()[0] == "T", "node 0 stopped")
+        stop(swarm.supervisor.pids[0])
         for node in range(2):
             swarm.link.send(node, encode(Observation(5, 0.0)))
         said, end = swarm.link.receive(20.0), swarm.link.receive(20.0)
@@ -240,7 +238,7 @@ def test_a_robot_exits_on_sigterm_and_ignores_sigint(nothing_left: None) -> None
 def test_hanging_and_paused_robots_are_killed_at_the_end_of_a_run(nothing_left: None) -> None:
     with LocalSwarm("run", {**members(3), 1: members(2, "small_controllers:Spins")[1]}) as swarm:
         swarm.link.send(1, encode(Observation(0, 0.0)))
-        swarm.supervisor.send_signal(2, signal.SIGSTOP)
+        stop(swarm.supervisor.pids[2])
         swarm.link.dismiss("over")
         swarm.supervisor.stop(0.5)
         assert swarm.supervisor.exit_codes == {0: 0, 1: -signal.SIGKILL, 2: -signal.SIGKILL}

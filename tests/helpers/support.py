@@ -2,10 +2,13 @@
 
 import importlib.util
 import os
+import signal
 import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+
+from waiting import until
 
 from zwerm.scenario.load import validate
 from zwerm.scenario.tables import Scenario
@@ -53,15 +56,23 @@ def robots_of_this_process() -> set[int]:
     return {robot for child in children_of(os.getpid()) for robot in children_of(child)}
 
 
+def state_of(pid: int) -> str:
+    """Return the letter by which the kernel calls a process's state, "" where it has ended and was waited for."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return ""
+
+
 def gone(pids: set[int]) -> bool:
     """Return whether all processes `pids` have ended; a zombie counts as ended."""
-    for pid in pids:
-        try:
-            if (Path("/proc") / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()[0] != "Z":
-                return False
-        except OSError:
-            continue
-    return True
+    return all(state_of(pid) in ("", "Z") for pid in pids)
+
+
+def stop(pid: int) -> None:
+    """Stop a process by SIGSTOP, and return when it has stopped: a busy one runs on for a moment."""
+    os.kill(pid, signal.SIGSTOP)
+    until(lambda: state_of(pid) == "T", f"process {pid} stopped")
 
 
 def script(path: Path) -> ModuleType:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from network import NIL, RUN, Network, ask, hello, network
+from support import stop
 from waiting import until
 
 from zwerm.agents.runtime.contract import Setup
@@ -398,9 +399,7 @@ def test_a_killed_process_is_reported_lost_and_restarts_as_a_new_incarnation(not
 
 def test_a_paused_process_is_not_lost_and_answers_after_it_resumes(nothing_left: None) -> None:
     with echo_swarm(2) as swarm:
-        swarm.supervisor.send_signal(0, signal.SIGSTOP)
-        status = Path(f"/proc/{swarm.supervisor.pids[0]}/status")
-        until(lambda: "\nState:\tT" in status.read_text(), "stopped")
+        stop(swarm.supervisor.pids[0])
         swarm.link.send(0, encode(Observation(3, 0.0)))
         answer = said(swarm.link, 1, 3)
         assert answer is not None

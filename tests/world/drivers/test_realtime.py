@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import ROOT, ZWERM, scenario
+from support import ROOT, ZWERM, scenario, stop
 from waiting import until
 
 from zwerm.agents.runtime.node import Node
@@ -103,9 +103,7 @@ def test_all_unanswered_observations_of_a_hung_robot_fit_into_the_buffers_of_the
     monkeypatch.setattr(swarm_module, "router_settings", patient)
     most = min(UNANSWERED_MAX, math.ceil(UNANSWERED_BYTES_MAX / size_bytes))
     with LocalSwarm(new_run_id(), node_specs(scenario(robots={"count": 1}), 1), paced=True) as swarm:
-        swarm.pause(0)
-        status = Path(f"/proc/{swarm.supervisor.pids[0]}/status")
-        until(lambda: "\nState:\tT" in status.read_text(), "stopped")
+        stop(swarm.supervisor.pids[0])
 
         def send_all() -> None:
             for _ in range(most):

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import robots_of_this_process, scenario
+from support import robots_of_this_process, scenario, state_of, stop
 from waiting import until
 
 from zwerm.deploy.node_specs import node_specs
@@ -98,16 +98,11 @@ def test_a_crash_is_a_sigkill_and_a_pause_a_sigstop(nothing_left: None) -> None:
         assert state_of(pids[0]) != "T"
 
 
-def state_of(pid: int) -> str:
-    """Return the letter by which the kernel calls a process's state."""
-    return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
-
-
 def test_a_process_that_is_stopped_from_outside_ends_the_run_with_its_name(nothing_left: None) -> None:
     chosen = scenario(time={"straggler_s": 2.0, "duration_s": 60.0})
     with LocalSwarm(new_run_id(), node_specs(chosen, 1)) as swarm:
         world = assemble(chosen, 1)
-        swarm.pause(2)
+        stop(swarm.supervisor.pids[2])
         result = drive(world, swarm.link, 1, "processes", programs=swarm)
         assert result.outcome == "failed"
         assert result.reason == str(StragglerError([2], 0, 2.0))
