@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
@@ -47,8 +47,15 @@ PASSWORD_BYTES_MAX: Final = 128
 
 _INTERRUPTS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
-# The place of the session id in /proc/PID/stat, after the name.
-_SESSION: Final = 3
+# Places in /proc/PID/stat, after the name.
+_STATE: Final = 0
+_PARENT: Final = 1
+_GROUP: Final = 2
+_ZOMBIE: Final = "Z"
+
+# Ids of all robots that this process has started: no other supervisor takes them for strays.
+_robots: Final[set[int]] = set()
+_starting: Final = threading.Lock()
 
 Progress = Callable[[int, int], object]
 
@@ -202,13 +209,27 @@ class LocalSupervisor:
             self._end_children(list(self._processes.values()))
 
     def _end_children(self, ended: Sequence[ForkServerProcess]) -> None:
-        """Kill what the controllers of robots that have `ended` started: each robot is the leader of a session of its own."""
-        sessions = {process.pid for process in ended}
-        for entry in Path("/proc").glob("[0-9]*/stat"):
-            with contextlib.suppress(OSError, ValueError):  # it has ended
-                session = int(entry.read_text().rpartition(")")[2].split()[_SESSION])
-                if session in sessions and int(entry.parent.name) not in sessions:
-                    os.kill(int(entry.parent.name), signal.SIGKILL)
+        """Kill what the controllers of robots that have `ended` started.
+
+        Each robot is the leader of a process group. What has left the group becomes a child of the robots' server when its
+        parent has ended.
+        """
+        server = _server_pid()
+        with _starting:
+            found = dict(_running_processes())
+            robots = frozenset(_robots)
+        groups = {process.pid for process in ended}
+        own_group = found[server][1] if server in found else None
+        strays = {pid for pid, (_, group) in found.items() if group in groups and pid != group}
+        strays |= {
+            pid
+            for pid, (parent, group) in found.items()
+            if parent == server and pid not in robots and group != own_group
+        }
+        started = [pid for pid in found if _descends(pid, strays, found)]
+        for pid in started:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
 
     def _alive(self) -> list[ForkServerProcess]:
         return [process for process in self._processes.values() if process.exitcode is None]
@@ -256,7 +277,9 @@ class LocalSupervisor:
             name=f"node {credential.node}",
             daemon=True,
         )
-        process.start()
+        with _starting:
+            process.start()
+            _robots.update([] if process.pid is None else [process.pid])
         self._processes[credential.node] = process
         return process
 
@@ -298,8 +321,31 @@ def server_answers(deadline_s: float) -> Iterator[None]:
         timer.cancel()
 
 
-def _kill_server() -> None:
+def _server_pid() -> int | None:
     server: int | None = vars(forkserver)["_forkserver"]._forkserver_pid  # it has no public name
+    return server
+
+
+def _running_processes() -> Iterator[tuple[int, tuple[int, int]]]:
+    """Yield the id of each process that runs, with its parent and its group (Linux only)."""
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError, ValueError):  # it has ended
+            fields = entry.read_text().rpartition(")")[2].split()
+            if fields[_STATE] != _ZOMBIE:
+                yield int(entry.parent.name), (int(fields[_PARENT]), int(fields[_GROUP]))
+
+
+def _descends(pid: int, ancestors: Collection[int], found: Mapping[int, tuple[int, int]]) -> bool:
+    """Return whether a process is one of `ancestors`, or was started by one."""
+    while pid in found:
+        if pid in ancestors:
+            return True
+        pid = found[pid][0]
+    return False
+
+
+def _kill_server() -> None:
+    server = _server_pid()
     if server is not None:
         with contextlib.suppress(ProcessLookupError):
             os.kill(server, signal.SIGKILL)

@@ -17,6 +17,7 @@ import io
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Callable
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
@@ -46,6 +47,7 @@ NICENESS: Final = 5
 
 _PR_SET_PDEATHSIG: Final = 1
 _PR_SET_DUMPABLE: Final = 4
+_PR_SET_CHILD_SUBREAPER: Final = 36
 
 
 def main(
@@ -64,7 +66,9 @@ def main(
     """
     die_with_parent(_server)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.setsid()  # the session identifies the processes that a controller has started
+    # The group identifies the processes that a controller has started. A session would do so, too, but Linux may schedule each
+    # session as a group of its own (autogroup). Then each robot has as much time as the world, whatever its niceness.
+    os.setpgid(0, 0)
     os.register_at_fork(after_in_child=die_with_parent)
     hide_memory()
     os.nice(NICENESS)
@@ -258,6 +262,12 @@ _server: int | None = None
 
 
 def serve_robots() -> None:
-    """Record that robots are forked from this process: a robot ends when its parent is no longer this process."""
+    """Record that robots are forked from this process: a robot ends when its parent is no longer this process.
+
+    On Linux this process also becomes the parent of what a robot that has ended had started.
+    """
     global _server
     _server = os.getpid()
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    warnings.filterwarnings("ignore", "forkserver: waitpid returned unexpected pid")

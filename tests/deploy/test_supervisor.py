@@ -326,6 +326,17 @@ def test_no_robot_survives_the_kill_of_its_parent_even_if_it_hangs_or_is_paused(
         until(lambda: gone(started), "all processes ended")
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere sessions are not scheduled as groups")
+def test_robots_share_the_session_of_the_world_and_each_leads_a_process_group(private_tmp: Path) -> None:
+    with program(private_tmp, 4, ECHO) as running:
+        read_until(running, "joined")
+        server = next(pid for pid in children_of(running.pid) if children_of(pid))
+        robots = children_of(server)
+        assert len(robots) == 4
+        assert {os.getsid(pid) for pid in robots} == {os.getsid(running.pid)}
+        assert {pid: os.getpgid(pid) for pid in robots} == {pid: pid for pid in robots}
+
+
 def test_an_unknown_controller_is_an_error_of_one_line_and_leaves_no_process(private_tmp: Path) -> None:
     with program(private_tmp, 1, "no_such_module:Robot") as running:
         _, said = running.communicate(timeout=30)
