@@ -50,7 +50,7 @@ def make(name: str, setup: Setup) -> Stepper:
         raise ControllerError(f"{name}: {error}") from None
     except ControllerError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{last.filename}:{last.lineno}"
         raise ControllerError(f"{name}: its constructor raised {type(error).__name__}: {error} ({where})") from error

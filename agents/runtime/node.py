@@ -43,11 +43,21 @@ class Node:
     `answer` returns the encoded command for one encoded observation. If the controller raises, it calls `on_failure` and
     returns the encoded Failure. `answer` is a closure over local names, because attribute look-ups cost most of an
     answer. In a large swarm the objects of a robot leave the processor's cache between two ticks.
+
+    A KeyboardInterrupt passes if the node is `interruptible`. In a process without Ctrl-C the controller has raised it.
     """
 
-    def __init__(self, controller: str, setup: Setup, on_failure: Callable[[], object] = _nothing) -> None:
+    def __init__(
+        self,
+        controller: str,
+        setup: Setup,
+        on_failure: Callable[[], object] = _nothing,
+        *,
+        interruptible: bool = True,
+    ) -> None:
         self.id = setup.node
         self._on_failure = on_failure
+        self._interruptible = interruptible
         self._controller: Stepper = make(controller, setup)
         self.answer: Answer = self._answering(self._controller.step)
 
@@ -66,7 +76,7 @@ class Node:
         self.answer = self._answering(step_with_radio)
 
     def _answering(self, step: Callable[[Observation], Command]) -> Answer:
-        decode, write, fail = decode_observation, encode, self._fail
+        decode, write, fail, interruptible = decode_observation, encode, self._fail, self._interruptible
 
         def answer(payload: bytes) -> bytes:
             observation = decode(payload)
@@ -84,9 +94,9 @@ class Node:
                         f"the command takes {len(payload_out)} bytes, at most {MESSAGE_BYTES_MAX} are allowed"
                     )
                 return payload_out
-            except KeyboardInterrupt:  # Ctrl-C during an inline run
-                raise
             except BaseException as error:
+                if interruptible and isinstance(error, KeyboardInterrupt):  # Ctrl-C during an inline run
+                    raise
                 return fail(tick, error)
 
         return answer

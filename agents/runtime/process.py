@@ -30,6 +30,7 @@ import uvloop
 from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.runtime.controllers import code_of
+from zwerm.agents.runtime.fork_guard import refuse_forks
 from zwerm.agents.runtime.node import Node
 from zwerm.errors import ControllerError, ZwermError
 from zwerm.link.node_link import ZenohNodeLink
@@ -70,6 +71,7 @@ def main(
     # session as a group of its own (autogroup). Then each robot has as much time as the world, whatever its niceness.
     os.setpgid(0, 0)
     os.register_at_fork(after_in_child=die_with_parent)
+    refuse_forks(anywhere=True)
     hide_memory()
     os.nice(NICENESS)
     parent = parent_process()
@@ -159,7 +161,7 @@ async def run_node(
         link.send_goodbye(reason, confirmed)
         await may_exit.wait()
 
-    failed = False
+    failed, own_id = False, os.getpid()
 
     def fail() -> None:
         nonlocal failed
@@ -169,7 +171,10 @@ async def run_node(
         if failed:
             return
         try:
-            send(answer(payload))
+            command = answer(payload)
+            if os.getpid() != own_id:  # a process that the controller has forked: the connection belongs to its parent
+                os._exit(EXIT_FAILED)
+            send(command)
         except REFUSABLE:
             finish_from_thread(0 if _is_goodbye(payload) else EXIT_LOST)
         except BaseException:  # an exception must not leave a callback of Zenoh
@@ -227,7 +232,11 @@ def _node(welcome: Welcome, radio: PeerRadio | None, on_failure: Callable[[], ob
     """Make the node that the world describes. Raises ControllerError if the controller is not found."""
     if welcome.code and code_of(welcome.controller) != welcome.code:
         raise ControllerError(f"{welcome.controller}: its file here differs from the world's; install the same on both")
-    node = Node(welcome.controller, msgspec.msgpack.decode(welcome.setup, type=Setup), on_failure)
+    setup = msgspec.msgpack.decode(welcome.setup, type=Setup)
+    try:
+        node = Node(welcome.controller, setup, on_failure, interruptible=False)
+    except KeyboardInterrupt as error:  # this process ignores Ctrl-C
+        raise ControllerError(f"{welcome.controller}: it raised KeyboardInterrupt while it was made") from error
     if radio is not None:
         node.use_radio(radio)
     return node

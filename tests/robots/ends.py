@@ -1,11 +1,15 @@
 """Controllers that print, hang, exit or crash together, for tests of the report of a run."""
 
+import builtins
+import ctypes
 import os
 import signal
 import subprocess
 import time
 from multiprocessing.util import Finalize
 from pathlib import Path
+
+from msgspec import Struct
 
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.wire.messages import Command, Observation, WheelSpeeds
@@ -91,15 +95,60 @@ class NeverMadeAgain(NeverMade):
 
 
 class Forks(Controller):
-    """Starts two processes that never end, by fork and as a command, and writes their ids."""
+    """Starts three processes that never end, by fork, as a command and in a session of its own, and writes their ids."""
 
     def step(self, observation: Observation) -> Command:
         if self.setup.node == 1 and observation.tick == 2:
-            forked = os.fork()
+            forked = ctypes.CDLL(None).fork()
             if forked == 0:
                 signal.pause()
             command = subprocess.Popen(["sleep", "3600"])
-            Path(os.environ["FORKED"]).write_text(f"{forked} {command.pid}")
+            grouped = subprocess.Popen(["sleep", "3600"], start_new_session=True)
+            Path(os.environ["FORKED"]).write_text(f"{forked} {command.pid} {grouped.pid}")
+        return Command()
+
+
+class ForksInStep(Controller):
+    """Robot 1 forks at tick 3, and both processes go on."""
+
+    def step(self, observation: Observation) -> Command:
+        if self.setup.node == 1 and observation.tick == 3:
+            os.fork()
+        return Command()
+
+
+class ForksPastPython(Controller):
+    """Robot 1 forks at tick 3 where Python does not see it, and both processes go on."""
+
+    def step(self, observation: Observation) -> Command:
+        if self.setup.node == 1 and observation.tick == 3:
+            ctypes.CDLL(None).fork()
+        return Command()
+
+
+class Interrupts(Controller):
+    """Robot 1 raises KeyboardInterrupt at tick 3."""
+
+    def step(self, observation: Observation) -> Command:
+        if self.setup.node == 1 and observation.tick == 3:
+            raise KeyboardInterrupt
+        return Command()
+
+
+class NotMade(Controller):
+    """The constructor of robot 1 raises the error that is named."""
+
+    class Parameters(Struct, frozen=True):
+        """The name of an error of Python."""
+
+        error: str = "SystemExit"
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(setup)
+        if setup.node == 1:
+            raise getattr(builtins, self.parameters.error)
+
+    def step(self, observation: Observation) -> Command:
         return Command()
 
 

@@ -47,6 +47,7 @@ def test_processes_that_a_controller_started_end_with_the_run(
     running = start(tmp_path, "--set", "robots.controller=ends:Forks", FORKED=str(forked))
     until(lambda: running.poll() is not None or (forked.exists() and forked.read_text()), "processes started")
     children = set(map(int, forked.read_text().split()))
+    assert len(children) == 3
     assert not gone(children)
     end(running)
     running.communicate(timeout=60)

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
-from zwerm.agents.runtime import controllers, node
+from zwerm.agents.runtime.fork_guard import ANSWERS, MAKERS
 from zwerm.errors import ControllerError
 
 # A call that runs at this many successive checks, half a deadline apart, has exceeded the deadline.
@@ -24,17 +24,13 @@ CHECKS: Final = 3
 # Time in which a controller is imported and made, as long as a robot has to join.
 MADE_S_MAX: Final = 60.0
 
-# The functions that call a controller: file and name.
-_ANSWERS: Final = ((node.__file__, "answer"),)
-_MAKERS: Final = ((controllers.__file__, "make"), (controllers.__file__, "find"))
-
 
 class HangError(BaseException):
     """A controller runs for longer than the deadline. It is no Exception: a controller must not catch it by chance."""
 
 
 @contextmanager
-def hang_guard(deadline_s: float, calls: Sequence[tuple[str, str]] = _ANSWERS) -> Iterator[None]:
+def hang_guard(deadline_s: float, calls: Sequence[tuple[str, str]] = ANSWERS) -> Iterator[None]:
     """Raise HangError in a controller whose answer takes longer than `deadline_s` to 1.5 times that.
 
     `calls` are the functions that are guarded. A guard inside another one takes its place.
@@ -82,7 +78,7 @@ class _Check:
 def constructors_guarded() -> Iterator[None]:
     """Raise ControllerError where a controller is imported or made in the block, and that takes longer than MADE_S_MAX."""
     try:
-        with hang_guard(MADE_S_MAX, _MAKERS):
+        with hang_guard(MADE_S_MAX, MAKERS):
             yield
     except HangError as error:
         last = traceback.extract_tb(error.__traceback__)[-2]  # the last is the check

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, Literal, Protocol, get_args
 import numpy as np
 
 from zwerm.agents.runtime.confinement import UNCONFINED, Confinement
+from zwerm.agents.runtime.fork_guard import refuse_forks
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs, restart_spec
 from zwerm.errors import ScenarioError, StragglerError
@@ -93,6 +94,7 @@ def run(
     if runner == "inline":
         if confinement != UNCONFINED:
             raise ScenarioError(["runner: only robots that are processes can be confined, got 'inline'"])
+        refuse_forks()
         with constructors_guarded():
             nodes = {node: Node(controller, setup) for node, (controller, setup) in members.items()}
         watcher.joined(len(nodes), len(nodes))

@@ -76,7 +76,7 @@ def _imported(name: str, what: str) -> Any:
         module = importlib.import_module(module_name)
     except SyntaxError as error:
         raise ValueError(f"cannot import {module_name!r}: {_syntax_error(error)}") from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(f"cannot import {module_name!r}: {error}{_raised_at(error)}") from error
     if elsewhere := _nearer(module):
         raise ValueError(
@@ -93,7 +93,7 @@ def _syntax_error(error: SyntaxError) -> str:
     return f"{type(error).__name__}: {error.msg} ({error.filename}:{error.lineno})"
 
 
-def _raised_at(error: Exception) -> str:
+def _raised_at(error: BaseException) -> str:
     """Return the kind and the place of an error that a module raised while it was imported, or the empty text.
 
     If the module itself does not exist, no line of it was run.
