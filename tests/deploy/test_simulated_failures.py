@@ -7,6 +7,7 @@ import random
 
 import numpy as np
 import pytest
+from seeds import explored
 from support import scenario
 from virtual_network import LEASE_S, VirtualNetwork
 
@@ -20,7 +21,7 @@ from zwerm.world.world import World
 
 ROBOTS = 5
 STRAGGLER_S = 30.0
-SEEDS = range(150)
+SEEDS = explored(150)
 NAMED_WITHIN_S = LEASE_S + 5.0  # the promise of docs/concepts/security.md
 
 
@@ -91,7 +92,7 @@ def test_a_single_cut_cable_is_named_within_the_lease_for_any_number_of_robots(m
 
 def test_in_real_time_no_lost_robot_moves_again_after_any_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     moved = 0.0
-    for seed in SEEDS[:60]:
+    for seed in explored(60):
         tables = scenario(robots={"count": ROBOTS, "on_crash": "continue"}, time={"duration_s": 30.0, "dt_s": 0.5})
         world = assemble(tables, 1)
         network = VirtualNetwork(tables, seed, monkeypatch)

@@ -3,6 +3,7 @@
 import random
 
 import pytest
+from seeds import explored
 from virtual_processes import NEVER, Fate, VirtualSystem
 
 from zwerm.deploy.identity import issue, renew
@@ -10,7 +11,7 @@ from zwerm.deploy.supervisor import JOINING_MAX, LEAVE_WAIT_S, TERMINATE_WAIT_S,
 from zwerm.errors import LinkError
 from zwerm.link.session import Credential
 
-SEEDS = range(100)
+SEEDS = explored(100)
 DEADLINE_S = 60.0
 
 
@@ -107,7 +108,7 @@ def test_an_interrupt_at_any_time_leaves_no_process(monkeypatch: pytest.MonkeyPa
 def test_a_robot_that_is_killed_and_restarted_many_times_has_one_process_at_a_time(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for seed in SEEDS[:50]:
+    for seed in explored(50):
         drawn = Drawn(seed, monkeypatch, healthy=1.0)
         current: dict[int, Credential] = {each.node: each for each in drawn.credentials.nodes}
         with drawn.supervisor as supervisor:
