@@ -89,6 +89,7 @@ class _Swarm(ABC):
 
     link: ZenohWorldLink
     credentials: Credentials
+    _processes: Callable[[], Collection[int]] | None = None
 
     def __init__(
         self,
@@ -135,7 +136,7 @@ class _Swarm(ABC):
         passwords = directory / "passwords"
         settings = router_settings(self.credentials, endpoints, passwords, identity, self._probe_password)
         try:
-            self.link = ZenohWorldLink(self._run, members, settings)
+            self.link = ZenohWorldLink(self._run, members, settings, self._processes)
         finally:
             passwords.unlink()
         if self._on_refusal is not None:
@@ -218,11 +219,12 @@ class LocalSwarm(_Swarm):
         prepare(len(self._members))
         endpoint = self._probed = f"{UNIX_PROTOCOL}/{directory}/router"
         self.credentials = issue(self._run, self._members)
-        self._listen(directory, [endpoint])
-        self._current = {credential.node: credential for credential in self.credentials.nodes}
         self.supervisor = LocalSupervisor(
             endpoint, self.credentials, order=self._order, stations=self._stations, confinement=self._confinement
         )
+        self._processes = lambda: self.supervisor.pids.values()
+        self._listen(directory, [endpoint])
+        self._current = {credential.node: credential for credential in self.credentials.nodes}
         self._stack.callback(self._end)
 
     def _gather(self) -> None:

@@ -1,5 +1,7 @@
 """A controller that attacks the run from inside its process is named and bounded, and the other robots go on."""
 
+import sys
+
 import pytest
 from support import scenario
 
@@ -48,6 +50,14 @@ def test_a_flood_of_answers_is_counted_and_its_robot_evicted(nothing_left: None)
     assert (result.outcome, result.ticks) == ("time-limit", 100), result.reason
     assert result.crashed == [ATTACKER]
     assert f"flood: {REFUSALS_MAX} of its messages were refused" in result.crash_reasons[ATTACKER]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a socket does not tell who has connected")
+def test_a_robot_that_opens_another_session_is_cut_off_and_no_other(nothing_left: None) -> None:
+    result = attacked("OpensAnotherSession", duration_s=300.0)
+    assert (result.outcome, result.ticks) == ("time-limit", 3_000), result.reason
+    assert result.crashed == [ATTACKER]
+    assert result.refused["cut-off"] >= 1
 
 
 def test_a_controller_that_never_answers_and_ignores_signals_is_named_and_ended(nothing_left: None) -> None:

@@ -1,5 +1,6 @@
 """The security log: what world and router refuse is counted by reason and node, in the result and in a file."""
 
+import contextlib
 import json
 import os
 import socket
@@ -173,9 +174,10 @@ def test_intruders_are_counted_by_reason_and_node_in_the_result_and_the_log(tmp_
             FrameProxy(endpoint_address[1]) as proxy,
             session(msgspec.structs.replace(own, zid="abc"), proxy.endpoint),
         ):
-            for _ in range(FOREIGN):
-                proxy.send(*captured)
-            proxy.close_session()
+            with contextlib.suppress(OSError):  # the world has closed the connection
+                for _ in range(FOREIGN):
+                    proxy.send(*captured)
+            until(lambda: proxy.ended, "the session was cut off")
         assert not replay(endpoint_address[1], proxy.handshake, fresh_cookie=False)
         with session(own) as intruder:
             intruder.put(command_key(run_id, 0), b"forged")
@@ -192,7 +194,8 @@ def test_intruders_are_counted_by_reason_and_node_in_the_result_and_the_log(tmp_
     assert refused["nodes"]["1"] == {"denied": 3, "not-joined": 1}
     unknown = refused["nodes"].pop("unknown")
     assert unknown.pop("password") >= 1  # Zenoh tries again within the timeout of the session
-    assert unknown == {"denied": FOREIGN, "foreign-session": 1, "handshake": 4, "oversized": 1}
+    assert unknown.pop("denied", 0) <= FOREIGN
+    assert unknown == {"cut-off": 1, "foreign-session": 1, "handshake": 4, "oversized": 1}
     *lines, last = lines_of(tmp_path / "log")
     assert last["counts"]["1"] == {"denied": 3, "not-joined": 1}
     denied = [line["detail"] for line in lines if line["reason"] == "denied" and line["node"] == 1]

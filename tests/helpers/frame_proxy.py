@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple, Self
 
 _LENGTH: Final = struct.Struct("<H")
+_TIME: Final = struct.Struct("ll")  # seconds and microseconds, as the kernel takes them
 BATCH_BYTES_MAX: Final = 65_535
 _ID_MASK: Final = 0x1F
 INIT: Final = 0x01
@@ -98,11 +99,13 @@ def with_cookie(open_syn: bytes, cookie: bytes) -> bytes:
 class FrameProxy:
     """Relays one connection to the router at `address`: a TCP port of this machine, or the path of a Unix socket.
 
-    `endpoint` is where the session connects.
+    `endpoint` is where the session connects. `send` gives up after `wait_s` if the router reads nothing: a connection that it
+    has shut down may stay blocked for longer.
     """
 
-    def __init__(self, address: int | str) -> None:
+    def __init__(self, address: int | str, wait_s: int = 60) -> None:
         self._address = address
+        self._wait_s = wait_s
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.endpoint = f"tcp/127.0.0.1:{self._listener.getsockname()[1]}"
         self.handshake: list[bytes] = []
@@ -140,6 +143,11 @@ class FrameProxy:
         with self._lock:
             self._send(Frame(channel, self._next.get(channel, first_number(self.handshake[1])), messages))
 
+    @property
+    def ended(self) -> bool:
+        """Whether the router has closed the connection of the session."""
+        return self._down.ident is not None and not self._down.is_alive()
+
     def close_session(self) -> None:
         """End the session, and return when the router has read all frames and has closed the connection."""
         with self._lock:
@@ -157,6 +165,7 @@ class FrameProxy:
         with contextlib.suppress(OSError):  # closed
             self._client, _ = self._listener.accept()
             self._router = connection_to(self._address)
+            self._router.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _TIME.pack(self._wait_s, 0))
             self._down.start()
             for batch in batches(self._client):
                 self._relay(batch)

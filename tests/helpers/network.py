@@ -2,7 +2,7 @@
 
 import contextlib
 import socket
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -54,14 +54,32 @@ class Network(NamedTuple):
 
 
 @contextlib.contextmanager
-def network(directory: Path, nodes: int = 3, members: Mapping[int, ExpectedNode] | None = None) -> Iterator[Network]:
+def network_over_tcp(directory: Path) -> Iterator[Network]:
+    """Open a world's link at a free TCP port, as `network` does, which knows the session of each of three nodes."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    credentials = issue(RUN, range(3))
+    members = {each.node: ExpectedNode(1, "nobody", NIL, session=each.zid) for each in credentials.nodes}
+    with network(directory, members=members, endpoint=f"tcp/127.0.0.1:{port}", credentials=credentials) as opened:
+        yield opened
+
+
+@contextlib.contextmanager
+def network(
+    directory: Path,
+    nodes: int = 3,
+    members: Mapping[int, ExpectedNode] | None = None,
+    endpoint: str = "",
+    credentials: Credentials | None = None,
+    processes: Callable[[], Collection[int]] | None = None,
+) -> Iterator[Network]:
     """Open a world's link that expects `members` (all `nodes`, if None) and has credentials for all `nodes`."""
     set_threads(TWO_THREADS)
-    endpoint = f"unixsock-stream/{directory}/router"
-    credentials = issue(RUN, range(nodes))
+    endpoint = endpoint or f"unixsock-stream/{directory}/router"
+    credentials = credentials or issue(RUN, range(nodes))
     if members is None:
         members = {node: ExpectedNode(1, "nobody", NIL) for node in range(nodes)}
-    link = ZenohWorldLink(RUN, members, router_settings(credentials, [endpoint], directory / "passwords"))
+    link = ZenohWorldLink(RUN, members, router_settings(credentials, [endpoint], directory / "passwords"), processes)
     try:
         yield Network(link, credentials, endpoint)
     finally:

@@ -1,18 +1,22 @@
 """Controllers that attack the run from inside a robot's process. Robot 1 attacks at tick 3; the others drive on."""
 
 import contextlib
+import ctypes
 import gc
 import os
 import signal
 import socket
 import threading
+import time
 from pathlib import Path
 
 import zenoh
 from msgspec import Struct
 
 from zwerm.agents.runtime.contract import Controller
+from zwerm.errors import LinkError
 from zwerm.link.node_link import ZenohNodeLink
+from zwerm.link.session import Credential, open_session
 from zwerm.wire.keys import command_key
 from zwerm.wire.messages import Command, Observation, Transmission, WheelSpeeds, encode
 
@@ -130,6 +134,27 @@ class Disconnects(Attacker):
         own_link().close()
 
 
+class OpensAnotherSession(Attacker):
+    """Opens a session with its own password and another Zenoh id, again whenever it is closed."""
+
+    def attack(self, observation: Observation) -> None:
+        own = vars(own_link())
+        endpoint = own["_place"].rpartition(" at ")[2]
+        threading.Thread(target=_open_again, args=(endpoint, own["_credential"]), daemon=True).start()
+
+
+def _open_again(endpoint: str, credential: Credential) -> None:
+    user = {"user": credential.user, "password": credential.password}
+    settings = {"mode": "client", "id": "abc", "connect/endpoints": [endpoint], "transport/auth/usrpwd": user}
+    while True:
+        with (
+            contextlib.suppress(LinkError),
+            open_session(settings | {"connect/timeout_ms": 1_000}, "closed") as session,
+        ):
+            while session.info.transports():
+                time.sleep(0.01)
+
+
 class Allocates(Attacker):
     """Allocates 4 GiB in steps of 64 MiB, and writes to all of it."""
 
@@ -138,14 +163,13 @@ class Allocates(Attacker):
 
 
 class Forks(Attacker):
-    """Starts processes that never end, up to 200, and reports how many it could start."""
+    """Starts processes that never end, up to 200, past Python, and reports how many it could start."""
 
     def attack(self, observation: Observation) -> Command:
-        started = 0
+        started, fork = 0, ctypes.CDLL(None).fork
         for _ in range(200):
-            try:
-                child = os.fork()
-            except OSError:
+            child = fork()
+            if child < 0:
                 break
             if child == 0:
                 signal.pause()

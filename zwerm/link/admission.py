@@ -21,6 +21,7 @@ RETURNED: Final = "returned"
 NOT_JOINED: Final = "not-joined"
 SOFTWARE: Final = "software"
 EVICTED: Final = "evicted"
+CUT_OFF: Final = "cut-off"
 MEANINGS: Final[Mapping[str, str]] = {
     IDENTITY: "it says that it is another node",
     UNKNOWN: "the run has no such node",
@@ -81,6 +82,15 @@ class Admission:
     def node_of_session(self, session: str) -> int:
         """Return the node that has joined by this session, or -1. The router admits no second session with its id."""
         return next((node for node in self.joined if self._expected[node].session == session), -1)
+
+    def owner_of(self, session: str) -> int:
+        """Return the node whose session has this Zenoh id, whether it has joined or not, or -1."""
+        return next((node for node, expected in self._expected.items() if expected.session == session), -1)
+
+    @property
+    def knows_sessions(self) -> bool:
+        """Whether the Zenoh id of every node's session is known."""
+        return all(expected.session for expected in self._expected.values())
 
     def expected(self, node: int) -> ExpectedNode:
         """Return what is expected of a node that has been admitted."""

@@ -20,8 +20,9 @@ from zenoh.handlers import Callback
 
 from zwerm.errors import LinkError
 from zwerm.link import Arrival, arrival
-from zwerm.link.admission import EVICTED, IDENTITY, NOT_JOINED, SOFTWARE, Admission, ExpectedNode
+from zwerm.link.admission import CUT_OFF, EVICTED, IDENTITY, NOT_JOINED, SOFTWARE, Admission, ExpectedNode
 from zwerm.link.arrival_signal import ArrivalSignal
+from zwerm.link.connections import Connections
 from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threads
 from zwerm.link.software import software
 from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
@@ -34,9 +35,18 @@ CAPACITY: Final = 16_384
 
 
 class ZenohWorldLink:
-    """The world's end of the link to the nodes `members` of the run `run`; `settings` are the router's."""
+    """The world's end of the link to the nodes `members` of the run `run`; `settings` are the router's.
 
-    def __init__(self, run: str, members: Mapping[int, ExpectedNode], settings: Mapping[str, Any]) -> None:
+    `processes` returns the ids of the nodes' processes, if all nodes are on this machine.
+    """
+
+    def __init__(
+        self,
+        run: str,
+        members: Mapping[int, ExpectedNode],
+        settings: Mapping[str, Any],
+        processes: Callable[[], Collection[int]] | None = None,
+    ) -> None:
         """Open the router's session, without waiting for nodes. Raises LinkError if it cannot listen."""
         self.refusals = Refusals()
         self._evicted: set[int] = set()
@@ -58,6 +68,7 @@ class ZenohWorldLink:
             self._session.declare_subscriber(command_key(run, EVERY), Callback(self._on_command, indirect=False))
             self._session.liveliness().declare_subscriber(alive_key(run, EVERY), self._on_liveliness)
             self._session.declare_queryable(hello_key(run, EVERY), self._on_hello)
+            self._connections = Connections(self._session, self._may_stay, self._on_cut, processes)
         except BaseException:
             self._session.close()  # type: ignore[no-untyped-call]
             raise
@@ -121,10 +132,12 @@ class ZenohWorldLink:
         return [node for node in left if node not in answered]
 
     def evict(self, node: int) -> None:
-        """Drop all messages of a node that arrive from now on."""
+        """Drop all messages of a node that arrive from now on, and close its connection if that is one of TCP."""
         with self._lock:
             self._evicted.add(node)
             self._source_of.pop(command_key(self._run, node), None)
+            session = self._members.expected(node).session
+        self._connections.cut(session)
 
     def node_of_session(self, session: str) -> int:
         """Return the node that has joined by the session with this Zenoh id, or -1."""
@@ -185,6 +198,17 @@ class ZenohWorldLink:
         """Count a command of a node that has not joined or was evicted."""
         with self._lock:
             self.refusals.count(node, EVICTED if node in self._evicted else NOT_JOINED)
+
+    def _may_stay(self, session: str) -> bool:
+        """Return whether a session with this Zenoh id belongs to a node of the run that was not evicted."""
+        with self._lock:
+            node = self._members.owner_of(session)
+            return node not in self._evicted and (node >= 0 or not self._members.knows_sessions)
+
+    def _on_cut(self, session: str) -> None:
+        """Count a session whose connection was closed."""
+        with self._lock:
+            self.refusals.count(self._members.owner_of(session), CUT_OFF)
 
     def _on_liveliness(self, sample: zenoh.Sample) -> None:
         """Handle a liveliness token; it vanishes after the node's last message. Runs in a thread of its own."""

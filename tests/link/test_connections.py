@@ -1,0 +1,124 @@
+"""A session that has no business with the router is cut off, and others stay: over TCP, where the router's sockets tell."""
+
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+
+import msgspec
+import pytest
+from frame_proxy import FrameProxy
+from network import NIL, RUN, Network, network, network_over_tcp
+from support import ROOT
+from waiting import until
+
+from zwerm.deploy.identity import issue
+from zwerm.link import Arrival
+from zwerm.link.admission import ExpectedNode
+from zwerm.link.connections import address_in, shut_down
+
+VICTIM, OTHER = 0, 1
+
+
+@pytest.fixture
+def net(private_tmp: Path) -> Iterator[Network]:
+    with network_over_tcp(private_tmp) as opened:
+        yield opened
+
+
+@pytest.mark.parametrize(
+    ("locator", "address"),
+    [
+        ("tcp/127.0.0.1:7447", ("127.0.0.1", 7447)),
+        ("tls/[::1]:7447", ("::1", 7447)),
+        ("tcp/[::ffff:10.0.0.1]:80", ("10.0.0.1", 80)),
+        ("tcp/[fe80::1%eth0]:80", ("fe80::1", 80)),
+        ("tcp/10.0.0.1:80?rel=0#iface=eth0", ("10.0.0.1", 80)),
+        ("quic/127.0.0.1:7447", None),
+        ("unixsock-stream/4296c661-eb1a", None),
+        ("tcp/localhost:80", None),
+        ("tcp/127.0.0.1:", None),
+        ("tcp/127.0.0.1", None),
+        ("", None),
+    ],
+)
+def test_a_locator_of_tcp_and_tls_names_an_address(locator: str, address: tuple[str, int] | None) -> None:
+    assert address_in(locator) == address
+
+
+@pytest.mark.parametrize(("family", "host"), [(socket.AF_INET, "127.0.0.1"), (socket.AF_INET6, "::1")])
+def test_only_the_connection_from_an_address_is_shut_down(family: socket.AddressFamily, host: str) -> None:
+    with socket.create_server((host, 0), family=family) as server:
+        address = server.getsockname()[:2]
+        with socket.create_connection(address) as one, socket.create_connection(address) as two:
+            ends = [server.accept()[0] for _ in range(2)]
+            assert shut_down([(host, one.getsockname()[1])]) == 1
+            one.settimeout(20.0)
+            assert one.recv(1) == b"", "the other end sees the end of the connection"
+            ends[1].sendall(b"x")
+            assert two.recv(1) == b"x", "the other connection works"
+            for end in ends:
+                end.close()
+
+
+def is_cut_off(net: Network, proxy: FrameProxy, times: int) -> bool:
+    return proxy.ended and net.link.refusals.by_reason["cut-off"] >= times
+
+
+def test_a_session_with_a_stolen_password_and_another_id_is_cut_off_whenever_it_connects(net: Network) -> None:
+    stolen = msgspec.structs.replace(net.credentials.nodes[VICTIM], zid="abc")
+    with closing(net.node(VICTIM)) as victim:
+        victim.join()
+        for times in (1, 2):
+            with (
+                FrameProxy(int(net.endpoint.rpartition(":")[2])) as proxy,
+                net._replace(endpoint=proxy.endpoint).session(stolen),
+            ):
+                until(partial(is_cut_off, net, proxy, times), "the session was cut off")
+        victim.send(b"real")
+        assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
+        assert net.link.refusals.by_node.keys() == {-1}
+
+
+def test_an_evicted_node_is_cut_off_and_no_other(net: Network) -> None:
+    with closing(net.node(VICTIM)) as victim, closing(net.node(OTHER)) as other:
+        victim.join()
+        other.join()
+        net.link.evict(OTHER)
+        assert net.link.wait_joined(lambda joined: OTHER not in joined, 20.0), "its connection has ended"
+        assert net.link.receive(20.0) == Arrival(OTHER, None)
+        victim.send(b"real")
+        assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
+        until(lambda: net.link.refusals.by_node.get(OTHER, {}).get("cut-off", 0) >= 1, "it was counted")
+        assert VICTIM not in net.link.refusals.by_node
+
+
+STRANGER = """
+import sys, time
+from zwerm.link.session import open_session
+endpoint, user, password = sys.argv[1:]
+settings = {"mode": "client", "id": "abc", "connect/endpoints": [endpoint]}
+session = open_session(settings | {"transport/auth/usrpwd": {"user": user, "password": password}}, "refused")
+while session.info.transports():
+    time.sleep(0.01)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a socket does not tell who has connected")
+def test_on_a_unix_socket_another_process_with_a_stolen_password_is_cut_off(private_tmp: Path) -> None:
+    credentials = issue(RUN, range(3))
+    members = {each.node: ExpectedNode(1, "nobody", NIL, session=each.zid) for each in credentials.nodes}
+    with network(private_tmp, members=members, credentials=credentials, processes=list) as net:
+        stolen = credentials.nodes[VICTIM]
+        with closing(net.node(VICTIM)) as victim:
+            victim.join()
+            arguments = [net.endpoint, stolen.user, stolen.password]
+            environment = os.environ | {"PYTHONPATH": str(ROOT)}
+            subprocess.run([sys.executable, "-c", STRANGER, *arguments], env=environment, check=True, timeout=60)
+            until(lambda: net.link.refusals.by_reason["cut-off"] >= 1, "it was counted")
+            victim.send(b"real")
+            assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
