@@ -30,6 +30,11 @@ from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegoti
 from zwerm.agents.sensor_coverage.protocols.transport.mailbox import ReliableMailbox
 from zwerm.wire.messages import BodyVelocity, Observation
 
+# A robot that is displaced again within so many ticks of its way back, so many times in a row, rests where it is: another
+# robot rests too near, and each pushes the other away when it returns.
+RECOVERY_TICKS: Final = 100
+RECOVERIES_MAX: Final = 4
+
 # A robot within this distance [m] of the point where it came out of the depot still stands there.
 AT_BASE_M: Final = 0.05
 
@@ -66,6 +71,7 @@ class Situation:
         self.on_cleared: Callable[[], None] = lambda: None
         self.on_arrived: Callable[[DriveResult | WalkResult], None] = lambda _: self.stand()
         self._activity: Generator[BodyVelocity, None, DriveResult | WalkResult | None] | None = self._look_around()
+        self._recoveries = self._recovered_at = 0
 
     # --- every tick -------------------------------------------------------------------------------------------------
 
@@ -193,8 +199,18 @@ class Situation:
         self._activity = self._look_around()
 
     def recover(self) -> None:
-        """Begin to drive back to the point of rest."""
-        if self.motion.rest is not None:
+        """Begin to drive back to the point of rest, or rest here if that did not help several times in a row."""
+        if self.motion.rest is None:
+            return
+        in_a_row = self.tick - self._recovered_at <= RECOVERY_TICKS
+        self._recoveries, self._recovered_at = (self._recoveries + 1 if in_a_row else 1), self.tick
+        if self._recoveries > RECOVERIES_MAX:
+            self._recoveries = 0
+            self.local_map.begin_drive()  # neighbours average its bearing again
+            self.motion.settle()
+            self.stand()
+            self.look_around()
+        else:
             self._activity = self._recover(self.motion.rest)
 
     def deploy(self, bearing_rad: float, hop_m: float, clear_m: float) -> None:

@@ -150,6 +150,11 @@ def test_a_robot_that_crashes_and_restarts_is_taken_in_again(robot: int, at_s: f
     assert result.metrics["robots_deployed"] <= 12, "it is of use where it stands"
 
 
+def test_robots_that_rest_too_near_each_other_do_not_push_each_other_away_for_ever() -> None:
+    """In this run two robots come to rest 12 mm nearer to each other than their bodies allow."""
+    assert is_covered(with_faults(SMALL, '{kind="crash", nodes=[7], at_s=86.7, for_s=49.4}', 3))
+
+
 def phases(hall: tuple[str, ...]) -> dict[str, tuple[int, int]]:
     """Return, for every state that a robot has in a hall, the first (tick, robot) for which it has it."""
     scenario = load("sensor-coverage", hall)
