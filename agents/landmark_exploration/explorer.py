@@ -43,9 +43,8 @@ FREE_REPORT_TICKS: Final = 5
 BUSY_REPORT_TICKS: Final = 50
 # Up to this many free frontiers a robot considers them at once when another one opens. With more, some are near.
 FEW_FREE: Final = 48
-# A robot adds observations to its map in its first LOOK_TICKS, and then only while it explores: observations of idle
-# robots open frontiers, and large halls may take longer (`look_idle`). It does so again if no path led to any free
-# frontier for CUT_OFF_TICKS.
+# Without `look_idle` a robot adds observations to its map in its first LOOK_TICKS, and then only while it explores, or
+# if no path led to any free frontier for CUT_OFF_TICKS.
 LOOK_TICKS: Final = 5
 CUT_OFF_TICKS: Final = 200
 # Ticks for which a robot does not choose a frontier that it did not reach.
@@ -134,9 +133,7 @@ class Explorer(Controller):
             return False
         if self.parameters.strategy == "random-walk" or self.parameters.presence_only:
             return True
-        if self.parameters.look_idle and self.map.frontiers.open:
-            return True
-        return self._task is not None or self._cut_off or self.view.tick <= LOOK_TICKS
+        return self.parameters.look_idle or self._task is not None or self._cut_off or self.view.tick <= LOOK_TICKS
 
     # --- the map ----------------------------------------------------------------------------------------------------
 
@@ -166,7 +163,8 @@ class Explorer(Controller):
         self.map.read(stretch, held)
         if self._frozen and (self.map.frontiers.open or self.parameters.presence_only):
             self._frozen = False
-        self._quiet_since = self.view.tick
+        if self.parameters.presence_only:
+            self._quiet_since = self.view.tick
 
     # --- tasks ------------------------------------------------------------------------------------------------------
 
@@ -188,8 +186,9 @@ class Explorer(Controller):
             if self._task is None:
                 self._choose()
             if self._task is None or self._task.key is None:
-                # Without a coordinator, idle robots move to exchange the map. With one, they wait for a task.
-                if self._halted or not (self._carries or self._cut_off):
+                # Idle robots walk to see more, and without a coordinator to exchange the map. Else they wait for a task.
+                looks = self.parameters.look_idle and not self._frozen
+                if self._halted or not (looks or self._carries or self._cut_off):
                     yield None
                 else:
                     yield next(meeting if meets and self._waits_for_news() else idle)

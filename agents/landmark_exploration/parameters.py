@@ -23,21 +23,21 @@ class ExplorerParameters(Struct, frozen=True, forbid_unknown_fields=True):
     been silent for `lease_ticks`; a robot silent for `dead_ticks` is presumed dead. A robot without an open frontier for
     `freeze_ticks` freezes: it adds no entry to the map. `robots_expected` robots must agree that exploration is complete. A
     robot that never sent a message counts as silent from the start. `turn_sd_rad` is the deviation of the random walk's turn
-    in a tick. With `look_idle` a robot without a frontier adds what it sees to the map while a frontier is open: the map
-    is more complete, and large halls may take longer. With `presence_only` no bearing is used: robots know which landmarks they
-    see, and stop when no observation was new for `stagnation_ticks`.
+    in a tick. With `look_idle` a robot without a frontier walks about, and adds what it sees to the map until it freezes or
+    is halted. Without it the map is less complete, and large halls take less time. With `presence_only` no bearing is used:
+    robots know which landmarks they see, and stop when no observation was new for `stagnation_ticks`.
     """
 
     beta: NonNegative = 10.0
     strategy: Strategy = "cost-utility"
     cross_ticks: Ticks = 40
-    search_ticks: Ticks = 40
+    search_ticks: Ticks = 20
     message_bytes_max: MessageBytes = LARGE_BYTES
     lease_ticks: Ticks = 300
     dead_ticks: Ticks = 1_500
     freeze_ticks: Ticks = 40
     robots_expected: Annotated[int, Meta(ge=1, le=100_000)] = 1
     turn_sd_rad: NonNegative = 0.05
-    look_idle: bool = False
+    look_idle: bool = True
     presence_only: bool = False
     stagnation_ticks: Ticks = 60

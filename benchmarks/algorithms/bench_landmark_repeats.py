@@ -2,8 +2,9 @@
 
 A robot observes while it has a frontier to explore. Each observation is *repeated* if the robots together already knew that
 frontier to be closed, or another robot explored it before; the robot had not received that. A row compares the completion of
-the whole map with that of a map without repeated observations. With `--idle look` robots have the parameter `look_idle`. A
-place is *open* if no robot saw all its landmarks together, and a robot that did would open a frontier.
+the whole map with that of a map without repeated observations. With `--idle wait` robots without a frontier do not add what
+they see to the map (`look_idle=false`). A place is *open* if no robot saw all its landmarks together, and a robot that did
+would open a frontier.
 
     python -m benchmarks.algorithms.bench_landmark_repeats --rows rows.csv --seeds 1 20
 """
@@ -37,7 +38,7 @@ from zwerm.world.metrics.landmark_exploration import (
 
 SETTINGS: Final = ("services.map=gossip", "services.assignment=claims", "time.duration_s=2000")
 RANGES: Final = {"whole hall": (), "0.7 r": ("radio.range_m=0.7",)}
-IDLE: Final = {"wait": (), "look": ("robots.parameters.look_idle=true",)}
+IDLE: Final = {"wait": ("robots.parameters.look_idle=false",), "look": ()}
 
 
 class Case(msgspec.Struct, frozen=True):

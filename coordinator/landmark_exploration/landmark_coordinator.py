@@ -55,7 +55,8 @@ OUTBOX_BYTES_MAX: Final = 20_000
 class CoordinatorParameters(Struct, frozen=True, forbid_unknown_fields=True):
     """`beta` weighs the cost against the utility; `strategy` chooses frontiers; a robot silent for `dead_ticks` is dead.
 
-    With `walk_if_cut_off` a robot from which no path leads to a free frontier does a random walk, and looks; else it waits.
+    With `walk_if_cut_off` a robot from which no path leads to a free frontier does a random walk, and looks. Without it such a
+    robot does what robots without a frontier do: it waits if its `look_idle` is false.
     """
 
     beta: NonNegative = 10.0

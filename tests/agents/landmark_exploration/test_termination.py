@@ -8,12 +8,21 @@ import pytest
 
 from zwerm.agents.landmark_exploration.explorer import LOOK_TICKS, Explorer
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot
-from zwerm.agents.landmark_exploration.mapping.frontier_status import ABANDONED, CLEAR, REOPENED, TIMED_OUT, key_of
-from zwerm.agents.landmark_exploration.sharing.landmark_messages import Register
+from zwerm.agents.landmark_exploration.mapping.frontier_status import (
+    ABANDONED,
+    CLEAR,
+    REOPENED,
+    TIMED_OUT,
+    UNEXPLORED,
+    key_of,
+)
+from zwerm.agents.landmark_exploration.sharing import landmark_messages as messages
+from zwerm.agents.landmark_exploration.sharing.landmark_messages import Entries, Register, RegisterBeacon
+from zwerm.agents.landmark_exploration.sharing.log_entries import status_entries
 from zwerm.agents.landmark_exploration.sharing.registers import SETTLE_TICKS, Registers
 from zwerm.agents.landmark_exploration.sharing.replica import Replica, Stretch, origin_of
 from zwerm.agents.runtime.contract import Body, Setup
-from zwerm.wire.messages import LandmarkBearing, Observation
+from zwerm.wire.messages import BodyVelocity, Command, LandmarkBearing, Observation, Packet
 
 LEASE, DEAD = 150, 1_500
 
@@ -83,10 +92,21 @@ def test_a_robot_that_lost_its_memory_is_received_before_all_agree_for_long_enou
     assert registers.concluded(7, 2 + 2 * SETTLE_TICKS)
 
 
-def explorer(parameters: dict[str, object]) -> Explorer:
-    """Return robot 0, which shares its map by gossip and claims frontiers."""
-    body, services = Body("holonomic", 0.04, 0.5, 1.0), {"map": "gossip", "assignment": "claims"}
-    return Explorer(Setup(0, "robot", 0.1, Explorer.sensors, bytes(16), body, ("robots",), parameters, (), services))
+GOSSIP = {"map": "gossip", "assignment": "claims"}
+
+
+def explorer(parameters: dict[str, object], services: dict[str, str] = GOSSIP) -> Explorer:
+    """Return robot 0, which shares its map by gossip and claims frontiers unless `services` says otherwise."""
+    body, channels = Body("holonomic", 0.04, 0.5, 1.0), ("robots", "uplink")
+    return Explorer(Setup(0, "robot", 0.1, Explorer.sensors, bytes(16), body, channels, parameters, (), services))
+
+
+def frozen(command: Command) -> bool | None:
+    """Return whether robot 0 says in this command that it is frozen; None if it sends no register."""
+    for message in (messages.read(each.payload) for each in command.outbox):
+        if isinstance(message, RegisterBeacon):
+            return message.registers[0].frozen != 0
+    return None
 
 
 def test_a_robot_alone_explores_a_frontier_that_no_boundary_continues_once_more_before_it_freezes() -> None:
@@ -109,11 +129,9 @@ def test_a_robot_alone_explores_a_frontier_that_no_boundary_continues_once_more_
 
 
 @pytest.mark.parametrize(
-    ("look_idle", "is_open", "looks"), [(False, True, False), (True, True, True), (True, False, False)]
+    ("look_idle", "is_open", "looks"), [(False, True, False), (True, True, True), (True, False, True)]
 )
-def test_a_robot_without_a_frontier_looks_if_asked_to_while_another_explores_one(
-    look_idle: bool, is_open: bool, looks: bool
-) -> None:
+def test_a_robot_without_a_frontier_looks_unless_asked_not_to(look_idle: bool, is_open: bool, looks: bool) -> None:
     robot = explorer({"look_idle": look_idle})
     robot.map.observe(BearingSnapshot((1, 2, 3), (0, 85, 170)))
     for node, key in enumerate(list(robot.map.frontiers.open), start=1):
@@ -125,6 +143,32 @@ def test_a_robot_without_a_frontier_looks_if_asked_to_while_another_explores_one
     seen = tuple(LandmarkBearing(landmark, 2.0 * landmark) for landmark in (2, 3, 4))
     robot.step(Observation(LOOK_TICKS, 0.1 * LOOK_TICKS, landmarks=seen))
     assert robot.map.complex.contains((2, 3, 4)) is looks
+
+
+@pytest.mark.parametrize("look_idle", [True, False])
+def test_a_robot_that_waits_for_the_coordinator_walks_and_looks_unless_asked_not_to(look_idle: bool) -> None:
+    robot = explorer({"look_idle": look_idle}, {"map": "coordinator", "assignment": "coordinator"})
+    for tick in range(LOOK_TICKS):
+        robot.step(Observation(tick, 0.1 * tick))
+    seen = tuple(LandmarkBearing(landmark, 2.0 * landmark) for landmark in (2, 3, 4))
+    command = robot.step(Observation(LOOK_TICKS, 0.1 * LOOK_TICKS, landmarks=seen))
+    assert robot.map.complex.contains((2, 3, 4)) is look_idle
+    assert (command.drive != BodyVelocity()) is look_idle
+
+
+@pytest.mark.parametrize("opens", [False, True])
+def test_entries_that_open_no_frontier_do_not_delay_that_a_robot_freezes(opens: bool) -> None:
+    """Robots that look about write entries all the time."""
+    robot = explorer({})
+    robot.map.observe(BearingSnapshot((1, 2, 3), (0, 85, 170)))
+    closed = list(robot.map.frontiers.open)
+    robot.map.raise_all(closed, CLEAR)
+    said = []
+    for tick in range(robot.parameters.freeze_ticks + SETTLE_TICKS):
+        entries = status_entries([key_of(7, 8)] if opens else closed, UNEXPLORED if opens else CLEAR)
+        payload = messages.write(Entries(origin_of(1, 1), tick, tuple(entries)))
+        said.append(frozen(robot.step(Observation(tick, 0.1 * tick, (Packet("robots", payload, 1),)))))
+    assert (True in said) is not opens
 
 
 # --- model checking ----------------------------------------------------------------------------------------------------
