@@ -1,5 +1,6 @@
 """A session that has no business with the router is cut off, and others stay: over TCP, where the router's sockets tell."""
 
+import contextlib
 import os
 import socket
 import subprocess
@@ -19,7 +20,8 @@ from waiting import until
 from zwerm.deploy.identity import issue
 from zwerm.link import Arrival
 from zwerm.link.admission import ExpectedNode
-from zwerm.link.connections import address_in, shut_down
+from zwerm.link.connections import address_in, process_of, shut_down
+from zwerm.link.session import Credential
 
 VICTIM, OTHER = 0, 1
 
@@ -97,18 +99,30 @@ def test_an_evicted_node_is_cut_off_and_no_other(net: Network) -> None:
         assert VICTIM not in net.link.refusals.by_node
 
 
-STRANGER = """
+SESSION = """
 import sys, time
 from zwerm.link.session import open_session
-endpoint, user, password = sys.argv[1:]
-settings = {"mode": "client", "id": "abc", "connect/endpoints": [endpoint]}
+endpoint, user, password, zid = sys.argv[1:]
+settings = {"mode": "client", "id": zid, "connect/endpoints": [endpoint]}
 session = open_session(settings | {"transport/auth/usrpwd": {"user": user, "password": password}}, "refused")
 while session.info.transports():
     time.sleep(0.01)
 """
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a socket does not tell who has connected")
+linux = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a socket does not tell who has connected")
+
+
+def session_of_a_process(net: Network, credential: Credential, zid: str) -> "subprocess.Popen[str]":
+    """Start a process that opens a session with this Zenoh id, and ends when that is cut off."""
+    return subprocess.Popen(
+        [sys.executable, "-c", SESSION, net.endpoint, credential.user, credential.password, zid],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        text=True,
+    )
+
+
+@linux
 def test_on_a_unix_socket_another_process_with_a_stolen_password_is_cut_off(private_tmp: Path) -> None:
     credentials = issue(RUN, range(3))
     members = {each.node: ExpectedNode(1, "nobody", NIL, session=each.zid) for each in credentials.nodes}
@@ -116,9 +130,37 @@ def test_on_a_unix_socket_another_process_with_a_stolen_password_is_cut_off(priv
         stolen = credentials.nodes[VICTIM]
         with closing(net.node(VICTIM)) as victim:
             victim.join()
-            arguments = [net.endpoint, stolen.user, stolen.password]
-            environment = os.environ | {"PYTHONPATH": str(ROOT)}
-            subprocess.run([sys.executable, "-c", STRANGER, *arguments], env=environment, check=True, timeout=60)
+            assert session_of_a_process(net, stolen, "abc").wait(60) == 0
             until(lambda: net.link.refusals.by_reason["cut-off"] >= 1, "it was counted")
             victim.send(b"real")
             assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
+
+
+@linux
+def test_a_robot_whose_connection_has_two_descriptors_is_not_taken_for_two(private_tmp: Path) -> None:
+    """Another thread may copy descriptors at the same time."""
+    credentials = issue(RUN, range(2))
+    members = {each.node: ExpectedNode(1, "nobody", NIL, session=each.zid) for each in credentials.nodes}
+    robots: list[int] = []
+    with network(private_tmp, 2, members, credentials=credentials, processes=lambda: robots) as net:
+        own = credentials.nodes[OTHER]
+        with session_of_a_process(net, own, own.zid) as robot, contextlib.ExitStack() as copies:
+            robots.append(robot.pid)
+            copies.callback(robot.kill)
+            until(lambda: connections_from(robot.pid), "the robot has connected")
+            for number in connections_from(robot.pid):
+                copies.callback(os.close, os.dup(number))
+            assert len(connections_from(robot.pid)) == 2
+            assert session_of_a_process(net, credentials.nodes[VICTIM], "abc").wait(60) == 0
+            assert robot.poll() is None
+            assert connections_from(robot.pid), "its connection is open"
+
+
+def connections_from(process: int) -> list[int]:
+    """Return the descriptors of this process that are connections from another one by a Unix socket."""
+    found = []
+    for path in list(Path("/dev/fd").iterdir()):
+        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(int(path.name))) as copy:
+            if copy.family == socket.AF_UNIX and process_of(copy) == process:
+                found.append(int(path.name))
+    return found

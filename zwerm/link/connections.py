@@ -82,16 +82,17 @@ class Connections:
     def _cut_strangers(self, path: str) -> int:
         """Close the connections to a Unix socket of all but this process and robots that connected once."""
         robots = set() if self._processes is None else set(self._processes())
-        connections: dict[int, list[socket.socket]] = defaultdict(list)
+        # Of each process, by the inode of the socket: a socket may have several descriptors, also for a moment.
+        connections: dict[int, dict[int, socket.socket]] = defaultdict(dict)
         with contextlib.ExitStack() as stack:
             for each in _connections((socket.AF_UNIX,)):
                 stack.enter_context(each)
                 with contextlib.suppress(OSError):  # not connected
                     if each.getsockname() == path:
-                        connections[process_of(each)].append(each)
+                        connections[process_of(each)][os.fstat(each.fileno()).st_ino] = each
             self._banned |= {process for process, own in connections.items() if process in robots and len(own) > 1}
             strangers = sorted(set(connections) - {os.getpid(), 0} - (robots - self._banned))
-            for each in (each for process in strangers for each in connections[process]):
+            for each in (each for process in strangers for each in connections[process].values()):
                 with contextlib.suppress(OSError):
                     each.shutdown(socket.SHUT_RDWR)
         return len(strangers)
