@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import zenoh
 
-from zwerm.deploy.identity import issue, router_settings
+from zwerm.deploy.authority import certify
+from zwerm.deploy.identity import WorldIdentity, issue, router_settings
 from zwerm.link import Arrival, WorldLink
 from zwerm.link.admission import ExpectedNode
 from zwerm.link.node_link import ZenohNodeLink
@@ -54,13 +55,18 @@ class Network(NamedTuple):
 
 
 @contextlib.contextmanager
-def network_over_tcp(directory: Path) -> Iterator[Network]:
-    """Open a world's link at a free TCP port, as `network` does, which knows the session of each of three nodes."""
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
-    credentials = issue(RUN, range(3))
+def network_over_tcp(directory: Path, *, encrypted: bool = False) -> Iterator[Network]:
+    """Open a world's link at a free TCP port, as `network` does, which knows the session of each of three nodes.
+
+    If it is `encrypted`, by TLS, the world and each node have a certificate.
+    """
+    identity, credentials = None, issue(RUN, range(3))
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    if encrypted:
+        identity, credentials = certify(credentials, ["localhost"])
+        endpoint = f"tls/localhost:{free_port()}"
     members = {each.node: ExpectedNode(1, "nobody", NIL, session=each.zid) for each in credentials.nodes}
-    with network(directory, members=members, endpoint=f"tcp/127.0.0.1:{port}", credentials=credentials) as opened:
+    with network(directory, members=members, endpoint=endpoint, credentials=credentials, identity=identity) as opened:
         yield opened
 
 
@@ -72,6 +78,7 @@ def network(
     endpoint: str = "",
     credentials: Credentials | None = None,
     processes: Callable[[], Collection[int]] | None = None,
+    identity: WorldIdentity | None = None,
 ) -> Iterator[Network]:
     """Open a world's link that expects `members` (all `nodes`, if None) and has credentials for all `nodes`."""
     set_threads(TWO_THREADS)
@@ -79,7 +86,8 @@ def network(
     credentials = credentials or issue(RUN, range(nodes))
     if members is None:
         members = {node: ExpectedNode(1, "nobody", NIL) for node in range(nodes)}
-    link = ZenohWorldLink(RUN, members, router_settings(credentials, [endpoint], directory / "passwords"), processes)
+    settings = router_settings(credentials, [endpoint], directory / "passwords", identity)
+    link = ZenohWorldLink(RUN, members, settings, processes)
     try:
         yield Network(link, credentials, endpoint)
     finally:

@@ -18,10 +18,11 @@ from support import ROOT
 from waiting import until
 
 from zwerm.deploy.identity import issue
+from zwerm.errors import LinkError
 from zwerm.link import Arrival
 from zwerm.link.admission import ExpectedNode
 from zwerm.link.connections import address_in, process_of, shut_down
-from zwerm.link.session import Credential
+from zwerm.link.session import Credential, trust_settings
 
 VICTIM, OTHER = 0, 1
 
@@ -84,6 +85,24 @@ def test_a_session_with_a_stolen_password_and_another_id_is_cut_off_whenever_it_
         victim.send(b"real")
         assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
         assert net.link.refusals.by_node.keys() == {-1}
+
+
+def test_by_tls_a_session_with_a_stolen_certificate_and_another_id_is_cut_off_whenever_it_connects(
+    private_tmp: Path,
+) -> None:
+    with network_over_tcp(private_tmp, encrypted=True) as net:
+        terms = net.credentials.terms
+        stolen = msgspec.structs.replace(net.credentials.nodes[VICTIM], zid="abc")
+        with closing(net.node(VICTIM, terms=terms)) as victim:
+            victim.join()
+            for _ in range(10):
+                # It may be closed before it is open at the other end.
+                with contextlib.suppress(LinkError), net.session(stolen, **trust_settings(stolen, terms)) as session:
+                    until(lambda: not session.info.transports(), "the session was closed")
+            until(lambda: net.link.refusals.by_reason["cut-off"] >= 2, "they were counted")
+            victim.send(b"real")
+            assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
+            assert net.link.refusals.by_node.keys() == {-1}
 
 
 def test_an_evicted_node_is_cut_off_and_no_other(net: Network) -> None:
