@@ -1,7 +1,8 @@
 """Write the generated parts of the documentation into its pages: `python docs/pages.py`, or `--check` to compare only.
 
-A part stands between a line `<!-- generated: NAME -->` or `<!-- measured: NAME -->` and a line `<!-- end -->`. The first comes
-from the code (`_generate.py`), the second from a stored measurement (`_measured.py`). The pages are committed with these
+A part stands between a line `<!-- generated: NAME -->`, `<!-- described: NAME -->` or `<!-- measured: NAME -->` and a line
+`<!-- end -->`. The first comes from the code (`_generate.py`), the second is a public name of it with signature and
+docstring (`_described.py`), the third comes from a stored measurement (`_measured.py`). The pages are committed with these
 parts filled in, so that they read well where nothing builds them; a test keeps them true.
 """
 
@@ -15,12 +16,14 @@ from typing import Final
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import _described
 import _generate
 import _measured
 
 DOCS: Final = Path(__file__).parent
+_KINDS: Final = "generated|described|measured"
 MARK: Final = re.compile(
-    r"^<!-- (generated|measured): ([a-z0-9-]+) -->$(?:(?:(?!^<!-- (?:generated|measured): ).)*?^<!-- end -->$)?",
+    rf"^<!-- ({_KINDS}): ([\w.-]+) -->$(?:(?:(?!^<!-- (?:{_KINDS}): ).)*?^<!-- end -->$)?",
     re.MULTILINE | re.DOTALL,
 )
 
@@ -42,7 +45,11 @@ def filled(text: str, page: Path) -> str:
 
     def part(found: re.Match[str]) -> str:
         kind, name = found[1], found[2]
-        made = _generate.GENERATED[name]() if kind == "generated" else _measured.render(name, to_store)
+        made = {
+            "generated": lambda: _generate.GENERATED[name](),
+            "described": lambda: _described.describe(name),
+            "measured": lambda: _measured.render(name, to_store),
+        }[kind]()
         return f"<!-- {kind}: {name} -->\n\n{made.strip()}\n\n<!-- end -->"
 
     return MARK.sub(part, text)

@@ -57,13 +57,20 @@ def test_a_picture_of_the_gallery_is_drawn_by_its_script(tmp_path: Path, monkeyp
     assert 10_000 < path.stat().st_size <= gallery.BYTES_MAX
 
 
+@pytest.mark.parametrize("page", [*PAGES, *ROOT_PAGES, ROOT / "README.md"], ids=lambda page: page.name)
+def test_a_page_is_plain_markdown_that_a_code_host_renders(page: Path) -> None:
+    """Directives, admonitions and attributes of a generator would stand there as they are written."""
+    text = re.sub(r"^```.*?^```$|`[^`\n]*`", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    assert re.findall(r"^(?::::|!!!|\?\?\?|===|--8<--).*|\{[:#].*?\}|\[[^]]+\]\[[^]]*\]", text, re.MULTILINE) == []
+
+
 def test_every_public_name_is_described() -> None:
     described = "".join(
         (DOCS / name).read_text(encoding="utf-8") for name in ("reference/api.md", "reference/protocol.md")
     )
     errors = {name for name in zwerm.__all__ if name.endswith("Error")}
     own = {"zwerm.run.runner.run", "zwerm.errors"} | {f"zwerm.{name}" for name in zwerm.__all__}
-    named = set(re.findall(r"^::: ([\w.]+)$", described, re.MULTILINE))
+    named = set(re.findall(r"^<!-- described: ([\w.]+) -->$", described, re.MULTILINE))
     assert named <= own
     assert [
         name
