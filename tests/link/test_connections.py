@@ -21,7 +21,7 @@ from zwerm.deploy.identity import issue
 from zwerm.errors import LinkError
 from zwerm.link import Arrival
 from zwerm.link.admission import ExpectedNode
-from zwerm.link.connections import address_in, process_of, shut_down
+from zwerm.link.connections import address_in, own_sockets, process_of, shut_down
 from zwerm.link.session import Credential, trust_settings
 
 VICTIM, OTHER = 0, 1
@@ -163,23 +163,35 @@ def test_a_robot_whose_connection_has_two_descriptors_is_not_taken_for_two(priva
     robots: list[int] = []
     with network(private_tmp, 2, members, credentials=credentials, processes=lambda: robots) as net:
         own = credentials.nodes[OTHER]
-        with session_of_a_process(net, own, own.zid) as robot, contextlib.ExitStack() as copies:
+        with session_of_a_process(net, own, own.zid) as robot, contextlib.ExitStack() as stack:
             robots.append(robot.pid)
-            copies.callback(robot.kill)
-            until(lambda: connections_from(robot.pid), "the robot has connected")
-            for number in connections_from(robot.pid):
-                copies.callback(os.close, os.dup(number))
-            assert len(connections_from(robot.pid)) == 2
+            stack.callback(robot.kill)
+            until(lambda: has_connected(robot.pid), "the robot has connected")
+            copies = [stack.enter_context(each) for each in connections_from(robot.pid)]
             assert session_of_a_process(net, credentials.nodes[VICTIM], "abc").wait(60) == 0
             assert robot.poll() is None
-            assert connections_from(robot.pid), "its connection is open"
+            assert not any(is_shut_down(each) for each in copies)
 
 
-def connections_from(process: int) -> list[int]:
-    """Return the descriptors of this process that are connections from another one by a Unix socket."""
+def has_connected(process: int) -> bool:
+    with contextlib.ExitStack() as stack:
+        return bool([stack.enter_context(each) for each in connections_from(process)])
+
+
+def is_shut_down(connection: socket.socket) -> bool:
+    try:
+        return connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT) == b""
+    except BlockingIOError:  # there is nothing to read
+        return False
+
+
+def connections_from(process: int) -> list[socket.socket]:
+    """Return copies of this process's connections from another one by a Unix socket."""
     found = []
-    for path in list(Path("/dev/fd").iterdir()):
-        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(int(path.name))) as copy:
-            if copy.family == socket.AF_UNIX and process_of(copy) == process:
-                found.append(int(path.name))
+    for each in own_sockets((socket.AF_UNIX,)):
+        with contextlib.suppress(OSError):  # not connected
+            if process_of(each) == process:
+                found.append(each)
+                continue
+        each.close()
     return found

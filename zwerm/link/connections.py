@@ -85,7 +85,7 @@ class Connections:
         # Of each process, by the inode of the socket: a socket may have several descriptors, also for a moment.
         connections: dict[int, dict[int, socket.socket]] = defaultdict(dict)
         with contextlib.ExitStack() as stack:
-            for each in _connections((socket.AF_UNIX,)):
+            for each in own_sockets((socket.AF_UNIX,)):
                 stack.enter_context(each)
                 with contextlib.suppress(OSError):  # not connected
                     if each.getsockname() == path:
@@ -120,7 +120,7 @@ def address_in(locator: str) -> Address | None:
 def shut_down(addresses: Collection[Address]) -> int:
     """Shut down this process's connections from these addresses, and return how many there were."""
     count = 0
-    for connection in _connections((socket.AF_INET, socket.AF_INET6)):
+    for connection in own_sockets((socket.AF_INET, socket.AF_INET6)):
         with connection, contextlib.suppress(OSError, ValueError):  # not connected, or another thread closes it
             host, port = connection.getpeername()[:2]
             if (_plain(host), port) in addresses:
@@ -129,7 +129,7 @@ def shut_down(addresses: Collection[Address]) -> int:
     return count
 
 
-def _connections(families: Collection[int]) -> Iterator[socket.socket]:
+def own_sockets(families: Collection[int]) -> Iterator[socket.socket]:
     """Yield copies of this process's stream sockets of these families."""
     for path in list(Path("/dev/fd").iterdir()):
         with contextlib.suppress(OSError):  # the descriptor of the listing is closed; another thread may close one
