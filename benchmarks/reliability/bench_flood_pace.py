@@ -19,15 +19,14 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 import msgspec
-import zenoh
 
 from benchmarks.common.csv_rows import add_csv_option, write_csv
-from benchmarks.reliability.bench_floods import MARK, SETTINGS, program_starter, session
+from benchmarks.reliability.bench_floods import GUESS_MS, MARK, SETTINGS, capture, program_starter, session
 from tests.helpers.frame_proxy import BATCH_BYTES_MAX, FrameProxy
 from tests.helpers.waiting import DEADLINE_S, until
 from zwerm.deploy.identity import load
 from zwerm.errors import LinkError
-from zwerm.link.session import Credential, open_session
+from zwerm.link.session import Credential
 from zwerm.wire.keys import command_key
 
 TICK_S: Final = 0.1
@@ -44,32 +43,15 @@ class Flooded(NamedTuple):
     sessions: int
 
 
-def capture(address: int | str, credential: Credential, run: str) -> tuple[bytes, bytes]:
-    """Return channel and bytes of a message that a session of this credential has sent."""
-    with FrameProxy(address) as proxy, session(proxy.endpoint, credential) as victim:
-        victim.put(command_key(run, 0), MARK, congestion_control=zenoh.CongestionControl.BLOCK)
-        until(lambda: any(MARK in frame.messages for frame in list(proxy.frames)), "a frame was captured")
-        return proxy.message_with(MARK)
-
-
-def settings_of(endpoint: str, credential: Credential) -> dict[str, Any]:
-    """Return the settings of a session that gives up soon."""
-    user = {"user": credential.user, "password": credential.password}
-    settings = {"mode": "client", "id": credential.zid, "connect/endpoints": [endpoint], "connect/timeout_ms": 1_000}
-    return settings | {"connect/exit_on_failure": True, "transport/auth/usrpwd": user}
-
-
 def flood(address: int | str, credential: Credential, message: tuple[bytes, bytes]) -> int:
     """Send a message in one session until the router closes its connection, and return how often."""
     channel, content = message
     batch = content * (BATCH_BYTES_MAX // 2 // len(content))
     sent = 0
     with (
-        contextlib.suppress(
-            OSError, LinkError, IndexError
-        ),  # the router has closed the connection, maybe before it was open
+        contextlib.suppress(OSError, LinkError, IndexError),  # closed, maybe before it was open
         FrameProxy(address, wait_s=1) as proxy,
-        open_session(settings_of(proxy.endpoint, credential), "refused"),
+        session(proxy.endpoint, credential, GUESS_MS),
     ):
         while not proxy.ended:
             proxy.send(channel, batch)
@@ -102,7 +84,7 @@ def run(transport: str, ticks: int, flooded: bool) -> Flooded:
         world = start("world", *settings, "--listen", endpoint, "--credentials", str(keys))
         until(lambda: world.poll() is not None or (keys.exists() and keys.stat().st_size), "credentials written")
         credentials = load(keys)
-        message = capture(address, credentials.nodes[1], credentials.run)
+        message = capture(address, credentials.nodes[1], command_key(credentials.run, 0)).message_with(MARK)
         robots = start("robot", "--connect", endpoint, "--credentials", str(keys))
         messages, sessions = attack(address, keys, world, message) if flooded else (0, 0)
         out, _ = world.communicate(timeout=1_000)

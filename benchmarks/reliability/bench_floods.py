@@ -96,7 +96,7 @@ def flood(intruder: zenoh.Session, key: str, messages: int) -> int:
     return sent
 
 
-def capture(port: int, credential: Credential, key: str) -> FrameProxy:
+def capture(port: int | str, credential: Credential, key: str) -> FrameProxy:
     """Return a closed proxy with the handshake of a session, and the frame of one message that it sent on `key`."""
     with FrameProxy(port) as proxy, session(proxy.endpoint, credential) as victim:
         victim.put(key, MARK, congestion_control=zenoh.CongestionControl.BLOCK)
