@@ -27,6 +27,8 @@ from zwerm.errors import LinkError
 SETTINGS: Final[Mapping[str, Any]] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
+    # A router waits this long for what it discovers before its session is open: 500 ms, for nothing.
+    "scouting/delay": 0,
     "transport/shared_memory/enabled": False,
     "transport/unicast/qos/enabled": False,
     # Batches of 64 KiB that can wait to be sent. With the minimum, 2, a long message blocks on the thread that sends it.
