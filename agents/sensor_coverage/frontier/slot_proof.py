@@ -56,6 +56,11 @@ class SlotProof:
         self._stretch: list[Arc] = []
         self._stretch_end: WalkPoint | None = None
 
+    @property
+    def ready(self) -> bool:
+        """True once the proof has a view of its slot: without one, a point of a walk closes too little."""
+        return self._slot != NOWHERE
+
     def update(self, slot: int, scan: ScanResult, touched: Iterable[float]) -> None:
         """Take in the slot's view and the complex around it, and the directions [rad] of walls in touch."""
         view = scan.views[slot]

@@ -235,18 +235,13 @@ class LocalMap(NeighbourTable):
     def update_plans(self) -> None:
         """Find the deployments that this robot could lead, if anything has changed."""
         mutual = self.mutual()
-        basis = (
-            self.slot,
-            self.epoch,
-            self.samples,
-            [(n, s.epoch, s.seen, s.attempts, s.expandable) for n, s in mutual.items()],
-        )
+        views = [(n, s.epoch, s.seen, s.attempts, s.expandable) for n, s in mutual.items()]
+        basis = self.slot, self.epoch, self.samples, views
         if self.slot == NOWHERE or self.redundant or self.heading is None or basis == self._plan_basis:
             return
         self._plan_basis = basis
         self.plan_count += 1
-        me, planner = self.slot, self._planner
-        scan = self.scan()
+        me, planner, scan = self.slot, self._planner, self.scan()
         take_over(planner.attempt_log, me, mutual.values(), self.parameters.attempts_max)
         for slot, (mean, _) in self._references.items():
             self._slots.remember(me, slot, cmath.phase(mean))
@@ -269,11 +264,16 @@ class LocalMap(NeighbourTable):
 
     def _plan_walks(self, scan: ScanResult) -> None:
         """Find the open arcs around this robot, and the walks into them. A robot without neighbours has none."""
+        self.update_proof(scan)
+        beside = next(iter(self.proof.around), NOWHERE)
+        arcs = self.proof.open_arcs() if beside != NOWHERE else []
+        self.wall_plans, self.unproven = self._planner.walls.plans_at(self.slot, beside, arcs)
+
+    def update_proof(self, scan: ScanResult | None = None) -> None:
+        """Take the present view into the proof of coverage."""
         me, slots = self.slot, self._slots
         self.proof.lose(*(each.slot for each in self.states.values() if each.redundant))
-        self.proof.update(me, scan, (*slots.walls.get(me, ()), *slots.felt.get(me, ())))
-        arcs, beside = self.proof.open_arcs(), next(iter(self.proof.around), me)
-        self.wall_plans, self.unproven = self._planner.walls.plans_at(me, beside, arcs if beside != me else ())
+        self.proof.update(me, scan or self.scan(), (*slots.walls.get(me, ()), *slots.felt.get(me, ())))
 
     def scan(self) -> ScanResult:
         """Return the views of this robot and its neighbours as a scan, by this robot's slot."""

@@ -249,8 +249,17 @@ class NeighbourTable:
 
     def changing(self, visible: Mapping[int, float], tick: int) -> bool:
         """Return whether slots around are changing hands, or views do not agree yet."""
+        return self._changes_hands(tick) or bool(self.stale(visible))
+
+    def settled(self, visible: Mapping[int, float], tick: int) -> bool:
+        """Return whether no slot around changes hands, and views agree with those of the robots that stand still."""
+        return not self._changes_hands(tick) and all(
+            node in self.states and self.states[node].moving for node in self.stale(visible)
+        )
+
+    def _changes_hands(self, tick: int) -> bool:
         self._handovers = {slot: since for slot, since in self._handovers.items() if tick - since < HANDOVER_TICKS_MAX}
-        return bool(self._handovers) or bool(self.stale(visible))
+        return bool(self._handovers)
 
 
 def _held(state: StateBeacon) -> int:

@@ -135,6 +135,11 @@ class Situation:
         return not self.busy and not self.local_map.changing(self.bearings, self.tick)
 
     @property
+    def settled(self) -> bool:
+        """True if the robot stands still, and its view agrees with those of all robots that do. Others may move in sight."""
+        return not self.busy and self.local_map.settled(self.bearings, self.tick)
+
+    @property
     def stands(self) -> bool:
         """True if the robot stands at its slot in the complex, and has nothing else to do."""
         return not (self.local_map.redundant or self.local_map.moving or self.driving or self.in_push)

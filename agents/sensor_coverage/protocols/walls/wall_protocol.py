@@ -1,8 +1,8 @@
 """Walks without a coordinator: the walking robot announces its way, and the robots that it passes prove their slots.
 
 Each robot that a point of the walk names takes the point into the proof of its own slot, and answers if that closed
-something. The end of a walk is flooded, because the walking robot is out of range of its push by then. A lost message
-leaves an arc open, which is tried again.
+something. A robot whose view is not complete yet keeps the points until it is. The end of a walk is flooded, because the
+walking robot is out of range of its push by then. A lost message leaves an arc open, which is tried again.
 """
 
 import math
@@ -12,11 +12,12 @@ from typing import ClassVar, Final, NamedTuple, Protocol
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof, WallStep
 from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, WalkPoint, point_before
-from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
 from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, PassedPoint, WalkMessage, WalkOver
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
+from zwerm.agents.sensor_coverage.protocols.walls.kept_points import KeptPoints, Neighbourhood
 
 # A robot makes plans again this many ticks after the latest point that closed something: the walk has passed.
 PASSED_TICKS: Final = 10
@@ -26,17 +27,16 @@ REMEMBERED_POINTS: Final = 60
 RESENT_POINTS: Final = 10
 
 
-class ProvedSlot(Protocol):
+class ProvedSlot(Neighbourhood, Protocol):
     """What a robot knows of its slot, its neighbours, and the proof of coverage there."""
 
-    slot: int
     moving: bool
     redundant: bool
     heading: float | None
     proof: SlotProof
 
-    def mutual(self) -> Mapping[int, StateBeacon]:
-        """Return the states of the robots that this robot sees and that see it."""
+    def update_proof(self) -> None:
+        """Take the present view into the proof."""
 
     def replan(self) -> None:
         """Make plans again."""
@@ -62,6 +62,10 @@ class WalkSituation(Protocol):
     @property
     def local_map(self) -> ProvedSlot:
         """The robot's slot and its neighbours."""
+
+    @property
+    def settled(self) -> bool:
+        """True if the robot stands still, and its view agrees with the states of all robots that do."""
 
 
 class _Received(NamedTuple):
@@ -121,6 +125,7 @@ class WallProtocol(Component):
         self._touch, self._sightlines = TouchCounter(), Sightlines()
         self._closed = False
         self._received: dict[int, _Received] = {}
+        self._kept = KeptPoints()
         self._replan_at: int | None = None
         self._over: dict[int, None] = {}
 
@@ -166,7 +171,7 @@ class WallProtocol(Component):
         """Take in a point of another robot's walk, an answer to this robot's walk, or the end of a walk."""
         match message:
             case PassedPoint():
-                self._pass(sender, message, tick)
+                self._hear(sender, message, tick)
             case ArcClosed(push):
                 self._closed = self._closed or push == self._push
             case WalkOver(push) if push not in self._over:
@@ -175,13 +180,35 @@ class WallProtocol(Component):
             case _:
                 pass
 
-    def _pass(self, sender: int, passed: PassedPoint, tick: int) -> None:
-        """Take a point into the proof of this robot's slot."""
+    @property
+    def _proves(self) -> bool:
         local_map = self._situation.local_map
-        slot = local_map.slot
-        if slot == NOWHERE or local_map.moving or local_map.redundant or local_map.heading is None:
+        placed = local_map.slot != NOWHERE and not (local_map.moving or local_map.redundant)
+        return placed and local_map.heading is not None
+
+    def _hear(self, sender: int, passed: PassedPoint, tick: int) -> None:
+        """Take a point into the proof of this robot's slot, or keep it until the proof has a view of the slot."""
+        local_map = self._situation.local_map
+        if not self._proves:
             return
-        slots = {node: state.slot for node, state in local_map.mutual().items()} | {self._situation.node: slot}
+        if local_map.proof.ready:
+            slots = {node: state.slot for node, state in local_map.mutual().items()} | {local_map.node: local_map.slot}
+            self._pass(sender, passed, slots, tick)
+        else:
+            self._kept.keep(sender, passed, local_map)
+
+    def _take_kept(self, tick: int) -> None:
+        """Take the points into the proof that were received before it had a view of the slot."""
+        local_map = self._situation.local_map
+        if self._proves and not local_map.proof.ready:
+            local_map.update_proof()
+        for sender, passed, slots in self._kept.take(local_map):
+            if self._proves and local_map.node in slots:
+                self._pass(sender, passed, slots, tick)
+
+    def _pass(self, sender: int, passed: PassedPoint, slots: Mapping[int, int], tick: int) -> None:
+        """Take a point into the proof of this robot's slot; `slots` has the slots of the robots that count."""
+        local_map, slot = self._situation.local_map, self._situation.local_map.slot
         point = WalkPoint(
             {slots[node]: direction for node, direction in passed.seen if node in slots},
             passed.walls,
@@ -230,9 +257,12 @@ class WallProtocol(Component):
     def restarted(self, node: int, tick: int) -> None:
         """Forget the points of a former incarnation."""
         self._received.pop(node, None)
+        self._kept.forget(node)
 
     def poll(self, tick: int) -> None:
-        """Make plans again once a walk has passed."""
+        """Take in the points that were kept, and make plans again once a walk has passed."""
+        if self._kept and self._situation.settled:
+            self._take_kept(tick)
         if self._replan_at is not None and tick >= self._replan_at:
             self._replan_at = None
             self._situation.local_map.replan()

@@ -1,0 +1,110 @@
+"""Points of a walk that a robot receives before it has a view of its slot: they count once it has one."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from zwerm.agents.sensor_coverage.frontier.planner import Planner
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, SeenRobot, StateBeacon
+from zwerm.agents.sensor_coverage.messages.commands import Waypoint
+from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, PassedPoint
+from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
+from zwerm.agents.sensor_coverage.protocols.component import Outgoing
+from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
+
+# The robot, its neighbour in the east, and the walking robot, which follows a wall in the south from west to east; their slots.
+ME, NEIGHBOUR, WALKER = 7, 8, 9
+SLOTS = {ME: 4, NEIGHBOUR: 5, WALKER: 17}
+# Directions [deg] to the points of the walk from the robot and its neighbour.
+WAY = ({ME: -70.0}, {ME: -45.0, NEIGHBOUR: -135.0}, {ME: -30.0, NEIGHBOUR: -110.0})
+STEPS_DEG, TRIANGLE_DEG = 40.0, 30.0
+
+
+def state(node: int, number: int, epoch: int, moving: bool, *seen: SeenRobot) -> StateBeacon:
+    return StateBeacon(number, SLOTS[node], epoch, moving, False, 1, seen, (), (), NO_PATH_VECTOR)
+
+
+class Here:
+    """A robot at a slot that it has just taken: it has received states, and has not averaged a bearing yet."""
+
+    on_step: Callable[[Waypoint], None] = staticmethod(lambda _: None)
+    node = ME
+
+    def __init__(self) -> None:
+        self.local_map = LocalMap(ME, PlannerParameters(walls="followed"), Planner)
+        self.local_map.occupy(SLOTS[ME])
+        self.local_map.heading = 0.0
+        self.hear_neighbour(1, 3)
+        self.local_map.receive(WALKER, state(WALKER, 1, 2, True), 0)
+        self.walls = WallProtocol(self)
+        self.sees = dict[int, float]()
+
+    @property
+    def wall_walk(self) -> "Here":
+        return self
+
+    @property
+    def settled(self) -> bool:
+        return bool(self.local_map.samples) and self.local_map.settled(self.sees, 0)
+
+    def hear_neighbour(self, number: int, epoch: int) -> None:
+        seen = SeenRobot(ME, self.local_map.epoch, SLOTS[ME], math.pi)
+        self.local_map.receive(NEIGHBOUR, state(NEIGHBOUR, number, epoch, False, seen), 0)
+
+    def look(self) -> None:
+        self.sees = {NEIGHBOUR: 0.0, WALKER: -0.3}
+        self.local_map.update_bearings(self.sees)
+
+    def watch_walk(self) -> None:
+        for number, point in enumerate(WAY, 1):
+            seen = tuple((node, math.radians(each)) for node, each in point.items())
+            self.walls.receive(WALKER, PassedPoint(1, number, -1, 1, seen, (math.radians(-90.0),), ()), 0)
+            self.walls.poll(0)
+
+    @property
+    def closed_deg(self) -> float:
+        return 360.0 - math.degrees(sum(each.width_rad for each in self.local_map.proof.open_arcs()))
+
+
+def test_points_of_a_walk_are_taken_once_the_robot_has_a_view_of_its_slot() -> None:
+    """The walking robot is in sight all the time, and moves: its state agrees with no view."""
+    here = Here()
+    here.watch_walk()
+    assert here.walls.outgoing() == []
+    here.look()
+    here.walls.poll(0)
+    assert here.closed_deg == pytest.approx(STEPS_DEG + TRIANGLE_DEG)
+    assert Outgoing(WALKER, ArcClosed(1)) in here.walls.outgoing()
+
+
+def test_a_kept_point_does_not_count_for_a_robot_that_has_moved_since() -> None:
+    here = Here()
+    here.watch_walk()
+    here.hear_neighbour(2, 4)
+    here.look()
+    here.walls.poll(0)
+    assert here.closed_deg == pytest.approx(STEPS_DEG), "the triangle with the neighbour does not count"
+
+
+def test_kept_points_do_not_count_for_a_robot_that_has_moved_itself() -> None:
+    here = Here()
+    here.watch_walk()
+    here.local_map.begin_drive()
+    here.local_map.end_drive()
+    here.hear_neighbour(2, 3)
+    here.look()
+    here.walls.poll(0)
+    assert here.closed_deg == pytest.approx(0.0)
+    here.watch_walk()
+    assert here.closed_deg == pytest.approx(STEPS_DEG + TRIANGLE_DEG), "the next walk counts"
+
+
+def test_points_of_a_robot_that_restarts_are_dropped() -> None:
+    here = Here()
+    here.watch_walk()
+    here.walls.restarted(WALKER, 0)
+    here.look()
+    here.walls.poll(0)
+    assert here.closed_deg == pytest.approx(0.0)
