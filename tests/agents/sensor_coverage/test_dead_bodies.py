@@ -1,0 +1,82 @@
+"""A robot dies in an opening, and beyond it is space: `completed` must not be said while that is unseen."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from zwerm.run.runner import run
+from zwerm.scenario.tables import Scenario
+from zwerm.world.faults.programs.crash import Crash, CrashTable
+from zwerm.world.scene import Scene
+
+
+class OpeningTable(CrashTable):
+    """A rectangle [m] in which a robot dies."""
+
+    x_min: float
+    x_max: float
+    y_min: float
+    y_max: float
+
+
+class CrashInOpening(Crash):
+    """The first robot in a rectangle crashes for good."""
+
+    Parameters = OpeningTable
+
+    @classmethod
+    def check(cls, parameters: Any, scenario: Scenario) -> list[str]:
+        return []
+
+    def strike(self, scene: Scene, dead: Sequence[int]) -> Sequence[int]:
+        if self.nodes:
+            return ()
+        table = self.parameters
+        robots = np.setdiff1d(scene.present_ids(), [0, *dead])
+        x, y = scene.position[robots].T
+        inside = (table.x_min < x) & (x < table.x_max) & (table.y_min < y) & (y < table.y_max)
+        self.nodes = robots[inside][:1].tolist()
+        return self.nodes
+
+
+def building(polygon: str, opening: tuple[float, float, float, float]) -> tuple[str, ...]:
+    """Return the settings of a building with noise-free odometry, in which a robot dies in an opening."""
+    names = ("x_min", "x_max", "y_min", "y_max")
+    bounds = ", ".join(f"{name}={value}" for name, value in zip(names, opening, strict=True))
+    return (
+        f"arena.polygon={polygon}",
+        "base.pose=[0.2,0.6,0.3]",
+        "robots.count=25",
+        "robots.sensors.2.distance_sd_fraction=0.0",
+        f'faults=[{{kind="{__name__}:CrashInOpening", at_s=1.0, {bounds}}}]',
+    )
+
+
+# Two rooms, with a door of 0.2 m, or with a passage of that width and a bend. A body is 0.14 m wide.
+DOOR = building(
+    "[[0,0],[1.2,0],[1.2,0.5],[1.3,0.5],[1.3,0],[2.5,0],[2.5,1.2],[1.3,1.2],[1.3,0.7],[1.2,0.7],[1.2,1.2],[0,1.2]]",
+    (1.15, 1.33, 0.45, 0.75),
+)
+BEND = building(
+    "[[0,0],[1.2,0],[1.2,0.5],[1.6,0.5],[1.6,1.2],[2.6,1.2],[2.6,2.2],[1.4,2.2],[1.4,0.7],[1.2,0.7],[1.2,1.2],[0,1.2]]",
+    (1.36, 1.6, 0.5, 0.74),
+)
+ALONE = ("services.path=gradient",)
+HIDDEN = "a walk passes the body, and the proof closes without the room behind it"
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        pytest.param(DOOR, id="central door"),
+        pytest.param(BEND, id="central bend", marks=pytest.mark.xfail(reason=HIDDEN)),
+        pytest.param((*DOOR, *ALONE), id="decentralised door", marks=pytest.mark.xfail(reason=HIDDEN)),
+        pytest.param((*BEND, *ALONE), id="decentralised bend", marks=pytest.mark.xfail(reason=HIDDEN)),
+    ],
+)
+def test_a_dead_body_in_an_opening_hides_no_room(settings: tuple[str, ...]) -> None:
+    result = run("sensor-coverage-narrow", 1, "inline", (*settings, "time.duration_s=4000.0"))
+    assert result.metrics["faults_missed"] == 0.0
+    assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
