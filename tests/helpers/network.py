@@ -55,16 +55,16 @@ class Network(NamedTuple):
 
 
 @contextlib.contextmanager
-def network_over_tcp(directory: Path, *, encrypted: bool = False) -> Iterator[Network]:
+def network_over_tcp(directory: Path, *, encrypted: bool = False, protocol: str = "tls") -> Iterator[Network]:
     """Open a world's link at a free TCP port, as `network` does, which knows the session of each of three nodes.
 
-    If it is `encrypted`, by TLS, the world and each node have a certificate.
+    If it is `encrypted`, by TLS or QUIC, the world and each node have a certificate.
     """
     identity, credentials = None, issue(RUN, range(3))
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     if encrypted:
         identity, credentials = certify(credentials, ["localhost"])
-        endpoint = f"tls/localhost:{free_port()}"
+        endpoint = f"{protocol}/localhost:{free_port()}"
     members = {each.node: ExpectedNode(1, "nobody", NIL, session=each.zid) for each in credentials.nodes}
     with network(directory, members=members, endpoint=endpoint, credentials=credentials, identity=identity) as opened:
         yield opened

@@ -21,7 +21,7 @@ from zwerm.deploy.identity import issue
 from zwerm.errors import LinkError
 from zwerm.link import Arrival
 from zwerm.link.admission import ExpectedNode
-from zwerm.link.connections import address_in, own_sockets, process_of, shut_down
+from zwerm.link.connections import STREAMS, address_in, own_sockets, process_of, shut_down
 from zwerm.link.session import Credential, trust_settings
 
 VICTIM, OTHER = 0, 1
@@ -50,7 +50,7 @@ def net(private_tmp: Path) -> Iterator[Network]:
     ],
 )
 def test_a_locator_of_tcp_and_tls_names_an_address(locator: str, address: tuple[str, int] | None) -> None:
-    assert address_in(locator) == address
+    assert address_in(locator, STREAMS) == address
 
 
 @pytest.mark.parametrize(("family", "host"), [(socket.AF_INET, "127.0.0.1"), (socket.AF_INET6, "::1")])
@@ -66,6 +66,9 @@ def test_only_the_connection_from_an_address_is_shut_down(family: socket.Address
             assert two.recv(1) == b"x", "the other connection works"
             for end in ends:
                 end.close()
+
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a socket does not tell who has connected")
 
 
 def is_cut_off(net: Network, proxy: FrameProxy, times: int) -> bool:
@@ -105,6 +108,24 @@ def test_by_tls_a_session_with_a_stolen_certificate_and_another_id_is_cut_off_wh
             assert net.link.refusals.by_node.keys() == {-1}
 
 
+@linux
+def test_by_quic_what_a_session_with_a_stolen_certificate_and_another_id_sends_is_dropped(private_tmp: Path) -> None:
+    with network_over_tcp(private_tmp, encrypted=True, protocol="quic") as net:
+        terms = net.credentials.terms
+        stolen = msgspec.structs.replace(net.credentials.nodes[VICTIM], zid="abc")
+        with closing(net.node(VICTIM, terms=terms)) as victim:
+            victim.join()
+            for _ in range(2):
+                # The router closes a session from which nothing comes for its lease.
+                short = trust_settings(stolen, terms) | {"transport/link/tx/lease": 1_000}
+                with contextlib.suppress(LinkError), net.session(stolen, **short) as session:
+                    until(lambda: not session.info.transports(), "the session ended")
+            until(lambda: net.link.refusals.by_reason["cut-off"] >= 2, "they were counted")
+            victim.send(b"real")
+            assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
+            assert net.link.refusals.by_node.keys() == {-1}
+
+
 def test_an_evicted_node_is_cut_off_and_no_other(net: Network) -> None:
     with closing(net.node(VICTIM)) as victim, closing(net.node(OTHER)) as other:
         victim.join()
@@ -120,23 +141,32 @@ def test_an_evicted_node_is_cut_off_and_no_other(net: Network) -> None:
 
 SESSION = """
 import sys, time
+from network import RUN
 from zwerm.link.session import open_session
-endpoint, user, password, zid = sys.argv[1:]
+from zwerm.wire.keys import alive_key, hello_key
+from zwerm.wire.messages import Hello, encode
+endpoint, user, password, zid, named = sys.argv[1:]
 settings = {"mode": "client", "id": zid, "connect/endpoints": [endpoint]}
 session = open_session(settings | {"transport/auth/usrpwd": {"user": user, "password": password}}, "refused")
+if named:
+    token = session.liveliness().declare_token(alive_key(RUN, 0))
+    answers = list(session.get(hello_key(RUN, 0), payload=encode(Hello(0, 1, process=int(named)))))
 while session.info.transports():
     time.sleep(0.01)
 """
 
 
-linux = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a socket does not tell who has connected")
+def session_of_a_process(
+    net: Network, credential: Credential, zid: str, named: int | None = None
+) -> "subprocess.Popen[str]":
+    """Start a process that opens a session with this Zenoh id, and ends when that is cut off.
 
-
-def session_of_a_process(net: Network, credential: Credential, zid: str) -> "subprocess.Popen[str]":
-    """Start a process that opens a session with this Zenoh id, and ends when that is cut off."""
+    With `named` it joins as node 0 of that process.
+    """
+    told = "" if named is None else str(named)
     return subprocess.Popen(
-        [sys.executable, "-c", SESSION, net.endpoint, credential.user, credential.password, zid],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        [sys.executable, "-c", SESSION, net.endpoint, credential.user, credential.password, zid, told],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "tests/helpers")))},
         text=True,
     )
 
@@ -153,6 +183,51 @@ def test_on_a_unix_socket_another_process_with_a_stolen_password_is_cut_off(priv
             until(lambda: net.link.refusals.by_reason["cut-off"] >= 1, "it was counted")
             victim.send(b"real")
             assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
+
+
+@contextlib.contextmanager
+def network_of_one(directory: Path) -> Iterator[Network]:
+    """Open the link of a world that did not start its only node, over a Unix socket."""
+    credentials = issue(RUN, range(1))
+    members = {each.node: ExpectedNode(1, "nobody", NIL, session=each.zid) for each in credentials.nodes}
+    with network(directory, 1, members, credentials=credentials) as net:
+        yield net
+
+
+@linux
+def test_of_robots_started_elsewhere_another_process_is_cut_off_as_soon_as_all_have_joined(private_tmp: Path) -> None:
+    with network_of_one(private_tmp) as net, closing(net.node(VICTIM)) as victim:
+        stolen = net.credentials.nodes[VICTIM]
+        with session_of_a_process(net, stolen, "abc") as early:
+            until(lambda: has_connected(early.pid), "it has connected")
+            victim.join()
+            assert early.wait(60) == 0
+        assert session_of_a_process(net, stolen, "def").wait(60) == 0
+        until(lambda: net.link.refusals.by_reason["cut-off"] >= 2, "they were counted")
+        victim.send(b"real")
+        assert net.link.receive(20.0) == Arrival(VICTIM, b"real")
+
+
+@linux
+@pytest.mark.parametrize("named", [0, 2**22 + 1], ids=["no process", "one of a container"])
+def test_no_robot_is_cut_off_whose_process_is_not_known_here(private_tmp: Path, named: int) -> None:
+    """No process has an id above 2**22. The node that joins is of another process: the world's own one is never cut off."""
+    with network_of_one(private_tmp) as net, contextlib.ExitStack() as stack:
+        own = net.credentials.nodes[VICTIM]
+
+        def start(zid: str, named: int | None = None) -> "subprocess.Popen[str]":
+            process = stack.enter_context(session_of_a_process(net, own, zid, named))
+            stack.callback(process.kill)
+            return process
+
+        robot = start(own.zid, named)
+        assert net.link.wait_joined(lambda joined: VICTIM in joined, 60.0)
+        copies = [stack.enter_context(each) for each in connections_from(robot.pid)]
+        thief = start("abc")
+        until(lambda: has_connected(thief.pid), "it has connected")
+        until(lambda: len(vars(net.link._connections)["_links"]) == 2, "the router has told of it")
+        assert not any(is_shut_down(each) for each in copies)
+        assert thief.poll() is None
 
 
 @linux

@@ -92,6 +92,14 @@ class Admission:
         """Whether the Zenoh id of every node's session is known."""
         return all(expected.session for expected in self._expected.values())
 
+    @property
+    def is_complete(self) -> bool:
+        """Whether every node that is expected has joined, now or before: no other session may join."""
+        return all(
+            node in self.joined or self._ended.get(node, 0) >= member.incarnation
+            for node, member in self._expected.items()
+        )
+
     def expected(self, node: int) -> ExpectedNode:
         """Return what is expected of a node that has been admitted."""
         return self._expected[node]

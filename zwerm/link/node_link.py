@@ -5,6 +5,7 @@ transport is lost, the link is lost for good, and the world reports the node los
 """
 
 import contextlib
+import os
 import queue
 import threading
 import time
@@ -58,7 +59,7 @@ class ZenohNodeLink:
     ) -> None:
         """Connect. Raises LinkError if it does not succeed within `deadline_s` seconds."""
         self._run = run
-        self._software = "" if is_local(endpoint) else software()
+        self._software, self._process = ("", os.getpid()) if is_local(endpoint) else (software(), 0)
         self._credential = credential
         self._place = f"node {credential.node} at {endpoint}"
         self._deadline_s = time.monotonic() + deadline_s
@@ -106,7 +107,7 @@ class ZenohNodeLink:
         # Kept as an attribute, because Zenoh withdraws an unreferenced token. Declared before hello, so that the world
         # knows the token when it answers.
         self._token = self._session.liveliness().declare_token(alive_key(self._run, node))
-        hello = encode(Hello(node, self._credential.incarnation, self._software))
+        hello = encode(Hello(node, self._credential.incarnation, self._software, self._process))
         while (left_s := self._deadline_s - time.monotonic()) > 0:
             replies = self._session.get(
                 hello_key(self._run, node), FifoChannel(1), payload=hello, timeout=left_s, express=True

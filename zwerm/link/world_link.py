@@ -10,7 +10,7 @@ for each message would cost more than the work on the message.
 
 import contextlib
 import threading
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Final
 
@@ -22,7 +22,7 @@ from zwerm.errors import LinkError
 from zwerm.link import Arrival, arrival
 from zwerm.link.admission import CUT_OFF, EVICTED, IDENTITY, NOT_JOINED, SOFTWARE, Admission, ExpectedNode
 from zwerm.link.arrival_signal import ArrivalSignal
-from zwerm.link.connections import Connections
+from zwerm.link.connections import Connections, connected_processes
 from zwerm.link.session import TWO_THREADS, keep_thread, open_session, set_threads
 from zwerm.link.software import software
 from zwerm.wire.keys import EVERY, alive_key, command_key, hello_key, node_of, observation_key
@@ -53,6 +53,9 @@ class ZenohWorldLink:
         self._run = run
         self._members = Admission(members, software())
         self._source_of: dict[str, int] = {}
+        self._processes = processes
+        self._process_of: dict[int, int] = {}  # as nodes named them
+        self._knows_processes = False
         self._signal = ArrivalSignal()
         self._lock = self._signal.lock
         self._room = threading.Condition(self._lock)  # only Zenoh's threads wait for it
@@ -67,8 +70,8 @@ class ZenohWorldLink:
             self._put = {node: self._publisher(observation_key(run, node)).put for node in members}
             self._session.declare_subscriber(command_key(run, EVERY), Callback(self._on_command, indirect=False))
             self._session.liveliness().declare_subscriber(alive_key(run, EVERY), self._on_liveliness)
+            self._connections = Connections(self._session, self._may_stay, self._on_cut, self._may_connect)
             self._session.declare_queryable(hello_key(run, EVERY), self._on_hello)
-            self._connections = Connections(self._session, self._may_stay, self._on_cut, processes)
         except BaseException:
             self._session.close()  # type: ignore[no-untyped-call]
             raise
@@ -132,7 +135,7 @@ class ZenohWorldLink:
         return [node for node in left if node not in answered]
 
     def evict(self, node: int) -> None:
-        """Drop all messages of a node that arrive from now on, and close its connection if that is one of TCP."""
+        """Drop all messages of a node that arrive from now on, and close its connection where the world can."""
         with self._lock:
             self._evicted.add(node)
             self._source_of.pop(command_key(self._run, node), None)
@@ -205,6 +208,36 @@ class ZenohWorldLink:
             node = self._members.owner_of(session)
             return node not in self._evicted and (node >= 0 or not self._members.knows_sessions)
 
+    def _may_connect(self) -> Mapping[int, int] | None:
+        """Return the processes that may connect to a Unix socket and how often each may; None where that is not known."""
+        if self._processes is not None:
+            return Counter(self._processes())
+        with self._lock:
+            if not self._knows_processes:
+                return None
+            stays = self._members.joined.keys() - self._evicted
+            return Counter(process for node, process in self._process_of.items() if node in stays)
+
+    def _settle_processes(self) -> None:
+        """Once all nodes have joined, cut off who else has connected to a Unix socket.
+
+        Not where a node there names no process, or none that has connected: the ids of a container differ from those here.
+        """
+        with self._lock:
+            if self._processes is not None or self._knows_processes or not self._members.is_complete:
+                return
+            named = {node: self._process_of.get(node, 0) for node in self._members.joined}
+            sessions = {node: self._members.expected(node).session for node in named}
+        connected = connected_processes()
+        known = all(
+            process in connected if process else not self._connections.is_local(sessions[node])
+            for node, process in named.items()
+        )
+        with self._lock:
+            self._knows_processes = known
+        if known:
+            self._connections.cut_foreign()
+
     def _on_cut(self, session: str) -> None:
         """Count a session whose connection was closed."""
         with self._lock:
@@ -234,6 +267,7 @@ class ZenohWorldLink:
                 with self._lock:
                     self.refusals.count(_node_in(key), welcome.refused)
             query.reply(key, encode(welcome))
+            self._settle_processes()
 
     def _welcome(self, node: int, payload: bytes) -> Welcome:
         """Admit the node and return its controller and Setup, or return the reason for refusing it."""
@@ -250,6 +284,8 @@ class ZenohWorldLink:
                 return Welcome(refused=refused, detail=differing)
             member = self._members.expected(node)
             self._source_of[command_key(self._run, node)] = node
+            if hello.process:
+                self._process_of[node] = hello.process
             self._signal.notify()
         return Welcome(
             controller=member.controller, setup=msgspec.Raw(member.setup), paced=member.paced, code=member.code

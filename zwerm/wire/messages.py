@@ -210,12 +210,14 @@ class Failure(_WireMessage, frozen=True, tag=f"failure/{PROTOCOL_VERSION}"):
 class Hello(_WireMessage, frozen=True, tag=f"hello/{PROTOCOL_VERSION}"):
     """A node asks to join under the incarnation it was started with.
 
-    `software` names its releases (`zwerm.link.software`); a node on the world's own machine leaves it empty.
+    `software` names its releases (`zwerm.link.software`); a node on the world's own machine leaves it empty. That node
+    tells the id of its process, others 0.
     """
 
     node: int
     incarnation: int
     software: str = ""
+    process: int = 0
 
 
 class Welcome(_WireMessage, frozen=True, tag=f"welcome/{PROTOCOL_VERSION}"):
