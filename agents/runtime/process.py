@@ -19,7 +19,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable
-from multiprocessing import parent_process
+from multiprocessing import forkserver, parent_process, resource_tracker
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Final, TextIO
@@ -66,6 +66,7 @@ def main(
     With a `station` the process moves into its network namespace and sends packets over that network.
     """
     die_with_parent(_server)
+    _close_pipes_of_server()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # The group identifies the processes that a controller has started. A session would do so, too, but Linux may schedule each
     # session as a group of its own (autogroup). Then each robot has as much time as the world, whatever its niceness.
@@ -99,6 +100,23 @@ def main(
         sys.stderr.flush()
         os._exit(code)  # closing the radio's session waits for messages that the network loses
     sys.exit(code)
+
+
+def _close_pipes_of_server() -> None:
+    """Close the pipes by which a process starts others by the server of robots, and its tracker of resources.
+
+    A robot starts none. Any byte from it would end the server, and make the tracker print a traceback.
+    """
+    # They have no public names.
+    holders = (
+        (vars(forkserver)["_forkserver"], "_forkserver_alive_fd"),
+        (vars(resource_tracker)["_resource_tracker"], "_fd"),
+    )
+    for holder, name in holders:
+        descriptor: int | None = getattr(holder, name)
+        if descriptor is not None:
+            os.close(descriptor)
+            setattr(holder, name, None)
 
 
 class _Prefixed(io.TextIOBase):

@@ -1,6 +1,8 @@
 """A controller that attacks the run from inside its process is named and bounded, and the other robots go on."""
 
 import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pytest
 from support import scenario
@@ -16,9 +18,9 @@ ATTACKER, AT_TICK = 1, 3
 pytestmark = pytest.mark.usefixtures("impatient")
 
 
-def attacked(attack: str, **time: float) -> RunResult:
+def attacked(attack: str, faults: Sequence[Mapping[str, Any]] = (), **time: float) -> RunResult:
     robots = {"controller": f"malicious:{attack}", "count": 3, "on_crash": "continue"}
-    return run(scenario(robots=robots, radio={"range_m": 1.0}, time={"duration_s": 1.0} | time))
+    return run(scenario(robots=robots, radio={"range_m": 1.0}, time={"duration_s": 1.0} | time, faults=list(faults)))
 
 
 @pytest.mark.parametrize(
@@ -43,6 +45,15 @@ def test_an_attack_ends_its_own_robot_and_no_other(
     assert result.crashed == [ATTACKER]
     assert result.crash_reasons[ATTACKER].startswith(f"tick {AT_TICK}: {reason}")
     assert result.middleware_lost == 0
+
+
+def test_a_robot_that_writes_to_every_descriptor_keeps_no_other_from_a_restart(
+    nothing_left: None, capfd: pytest.CaptureFixture[str]
+) -> None:
+    result = attacked("Scribbles", faults=[{"kind": "restart", "nodes": [2], "at_s": 0.6}])
+    assert (result.outcome, result.ticks) == ("time-limit", 10), result.reason
+    assert (list(result.crash_reasons), result.restarted) == ([ATTACKER], [2])
+    assert "Traceback" not in capfd.readouterr().err, "a process of the run has failed"
 
 
 def test_a_flood_of_answers_is_counted_and_its_robot_evicted(nothing_left: None) -> None:

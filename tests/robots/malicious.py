@@ -127,6 +127,16 @@ class Closes(Attacker):
         os.closerange(0, 1_024)
 
 
+class Scribbles(Attacker):
+    """Writes to every descriptor of its process that is no file, and ends."""
+
+    def attack(self, observation: Observation) -> None:
+        for number in range(3, 1_024):
+            with contextlib.suppress(OSError):
+                os.write(number, b"scribbled")
+        os._exit(0)
+
+
 class Disconnects(Attacker):
     """Closes its connection, and goes on."""
 
