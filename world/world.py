@@ -23,7 +23,7 @@ from zwerm.errors import ProtocolError
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import BodyVelocity, Command, Failure, Transmission, WheelSpeeds
-from zwerm.wire.text import printable
+from zwerm.wire.text import printable, printable_line
 from zwerm.wire.trace import Trace
 from zwerm.world.arena.arena import Arena
 from zwerm.world.bodies.bodies import Bodies
@@ -198,7 +198,7 @@ class World:
     def crash(self, node: int, reason: str) -> None:
         """Record that a node's program ended: its motors stop, it is never awaited again, its body stays where it is."""
         self.status.crash_ticks.setdefault(node, self.tick)
-        self._lifecycle.crash(node, printable(reason))
+        self._lifecycle.crash(node, printable_line(reason))
 
     def evict(self, node: int, reason: str) -> None:
         """Record that a node has crashed because it floods the run, and stop its messages."""

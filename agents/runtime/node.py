@@ -23,7 +23,7 @@ from zwerm.wire.messages import (
     decode_observation,
     encode,
 )
-from zwerm.wire.text import printable
+from zwerm.wire.text import printable, printable_line
 
 if TYPE_CHECKING:
     from zwerm.link.peer_radio import PeerRadio
@@ -106,7 +106,7 @@ class Node:
         return encode(
             Failure(
                 tick,
-                printable(f"{type(error).__name__}: {_text_of(error)}")[:ERROR_CHARS_MAX] + self._place(error),
+                printable_line(f"{type(error).__name__}: {_text_of(error)}")[:ERROR_CHARS_MAX] + self._place(error),
                 printable("".join(_formatted(error)))[-TRACEBACK_CHARS_MAX:],
             )
         )

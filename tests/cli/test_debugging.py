@@ -12,7 +12,7 @@ from zwerm.cli.tracebacks import grouped
 
 CONTROLLERS = """
 import dataclasses
-from zwerm import Command, Controller
+from zwerm import Command, Controller, WheelSpeeds
 
 class Plain(Controller):
     def step(self, observation):
@@ -22,6 +22,12 @@ class Raises(Plain):
     def step(self, observation):
         if observation.tick == 3:
             raise ValueError(f"no luck for {self.setup.node}")
+        return Command()
+
+class Refused(Plain):
+    def step(self, observation):
+        if observation.tick == 3 and self.setup.node == 1:
+            return Command(drive=WheelSpeeds(float("nan"), 0.0))
         return Command()
 
 class Stops(Plain):
@@ -127,3 +133,9 @@ def test_a_class_that_cannot_be_a_controller_is_one_line(tmp_path: Path, control
     assert ran.returncode == 2
     assert len(ran.stderr.splitlines()) == 1
     assert printed in ran.stderr
+
+
+def test_a_refused_command_is_named_although_the_run_goes_on(tmp_path: Path) -> None:
+    ran = run(tmp_path, "Refused", "--inline", "--quiet", "--set", "robots.on_crash=continue")
+    assert ran.returncode == 0
+    assert "node 1 crashed at tick 3: its command was refused: not-finite: WheelSpeeds(left_m_s=nan" in ran.stderr

@@ -18,7 +18,7 @@ import numpy as np
 
 from zwerm.catalogue import BASE
 from zwerm.scenario.tables import Scenario
-from zwerm.wire.text import printable
+from zwerm.wire.text import printable_line
 from zwerm.world.scene import Bools
 
 # The outcomes of a run. The driver's caller sets INTERRUPTED.
@@ -68,7 +68,7 @@ class Completion:
         """
         centre = self._coordinator
         if node in self._deciding and (centre not in self._deciding or node == centre or centre in dead):
-            self._gave_up = f"node {node} gave up: {printable(reason)}"
+            self._gave_up = f"node {node} gave up: {printable_line(reason)}"
 
     def restart(self, node: int) -> None:
         """Drop a node's report: its program lost its memory."""

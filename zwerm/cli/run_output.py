@@ -14,7 +14,7 @@ from zwerm.cli.console import RunProgress, print_file, print_result
 from zwerm.cli.output_files import ANIMATIONS, PICTURES, RECORDINGS, OutputFile, check_outputs, run_stem
 from zwerm.cli.radio_table import print_radio_ledger
 from zwerm.cli.terminal import EXIT_FAILED, EXIT_INTERRUPTED, err, out, print_json
-from zwerm.cli.tracebacks import print_tracebacks
+from zwerm.cli.tracebacks import print_crashes, print_tracebacks
 from zwerm.errors import PictureError, ScenarioError, ZwermError
 from zwerm.run.result import RunResult
 
@@ -88,6 +88,7 @@ class RunOutput:
         The result comes first: a full disk, or Ctrl-C while a picture is drawn, does not lose it.
         """
         print_tracebacks(err, result.tracebacks)
+        print_crashes(err, result)
         if self.as_json:
             print_json(result.as_json())
         else:

@@ -1,9 +1,11 @@
-"""Tracebacks of controllers that raised: those from the same lines are printed once."""
+"""Why programs of robots ended: tracebacks of controllers that raised, once for the same lines, and a line for all others."""
 
 from collections.abc import Mapping
 from typing import Final
 
 from rich.console import Console
+
+from zwerm.run.result import RunResult
 
 _NODES_MAX: Final = 10
 
@@ -16,6 +18,17 @@ def print_tracebacks(console: Console, tracebacks: Mapping[int, str]) -> None:
         more = f", and {len(nodes) - 1} more from the same line: {others}{rest}" if others else ""
         text = f"node {nodes[0]} raised{more}\n{tracebacks[nodes[0]]}"
         console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def print_crashes(console: Console, result: RunResult) -> None:
+    """Print a line for each program that ended without a traceback while the run went on, and count those after the first."""
+    ended = [node for node in result.crash_reasons if node not in result.tracebacks]
+    unnamed = [node for node in sorted(ended) if not result.reason.startswith(f"node {node} crashed ")]
+    for node in unnamed[:_NODES_MAX]:
+        text = f"node {node} crashed at {result.crash_reasons[node]}"
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+    if len(unnamed) > _NODES_MAX:
+        console.print(f"and {len(unnamed) - _NODES_MAX} more programs ended", markup=False, highlight=False)
 
 
 def grouped(tracebacks: Mapping[int, str]) -> list[list[int]]:

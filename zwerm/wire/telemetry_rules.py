@@ -47,12 +47,20 @@ def plain_numbers(telemetry: Mapping[str, Any]) -> dict[str, float]:
         # NumPy scalars are numbers; text and arrays are not, although `float` takes some of them.
         if isinstance(value, str | bytes) or not hasattr(value, "__float__") or getattr(value, "ndim", False):
             raise TypeError(f"telemetry.{name[:NAME_CHARS_MAX]}: expected a number, got {_shown(value)}")
-        numbers[name] = float(value)
+        try:
+            numbers[name] = float(value)
+        except OverflowError:
+            raise ValueError(
+                f"telemetry.{name[:NAME_CHARS_MAX]}: expected a finite number, got {_shown(value)}"
+            ) from None
     if error := telemetry_error(numbers):
         raise ValueError(error)
     return numbers
 
 
 def _shown(value: object) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except Exception:  # the code of a user, or an integer of too many digits
+        text = f"a {type(value).__name__}"
     return text if len(text) <= _SHOWN_CHARS_MAX else text[:_SHOWN_CHARS_MAX] + "..."

@@ -11,6 +11,11 @@ _ESCAPED: Final = {code: f"\\x{code:02x}" for code in _CONTROLS if chr(code) not
 }
 
 
+def printable_line(text: str) -> str:
+    """Return `text` as `printable` does, and on one line: no text can add a line that seems to be of someone else."""
+    return printable(text).replace("\n", "\\n")
+
+
 def printable(text: str) -> str:
     """Return `text` with control characters, marks of direction and lone surrogates as escapes such as \\x1b."""
     return text.translate(_ESCAPED).encode(errors="backslashreplace").decode()
