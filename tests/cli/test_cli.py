@@ -93,7 +93,10 @@ def test_check_reports_an_unknown_controller_and_an_unknown_sensor_beside_errors
             ["world", "computation-free", "--listen", "foo", "--credentials", "k"],
             "zwerm: --listen: expected an endpoint such as tcp/0.0.0.0:7447, got 'foo'",
         ),
-        (["run", "computation-free", "--inline", "--realtime", "0"], "zwerm: realtime: expected a factor > 0, got 0.0"),
+        (
+            ["run", "computation-free", "--inline", "--realtime", "0"],
+            "zwerm: realtime: expected a factor of at least 1e-06, got 0.0",
+        ),
         (
             ["robot", "--connect", "tcp/127.0.0.1:1", "--credentials", "none.key"],
             "zwerm: none.key: cannot read credentials",

@@ -12,6 +12,7 @@ import pytest
 from network import network
 from waiting import until
 
+from zwerm.link.arrival_signal import ArrivalSignal
 from zwerm.link.world_link import ZenohWorldLink
 
 Wait = Callable[[ZenohWorldLink], object]
@@ -72,3 +73,14 @@ def test_an_interrupt_at_any_moment_of_a_wait_does_not_block_the_threads_that_re
             assert arrival is not None, moment
             assert arrival.payload == b"after"
         assert moment > 5, "the interrupts came inside the wait"
+
+
+def test_a_wait_may_have_any_time_limit() -> None:
+    signal = ArrivalSignal()
+    answers = iter([False, True])
+
+    def condition() -> bool:
+        signal.notify()
+        return next(answers)
+
+    assert signal.wait_for(condition, 1e300)

@@ -1,5 +1,6 @@
 """Input of unknown origin: every file and setting is used, or refused in one line; none hangs or ends in a traceback."""
 
+import math
 import os
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from zwerm.run.runner import run
 from zwerm.run.validation import scenario_mistakes
 from zwerm.study.study_tables import parse_seeds
 from zwerm.wire.messages import Command, Failure, encode
-from zwerm.wire.text import printable
+from zwerm.wire.text import printable, printable_line
 
 LONG = "9" * 5_000
 DEEP = "[" * 5_000 + "]" * 5_000
@@ -30,6 +31,18 @@ def test_any_value_of_a_setting_is_used_or_refused(path: str, value: str) -> Non
     found = scenario_mistakes("computation-free", (f"{path}={value}",))
     assert all(len(line) < 6_000 and "\n" not in line for line in found)
     assert found or path == "robots.parameters.x"
+
+
+@pytest.mark.parametrize("dt_s", ["1e-308", "1e-300", "1e-11"])
+def test_a_tick_too_short_for_the_run_is_refused(dt_s: str) -> None:
+    [line] = scenario_mistakes("computation-free", (f"time.dt_s={dt_s}",))
+    assert "expected duration_s of at most 1e+12 times dt_s" in line
+
+
+@pytest.mark.parametrize("factor", [1e-300, -1.0, math.nan])
+def test_a_pace_that_never_comes_to_a_tick_is_refused(factor: float) -> None:
+    with pytest.raises(ScenarioError, match=r"^realtime: expected a factor of at least 1e-06, got "):
+        run("computation-free", runner="inline", realtime=factor)
 
 
 @pytest.mark.parametrize("text", [f"x = {LONG}", f"x = {DEEP}", f"x = {NESTED}", "\x00", "x" * 10_000])
@@ -146,7 +159,9 @@ def test_a_working_directory_that_is_deleted_in_the_start_of_a_run_is_an_error_o
 def test_no_text_of_a_robot_reaches_the_terminal_with_control_characters() -> None:
     assert printable("a \u202eb\u2066c\u2028d") == "a \\u202eb\\u2066c\\u2028d"
     assert printable("\x1b[2J\x07\x9b1m\udcff\tok\n") == "\\x1b[2J\\x07\\x9b1m\\udcff\tok\n"
+    assert printable_line("failed\nzwerm: all is well\n") == "failed\\nzwerm: all is well\\n"
     result = run(scenario(robots={"controller": "ends:Escapes"}), runner="inline")
+    assert "\n" not in result.reason
     assert "\x1b" not in result.reason + "".join(result.tracebacks.values())
     assert r"\x1b[2J" in result.reason
     world = assemble(scenario(robots={"on_crash": "continue"}), 1)

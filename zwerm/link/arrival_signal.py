@@ -11,6 +11,9 @@ import time
 from collections.abc import Callable
 from typing import Final
 
+# The system takes no time limit of 300 years or more.
+_WAIT_S_MAX: Final = threading.TIMEOUT_MAX / 2
+
 
 class ArrivalSignal:
     """Guards what Zenoh's threads and the world's threads share, and wakes the latter."""
@@ -26,7 +29,7 @@ class ArrivalSignal:
 
     def wait_for(self, condition: Callable[[], object], timeout_s: float) -> bool:
         """Wait until `condition()`, evaluated under the lock, is true; return whether it is within `timeout_s` seconds."""
-        end_s = time.monotonic() + timeout_s
+        end_s = time.monotonic() + min(timeout_s, _WAIT_S_MAX)
         wakes: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._waiting.append(wakes)
         try:

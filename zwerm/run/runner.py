@@ -46,6 +46,9 @@ if TYPE_CHECKING:  # an inline run needs no transport
 
 Runner = Literal["processes", "inline"]
 
+# The slowest pace of a run in real time, as a factor of the wall clock.
+REALTIME_MIN: Final = 1e-6
+
 # The samples of positions that a run's history holds for pictures, and the progress reports of a run, at most about.
 HISTORY_SAMPLES: Final = 4_000
 PROGRESS_REPORTS: Final = 1_000
@@ -78,8 +81,8 @@ def run(
         raise ScenarioError([f"runner: expected {expected}, got {runner!r}{did_you_mean(runner, get_args(Runner))}"])
     if seed < 0:
         raise ScenarioError([f"seed: expected >= 0, got {seed}"])
-    if realtime is not None and not realtime > 0:
-        raise ScenarioError([f"realtime: expected a factor > 0, got {realtime}"])
+    if realtime is not None and not realtime >= REALTIME_MIN:
+        raise ScenarioError([f"realtime: expected a factor of at least {REALTIME_MIN:g}, got {realtime}"])
     if isinstance(scenario, Scenario):
         if overrides:
             raise ScenarioError([f"overrides: a scenario that is already loaded takes none, got {list(overrides)}"])

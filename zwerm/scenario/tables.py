@@ -41,6 +41,9 @@ from zwerm.scenario.types import (
     scenario_name,
 )
 
+# The most ticks that a run may have. At a million a second it takes eleven days.
+TICKS_MAX: Final = 1e12
+
 
 class TimeTable(Table):
     """Virtual time, and how long the world waits for a node in wall-clock time."""
@@ -49,6 +52,14 @@ class TimeTable(Table):
     duration_s: Positive = 60.0
     straggler_s: Positive = 30.0
     deadman_s: Positive = 0.5
+
+    @model_validator(mode="after")
+    def _has_an_end(self) -> Self:
+        if not self.duration_s / self.dt_s <= TICKS_MAX:
+            raise ValueError(
+                f"expected duration_s of at most {TICKS_MAX:g} times dt_s, got {self.duration_s / self.dt_s:g}"
+            )
+        return self
 
 
 class ArenaTable(Table):
