@@ -209,6 +209,25 @@ def test_an_integer_is_taken_where_a_number_is_expected() -> None:
 FULL = encode(WIRE[3][0])
 
 
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"outbox": [["news", "text"]]}, "outbox[0].payload: expected bytes, got 'text'"),
+        ({"outbox": ["news", b"x", None]}, "outbox[0]: expected a Transmission, got 'news'"),
+        ({"outbox": [["a", b""], ["b", b"", "all"]]}, "outbox[1].to: expected int | null, got 'all'"),
+        ({"drive": [0.1, 0.2]}, "drive: expected BodyVelocity, WheelSpeeds or None, got [0.1, 0.2]"),
+        ({"drive": {"kind": "wheels", "left_m_s": True}}, "drive.left_m_s: expected float, got True"),
+        ({"wake": {"at_s": "\x1b[2J" + 99 * "x"}}, f"wake.at_s: expected float | null, got '\\x1b[2J{72 * 'x'}"),
+        ({"wake": {"on_smell": True}}, "wake: Object contains unknown field `on_smell`"),
+        ({"speed": 1.0}, "Object contains unknown field `speed`"),
+    ],
+)
+def test_a_refused_field_is_named_as_in_the_class_with_its_value(fields: dict[str, Any], text: str) -> None:
+    with pytest.raises(ProtocolError) as caught:
+        open_answer(msgpack.packb({"type": "command/1", "tick": 1} | fields))
+    assert str(caught.value) == f"schema: {text}"
+
+
 def reason_of(payload: bytes) -> str:
     with pytest.raises(ProtocolError) as caught:
         open_answer(payload)

@@ -7,7 +7,7 @@ ledger of every link is compared with the packets in flight at every tick.
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 from zwerm.maths.keyed_random import Draws
 from zwerm.scenario.tables import Scenario
@@ -19,6 +19,9 @@ from zwerm.world.radio.channel import Channel, Outboxes
 from zwerm.world.radio.links import Links
 from zwerm.world.radio.registry import make_models
 from zwerm.world.scene import Scene
+
+# The table that makes a channel.
+_TABLES: Final = {ROBOTS: "radio", UPLINK: "coordinator"}
 
 
 class Medium:
@@ -102,7 +105,9 @@ class Medium:
         """Return the reason why this transmission cannot be sent, or an empty string."""
         channel = self.channels.get(message.channel)
         if channel is None:
-            return f"no channel {message.channel!r} here"
+            if message.channel in _TABLES:
+                return f"no channel {message.channel!r}: the scenario has no [{_TABLES[message.channel]}]"
+            return f"no channel {message.channel!r}; the scenario has {', '.join(self.channels) or 'none'}"
         if message.to is not None and not channel.carries(sender, message.to):
             return f"channel {message.channel!r} does not lead from node {sender} to {message.to}"
         return ""

@@ -19,6 +19,7 @@ import msgspec
 from msgspec import Struct
 
 from zwerm.errors import ProtocolError
+from zwerm.wire.schema_text import schema_text
 from zwerm.wire.telemetry_rules import plain_numbers, telemetry_error
 
 PROTOCOL_VERSION: Final = 1
@@ -263,6 +264,15 @@ decode_to_node: Final = msgspec.msgpack.Decoder(Observation | Goodbye).decode
 # The error text of msgspec for a message of another type, such as "command/2".
 _OTHER_TYPE = re.compile(r"Invalid value '\w+/([0-9]{1,9})' - at `\$\.type`")
 
+# How a controller's author calls what MessagePack calls an array or an object.
+_ARRAYS: Final = {"outbox[]": Transmission.__struct_fields__}
+_TYPES: Final = {
+    "drive": "BodyVelocity, WheelSpeeds or None",
+    "outbox": "a tuple of Transmission",
+    "outbox[]": "a Transmission",
+    "wake": "Wake or None",
+}
+
 REFUSABLE: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
@@ -292,7 +302,11 @@ def open_answer(payload: bytes) -> Command | Failure:
     except REFUSABLE as error:
         found = refusal(error)
         # A number of another type: the decoder names the field, not the key.
-        raise ProtocolError("telemetry", str(found)) if "`$.telemetry" in str(found) else found from None
+        if "`$.telemetry" in str(found):
+            raise ProtocolError("telemetry", str(found)) from None
+        if found.reason == "schema":
+            raise ProtocolError("schema", schema_text(str(error), payload, _ARRAYS, _TYPES)) from None
+        raise found from None
     if type(answer) is Command:
         drive, wake = answer.drive, answer.wake
         if drive is not None:
