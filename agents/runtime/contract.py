@@ -71,6 +71,13 @@ class Controller:
         self.setup = setup
         self.parameters: Any = msgspec.convert(setup.parameters, self.Parameters)
 
+    def __getattr__(self, name: str) -> Any:  # only for what is missing
+        if name in ("setup", "parameters"):
+            raise AttributeError(
+                f"no {name}: the constructor of {type(self).__name__} must call super().__init__(setup)"
+            )
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+
     @cached_property
     def random(self) -> np.random.Generator:
         """The node's own stream of random numbers, made when it is first used."""

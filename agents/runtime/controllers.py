@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import msgspec
 
-from zwerm.agents.runtime.contract import NoParameters, Setup, Stepper
+from zwerm.agents.runtime.contract import Controller, NoParameters, Setup, Stepper
 from zwerm.catalogue import ROBOT, algorithm_of, names
 from zwerm.errors import ControllerError
 from zwerm.scenario.plugin_names import class_named, takes
@@ -28,10 +28,14 @@ def find(name: str) -> type[Any]:
         found = class_named(built_in.get(name, name), "controller", BUILT_IN)
     except ValueError as error:
         raise ControllerError(str(error)) from error
-    if not callable(getattr(found, "step", None)):
+    step = getattr(found, "step", None)
+    if not callable(step) or step is Controller.step:
         raise ControllerError(f"{name}: a controller needs a method step(observation) -> Command")
     if not takes(found, 1):
         raise ControllerError(f"{name}: a controller's constructor takes its Setup: __init__(self, setup)")
+    sensors = getattr(found, "sensors", ())
+    if isinstance(sensors, str):
+        raise ControllerError(f"{name}: its sensors must be a tuple of names, such as ({sensors!r},), got {sensors!r}")
     kind: Any = parameters_of(found)
     if not isinstance(kind, type) or not issubclass(kind, msgspec.Struct):
         raise ControllerError(f"{name}: its Parameters must be a subclass of msgspec.Struct, got {kind!r}")

@@ -129,8 +129,12 @@ def _text_of(error: BaseException) -> str:
 
 
 def _formatted(error: BaseException) -> list[str]:
-    """Return the traceback of an error without the frame of this file, which gives no information about the controller."""
+    """Return the traceback of an error from the controller's frame on.
+
+    It is empty where the error is about the command that `step` returned: no frame is the controller's own.
+    """
     trace = error.__traceback__
-    if trace is not None and trace.tb_next is not None:
-        trace = trace.tb_next
+    trace = None if trace is None else trace.tb_next
+    if trace is None or trace.tb_frame.f_code.co_filename == check_records.__code__.co_filename:
+        return []
     return traceback.format_exception(type(error), error, trace)

@@ -40,6 +40,24 @@ class NoSetup(Plain):
     def __init__(self):
         pass
 
+class TextSensors(Plain):
+    sensors = "compass"
+
+class NoStep(Controller):
+    def setp(self, observation):
+        return Command()
+
+class NoSuper(Plain):
+    def __init__(self, setup):
+        self.speed = 1.0
+
+    def step(self, observation):
+        return Command(telemetry={"x": self.random.uniform()})
+
+class Nothing(Plain):
+    def step(self, observation):
+        pass
+
 class BadConstructor(Plain):
     def __init__(self, setup):
         super().__init__(setup)
@@ -125,6 +143,11 @@ def test_a_breakpoint_in_a_process_names_the_option_that_it_needs(tmp_path: Path
             "robots.controller: debugged:NoSetup: a controller's constructor takes its Setup: __init__(self, setup)",
         ),
         ("BadConstructor", "debugged:BadConstructor: its constructor raised ZeroDivisionError: division by zero ("),
+        (
+            "TextSensors",
+            "debugged:TextSensors: its sensors must be a tuple of names, such as ('compass',), got 'compass'",
+        ),
+        ("NoStep", "debugged:NoStep: a controller needs a method step(observation) -> Command"),
         ("WithDataclass", "debugged:WithDataclass: its Parameters must be a subclass of msgspec.Struct, got <class"),
     ],
 )
@@ -139,3 +162,19 @@ def test_a_refused_command_is_named_although_the_run_goes_on(tmp_path: Path) -> 
     ran = run(tmp_path, "Refused", "--inline", "--quiet", "--set", "robots.on_crash=continue")
     assert ran.returncode == 0
     assert "node 1 crashed at tick 3: its command was refused: not-finite: WheelSpeeds(left_m_s=nan" in ran.stderr
+
+
+def test_an_answer_that_is_no_command_is_one_line_without_a_traceback(tmp_path: Path) -> None:
+    ran = run(tmp_path, "Nothing", "--inline", "--quiet")
+    assert ran.returncode == 1
+    line = (
+        next(number for number, text in enumerate(CONTROLLERS.splitlines(), 1) if text == "class Nothing(Plain):") + 1
+    )
+    rule = "TypeError: step() returned None, expected a Command"
+    assert ran.stderr == f"zwerm: node 0 crashed at tick 0: {rule} (debugged.py:{line}, in Nothing.step)\n"
+
+
+def test_a_constructor_that_forgets_its_base_class_is_told_what_to_call(tmp_path: Path) -> None:
+    ran = run(tmp_path, "NoSuper", "--inline", "--quiet")
+    assert ran.returncode == 1
+    assert "AttributeError: no setup: the constructor of NoSuper must call super().__init__(setup)" in ran.stderr

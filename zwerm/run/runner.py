@@ -383,5 +383,5 @@ def _result(
         telemetry=world.telemetry.arrays(),
         snapshots=world.telemetry.snapshots,
         crash_reasons={node: f"tick {status.crash_ticks[node]}: {why}" for node, why in status.crashed.items()},
-        tracebacks={node: failure.traceback for node, failure in status.failures.items()},
+        tracebacks={node: failure.traceback for node, failure in status.failures.items() if failure.traceback},
     )
