@@ -59,6 +59,12 @@ def test_an_interrupt_while_the_recording_is_closed_does_not_lose_the_result(
     assert (found.outcome, found.ticks) == ("interrupted", 3)
 
 
+def test_a_result_prints_as_one_line(result: zwerm.RunResult) -> None:
+    assert repr(result).startswith(f"<RunResult {result.title}: {result.outcome}, ")
+    assert repr(result).endswith(f"trace {result.trace}>")
+    assert "\n" not in repr(result)
+
+
 def test_metrics_over_time_are_arrays(result: zwerm.RunResult) -> None:
     assert result.series["time_s"].tolist() == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
     assert result.series["cell_coverage_fraction"].dtype == np.float64

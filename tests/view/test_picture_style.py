@@ -65,7 +65,21 @@ def test_links_connect_robots_between_which_a_packet_has_arrived(pairs: RunResul
 def test_telemetry_that_no_robot_reported_is_refused_as_a_colour_in_one_line(pairs: RunResult, tmp_path: Path) -> None:
     with pytest.raises(PictureError) as caught:
         pairs.picture(tmp_path / "a.png", colour_by="larges")
-    assert str(caught.value) == "colour_by: expected a name of telemetry that the run has (largest), got 'larges'"
+    assert (
+        str(caught.value)
+        == "colour_by: expected a name of telemetry that the run has (largest), got 'larges'; did you mean largest?"
+    )
+
+
+def test_a_picture_without_the_colours_of_its_scenario_is_drawn_where_no_robot_reported_them(
+    pairs: RunResult, tmp_path: Path
+) -> None:
+    assert (pairs.scenario.pictures.colour_by, pairs.missing_colour) == ("largest", "")
+    other = run(
+        "gossip-max", 1, "inline", ["robots.controller=refused:Plain", "robots.parameters={}", "time.duration_s=1"]
+    )
+    assert other.missing_colour == "largest"
+    assert other.picture(tmp_path / "plain.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_arena_in_a_picture_has_the_requested_size(pairs: RunResult, tmp_path: Path) -> None:

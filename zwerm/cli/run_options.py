@@ -70,6 +70,7 @@ class RunOptions:
             self.bare,
             self.colour_by,
             self.links,
+            self.quiet,
         )
 
     def load(self) -> "Scenario":

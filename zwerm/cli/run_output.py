@@ -46,6 +46,7 @@ class RunOutput:
     bare: bool = False
     colour_by: str | None = None
     links: bool | None = None
+    quiet: bool = False
 
     def __post_init__(self) -> None:
         diagnostics = [
@@ -123,6 +124,9 @@ class RunOutput:
             files.append(lambda: _write_faults(result))
         if self.animation is not None:
             files.append(partial(self._animate, result, self.animation))
+        if result.missing_colour and self.colour_by is None and (self.picture or self.animation or not self.as_json):
+            hint = f"pictures.colour_by: no robot reported {result.missing_colour!r}; robots have no colours"
+            err.print(hint, highlight=False, markup=False, soft_wrap=True)
         errors: list[str] = []
         for write in files:
             try:
@@ -135,7 +139,7 @@ class RunOutput:
         return errors
 
     def _animate(self, result: RunResult, path: Path) -> Path:
-        with RunProgress(err, "animation", quiet=self.as_json) as progress:
+        with RunProgress(err, "animation", quiet=self.as_json or self.quiet) as progress:
             return result.animate(path, progress.ticked, **self._style)
 
 

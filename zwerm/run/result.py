@@ -130,7 +130,8 @@ class RunResult:
         The suffix chooses the format: .png, .pdf or .svg. `size_in` is the greatest width and height [inches] of the
         arena. A `bare` picture has no title, numbers, legend and curve. `colour_by` names the telemetry that colours
         robots, and `links` connects robots whose packets have arrived; by default the scenario's `[pictures]` decides
-        on both. Raises PictureError where the file cannot be written, or the moment is not of the run.
+        on both, and a colour that no robot reported is left out. Raises PictureError where the file cannot be written,
+        the moment is not of the run, or no robot reported `colour_by`.
         """
         from zwerm.view.stills import draw_run
 
@@ -163,9 +164,19 @@ class RunResult:
         return PictureStyle(
             size_in,
             bare,
-            chosen.colour_by if colour_by is None else colour_by,
+            ("" if self.missing_colour else chosen.colour_by) if colour_by is None else colour_by,
             chosen.links if links is None else links,
         )
+
+    def __repr__(self) -> str:
+        """Return one line: the arrays of a run fill screens."""
+        return f"<RunResult {self.title}: {self.outcome}, {len(self.metrics)} metrics, trace {self.trace}>"
+
+    @property
+    def missing_colour(self) -> str:
+        """The telemetry by which the scenario colours robots, if no robot reported it: another controller runs."""
+        name = self.scenario.pictures.colour_by
+        return "" if name in self.telemetry.name else name
 
     def _links(self) -> list[tuple[int, int]]:
         """Return the pairs of robots, smaller id first, between which a packet has arrived on the robots' channel."""

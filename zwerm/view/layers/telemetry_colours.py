@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 
 from zwerm.errors import PictureError
 from zwerm.record.history import Tracks
+from zwerm.scenario.nearest import did_you_mean
 from zwerm.view.canvas import WALL, Sheet
 from zwerm.view.layer import Layer
 from zwerm.view.run_view import RunView
@@ -35,9 +36,9 @@ class TelemetryColours(Layer):
         known = sorted(set(view.telemetry.name.tolist()))
         if view.colour_by not in known:
             reported = ", ".join(known) or "none"
-            raise PictureError(
-                f"colour_by: expected a name of telemetry that the run has ({reported}), got {view.colour_by!r}"
-            )
+            expected = f"a name of telemetry that the run has ({reported})"
+            hint = did_you_mean(view.colour_by, known)
+            raise PictureError(f"colour_by: expected {expected}, got {view.colour_by!r}{hint}")
         self._name = view.colour_by
         chosen = view.telemetry.name == view.colour_by
         self._reports: dict[int, tuple[list[float], list[float]]] = {}
