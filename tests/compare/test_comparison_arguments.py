@@ -6,9 +6,8 @@ import pytest
 from comparisons import planned
 
 from zwerm.compare.comparison import make_comparison
-from zwerm.compare.comparison_figure import check_figure
 from zwerm.compare.variants import parse_sweep, parse_variant
-from zwerm.errors import PictureError, ScenarioError
+from zwerm.errors import ScenarioError
 from zwerm.study.study_tables import load_study
 from zwerm.study.trial_plan import make_points
 
@@ -75,11 +74,6 @@ def test_a_malformed_sweep_is_an_error_of_one_line(text: str, rule: str) -> None
 def test_a_comparison_needs_two_variants() -> None:
     with pytest.raises(ScenarioError, match="variants: expected 2 at least to compare, got 0"):
         make_comparison("gossip-max")
-
-
-def test_an_unsupported_figure_suffix_is_an_error() -> None:
-    with pytest.raises(PictureError, match=r"figure.jpeg: expected a file that ends in .png or .pdf or .svg"):
-        check_figure(Path("figure.jpeg"))
 
 
 def test_an_axis_sets_one_path_or_several_or_levels_of_settings(gossip: Path) -> None:

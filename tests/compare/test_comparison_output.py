@@ -67,6 +67,24 @@ def marker_places(gossip: Path, tmp_path: Path, sweep: str, monkeypatch: pytest.
     return [list(map(float, each[0].get_xdata())) for each in figures[0].axes[0].containers]
 
 
+def test_no_words_of_a_figure_are_cut_off(gossip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    figures: list[Figure] = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
+    names = [
+        f"{name}-with-a-long-name:{settings}" for name in "abcdef" for settings in ["robots.parameters.every_ticks=5"]
+    ]
+    study = make_comparison(str(gossip), [parse_variant(each) for each in names], [])
+    result = run_study(study, tmp_path / "out.parquet", seeds=[1], jobs=1)
+    draw_comparison(tmp_path / "figure.png", Comparison(result.results), ["ticks"])
+    (figure,) = figures
+    figure.draw_without_rendering()
+    words = [*figure.texts, *figure.legends[0].get_texts()]
+    boxes = [each.get_window_extent() for each in words]
+    assert len(boxes) == 2 + len(names)
+    assert all(figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1 for box in boxes)
+    assert min(box.y0 for box in boxes) >= max(axes.get_tightbbox().y1 for axes in figure.axes)
+
+
 def test_markers_stand_at_the_values_of_a_sweep(gossip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert marker_places(gossip, tmp_path, "radio.loss=0.0,0.5", monkeypatch) == [[0.0, 0.5], [0.0, 0.5]]
     named = marker_places(gossip, tmp_path, "radio.models=few:[],many:[{kind='loss',fraction=0.5}]", monkeypatch)

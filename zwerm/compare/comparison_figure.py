@@ -9,12 +9,12 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from zwerm.compare.comparison import COMPLETED, Comparison, SweepPoint
-from zwerm.errors import PictureError
 from zwerm.maths.statistics import Sample
 from zwerm.study.study_tables import Setting
 from zwerm.study.trial_plan import Point
@@ -34,24 +34,16 @@ SHOWN: Final = (
     ("bytes_per_robot_mean",),
 )
 UNITS: Final = {"_m_s": " [m/s]", "_m2": " [m²]", "_m": " [m]", "_s": " [s]", "_fraction": " [fraction]"}
-SUFFIXES: Final = (".png", ".pdf", ".svg")
 LABELS: Final = {COMPLETED: "runs completed [fraction]", "sim_s": "duration of the run [s]"}
 COLUMNS: Final = 3
 PANEL_IN: Final = (3.5, 3.6)
-HEAD_IN: Final = 0.95
+HEAD_IN: Final = 0.78
+LINE_IN: Final = 0.17  # of the explanation and the legend
+CHARACTER_IN: Final = 0.068  # width of a character, a little too large
+HANDLE_IN: Final = 0.75  # of the legend, with the space around it
 FOOT_IN: Final = 0.3
 DODGE: Final = 0.12
 DPI: Final = 200
-
-
-def check_figure(path: Path) -> Path:
-    """Return the path of a figure.
-
-    Raises PictureError if its suffix is not supported.
-    """
-    if path.suffix.lower() not in SUFFIXES:
-        raise PictureError(f"{path}: expected a file that ends in {' or '.join(SUFFIXES)}")
-    return path
 
 
 def draw_comparison(path: Path, comparison: Comparison, metrics: Sequence[str] = ()) -> list[Path]:
@@ -83,28 +75,34 @@ def _draw(comparison: Comparison, places: Sequence[SweepPoint], metrics: Sequenc
 
     columns = min(COLUMNS, len(metrics))
     rows = math.ceil(len(metrics) / columns)
-    size = (PANEL_IN[0] * columns, PANEL_IN[1] * rows + HEAD_IN + FOOT_IN)
+    width = PANEL_IN[0] * columns
+    seeds = sorted({seed for place in places for point in place.points for seed in comparison.seeds(point)})
+    about = f"{len(seeds)} seeds a point" if len(seeds) > 1 else "one seed a point"
+    explained = fill(
+        f"{about}; means with their 95 % intervals; below, the difference from {comparison.variants[0]}, paired by seed. "
+        "A failed run counts with its measured values.",
+        int(width / CHARACTER_IN),
+    )
+    labelled = max(1, int(width / (HANDLE_IN + CHARACTER_IN * max(map(len, comparison.variants)))))
+    lines = explained.count("\n") + math.ceil(len(comparison.variants) / labelled)
+    head = HEAD_IN + LINE_IN * lines
+    size = (width, PANEL_IN[1] * rows + head + FOOT_IN)
     figure = Figure(figsize=size)
-    below_head = (0.0, FOOT_IN / size[1], 1.0, 1.0 - (HEAD_IN + FOOT_IN) / size[1])
+    below_head = (0.0, FOOT_IN / size[1], 1.0, 1.0 - (head + FOOT_IN) / size[1])
     figure.set_layout_engine("constrained", rect=below_head, wspace=0.04)
     blocks = figure.subfigures(rows, columns, squeeze=False).ravel().tolist()
     for metric, block in zip(metrics, blocks, strict=False):
-        above, below = block.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
-        _draw_metric(above, below, comparison, places, metric)
+        above, under = block.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+        _draw_metric(above, under, comparison, places, metric)
     handles, labels = above.get_legend_handles_labels()
     top = 1.0 - 0.12 / size[1]
     scenario = comparison.places[0].points[0].scenario
     title = ": ".join(filter(None, [scenario.name, subtitle]))
     figure.text(0.01, top, title, va="top", fontsize=12, fontweight="bold")
-    seeds = sorted({seed for place in places for point in place.points for seed in comparison.seeds(point)})
-    about = f"{len(seeds)} seeds a point" if len(seeds) > 1 else "one seed a point"
-    explained = (
-        f"{about}; means with their 95 % intervals; below, the difference from {comparison.variants[0]}, paired by seed. "
-        "A failed run counts with its measured values."
-    )
     figure.text(0.01, top - 0.27 / size[1], explained, va="top", fontsize=9)
+    below = top - (0.42 + LINE_IN * explained.count("\n")) / size[1]
     figure.legend(
-        handles, labels, loc="upper left", bbox_to_anchor=(0.0, top - 0.42 / size[1]), ncols=len(labels), frameon=False
+        handles, labels, loc="upper left", bbox_to_anchor=(0.0, below), ncols=min(labelled, len(labels)), frameon=False
     )
     if _some_missing(comparison, places, metrics):
         figure.text(

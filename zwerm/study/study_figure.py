@@ -66,7 +66,8 @@ def _lines(figure: "Figure", results: Results) -> None:
         panel.set(xlabel=axis)
         _show_range(panel, metric)
         panel.grid(alpha=0.3)
-        panel.legend()
+        if results.study.table.paper is not None or len(curves) > 1:
+            panel.legend()
 
 
 def _bars(figure: "Figure", results: Results) -> None:

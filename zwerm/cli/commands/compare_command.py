@@ -97,7 +97,7 @@ def compare(
         with study_extra():
             from zwerm.compare.comparison import Comparison, make_comparison
             from zwerm.compare.comparison_export import comparison_json
-            from zwerm.compare.comparison_figure import check_figure, draw_comparison
+            from zwerm.compare.comparison_figure import draw_comparison
             from zwerm.compare.comparison_report import print_comparison
             from zwerm.compare.variants import parse_sweep, parse_variant, split
             from zwerm.study.study_report import StudyProgress
@@ -113,8 +113,8 @@ def compare(
         )
         chosen = None if seeds is None else parse_seeds(seeds)
         path = rows_file(output, planned.name)
-        drawing = check_figure(figure or path.with_suffix(".png"))
         check_outputs([OutputFile("--figure", figure, PICTURES)])
+        drawing = figure or path.with_suffix(".png")
         with StudyProgress(err, planned.name, quiet=as_json) as progress:
             result = run_study(
                 planned,
