@@ -91,7 +91,19 @@ def test_check_reports_an_unknown_controller_and_an_unknown_sensor_beside_errors
         (["run", "computation-free", "--set", "robots.count=2000"], "robots.placement: no room for robot"),
         (
             ["world", "computation-free", "--listen", "foo", "--credentials", "k"],
-            "zwerm: --listen: expected an endpoint such as tcp/0.0.0.0:7447, got 'foo'",
+            "zwerm: --listen: expected an endpoint such as tls/0.0.0.0:7447, with tls, quic or tcp, got 'foo'",
+        ),
+        (["world", "computation-free", "--listen", "foo/bar", "--credentials", "k"], "tls, quic or tcp, got 'foo/bar'"),
+        (["world", "computation-free", "--listen", "tcp/127.0.0.1", "--credentials", "k"], "got 'tcp/127.0.0.1'"),
+        (["world", "computation-free", "--listen", "tcp/[::1:7447", "--credentials", "k"], "got 'tcp/[::1:7447'"),
+        (["robot", "--connect", "tcp/127.0.0.1:99999", "--credentials", "k"], "zwerm: --connect: expected an endpoint"),
+        (
+            ["compare", "gossip-max", "--variant", "a", "--variant", "b", "--figure", "figure.jpeg"],
+            "zwerm: --figure: figure.jpeg: expected a file that ends in .png or .pdf or .svg",
+        ),
+        (
+            ["compare", "gossip-max", "--variant", "a", "--variant", "b", "--metrics", "tikcs"],
+            "got 'tikcs'; did you mean ticks?",
         ),
         (
             ["run", "computation-free", "--inline", "--realtime", "0"],

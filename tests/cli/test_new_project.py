@@ -36,6 +36,11 @@ def test_a_new_project_runs_and_its_tests_pass(tmp_path: Path) -> None:
     assert FILES.keys() - {"README.md"} <= set(readme.replace("`", " ").split())
 
 
+def test_the_folder_of_a_new_project_is_named_as_a_shell_takes_it(tmp_path: Path) -> None:
+    made = zwerm("new", "my swärm", cwd=tmp_path)
+    assert made.stdout.splitlines()[-1] == "cd 'my swärm', and look at README.md for what to run"
+
+
 def test_new_overwrites_nothing(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("")
     refused = zwerm("new", ".", cwd=tmp_path)

@@ -159,6 +159,27 @@ def test_an_unknown_scenario_is_one_line_with_the_known_ones() -> None:
     assert caught.value.mistakes == ["gone.toml: expected a scenario file or the name of a built-in one"]
 
 
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("meadow", "did you mean meadow.toml?"),
+        ("maedow.toml", "nearest are meadow.toml"),
+        ("meadow.tom", "nearest are meadow.toml"),
+        ("{folder}/meadw.toml", "nearest are {folder}/meadow.toml"),
+    ],
+)
+def test_a_misspelt_file_is_answered_with_the_files_of_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, hint: str
+) -> None:
+    (tmp_path / "meadow.toml").write_text(GOOD)
+    (tmp_path / "other.toml").write_text(GOOD)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ScenarioError) as caught:
+        locate(name.format(folder=tmp_path))
+    (line,) = caught.value.mistakes
+    assert line.endswith(f"; {hint.format(folder=tmp_path)}")
+
+
 def test_the_file_of_a_study_in_place_of_a_scenario_is_one_line_with_the_command(tmp_path: Path) -> None:
     path = written(tmp_path, 'scenario = "computation-free"\nseeds = 2\nmetrics = ["robots_in_arena"]\n')
     assert scenario_mistakes(path, ()) == [f"{path}: is a study and no scenario; run it with: zwerm study {path}"]

@@ -45,7 +45,7 @@ def checked(path: str, table: OpenTable, scenario: Scenario) -> tuple[type[Fault
         parameters = kind.Parameters.model_validate(table.parameters)
     except ValidationError as error:
         named = f"{scenario.place}: "
-        lines = mistakes(error, scenario.place, f"{path}.")
+        lines = mistakes(error, scenario.place, f"{path}.", kind.Parameters)
         raise ScenarioError([line.removeprefix(named) for line in lines]) from None
     wrong = [*_wrong_times(kind, parameters, scenario), *kind.check(parameters, scenario)]
     if wrong:

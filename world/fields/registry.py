@@ -32,7 +32,7 @@ def make_field(table: OpenTable, bounds_m: Box, folder: Path, place: str, path: 
     try:
         parameters = kind.Parameters.model_validate(table.parameters)
     except ValidationError as error:
-        raise ScenarioError(mistakes(error, place, f"{path}.")) from None
+        raise ScenarioError(mistakes(error, place, f"{path}.", kind.Parameters)) from None
     try:
         return kind.make(parameters, FieldPlace(bounds_m, folder))
     except ValueError as error:

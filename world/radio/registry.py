@@ -132,8 +132,8 @@ def make_model(
         parameters = kind.Parameters.model_validate(table.parameters)
     except ValidationError as error:
         named = f"{scenario.place}: "
-        found = [line.removeprefix(named) for line in mistakes(error, scenario.place, f"{path}.")]
-        raise ScenarioError(found) from None
+        lines = mistakes(error, scenario.place, f"{path}.", kind.Parameters)
+        raise ScenarioError([line.removeprefix(named) for line in lines]) from None
     wrong: list[str] = []
     senders = selected(parameters.senders, scenario, f"{path}.senders", wrong)
     receivers = selected(parameters.receivers, scenario, f"{path}.receivers", wrong)

@@ -10,13 +10,20 @@ import typer
 from zwerm.catalogue import shipped
 from zwerm.errors import ScenarioError
 
-_ENDPOINT: Final = re.compile(r"[a-z][a-z-]*/\S+")
+# A protocol, a host or an address, and a port; or a file of this machine. Settings of Zenoh may follow.
+_ENDPOINT: Final = re.compile(
+    r"(?:tcp|tls|quic)/(?:[^\s\[\]:#?]+|\[[0-9a-fA-F:.%]+\]):(?P<port>[0-9]{1,5})(?:[#?]\S*)?"
+)
+_LOCAL: Final = re.compile(r"unixsock-stream/\S+")
+_PORT_MAX: Final = 65_535
 
 
 def check_endpoint(option: str, endpoint: str) -> None:
-    """Raise ScenarioError, in one line, if the value of an option is no Zenoh endpoint."""
-    if not _ENDPOINT.fullmatch(endpoint):
-        raise ScenarioError([f"{option}: expected an endpoint such as tcp/0.0.0.0:7447, got {endpoint!r}"])
+    """Raise ScenarioError, in one line, if the value of an option is no Zenoh endpoint that robots can use."""
+    network = _ENDPOINT.fullmatch(endpoint)
+    if not (_LOCAL.fullmatch(endpoint) or (network and int(network["port"]) <= _PORT_MAX)):
+        expected = "an endpoint such as tls/0.0.0.0:7447, with tls, quic or tcp"
+        raise ScenarioError([f"{option}: expected {expected}, got {endpoint!r}"])
 
 
 def built_in_names(*kinds: Literal["scenarios", "studies"]) -> Callable[[str], list[str]]:

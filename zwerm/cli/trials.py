@@ -45,7 +45,7 @@ def study_extra() -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        raise ZwermError(f"study: needs {error.name}; install it with: pip install 'zwerm[study]'") from None
+        raise ZwermError(f"needs {error.name}: pip install 'zwerm[study]'") from None
 
 
 def rows_file(output: Path | None, name: str) -> Path:

@@ -41,15 +41,35 @@ def locate(name: str) -> Path:
         return path
     if name in shipped("studies"):
         raise ScenarioError([f"{name}: is a study and no scenario; run it with: zwerm study {name}"])
-    hint = "" if path.suffix == ".toml" else suggestion(name, built_in(), "zwerm list")
+    hint = suggestion(name, built_in(), "zwerm list")
     raise ScenarioError([f"{name}: expected a scenario file or the name of a built-in one{hint}"])
 
 
 def suggestion(name: str, known: Iterable[str], command: str) -> str:
-    """Return the three known names that are most similar to `name`, and the command that lists all, as part of a
-    line."""
+    """Return the files or else the known names that are most similar to `name`, three at most, as part of a line.
+
+    The files are those of the folder that `name` leads to. The command that lists all names follows, unless `name` is a
+    path.
+    """
+    path = Path(name)
+    files = _toml_files(path.parent)
+    if path.suffix != ".toml" and f"{path.name}.toml" in files:
+        return f"; did you mean {path}.toml?"
+    found = nearest(path.name, files, count=3, similarity=0.7)
+    if found:
+        return f"; nearest are {', '.join(str(path.with_name(each)) for each in found)}"
+    if path.suffix == ".toml":
+        return ""
     similar = nearest(name, known, count=3, similarity=0.3)
     return f"; nearest are {', '.join(similar)}; `{command}` names all" if similar else f"; `{command}` names all"
+
+
+def _toml_files(folder: Path) -> list[str]:
+    """Return the names of the TOML files of a folder, none where it cannot be read."""
+    try:
+        return sorted(each.name for each in folder.glob("*.toml"))
+    except (OSError, ValueError):
+        return []
 
 
 def read(path: Path) -> dict[str, Any]:

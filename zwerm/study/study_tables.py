@@ -182,7 +182,7 @@ def load_study(name: str) -> Study:
     if not path.is_file():
         if name in built_in_scenarios():
             raise ScenarioError([f"{name}: is a scenario and no study; run it with: zwerm run {name}"])
-        hint = "" if path.suffix == ".toml" else suggestion(name, built_in(), "zwerm list")
+        hint = suggestion(name, built_in(), "zwerm list")
         raise ScenarioError([f"{name}: expected a study's file or the name of a built-in one{hint}"])
     tables = read(path)
     if SCENARIO_KEYS & tables.keys() and not STUDY_KEYS & tables.keys():

@@ -14,6 +14,7 @@ from zwerm.run.measurement import metric_names
 from zwerm.run.runner import Runner
 from zwerm.scenario.load import built_in as built_in_scenarios
 from zwerm.scenario.load import load
+from zwerm.scenario.nearest import did_you_mean
 from zwerm.scenario.tables import Scenario
 from zwerm.scenario.user_modules import UserModules
 from zwerm.study.study_tables import CELL_METRICS, REPORTABLE_COLUMNS, Setting, Study, VariantTable
@@ -93,7 +94,8 @@ def _unmeasured(study: Study, points: Sequence[Point]) -> dict[str, str]:
     ]
     listed = ", ".join(sorted(known))
     return {
-        metric: f"{study.path}: metrics: expected names of metrics that its scenarios measure ({listed}), got {metric!r}"
+        metric: f"{study.path}: metrics: expected names of metrics that its scenarios measure ({listed}), "
+        f"got {metric!r}{did_you_mean(metric, known)}"
         for metric in study.table.metrics
         if not is_measured(metric, known)
     }

@@ -426,6 +426,8 @@ def test_these_tests_try_every_former_name() -> None:
         ({"kind": "loss", "fraction": 1.5}, "radio.models.0.fraction: expected <= 1, got 1.5"),
         ({"kind": "loss", "fraction": "half"}, 'radio.models.0.fraction: expected a number, got "half"'),
         ({"kind": "loss", "fraction": 0.1, "rate": 1}, "radio.models.0.rate: unknown key"),
+        ({"kind": "loss", "fraction": 0.1, "recievers": [0]},
+         "radio.models.0.recievers: unknown key; did you mean receivers?"),
         ({"kind": "loss", "fraction": 0.1, "senders": [0, 7]},
          "radio.models.0.senders.1: no such robot: ids are 0 to 1, got 7"),
         ({"kind": "loss", "fraction": 0.1, "receivers": ["coordinator"]},

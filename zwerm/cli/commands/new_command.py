@@ -1,6 +1,7 @@
 """`zwerm new`: write a small project that runs, as the start of a user's own."""
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -27,4 +28,9 @@ def new(folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder tha
             raise ScenarioError([f"{folder}: cannot be written: {error.strerror}"]) from None
     for name in FILES:
         out.print(str(folder / name), markup=False, highlight=False, soft_wrap=True)
-    out.print(f"\ncd {folder}, and look at README.md for what to run", markup=False, highlight=False, soft_wrap=True)
+    out.print(
+        f"\ncd {quote(str(folder))}, and look at README.md for what to run",
+        markup=False,
+        highlight=False,
+        soft_wrap=True,
+    )
