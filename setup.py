@@ -32,9 +32,9 @@ class SourceArchive(sdist):
 
 
 def description():
-    """Return README.md without pictures and without links to files, which no page of a package index has."""
+    """Return README.md without pictures, their announcements and links to files, which no page of a package index has."""
     text = Path(__file__).with_name("README.md").read_text(encoding="utf-8")
-    text = re.sub(r"^!\[[^]]*\]\((?!https?:)[^)]*\)\n+", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^(?:[^\n]+:\n\n)?!\[[^]]*\]\((?!https?:)[^)]*\)\n+", "", text, flags=re.MULTILINE)
     return re.sub(r"\[([^]]*)\]\((?!https?:)([^)]*)\)", r"\1 (`\2`)", text)
 
 

@@ -1,5 +1,6 @@
 """The user's choices for pictures: size, words, colours by telemetry, and radio links."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ from PIL import Image
 from zwerm.errors import PictureError
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
+from zwerm.view.canvas import Sheet
 from zwerm.view.layers.telemetry_colours import TelemetryColours
 from zwerm.view.picture_style import PictureStyle
+from zwerm.world.tick.telemetry import TelemetryArrays
 
 # Two pairs, each out of reach of the other: 0 and 1 on the left, 2 and 3 on the right.
 POSES = "[[0.3,1.0,0.0],[0.7,1.0,0.0],[1.3,1.0,0.0],[1.7,1.0,0.0]]"
@@ -60,6 +63,27 @@ def test_links_connect_robots_between_which_a_packet_has_arrived(pairs: RunResul
     hidden = pairs.picture(tmp_path / "none.png", bare=True, links=False)
     assert colour_at(shown, 0.55, 1.0) != colour_at(hidden, 0.55, 1.0) == (255, 255, 255)
     assert colour_at(shown, 1.0, 1.0) == (255, 255, 255)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ([0.0, 1.0, 1.0], ["x is 0", "x is 1"]),
+        ([2.0, 2.0, 2.0], ["x is 2"]),
+        ([0.0, 1.0, 9.0], ["x is 0", "x is 1", "x is 9"]),
+        ([0.0, 1.0, 2.0, 10.0], ["x is 0", "x is 5", "x is 10"]),
+    ],
+)
+def test_the_legend_names_values_that_occur_where_there_are_few(
+    pairs: RunResult, values: list[float], words: list[str]
+) -> None:
+    count = len(values)
+    told = TelemetryArrays(
+        np.arange(count), np.zeros(count), np.zeros(count, int), np.full(count, "x"), np.array(values)
+    )
+    view = replace(pairs._view(PictureStyle()), telemetry=told, colour_by="x")
+    layer = TelemetryColours(Sheet(view.arena, ""), view)
+    assert [each.get_label() for each in layer.legend()] == words
 
 
 def test_telemetry_that_no_robot_reported_is_refused_as_a_colour_in_one_line(pairs: RunResult, tmp_path: Path) -> None:

@@ -51,6 +51,9 @@ class TelemetryColours(Layer):
             values.append(value)
         found = view.telemetry.value[chosen]
         self._least, self._greatest = float(found.min()), float(found.max())
+        self._shown: list[float] = np.unique(found).tolist()
+        if len(self._shown) > self.more_entries:
+            self._shown = [self._least, (self._least + self._greatest) / 2.0, self._greatest]
         xmin, ymin, xmax, ymax = view.arena.bounds
         radius = LARGER * max(view.radius_m, RADIUS_MIN_FRACTION * max(xmax - xmin, ymax - ymin))
         self._discs = EllipseCollection(
@@ -87,11 +90,9 @@ class TelemetryColours(Layer):
         return self.colours[min(steps - 1, int(steps * (value - self._least) / span)) if span > 0 else 0]
 
     def legend(self) -> Sequence[Line2D | Patch]:
-        """Return the least, a middle and the greatest value."""
-        least, greatest = self._least, self._greatest
-        shown = [least] if least == greatest else [least, (least + greatest) / 2.0, greatest]
+        """Return all values of a few, else the least, a middle and the greatest."""
         return [
             Line2D([], [], linestyle="none", marker="o", color=self._colour(each), mec=WALL, mew=0.3, label=label)
-            for each in shown
+            for each in self._shown
             for label in [f"{self._name.replace('_', ' ')} is {each:.4g}"]
         ]
