@@ -6,7 +6,7 @@ convenience: any class with the same constructor and `step` is accepted.
 """
 
 from functools import cached_property
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import msgspec
 import numpy as np
@@ -71,12 +71,14 @@ class Controller:
         self.setup = setup
         self.parameters: Any = msgspec.convert(setup.parameters, self.Parameters)
 
-    def __getattr__(self, name: str) -> Any:  # only for what is missing
-        if name in ("setup", "parameters"):
-            raise AttributeError(
-                f"no {name}: the constructor of {type(self).__name__} must call super().__init__(setup)"
-            )
-        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+    if not TYPE_CHECKING:  # or any attribute of a controller would have a type
+
+        def __getattr__(self, name: str) -> Any:
+            """Explain why an attribute of this class is missing."""
+            if name in ("setup", "parameters", "random") and "setup" not in vars(self):
+                constructor = f"the constructor of {type(self).__name__}"
+                raise AttributeError(f"no setup: {constructor} must call super().__init__(setup)")
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
 
     @cached_property
     def random(self) -> np.random.Generator:

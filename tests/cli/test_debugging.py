@@ -164,6 +164,14 @@ def test_a_refused_command_is_named_although_the_run_goes_on(tmp_path: Path) -> 
     assert "node 1 crashed at tick 3: its command was refused: not-finite: WheelSpeeds(left_m_s=nan" in ran.stderr
 
 
+@pytest.mark.parametrize("library", ["numpy", "pydantic"])
+def test_a_file_that_hides_a_library_is_named(tmp_path: Path, library: str) -> None:
+    (tmp_path / f"{library}.py").write_text("mine = 1")
+    ran = run(tmp_path, "Plain", "--inline", "--quiet")
+    assert ran.returncode == 2
+    assert ran.stderr == f"zwerm: {tmp_path / library}.py hides the library '{library}': give it another name\n"
+
+
 def test_an_answer_that_is_no_command_is_one_line_without_a_traceback(tmp_path: Path) -> None:
     ran = run(tmp_path, "Nothing", "--inline", "--quiet")
     assert ran.returncode == 1

@@ -11,12 +11,12 @@ REFUSED = {
     "got BodyVelocity(forward_m_s=0.25, left_m_s=0.0, turn_rad_s=0.0) (refused.py:16, in WrongDrive.step)",
     "NotANumber": "its command was refused: not-finite: WheelSpeeds(left_m_s=nan, right_m_s=0.0) "
     "(refused.py:16, in NotANumber.step)",
-    "TextForBytes": "its command was refused: schema: outbox[0].payload: expected bytes, got 'text' "
+    "TextForBytes": "its command was refused: schema: outbox[0].payload: expected bytes, got 'hello' "
     "(refused.py:16, in TextForBytes.step)",
     "NoRadio": "its command was refused: wrong-packet: outbox: no channel 'robots': the scenario has no [radio] "
     "(refused.py:16, in NoRadio.step)",
     "Nothing": "TypeError: step() returned None, expected a Command (refused.py:16, in Nothing.step)",
-    "NoSuchType": "its command was refused: schema: drive.left_m_s: expected float, got [0.25] "
+    "NoSuchType": "its command was refused: schema: drive.left_m_s: expected float, got [1] "
     "(refused.py:16, in NoSuchType.step)",
 }
 

@@ -130,6 +130,14 @@ def main() -> None:
         place = f"{error.filename}: " if error.filename else ""
         err.print(f"zwerm: {place}{error.strerror}", style="red", markup=False, highlight=False, soft_wrap=True)
         sys.exit(EXIT_USER_ERROR)
+    except (ImportError, AttributeError) as error:
+        from zwerm.cli.hidden_libraries import hidden_library  # most commands do not need it
+
+        hidden = hidden_library(error)
+        if not hidden:
+            raise
+        err.print(f"zwerm: {hidden}", style="red", markup=False, highlight=False, soft_wrap=True)
+        sys.exit(EXIT_USER_ERROR)
 
 
 def _exit_interrupted() -> NoReturn:
