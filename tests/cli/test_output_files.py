@@ -64,6 +64,12 @@ def test_files_are_checked_before_the_run_and_all_at_once(tmp_path: Path) -> Non
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_picture_after_the_end_of_the_run_is_refused_before_it(tmp_path: Path) -> None:
+    ran = zwerm(*SHORT, "--picture-at", "0.2s", "--picture-at", "99s", cwd=tmp_path)
+    assert (ran.returncode, ran.stdout) == (2, "")
+    assert ran.stderr == "zwerm: --picture-at: expected a time of the run, 0 to 0.3 s, got 99s\n"
+
+
 def test_the_table_names_every_file_and_settings_are_part_of_names(tmp_path: Path) -> None:
     ran = zwerm(*SHORT, "--record", "r.mcap", "--animate", "a.gif", "--set", "robots.count=3", cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr

@@ -74,10 +74,18 @@ class RunOptions:
         )
 
     def load(self) -> "Scenario":
-        """Return the scenario with its settings. Raises ScenarioError."""
+        """Return the scenario with its settings. Raises ScenarioError, also for a picture of a time after its end."""
+        from zwerm.errors import ScenarioError
         from zwerm.scenario.load import load
 
-        return load(self.scenario, tuple(self.sets or ()))
+        loaded = load(self.scenario, tuple(self.sets or ()))
+        end_s = loaded.time.duration_s
+        late = [each for each in self.picture_at or () if each.endswith("s") and float(each[:-1]) > end_s]
+        if late:
+            raise ScenarioError(
+                [f"--picture-at: expected a time of the run, 0 to {end_s:g} s, got {each}" for each in late]
+            )
+        return loaded
 
     @property
     def shows_no_progress(self) -> bool:
