@@ -172,6 +172,16 @@ def test_a_file_that_hides_a_library_is_named(tmp_path: Path, library: str) -> N
     assert ran.stderr == f"zwerm: {tmp_path / library}.py hides the library '{library}': give it another name\n"
 
 
+def test_crashes_of_many_robots_for_one_reason_are_one_line(tmp_path: Path) -> None:
+    ran = run(tmp_path, "Nothing", "--inline", "--quiet", "--set", "robots.on_crash=continue")
+    (line, *_) = ran.stderr.splitlines()
+    assert line.startswith(
+        "node 0 crashed at tick 0: TypeError: step() returned None, expected a Command (debugged.py:"
+    )
+    assert line.endswith("), and 11 more: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, ...")
+    assert ran.stderr.count("TypeError") <= 2, "the reason of the run, if all its robots are lost, is the second"
+
+
 def test_an_answer_that_is_no_command_is_one_line_without_a_traceback(tmp_path: Path) -> None:
     ran = run(tmp_path, "Nothing", "--inline", "--quiet")
     assert ran.returncode == 1

@@ -21,14 +21,26 @@ def print_tracebacks(console: Console, tracebacks: Mapping[int, str]) -> None:
 
 
 def print_crashes(console: Console, result: RunResult) -> None:
-    """Print a line for each program that ended without a traceback while the run went on, and count those after the first."""
-    ended = [node for node in result.crash_reasons if node not in result.tracebacks]
-    unnamed = [node for node in sorted(ended) if not result.reason.startswith(f"node {node} crashed ")]
-    for node in unnamed[:_NODES_MAX]:
-        text = f"node {node} crashed at {result.crash_reasons[node]}"
+    """Print a line for each reason for which programs ended without a traceback, but for the reason of the whole run."""
+    groups: dict[str, list[int]] = {}
+    for node, reason in sorted(result.crash_reasons.items()):
+        if node not in result.tracebacks:
+            groups.setdefault(reason, []).append(node)
+    others = [
+        (reason, nodes) for reason, nodes in groups.items() if result.reason != f"node {nodes[0]} crashed at {reason}"
+    ]
+    for reason, nodes in others[:_NODES_MAX]:
+        text = f"node {nodes[0]} crashed at {reason}{_and_more(nodes)}"
         console.print(text, markup=False, highlight=False, soft_wrap=True)
-    if len(unnamed) > _NODES_MAX:
-        console.print(f"and {len(unnamed) - _NODES_MAX} more programs ended", markup=False, highlight=False)
+    if len(others) > _NODES_MAX:
+        count = sum(len(nodes) for _, nodes in others[_NODES_MAX:])
+        console.print(f"and {count} more programs ended", markup=False, highlight=False)
+
+
+def _and_more(nodes: list[int]) -> str:
+    """Return how many nodes follow the first, and the first of them, as the rest of a line."""
+    others = ", ".join(map(str, nodes[1 : _NODES_MAX + 1]))
+    return f", and {len(nodes) - 1} more: {others}{', ...' if len(nodes) > _NODES_MAX + 1 else ''}" if others else ""
 
 
 def grouped(tracebacks: Mapping[int, str]) -> list[list[int]]:
