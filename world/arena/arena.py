@@ -18,6 +18,7 @@ from zwerm.errors import ScenarioError
 from zwerm.scenario.tables import ArenaTable
 from zwerm.scenario.types import COORDINATE_MAX_M
 from zwerm.world.arena.shapes import read_shape
+from zwerm.world.geometry.segments import Segments
 from zwerm.world.geometry.wall_index import WallIndex
 
 Floats = NDArray[np.float64]
@@ -64,8 +65,7 @@ class Arena:
         self.bounds = (xmin, ymin, xmax, ymax)
         self.is_convex = not self.walls and len(rings) == 1 and _is_convex(rings[0])
         self._px, self._py, self._qx, self._qy = (np.ascontiguousarray(column) for column in self.segments.T)
-        self._ex, self._ey = self._qx - self._px, self._qy - self._py
-        self._length2 = self._ex**2 + self._ey**2
+        self._pieces = Segments.of(self.segments)
         self._index = WallIndex(self.segments)
         self._tree = shapely.STRtree(shapely.linestrings(self.segments.reshape(-1, 2, 2)))
 
@@ -107,7 +107,7 @@ class Arena:
         count = len(points)
         if count * len(self.segments) <= _DENSE_POINTS:
             x, y = points.T[:, :, None]
-            nx, ny = self._nearest(x, y, np.s_[:])
+            nx, ny = self._pieces.nearest(x, y, np.s_[:])
             best = np.argmin((nx - x) ** 2 + (ny - y) ** 2, axis=1)
             rows = np.arange(count)
             return np.column_stack([nx[rows, best], ny[rows, best]])
@@ -115,7 +115,7 @@ class Arena:
         _, distance = self._tree.query_nearest(shapely.points(points), all_matches=False, return_distance=True)
         point, wall = self._near(points, distance + _ON_WALL_M)
         x, y = points[point].T
-        nx, ny = self._nearest(x, y, wall)
+        nx, ny = self._pieces.nearest(x, y, wall)
         order = np.lexsort((wall, (nx - x) ** 2 + (ny - y) ** 2, point))
         best = order[np.searchsorted(point, np.arange(count))]
         return np.column_stack([nx[best], ny[best]])
@@ -124,12 +124,12 @@ class Arena:
         """Return every pair of a point of points (k, 2) and a wall segment at most distance_m from it."""
         if len(self.segments) <= _DENSE_WALLS:
             x, y = points.T[:, :, None]
-            nx, ny = self._nearest(x, y, np.s_[:])
+            nx, ny = self._pieces.nearest(x, y, np.s_[:])
             apart = np.hypot(nx - x, ny - y)
             point, wall = (apart <= distance_m).nonzero()
             return WallContacts(point, wall, np.column_stack([nx[point, wall], ny[point, wall]]), apart[point, wall])
         point, wall = self._near(points, distance_m)
-        nearest = np.column_stack(self._nearest(points[point, 0], points[point, 1], wall))
+        nearest = np.column_stack(self._pieces.nearest(points[point, 0], points[point, 1], wall))
         distance = _norm(nearest - points[point])
         near = distance <= distance_m
         return WallContacts(point[near], wall[near], nearest[near], distance[near])
@@ -149,12 +149,6 @@ class Arena:
         point, wall = self._tree.query(boxes)
         order = np.lexsort((wall, point))
         return point[order], wall[order]
-
-    def _nearest(self, x: Floats, y: Floats, wall: Ints | slice) -> tuple[Floats, Floats]:
-        px, py, ex, ey = self._px[wall], self._py[wall], self._ex[wall], self._ey[wall]
-        # As np.clip, which is slower.
-        along = np.minimum(np.maximum(((x - px) * ex + (y - py) * ey) / self._length2[wall], 0.0), 1.0)
-        return px + along * ex, py + along * ey
 
 
 def _norm(vectors: Floats) -> Floats:

@@ -8,7 +8,8 @@ from typing import Final, NamedTuple, Self
 
 import numpy as np
 
-from zwerm.world.scene import Bools, Floats, Ints
+from zwerm.world.geometry.segments import Segments
+from zwerm.world.scene import Floats, Ints
 
 # Passes that share a limit between two bodies. Later passes stop both bodies.
 _SHARED_PASSES: Final = 30
@@ -18,13 +19,12 @@ _NO_SPEED_M_S: Final = 1e-9
 
 
 class Meeting(NamedTuple):
-    """Bodies that may meet within a tick: rows `first` and `second` (k,), and rows `at_wall` with the ends of walls."""
+    """Bodies that may meet within a tick: rows `first` and `second` (k,), and rows `at_wall` with the walls `wall`."""
 
     first: Ints
     second: Ints
     at_wall: Ints
-    wall_start: Floats
-    wall_end: Floats
+    wall: Ints
 
 
 class _Contacts(NamedTuple):
@@ -54,7 +54,7 @@ class ApproachLimit:
         self._radius_m = radius_m
         self._overlap_m = overlap_m
         self._substep_s = substep_s
-        self._start, self._end = segments[:, :2], segments[:, 2:]
+        self._walls = Segments.of(segments)
         # The way of one body in a tick, and a quarter of a body for what the solver adds.
         self._way_m = max_speed_m_s * dt_s + 0.25 * radius_m
 
@@ -64,12 +64,10 @@ class ApproachLimit:
         if not len(pairs):
             return None
         bodies = np.unique(pairs)
-        place = position[bodies, None]
-        near: Bools = np.linalg.norm(self._nearest(place, self._start, self._end) - place, axis=2) < (
-            self._radius_m + self._way_m
-        )
-        row, wall = np.nonzero(near)
-        return Meeting(pairs[:, 0], pairs[:, 1], bodies[row], self._start[wall], self._end[wall])
+        x, y = position[bodies].T[:, :, None]
+        nx, ny = self._walls.nearest(x, y, np.s_[:])
+        row, wall = np.nonzero(np.hypot(nx - x, ny - y) < self._radius_m + self._way_m)
+        return Meeting(pairs[:, 0], pairs[:, 1], bodies[row], wall)
 
     def slow(self, position: Floats, velocity: Floats, meeting: Meeting) -> bool:
         """Slow bodies down so that none of `meeting` meets within a substep; return whether any was slowed.
@@ -106,20 +104,12 @@ class ApproachLimit:
     def _contacts(self, position: Floats, meeting: Meeting) -> _Contacts:
         """Return the possible contacts. The way along `towards` bounds the distance at the end from below."""
         pairs = self._contact(meeting.first, meeting.second, position, position[meeting.second], 2.0 * self._radius_m)
-        place = position[meeting.at_wall]
-        nearest = self._nearest(place, meeting.wall_start, meeting.wall_end)
-        return pairs.joined(self._contact(meeting.at_wall, np.full(len(place), -1), position, nearest, self._radius_m))
+        x, y = position[meeting.at_wall].T
+        nearest = np.column_stack(self._walls.nearest(x, y, meeting.wall))
+        return pairs.joined(self._contact(meeting.at_wall, np.full(len(x), -1), position, nearest, self._radius_m))
 
     def _contact(self, first: Ints, second: Ints, position: Floats, other: Floats, touching_m: float) -> _Contacts:
         offset = other - position[first]
         distance = np.hypot(offset[:, 0], offset[:, 1])
         towards = offset / np.maximum(distance, 1e-12)[:, None]
         return _Contacts(first, second, towards, distance - touching_m + self._overlap_m)
-
-    @staticmethod
-    def _nearest(place: Floats, start: Floats, end: Floats) -> Floats:
-        """Return the point of each wall that is nearest to `place`."""
-        along = end - start
-        part = ((place - start) * along).sum(axis=-1) / np.maximum((along * along).sum(axis=-1), 1e-300)
-        nearest: Floats = start + np.clip(part, 0.0, 1.0)[..., None] * along
-        return nearest
