@@ -29,6 +29,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Waypoint,
 )
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
+from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, FEEL_M, FIRST_HOP_M, IDLE_LEGS_MAX, LEG_M
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
@@ -46,8 +47,6 @@ AXIS_BEARINGS_RAD: Final = tuple(math.radians(each) for each in (180, -90, 90, 0
 LINE_POINTS_MIN: Final = 4
 LINE_OFF_M: Final = 0.02
 LINE_ALONG_M: Final = 0.1
-# Rays to a robot that must differ by this [rad] to determine its distance.
-RAYS_RAD_MIN: Final = 0.3
 
 
 class WallWalks:
@@ -194,19 +193,8 @@ class WallWalks:
         """Find the distances of the leader's new slot to the robots in view, by their bearings along the walk and odometry."""
         slot_of = self._slots.slot_of()
         here = slot_of[leader]
-        if not waypoints:
-            return
-        end = waypoints[-1]
-        for node in (each.node for each in end.sightings):
-            rays = [
-                (each.x_m, each.y_m, one.bearing_rad)
-                for each in waypoints
-                for one in each.sightings
-                if one.node == node
-            ]
-            found = _crossing(rays)
-            if node in slot_of and found is not None:
-                length = math.hypot(found[0] - end.x_m, found[1] - end.y_m)
+        for node, length in distances_m(waypoints).items():
+            if node in slot_of:
                 self._slots.length_m[here, slot_of[node]] = self._slots.length_m[slot_of[node], here] = length
 
     def _order(self, robot: int, command: RobotCommand) -> Routine[Walked | None]:
@@ -230,17 +218,3 @@ def _line(waypoints: Sequence[Waypoint]) -> float | None:
     if middle - half > len(touching) * LINE_OFF_M**2 or middle + half < len(touching) * LINE_ALONG_M**2:
         return None
     return 0.5 * math.atan2(2.0 * xy, xx - yy)
-
-
-def _crossing(rays: Sequence[tuple[float, float, float]]) -> tuple[float, float] | None:
-    """Return the point [m] nearest to rays (x, y, bearing), or None if they are nearly parallel."""
-    sxx = sxy = syy = bx = by = 0.0
-    for x, y, bearing in rays:
-        nx, ny = -math.sin(bearing), math.cos(bearing)
-        off = nx * x + ny * y
-        sxx, sxy, syy = sxx + nx * nx, sxy + nx * ny, syy + ny * ny
-        bx, by = bx + nx * off, by + ny * off
-    det = sxx * syy - sxy * sxy
-    if det < (len(rays) * math.sin(RAYS_RAD_MIN) / 4.0) ** 2:
-        return None
-    return (syy * bx - sxy * by) / det, (sxx * by - sxy * bx) / det

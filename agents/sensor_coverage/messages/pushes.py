@@ -42,7 +42,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
 
     `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
     `felt` are directions [rad] of walls closer than a body. `explored` are directions of attempts to follow a wall.
-    `proved` has the arcs that walks closed.
+    `proved` has the arcs that walks closed. `distances_m` has (neighbouring slot, distance [m]) where a walk measured it.
     """
 
     slot: int
@@ -57,6 +57,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     felt: tuple[float, ...] = ()
     explored: tuple[float, ...] = ()
     proved: tuple[ProvedArc, ...] = ()
+    distances_m: tuple[tuple[int, float], ...] = ()
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).

@@ -112,6 +112,7 @@ class LocalMap(NeighbourTable):
             tuple(self._slots.felt.get(me, ())),
             tuple(self._planner.walls.tried.get(me, ())),
             self.proof.memory(),
+            tuple(self.distances_m.items()),
         )
 
     def reopen(self) -> None:
@@ -136,7 +137,7 @@ class LocalMap(NeighbourTable):
         Without it the gaps around this slot have other directions, so attempts at gaps do not count any more. The
         directions in which walls stopped drives remain.
         """
-        slot = self._slot_of(node)
+        slot = self.slot_of(node)
         if slot != NOWHERE and not self.states[node].moving and not self.path_vectors.is_claimed(slot):
             self._bodies.finished[node] = None
         self.path_vectors.forget(node, slot)
@@ -150,13 +151,9 @@ class LocalMap(NeighbourTable):
 
     def restarted(self, node: int) -> None:
         """Forget a robot that has lost its memory, and end the claims of its slot."""
-        self.proof.lose(self._slot_of(node))
-        self.path_vectors.forget(node, self._slot_of(node))
+        self.proof.lose(self.slot_of(node))
+        self.path_vectors.forget(node, self.slot_of(node))
         super().restarted(node)
-
-    def _slot_of(self, node: int) -> int:
-        state = self.states.get(node)
-        return NOWHERE if state is None else state.slot
 
     # --- slots change hands -------------------------------------------------------------------------------------------
 
@@ -169,7 +166,7 @@ class LocalMap(NeighbourTable):
         self._slots = Slots()
         self._planner = self._make_planner(self.parameters, self._slots)
         self._drop_plans()
-        self.proof = SlotProof()
+        self.proof, self.distances_m = SlotProof(), {}
         self._bodies.stopped = {}
         self._plan_basis = None
         self._led = None
@@ -202,6 +199,7 @@ class LocalMap(NeighbourTable):
         self._slots.felt[me] = list(memory.felt)
         self._planner.walls.tried[me] = list(memory.explored)
         self.proof.inherit(memory.proved)
+        self.distances_m = dict(memory.distances_m)
 
     def leave_complex(self) -> None:
         """Leave the complex; the body stays at the slot."""

@@ -33,7 +33,8 @@ class NeighbourTable:
     `at_base`: the robot stands at the base's own point, where it came out of the depot; None while it does not know,
     which is so after a restart. `slot` is where the robot stands. `redundant`: it has left the complex, and its body
     still stands there. `home` is the number of hops to the base. `epoch` counts its drives, and `samples` its averages
-    of bearings. `heading` [rad] is in the base's frame, or None if unknown. `version` counts all changes: between two
+    of bearings. `heading` [rad] is in the base's frame, or None if unknown. `distances_m` has the distances [m] from its slot
+    to others that are not a hop away, as a walk measured them. `version` counts all changes: between two
     changes, no decision changes.
     """
 
@@ -47,6 +48,7 @@ class NeighbourTable:
         self.moving = False
         self.heading: float | None = None
         self.samples = 0
+        self.distances_m: dict[int, float] = {}
         self.version = 0
         self.states: dict[int, StateBeacon] = {}
         self.received_at: dict[int, int] = {}  # node: tick of its latest state
@@ -126,8 +128,16 @@ class NeighbourTable:
             return self.node
         return next((node for node, state in self.states.items() if state.slot == slot), None)
 
-    # --- this robot's drives and bearings
-    # -------------------------------------------------------------------------------
+    def slot_of(self, node: int) -> int:
+        """Return the slot of a neighbour, or NOWHERE."""
+        state = self.states.get(node)
+        return NOWHERE if state is None else state.slot
+
+    def note_distances(self, by_robot: Mapping[int, float]) -> None:
+        """Record the distances [m] from this slot to those of other robots, as a walk to this slot measured them."""
+        self.distances_m |= {slot: each for node, each in by_robot.items() if (slot := self.slot_of(node)) != NOWHERE}
+
+    # --- this robot's drives and bearings -----------------------------------------------------------------------------
 
     def begin_drive(self) -> None:
         """Begin a drive: earlier bearings no longer hold."""

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final, Protocol
 
-from zwerm.agents.sensor_coverage.frontier.directions import angle_between
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import Body, Chain, SlotMemory
@@ -133,6 +133,11 @@ class PushPart:
         back_rad = direction_to(memory, self._chain.origin)
         seen_rad = self._situation.bearings[leader] + self._heading
         return back_rad is not None and angle_between(back_rad + math.pi, seen_rad) > BACK_RAD
+
+    def _back_bearing_rad(self) -> float:
+        """Return the approximate bearing of the robot that has taken this robot's former slot."""
+        there_rad = direction_to(self._memory, self._chain.origin)
+        return 0.0 if there_rad is None else wrapped(there_rad - self._heading)
 
     def _vacancy_check_due(self) -> bool:
         return self._waited > VACATED_TICKS and self._waited % VACANCY_PERIOD_TICKS == 1

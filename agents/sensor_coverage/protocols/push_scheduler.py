@@ -17,16 +17,20 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     RedundantOffer,
     RedundantPushEnd,
 )
+from zwerm.agents.sensor_coverage.messages.walls import WalkOver
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.component import Component
 from zwerm.agents.sensor_coverage.protocols.ending.completion_census import CompletionProtocol
 from zwerm.agents.sensor_coverage.protocols.ending.release_roster import ReleaseRoster
 from zwerm.agents.sensor_coverage.protocols.ending.termination import Termination
+from zwerm.agents.sensor_coverage.protocols.push_part import CLOSE_TICKS
 
 # Bounds of the ticks to wait: for a robot to come out, and for a push to end.
 RELEASE_TICKS_MAX: Final = 60
 PUSH_TICKS_MAX: Final = 2000
+# The same after the end of a walk: the walking robot may be out of range of those that would report the end of its push.
+WALKED_TICKS_MAX: Final = 3 * CLOSE_TICKS
 # Ticks after a push to wait for news of an edge before gaps are expanded.
 GAP_TICKS: Final = 24
 # Bound of the ticks to wait for a robot that stands at the base and is not ready.
@@ -51,6 +55,7 @@ class PushScheduler(Component):
         PushDone,
         RedundantOffer,
         RedundantPushEnd,
+        WalkOver,
     )
 
     def __init__(self, situation: Situation, beaconing: Beaconing, completion: CompletionProtocol) -> None:
@@ -70,6 +75,7 @@ class PushScheduler(Component):
         self._to_gap = False
         self._rear: int | None = None  # the robot that the active push takes from the base
         self._since = self._edges_since = 0
+        self._walked_at: int | None = None  # when the walk of the active push ended
         self._not_ready_since = 0
         self._tokens = first_count(situation.incarnation)  # the number of a push is the name of a slot
         self._paused_at = 0
@@ -115,6 +121,8 @@ class PushScheduler(Component):
                 self._end(True, True)
             case RedundantPushEnd(push, tried, done) if push == self._active:
                 self._end(tried, done)
+            case WalkOver(push) if push == self._active and self._walked_at is None:
+                self._walked_at = tick
             case _:
                 pass
 
@@ -145,6 +153,12 @@ class PushScheduler(Component):
             if self.outcome:
                 self._report_numbers()
 
+    def next_wake(self) -> int | None:
+        """Return the tick at which the push of a walk that is over ends, if a push is active."""
+        if self._active is None or self._walked_at is None:
+            return None
+        return self._walked_at + WALKED_TICKS_MAX + 1
+
     # --- one push -----------------------------------------------------------------------------------------------------
 
     def _watch_push(self, tick: int, push: int) -> None:
@@ -152,6 +166,8 @@ class PushScheduler(Component):
         self._not_ready_since = tick
         if tick - self._since > PUSH_TICKS_MAX or self._rear in self._situation.failure_detector.dead:
             self._end(False)
+        elif self._walked_at is not None and tick - self._walked_at > WALKED_TICKS_MAX:
+            self._end(True, True)
         elif self._released_at is None and self._rear_has_left() and not self._offers:
             self._let_out(tick)
 
@@ -207,6 +223,7 @@ class PushScheduler(Component):
         self._tokens += 1
         self._to_gap = self._map.to_gap
         self._active, self._since, self._is_first, self._rear = self._tokens, tick, first, rear
+        self._walked_at = None
         return self._tokens
 
     def _end(self, tried: bool, done: bool = False) -> None:

@@ -39,6 +39,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
 )
 from zwerm.agents.sensor_coverage.motion.push_drives import AHEAD_RAD, DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
+from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
@@ -223,6 +224,7 @@ class TokenPush(PushPart, WallPush):
         if result.driven_m > CLEAR_M:
             self._map.occupy(self._fresh)
             self._map.heading = 0.0
+            self._map.note_distances(distances_m(result.waypoints))
             self._settled()
         else:
             self._situation.stand()
@@ -260,9 +262,11 @@ class TokenPush(PushPart, WallPush):
         origin = self._chain.origin
         back_rad = direction_to(memory, origin)
         landmarks = self._chain.landmarks(memory.references, self._chain.future(), self._heading, origin)
-        hop_m = self._map.parameters.hop_m if back_rad is not None else 0.0
         bearing_rad = wrapped(back_rad + math.pi - self._heading) if back_rad is not None else 0.0
+        measured = {origin: self._map.distances_m[memory.slot]} if memory.slot in self._map.distances_m else {}
         self._map.inherit(memory)
+        self._map.distances_m |= measured
+        hop_m = self._map.distances_m.get(origin, self._map.parameters.hop_m) if back_rad is not None else 0.0
         self._situation.move(bearing_rad, hop_m, landmarks)
 
     # --- after the drive ----------------------------------------------------------------------------------------------
@@ -283,17 +287,13 @@ class TokenPush(PushPart, WallPush):
             self._write(AllStanding(self.id))
 
     def _straighten(self) -> None:
-        """Correct the distance in a single file, where bearings did not determine it."""
-        if self._result.used_odometry and self._back is not None:
+        """Correct the distance in a single file, where neither bearings nor a walk determined it."""
+        by_odometry = self._result.used_odometry and self._chain.origin not in self._map.distances_m
+        if by_odometry and self._back is not None:
             self._enter("straightening")
             self._situation.correct((Sighting(self._back, self._back_bearing_rad()),))
         else:
             self._home()
-
-    def _back_bearing_rad(self) -> float:
-        """Return the approximate bearing of the robot that has taken this robot's former slot."""
-        there_rad = direction_to(self._memory, self._chain.origin)
-        return 0.0 if there_rad is None else wrapped(there_rad - self._heading)
 
     def _home(self) -> None:
         """Repeat the visual homing on landmarks that were moving and stand still now."""

@@ -190,6 +190,17 @@ def test_a_leader_that_stays_occupies_the_new_slot_if_its_follower_came_after_al
     assert leader.slot == name
 
 
+def test_the_next_robot_at_a_slot_inherits_the_distances_that_a_walk_measured() -> None:
+    first, second = (LocalMap(node, PlannerParameters(), Planner) for node in (7, 8))
+    first.occupy(4)
+    first.receive(9, at(3), 10)
+    first.note_distances({9: 0.24, 10: 0.5})
+    second.inherit(first.memory())
+    assert second.distances_m == {3: 0.24}
+    second.vacate()
+    assert second.distances_m == {}
+
+
 # --- who provides what ----------------------------------------------------------------------------------------------
 
 

@@ -6,10 +6,11 @@ from typing import cast
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, united
-from zwerm.agents.sensor_coverage.messages.commands import SHUT
+from zwerm.agents.sensor_coverage.messages.commands import SHUT, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
+from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.wall_heading import swept
 from zwerm.agents.sensor_coverage.motion.wall_walk import WEDGED_TICKS, NearPoint, WallWalk, arcs_around
 from zwerm.run.runner import run
@@ -56,6 +57,23 @@ def test_a_wall_followed_close_to_a_slot_closes_the_arc_of_the_corner() -> None:
     first, last = closed[0].start_rad, closed[0].start_rad + closed[0].width_rad
     assert math.degrees(first) < 65.0
     assert math.degrees(last) == pytest.approx(180.0)
+
+
+def seen_along(way: list[tuple[float, float]], *robots: tuple[float, float]) -> list[Waypoint]:
+    """Return the waypoints of a walk along these points [m], in sight of robots at these places [m]."""
+    found = []
+    for x, y in way:
+        seen = tuple(Sighting(node, math.atan2(b - y, a - x)) for node, (a, b) in enumerate(robots))
+        found.append(Waypoint(x, y, seen, (math.pi,), ()))
+    return found
+
+
+def test_bearings_along_a_walk_determine_distances() -> None:
+    """The third robot is straight ahead all the time."""
+    way = [(0.0, 0.02 * step) for step in range(11)]
+    found = distances_m(seen_along(way, (0.3, 0.0), (-0.2, 0.3), (0.0, 0.9)))
+    assert found == pytest.approx({0: math.hypot(0.3, 0.2), 1: math.hypot(0.2, 0.1)})
+    assert distances_m([]) == {}
 
 
 def test_walls_in_different_directions_close_no_arc_between_them() -> None:
@@ -179,6 +197,17 @@ def test_robots_without_a_coordinator_leave_a_niche() -> None:
     niche = "arena.polygon=[[0,0],[0.24,0],[0.24,0.3],[0.6,0.3],[0.6,-0.4],[1.4,-0.4],[1.4,0.54],[0,0.54]]"
     settings = (niche, "base.pose=[0.12,0.1,0.4]", "robots.count=20", "services.path=gradient")
     result = run("sensor-coverage-narrow", 101, "inline", (*settings, "time.duration_s=300.0"))
+    assert result.metrics["reachable_coverage_fraction"] > 0.99
+
+
+def test_robots_without_a_coordinator_leave_a_bay_with_bent_walls() -> None:
+    """Slots along its walls are nearer than a hop, and the base does not see the end of a walk."""
+    bay = "[2.9,2.73],[3.2,2.8],[3.28,2.5],[3.34,2.56],[2.94,1.76],[3.6,1.75],[3.6,1.2],[2.0,1.2],[2.6,1.5],[2.48,1.94]"
+    outside = "[1.86,2.13],[1.94,2.23],[1.93,2.39],[3.08,2.43]"
+    settings = (f"arena.polygon=[{bay},{outside}]", "base.pose=[3.15,2.61,0.4]", "robots.count=20")
+    more = ("services.path=gradient", "time.duration_s=600.0")
+    result = run("sensor-coverage-narrow", 101, "inline", (*settings, *more))
+    assert result.outcome == "completed"
     assert result.metrics["reachable_coverage_fraction"] > 0.99
 
 

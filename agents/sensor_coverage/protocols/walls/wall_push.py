@@ -15,6 +15,7 @@ from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import AllStanding, Body, PushAborted
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
+from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
@@ -161,6 +162,8 @@ class WallPush:
         if protocol is not None:
             protocol.end(self.id)
         self._is_spare = isinstance(result, WalkResult) and result.end != LOST
+        if isinstance(result, WalkResult) and result.end == LOST:
+            self._map.note_distances(distances_m(result.waypoints))
         self._settled()
 
     def _leave_if_spare(self) -> None:
