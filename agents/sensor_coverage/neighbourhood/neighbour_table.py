@@ -86,16 +86,18 @@ class NeighbourTable:
         held = known is not None and _held(known) != NOWHERE and not known.moving
         if known is not None and left and held and sender in self.seen:
             self._handovers[known.slot] = tick
+        # A robot that has just driven was perhaps averaged on its way: its neighbours do not know that it moves.
+        drove = known is None or state.epoch != known.epoch or (known.moving and not state.moving)
+        outdated = drove and (known is not None or state.samples == 0)
         sighting = self.seen.get(sender)
-        if sighting is not None and not state.moving and sighting.epoch in (-1, state.epoch):
+        fits = sighting is not None and (sighting.epoch == state.epoch or (sighting.epoch == -1 and not outdated))
+        if sighting is not None and fits and not state.moving:
             self.seen[sender] = NeighbourRecord(state.epoch, _held(state), sighting.bearing_rad)
         if state.slot != NOWHERE:
             for node, each in self.states.items():
                 if node != sender and each.slot == state.slot:  # the leader of a push has left it to its follower
                     self.states[node] = _without_slot(each)
-        if known is None:
-            return state.samples == 0
-        return bool(state.epoch != known.epoch or (known.moving and not state.moving))
+        return outdated
 
     def missed(self, sender: int, state: StateBeacon) -> bool:
         """Return whether a state before this one was lost, while neither its sender nor this robot has moved."""

@@ -190,6 +190,16 @@ def test_a_leader_that_stays_occupies_the_new_slot_if_its_follower_came_after_al
     assert leader.slot == name
 
 
+@pytest.mark.parametrize(("samples", "epoch"), [(0, -1), (1, 2)], ids=["has just driven", "stood"])
+def test_a_bearing_of_a_robot_that_may_have_been_on_its_way_belongs_to_no_drive(samples: int, epoch: int) -> None:
+    """A robot comes into sight during a drive. Its neighbour has not received that it moves, and averages its bearing."""
+    watcher = LocalMap(7, PlannerParameters(), Planner)
+    watcher.update_bearings({9: 0.5})
+    arrived = StateBeacon(1, 3, 2, False, False, samples, (), (), (), NO_PATH_VECTOR)
+    assert watcher.receive(9, arrived, 10) is (samples == 0)
+    assert watcher.seen[9].epoch == epoch
+
+
 def test_the_next_robot_at_a_slot_inherits_the_distances_that_a_walk_measured() -> None:
     first, second = (LocalMap(node, PlannerParameters(), Planner) for node in (7, 8))
     first.occupy(4)
