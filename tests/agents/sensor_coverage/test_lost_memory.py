@@ -12,12 +12,14 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan
 from zwerm.agents.sensor_coverage.local_node import CODECS
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, StateBeacon, StateRequest
+from zwerm.agents.sensor_coverage.messages.commands import LOST, SHUT, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.messages.incarnations import ADOPTED, adopted_slot, first_count
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, read_envelope, write
 from zwerm.agents.sensor_coverage.messages.pushes import PushAborted
 from zwerm.agents.sensor_coverage.messages.robot_sets import from_bytes, members, robot_set, to_bytes
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
+from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.component_loop import ComponentLoop
 from zwerm.agents.sensor_coverage.protocols.ending.release_roster import ReleaseRoster
@@ -262,6 +264,18 @@ def test_a_dead_body_ahead_that_does_not_yield_stands_at_a_wall(
     _, push = pushing({4: 0.1, 5: bearing, 6: -0.1, 9: 0.2}, dead)
     stopped = DriveResult(False, driven_m=0.1, touched=walls, robots=(Touched(bearing, 5),))
     assert push._body_in_the_way(stopped, 0.0) == hides
+
+
+@pytest.mark.parametrize("end", [LOST, STRETCH, SHUT])
+def test_a_robot_knows_how_far_it_is_from_others_after_a_walk(end: str) -> None:
+    """It is less than a hop. The robot may be the next to follow another one, from the place where its walk ended."""
+    robot, push = pushing({5: 0.0}, ())
+    robot.local_map.receive(5, StateBeacon(1, 4, 2, False, False, 1, (), (), (), NO_PATH_VECTOR), 1)
+    way = [(0.0, 0.02 * step) for step in range(11)]
+    points = [Waypoint(x, y, (Sighting(5, math.atan2(-y, 0.3 - x)),), (math.pi,), ()) for x, y in way]
+    push._idle_legs = IDLE_LEGS_MAX
+    push._walked(WalkResult(end, 0.2, (), tuple(points)))
+    assert robot.local_map.distances_m == pytest.approx({4: math.hypot(0.3, 0.2)})
 
 
 def test_a_push_ends_when_the_robot_that_has_the_token_dies() -> None:

@@ -162,7 +162,7 @@ class WallPush:
         if protocol is not None:
             protocol.end(self.id)
         self._is_spare = isinstance(result, WalkResult) and result.end != LOST
-        if isinstance(result, WalkResult) and result.end == LOST:
+        if isinstance(result, WalkResult):
             self._map.note_distances(distances_m(result.waypoints))
         self._settled()
 
