@@ -171,7 +171,11 @@ def main() -> None:
     )
     add_campaign_options(parser, last_seed=34)
     asked = parser.parse_args()
-    rows = carry_out(asked, cases(asked), lambda case: one_run(case, asked.arenas, asked.set))
+    wanted = list(cases(asked))
+    if not wanted:
+        first, last = asked.seeds
+        parser.error(f"{asked.arenas}: expected arenas of these kinds with numbers from {first} to {last}, found none")
+    rows = carry_out(asked, wanted, lambda case: one_run(case, asked.arenas, asked.set))
     write_csv(asked.csv, summary(rows))
 
 
