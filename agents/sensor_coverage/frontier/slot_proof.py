@@ -42,10 +42,13 @@ class SlotProof:
 
     `around` are the slots that share an edge with it, and their directions [rad]. An arc that other standing robots closed
     together with a walk counts while they stand within two hops. `lose` names the neighbours' slots that are lost for good.
+    `for_neighbours` has (neighbouring slot, arc there) of triangles that this slot proves and the neighbour cannot: the
+    neighbour did not see all points of the walk that they depend on.
     """
 
     def __init__(self) -> None:
         self.around: Mapping[int, float] = {}
+        self.for_neighbours: list[tuple[int, ProvedArc]] = []
         self._slot = NOWHERE
         self._scan = ScanResult({}, FlagComplex({}), ())
         self._by_view: list[Arc] = []
@@ -120,9 +123,21 @@ class SlotProof:
         fan = fan_of(point, views, neighbours, at_walls)
         if any(slot in pair for pair in fan):
             needed = dict.fromkeys(each for pair in fan for each in pair)
+            points = [each for step in steps for each in (step.before, step.point) if each is not None]
             for pair in fan:
                 if slot in pair:
-                    self._add(needed, point.seen, arc_between(views[slot][sum(pair) - slot], point.seen[slot]))
+                    other = sum(pair) - slot
+                    self._add(needed, point.seen, arc_between(views[slot][other], point.seen[slot]))
+                    if slot in views[other] and not all(other in each.seen for each in points):
+                        arc = arc_between(views[other][slot], point.seen[other])
+                        self.for_neighbours.append((other, (tuple(needed), tuple(point.seen), *arc)))
+
+    def accept(self, proved: ProvedArc) -> bool:
+        """Take in an arc that a neighbour has proved; return whether the open arcs are smaller."""
+        old = sum(each.width_rad for each in self.open_arcs())
+        needed, seen, start, width = proved
+        self._add(needed, seen, Arc(start, width))
+        return sum(each.width_rad for each in self.open_arcs()) < old - NEWS_RAD
 
     def _add(self, needed: Iterable[int], seen: Iterable[int], arc: Arc) -> None:
         """Add an arc that counts while the slots `needed` stand, until one of the slots `seen` is lost, which saw the walk."""

@@ -5,6 +5,8 @@ Directions are in the frame of the base.
 
 from msgspec import Struct
 
+from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
+
 
 class _WalkMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, which begins with its tag."""
@@ -35,10 +37,17 @@ class ArcClosed(_WalkMessage, frozen=True, tag="arc-closed"):
     push: int
 
 
+class NeighbourProved(_WalkMessage, frozen=True, tag="neighbour-proved"):
+    """To the robot at a slot: the sender has proved an arc there, by points of a walk that the receiver did not see."""
+
+    slot: int
+    arc: ProvedArc
+
+
 class WalkOver(_WalkMessage, frozen=True, tag="walk-over"):
     """To all, forwarded once by each robot: the walk of a push has ended."""
 
     push: int
 
 
-WalkMessage = PassedPoint | ArcClosed | WalkOver
+WalkMessage = PassedPoint | ArcClosed | NeighbourProved | WalkOver

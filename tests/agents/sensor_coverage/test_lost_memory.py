@@ -209,9 +209,7 @@ def test_the_base_that_restarts_goes_on(at_s: float) -> None:
     assert is_covered(with_faults(TINY, f'{{kind="restart", nodes=["base"], at_s={at_s}}}', 1, *PAPER))
 
 
-@pytest.mark.parametrize(
-    "at_s", [15.0, pytest.param(40.0, marks=pytest.mark.xfail(reason="the run fails: robot 1 is missing"))]
-)
+@pytest.mark.parametrize("at_s", [15.0, 40.0])
 def test_the_base_that_restarts_goes_on_where_walls_are_followed(at_s: float) -> None:
     assert is_covered(with_faults(TINY, f'{{kind="restart", nodes=["base"], at_s={at_s}}}'))
 

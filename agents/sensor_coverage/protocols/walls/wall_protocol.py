@@ -15,7 +15,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCou
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
-from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, PassedPoint, WalkMessage, WalkOver
+from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, NeighbourProved, PassedPoint, WalkMessage, WalkOver
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.walls.kept_points import KeptPoints, Neighbourhood
 
@@ -112,7 +112,7 @@ class WallProtocol(Component):
     """One robot's part in walks, its own and those of others."""
 
     channel: ClassVar[str] = CHANNEL
-    accepts: ClassVar[tuple[type, ...]] = (PassedPoint, ArcClosed, WalkOver)
+    accepts: ClassVar[tuple[type, ...]] = (PassedPoint, ArcClosed, NeighbourProved, WalkOver)
 
     def __init__(self, situation: WalkSituation, on_over: Callable[[int], None] = lambda _: None) -> None:
         """Call `on_over` with the number of the push when a walk has ended."""
@@ -174,6 +174,8 @@ class WallProtocol(Component):
                 self._hear(sender, message, tick)
             case ArcClosed(push):
                 self._closed = self._closed or push == self._push
+            case NeighbourProved():
+                self._accept(message, tick)
             case WalkOver(push) if push not in self._over:
                 self._spread(push)
                 self._on_over(push)
@@ -230,6 +232,22 @@ class WallProtocol(Component):
         if local_map.proof.pass_step(slot, None if received is None else received.step, step):
             self._replan_at = tick + PASSED_TICKS
             self._outbox.append(Outgoing(sender, ArcClosed(passed.push)))
+        nodes = {each: node for node, each in slots.items()}
+        for each, arc in dict.fromkeys(local_map.proof.for_neighbours):
+            if each in nodes:  # else its robot has left since the step before
+                self._outbox.append(Outgoing(nodes[each], NeighbourProved(each, arc)))
+        local_map.proof.for_neighbours.clear()
+
+    def _accept(self, message: NeighbourProved, tick: int) -> None:
+        """Take an arc that a neighbour has proved into the proof of this robot's slot."""
+        local_map = self._situation.local_map
+        if (
+            self._proves
+            and local_map.proof.ready
+            and local_map.slot == message.slot
+            and local_map.proof.accept(message.arc)
+        ):
+            self._replan_at = tick + PASSED_TICKS
 
     def _witnesses(self, passed: PassedPoint, last: int, slots: Mapping[int, int]) -> tuple[int, ...] | None:
         """Return slots that saw all points since the one with the number `last`, as far as this robot did not; or None.

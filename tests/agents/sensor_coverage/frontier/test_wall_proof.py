@@ -261,6 +261,26 @@ def test_a_slot_keeps_what_a_walk_closed_and_passes_it_on() -> None:
     assert open_rad(heir) == pytest.approx(math.tau), "slot 1 is lost, which saw the walk, too"
 
 
+def test_a_slot_proves_an_arc_at_a_neighbour_that_did_not_see_the_whole_walk() -> None:
+    """Slot 1 does not know that there is a wall beyond the line of sight from slot 0."""
+    here, there = at_slot(0, PAIR), at_slot(1, PAIR)
+    pass_walk(here, 0, PASSING, -1)
+    pass_walk(there, 1, PASSING[1:], -1)
+    assert there.for_neighbours == []
+    assert open_rad(there) == pytest.approx(math.tau - math.radians(25.0))
+    assert [there.accept(arc) for slot, arc in here.for_neighbours if slot == 1] == [True]
+    assert open_rad(there) == pytest.approx(math.tau - math.radians(70.0))
+    there.lose(0)
+    assert open_rad(there) == pytest.approx(math.tau), "slot 0 is lost, which is responsible for the space beyond"
+
+
+def test_a_slot_proves_nothing_at_a_neighbour_beside_a_door() -> None:
+    proof = at_slot(0, PAIR)
+    for points in DOOR:
+        pass_walk(proof, 0, points, -1)
+    assert proof.for_neighbours == []
+
+
 def test_two_points_of_walks_beside_a_door_close_nothing_at_a_slot() -> None:
     """The triangles of the two robots with the points cross. Behind the crossing, each robot would rely on the other."""
     proof = at_slot(0, PAIR)

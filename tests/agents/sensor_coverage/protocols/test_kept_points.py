@@ -9,7 +9,7 @@ from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
-from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, PassedPoint
+from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, NeighbourProved, PassedPoint
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.component import Outgoing
 from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
@@ -57,8 +57,8 @@ class Here:
         self.sees = {NEIGHBOUR: 0.0, WALKER: -0.3}
         self.local_map.update_bearings(self.sees)
 
-    def watch_walk(self) -> None:
-        for number, point in enumerate(WAY, 1):
+    def watch_walk(self, last: int = len(WAY)) -> None:
+        for number, point in enumerate(WAY[:last], 1):
             seen = tuple((node, math.radians(each)) for node, each in point.items())
             self.walls.receive(WALKER, PassedPoint(1, number, -1, 1, seen, (math.radians(-90.0),), ()), 0)
             self.walls.poll(0)
@@ -108,3 +108,31 @@ def test_points_of_a_robot_that_restarts_are_dropped() -> None:
     here.look()
     here.walls.poll(0)
     assert here.closed_deg == pytest.approx(0.0)
+
+
+def test_a_robot_informs_its_neighbour_of_an_arc_that_the_neighbour_cannot_prove() -> None:
+    """The neighbour did not see the first point of the walk."""
+    here = Here()
+    here.look()
+    here.walls.poll(0)
+    here.watch_walk()
+    found = [each for each in here.walls.outgoing() if isinstance(each.message, NeighbourProved)]
+    assert [(each.to, each.message.slot) for each in found] == [(NEIGHBOUR, SLOTS[NEIGHBOUR])]
+    there = Here()
+    there.look()
+    there.local_map.update_proof()
+    for slot in (99, SLOTS[ME]):
+        assert there.closed_deg == pytest.approx(0.0)
+        there.walls.receive(NEIGHBOUR, NeighbourProved(slot, ((SLOTS[ME],), (SLOTS[NEIGHBOUR],), 0.0, 0.5)), 0)
+    assert math.radians(there.closed_deg) == pytest.approx(0.5)
+
+
+def test_a_slot_whose_robot_has_left_during_the_walk_is_informed_of_nothing() -> None:
+    """The triangle was made of the point before."""
+    here = Here()
+    here.look()
+    here.local_map.update_proof()
+    here.local_map.proof.for_neighbours.append((99, ((4,), (99,), 0.0, 0.5)))
+    here.watch_walk(last=1)
+    assert not any(isinstance(each.message, NeighbourProved) for each in here.walls.outgoing())
+    assert here.local_map.proof.for_neighbours == []
