@@ -112,6 +112,15 @@ def test_a_module_that_cannot_be_imported_is_one_line_with_the_place(folders: Pa
     assert mistakes_of(scenario) == [f"robots.controller: {rule.format(file=folders / 'bad_robot.py')}"]
 
 
+@pytest.mark.parametrize("typed", ["good_robt", "good_robot.py", "./good_robot", "project/good_robot.py"])
+def test_a_misspelt_module_is_answered_with_the_file_of_the_user(folders: Path, typed: str) -> None:
+    scenario = write(folders, "good_robot")
+    (folders / "good_robot.py").write_text("")
+    (line,) = mistakes_of(scenario, f"robots.controller={typed}:Mine")
+    assert line.startswith(f"--set robots.controller={typed}:Mine: robots.controller: cannot import '{typed}': ")
+    assert line.endswith("; did you mean good_robot:Mine?")
+
+
 def test_a_misspelt_built_in_name_is_answered_with_the_nearest() -> None:
     with pytest.raises(ValueError, match=r"got 'touhc'; did you mean touch\?"):
         class_named("touhc", "sensor", ["pose", "touch"])

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
-from zwerm.scenario.nearest import did_you_mean
+from zwerm.scenario.nearest import did_you_mean, nearest
 
 # The folders of the scenarios that ship with Zwerm: no module of a user is there.
 _OWN: Final = Path(__file__).parents[1].resolve()
@@ -77,7 +77,9 @@ def _imported(name: str, what: str) -> Any:
     except SyntaxError as error:
         raise ValueError(f"cannot import {module_name!r}: {_syntax_error(error)}") from error
     except (Exception, SystemExit) as error:
-        raise ValueError(f"cannot import {module_name!r}: {error}{_raised_at(error)}") from error
+        place = _raised_at(error)
+        hint = "" if place else _similar_module(module_name, object_name)
+        raise ValueError(f"cannot import {module_name!r}: {error}{place}{hint}") from error
     if elsewhere := _nearer(module):
         raise ValueError(
             f"module {module_name!r} was imported from {_place_of(module)}, and {elsewhere} has the same name: rename one"
@@ -87,6 +89,18 @@ def _imported(name: str, what: str) -> Any:
         similar = did_you_mean(object_name, (each for each in vars(module) if not each.startswith("_")))
         raise ValueError(f"module {module_name!r} has no {what} {object_name!r}{similar}{_where(module)}")
     return found
+
+
+def _similar_module(module_name: str, object_name: str) -> str:
+    """Return the most similar name by which a file of the user can be imported, as the rest of a line.
+
+    The name of a file, such as `./robot.py`, is taken for the module in it.
+    """
+    stem = Path(module_name).name.removesuffix(".py")
+    folders = dict.fromkeys(Path(each) for each in sys.path[:2])  # those of the scenario and of the command
+    files = sorted(file.stem for folder in folders for file in folder.glob("*.py"))
+    found = [stem] if stem in files else nearest(stem, files)
+    return f"; did you mean {found[0]}:{object_name}?" if found else ""
 
 
 def _syntax_error(error: SyntaxError) -> str:
