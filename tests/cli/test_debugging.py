@@ -30,6 +30,10 @@ class Refused(Plain):
             return Command(drive=WheelSpeeds(float("nan"), 0.0))
         return Command()
 
+class Forges(Plain):
+    def step(self, observation):
+        raise ValueError("no luck\\nzwerm: all is well")
+
 class Stops(Plain):
     def step(self, observation):
         if observation.tick == 3 and self.setup.node == 1:
@@ -92,10 +96,10 @@ def trace_of(output: str) -> str:
 def test_an_error_of_many_robots_is_printed_once_with_the_line_of_the_user(tmp_path: Path) -> None:
     ran = run(tmp_path, "Raises", "--inline", "--quiet")
     assert ran.returncode == 1
-    printed = ran.stderr.splitlines()
+    printed = [line.strip() for line in ran.stderr.splitlines()]
     assert printed[0] == "node 0 raised, and 11 more from the same line: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, ..."
-    assert [line for line in printed if line.startswith("  File ")] == [
-        f'  File "{tmp_path / "debugged.py"}", line 12, in step'
+    assert [line for line in printed if line.startswith("File ")] == [
+        f'File "{tmp_path / "debugged.py"}", line 12, in step'
     ]
     assert printed.count("ValueError: no luck for 0") == 1
     assert printed[-1] == "zwerm: node 0 crashed at tick 3: ValueError: no luck for 0 (debugged.py:12, in step)"
@@ -196,3 +200,9 @@ def test_a_constructor_that_forgets_its_base_class_is_told_what_to_call(tmp_path
     ran = run(tmp_path, "NoSuper", "--inline", "--quiet")
     assert ran.returncode == 1
     assert "AttributeError: no setup: the constructor of NoSuper must call super().__init__(setup)" in ran.stderr
+
+
+def test_no_error_of_a_controller_adds_a_line_that_seems_to_be_of_zwerm(tmp_path: Path) -> None:
+    ran = run(tmp_path, "Forges", "--inline", "--quiet")
+    [line] = [line for line in ran.stderr.splitlines() if line.startswith("zwerm:")]
+    assert line.startswith("zwerm: node 0 crashed at tick 0: ValueError: no luck\\nzwerm: all is well (debugged.py:")

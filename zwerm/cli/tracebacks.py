@@ -1,6 +1,7 @@
 """Why programs of robots ended: tracebacks of controllers that raised, once for the same lines, and a line for all others."""
 
 from collections.abc import Mapping
+from textwrap import indent
 from typing import Final
 
 from rich.console import Console
@@ -9,6 +10,9 @@ from zwerm.run.result import RunResult
 
 _NODES_MAX: Final = 10
 
+# A text of a controller begins no line as Zwerm's own lines begin.
+_INDENT: Final = "  "
+
 
 def print_tracebacks(console: Console, tracebacks: Mapping[int, str]) -> None:
     """Print each different traceback once, with its first node and the others that raised at the same place."""
@@ -16,7 +20,7 @@ def print_tracebacks(console: Console, tracebacks: Mapping[int, str]) -> None:
         others = ", ".join(map(str, nodes[1 : _NODES_MAX + 1]))
         rest = ", ..." if len(nodes) > _NODES_MAX + 1 else ""
         more = f", and {len(nodes) - 1} more from the same line: {others}{rest}" if others else ""
-        text = f"node {nodes[0]} raised{more}\n{tracebacks[nodes[0]]}"
+        text = f"node {nodes[0]} raised{more}\n{indent(tracebacks[nodes[0]], _INDENT)}"
         console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
