@@ -142,6 +142,7 @@ def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
     return [
         {
             **dict(zip(columns, key, strict=True)),
+            "commit": f"`{group[0]['commit']}`",  # some commits look like numbers
             **numbers_of(group),
             f"coverage of {ENOUGH:g} or more": str(sum(float(row["reachable_coverage"]) >= ENOUGH for row in group)),
             "ended with": _reasons(group),
