@@ -119,6 +119,7 @@ class WallWalk:
             aside = (frame.y_m - start[1]) * ux - (frame.x_m - start[0]) * uy
             left = min(hop_m - done, motion.step_m)
             yield motion.velocity(ux * left + uy * aside * 0.5, uy * left - ux * aside * 0.5)
+            self._trail.append(motion.position)
         touched = tuple(each.bearing_rad for each in ahead if each.node is None)
         beside = [each for each in frame.contacts if _apart(each.bearing_rad, bearing_rad) < math.pi / 2.0]
         if not ahead and beside and all(each.node is None for each in beside):  # wedged between walls

@@ -114,6 +114,38 @@ def test_a_walk_ends_where_the_robot_is_wedged() -> None:
     assert ended.value.value.end == SHUT
 
 
+class Apart(Wedged):
+    """A robot that drives between its slot at (0, 0) and a wall 0.6 m to the east. It sees another robot at its slot only."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._read(0.0, 0.0)
+
+    def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        part = min(1.0, self.step_m / max(math.hypot(x_m, y_m), 1e-9))
+        self._read(min(0.6, self.position[0] + part * x_m), self.position[1] + part * y_m)
+        return BodyVelocity(x_m, y_m)
+
+    def _read(self, x_m: float, y_m: float) -> None:
+        self.position = self.frame.x_m, self.frame.y_m = x_m, y_m
+        self.frame.seen = {9: math.pi} if x_m < 0.03 else {}
+        self.frame.contacts = (Touched(0.0, None),) if x_m > 0.599 else ()
+
+
+def test_a_robot_at_a_wall_that_sees_no_other_robot_drives_back_to_its_slot() -> None:
+    robot = Apart()
+    walk = WallWalk(cast(Locomotion, robot))
+    for _ in walk.to_wall(0.0, 0.95, 0.12, 0.3, 1):
+        pass
+    assert robot.frame.seen == {}
+    seen = []
+    walk.on_step = lambda at: seen.append(at.sightings)
+    way = walk.along(-1, 0.1, (), (), 0.05)
+    while not seen:
+        next(way)
+    assert [each.node for each in seen[0]] == [9]
+
+
 class Passing(Wedged):
     """A robot that moves to the east below a wall, at a robot in the south-east, from which it is `away_m`."""
 
