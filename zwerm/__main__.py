@@ -20,6 +20,15 @@ def main() -> None:
         # Python ends itself by SIGINT, with another exit status, if an interrupt came while it executed a text, as libraries
         # do to make classes, although it was handled. The next text that it executes undoes that.
         exec("")
+        _ignore_signals()
+
+
+def _ignore_signals() -> None:
+    """Let no signal change the exit status any more: the command is over, and Python may take a while to end."""
+    import signal  # no command needs it earlier
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
 
 
 if __name__ == "__main__":

@@ -160,6 +160,17 @@ def test_an_interrupt_while_a_library_makes_a_class_exits_130(tmp_path: Path) ->
     assert (ran.returncode, ran.stderr) == (130, "zwerm: interrupted\n")
 
 
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_after_the_command_does_not_change_the_exit_status(name: str) -> None:
+    program = (
+        "import atexit, signal, sys; from zwerm.__main__ import main; sys.argv = ['zwerm', '--version'];"
+        f"atexit.register(signal.raise_signal, signal.{name}); main()"
+    )
+    ran = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert ran.stdout.startswith("zwerm ")
+
+
 def test_a_failed_run_exits_1_and_prints_its_traceback_and_reason() -> None:
     running = start("run", "computation-free", "--inline", "--json", "--set", "robots.controller=troubled:Raises")
     out, err = running.communicate(timeout=60)
