@@ -29,6 +29,8 @@ CONTACT_RAD: Final = math.radians(15.0)
 POCKET_RAD: Final = math.radians(55.0)
 # Successive points without a contact at which a walking robot still follows the wall: it turns round a corner.
 BLIND_MAX: Final = 3
+# Contacts at two points that differ by less than this [rad] are with the same wall: a switch is 30 degrees wide.
+SAME_WALL_RAD: Final = math.radians(35.0)
 # Largest arc [rad] behind a corner in which a slot may lose sight of a walking robot that stays in touch with the wall.
 HIDDEN_RAD: Final = math.radians(30.0)
 # A point of a walk is news for the walking robot if the open arcs become smaller by this [rad].
@@ -89,20 +91,30 @@ class TouchCounter:
     """Counts since which point of a walk the robot follows the wall. It may be out of touch for a few points at corners.
 
     It turns towards the wall meanwhile, and so enters each opening that its body fits through. A robot in touch is no wall:
-    a walk around a robot in an opening leads past the opening.
+    a walk around a robot in an opening leads past the opening. A dead body may fill an opening that nobody keeps. So where a
+    body is in touch, the robot follows the wall only as long as the same wall stays in touch, too.
     """
 
     def __init__(self) -> None:
         self.since = 0
         self._blind = BLIND_MAX + 1
+        self._walls: Collection[float] = ()
+        self._at_body = False  # whether a body was in touch at the latest point with a wall, or after it
 
-    def take(self, number: int, at_wall: bool) -> None:
-        """Take in whether the robot touches a wall at the point with this number."""
-        if at_wall and self._blind > BLIND_MAX:
+    def take(self, number: int, walls: Collection[float], at_body: bool = False) -> None:
+        """Take in the directions [rad] of walls in touch at the point with this number, and whether a body is in touch."""
+        if not walls:
+            self._at_body = self._at_body or at_body
+            self._blind += 1
+            if self._blind > BLIND_MAX:
+                self.since = number + 1
+            return
+        stays = not self._blind and any(
+            abs(math.remainder(a - b, math.tau)) < SAME_WALL_RAD for a in walls for b in self._walls
+        )
+        if self._blind > BLIND_MAX or ((self._at_body or at_body) and not stays):
             self.since = number
-        self._blind = 0 if at_wall else self._blind + 1
-        if self._blind > BLIND_MAX:
-            self.since = number + 1
+        self._blind, self._walls, self._at_body = 0, walls, at_body
 
 
 class SeenPoint(NamedTuple):

@@ -2,7 +2,8 @@
 
 The robot keeps a hand on the wall: of all directions that its contacts allow, it takes the one that turns most towards
 the hand. So it enters every opening that is wider than its body, and turns back at the end of every niche. Robots in
-its way are passed in the same manner, but the robot does not press against them.
+its way are passed in the same manner, but the robot does not press against them. It pushes bodies of dead robots, and
+passes those as walls that do not yield (`bodies`).
 """
 
 import math
@@ -10,7 +11,9 @@ from collections.abc import Callable, Collection, Generator, Iterable, Mapping, 
 from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SAME_WALL_RAD
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
+from zwerm.agents.sensor_coverage.motion.bodies import Bodies, HeldPoints
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
@@ -41,8 +44,6 @@ NEAR_M_MIN: Final = 0.02
 # unless the walking robot moved by this distance [m] across its line of sight: a bearing's noise would decide.
 TOUCHING_RADII_MAX: Final = 4.0
 ACROSS_M_MIN: Final = 0.03
-# Two contacts whose bearings differ by less than this [rad] are with the same wall; a switch is 30 degrees wide.
-SAME_WALL_RAD: Final = math.radians(35.0)
 # Two contacts at the same point that differ by less than this [rad] are the walls of a corner.
 CORNER_RAD: Final = math.radians(125.0)
 # Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
@@ -76,12 +77,15 @@ class NearPoint(NamedTuple):
 class WallWalk:
     """The walk of one robot along walls, over several commands: its trail, and the direction of the wall it has in touch.
 
-    `on_step` is called with each point of a walk along a wall, one a tick.
+    `on_step` is called with each point of a walk along a wall, one a tick; points at bodies of dead robots are held back.
+    `dead` are the robots that are known to be dead, which may change.
     """
 
-    def __init__(self, motion: Locomotion) -> None:
+    def __init__(self, motion: Locomotion, dead: Collection[int] = ()) -> None:
         self.on_step: Callable[[Waypoint], None] = lambda _: None
         self._motion = motion
+        self._bodies = Bodies(motion, dead)
+        self._latest = motion.position, 0.0  # where the latest step began, and its heading [rad]
         self._wall_rad = 0.0
         self._trail: list[Vector] = []
         self._blind_rad = 0.0
@@ -103,12 +107,13 @@ class WallWalk:
         """
         motion, frame = self._motion, self._motion.frame
         frame.forget()
+        self._bodies.begin()
         start = self._start = motion.position
         self._trail = [start]
         ux, uy = unit(bearing_rad)
         done, stuck = 0.0, 0
         while True:
-            ahead = [each for each in frame.contacts if _apart(each.bearing_rad, bearing_rad) < AHEAD_RAD]
+            ahead = [each for each in self._bodies.contacts() if _apart(each.bearing_rad, bearing_rad) < AHEAD_RAD]
             now = (frame.x_m - start[0]) * ux + (frame.y_m - start[1]) * uy
             stuck = stuck + 1 if now < done + STUCK_FRACTION * motion.step_m else 0
             done = max(done, now)
@@ -170,15 +175,30 @@ class WallWalk:
         last place with a margin of `margin_m`). MET (a robot of `meet` and another one are in sight). SHUT (no wall any
         more, or the robot is wedged).
         """
+        held = HeldPoints(self._bodies, lambda point: self.on_step(point))
+        ended = yield from self._along(hand, length_m, keep, meet, margin_m, held)
+        held.end()
+        return ended
+
+    def _along(
+        self,
+        hand: int,
+        length_m: float,
+        keep: Collection[int],
+        meet: Collection[int],
+        margin_m: float,
+        held: HeldPoints,
+    ) -> DriveToWalk:
         motion, frame = self._motion, self._motion.frame
         frame.forget()
+        self._bodies.begin()
         yield from self._back_into_sight(keep)
         if not self._sees(keep):
             return WalkResult(LOST)
         self._trail = [motion.position]
         self._blind_rad, self._out_of_reach = 0.0, frozenset()
         points = [self._waypoint()]
-        self.on_step(points[0])
+        held.take(points[0])
         seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
         last, way, stuck = motion.position, 0.0, 0
         while way < length_m:
@@ -196,7 +216,7 @@ class WallWalk:
                 yield from self._back(margin_m, keep)
                 return WalkResult(LOST, way, (), tuple(points))
             self._trail.append(motion.position)
-            self.on_step(self._waypoint())
+            held.take(self._waypoint())
             now, touch = tuple(sorted(frame.seen)), _hands(frame.contacts)
             if now != seen or touch != hands:
                 if before != last:
@@ -212,7 +232,12 @@ class WallWalk:
 
     def _step(self, hand: int) -> BodyVelocity:
         """Return the velocity of the next step, and keep the direction of the wall."""
-        motion, contacts = self._motion, self._motion.frame.contacts
+        motion = self._motion
+        push = self._bodies.step(math.dist(self._latest[0], motion.position), self._latest[1])
+        if push is not None:
+            self._latest = motion.position, self._latest[1]
+            return push
+        contacts = self._bodies.contacts()
         if not contacts:
             self._blind_rad += TURN_RAD
             self._was_in_touch = False
@@ -226,6 +251,7 @@ class WallWalk:
             self._was_in_touch = True
         heading, self._wall_rad = hand_on_wall(self._wall_rad, contacts, hand)
         ux, uy = unit(heading)
+        self._latest = motion.position, heading
         return motion.velocity(ux * motion.step_m, uy * motion.step_m)
 
     def _check_contacts(self, before: Vector, seen_before: Mapping[int, float]) -> None:
@@ -259,7 +285,7 @@ class WallWalk:
 
     def _sees(self, keep: Collection[int]) -> bool:
         seen = self._motion.frame.seen
-        return any(each in seen for each in keep) if keep else bool(seen)
+        return any(each in seen for each in keep) if keep else any(not self._bodies.is_body(each) for each in seen)
 
     def _meets(self, meet: Collection[int]) -> bool:
         seen = self._motion.frame.seen

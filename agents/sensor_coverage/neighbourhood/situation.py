@@ -55,13 +55,13 @@ class Situation:
         self.tick = 0
         self.motion = Locomotion(parameters, setup)
         self.motion.rest = 0.0, 0.0
-        self.wall_walk = WallWalk(self.motion)
+        self.failure_detector = FailureDetector()
+        self.wall_walk = WallWalk(self.motion, self.failure_detector.dead)
         planner_parameters = PlannerParameters(
             link_m=parameters.link_m, margin_m=parameters.margin_m, walls=parameters.walls
         )
         self.local_map = LocalMap(setup.node, planner_parameters, make_planner, setup.incarnation)
         self.mailbox = ReliableMailbox()
-        self.failure_detector = FailureDetector()
         self.negotiation: LeaveNegotiation | None = None
         if setup.services.get("redundancy") in ("link", "coordinator"):
             self.negotiation = LeaveNegotiation(setup.node, setup.dt_s, random, setup.incarnation == 1)

@@ -150,9 +150,10 @@ class WallProtocol(Component):
         self._spread(push)
 
     def _announce(self, at: Waypoint) -> None:
-        heading = self._situation.local_map.heading or 0.0
+        local_map = self._situation.local_map
+        heading = local_map.heading or 0.0
         self._number += 1
-        self._touch.take(self._number, bool(at.touched))
+        self._touch.take(self._number, at.touched, any(each not in local_map.states for each in at.robots))
         point = PassedPoint(
             self._push or 0,
             self._number,

@@ -1,0 +1,202 @@
+"""Bodies of dead robots in the way of a robot that follows a wall.
+
+A dead robot does not drive: its body yields to a push until something is behind it. So the walking robot drives on where
+it touches a body. Where that stops it, it pushes straight at the body. A body that does not yield counts as wall in this
+direction. When the direction has turned, the robot pushes again. A robot that pushes back lives, and is no wall.
+
+Beyond a body that does not yield may still be a way: a body that lies in a bend of a passage narrower than two bodies
+yields to no push from one end, and the robot turns round in front of it. Around a body in the corner of a room the direction to
+the body turns by as much as the angle of the corner. So the points of the walk at bodies are held back until walls alone
+are in touch again. The bodies count only if their direction turned by `ROUND_RAD` and they did not yield meanwhile.
+"""
+
+import math
+from collections.abc import Callable, Collection
+from typing import Final
+
+import msgspec
+
+from zwerm.agents.sensor_coverage.messages.commands import Waypoint
+from zwerm.agents.sensor_coverage.motion.homing import unit
+from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive, Locomotion
+from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
+from zwerm.wire.messages import BodyVelocity
+
+# A robot with less than this fraction of a full step is stopped. A body that yields half its way, as one body does, is not.
+STOPPED_FRACTION: Final = 0.2
+# Ticks of a push. In the first one the bodies come into contact, and it does not count.
+PUSH_TICKS: Final = 3
+# A body does not yield if the robot moves in these ticks by less than this fraction of full steps: 18 free bodies in a row
+# yield by more, and so does a body that is free in a direction within 75 degrees of the push.
+YIELD_FRACTION: Final = 0.05
+# Ticks for which the robot then stands still. A robot that lives and was displaced drives back meanwhile.
+REST_TICKS: Final = 2
+# A body is pushed again when its direction has turned by this [rad], or after so many ticks without a contact.
+AGAIN_RAD: Final = math.radians(25.0)
+APART_TICKS: Final = 2
+# Bodies count as wall if the direction to them turned by this [rad] at least from one wall to the next. A robot turns round
+# by less than 35 degrees in front of a body in a bend that it cannot pass.
+ROUND_RAD: Final = math.radians(60.0)
+# Points at bodies that are held back at most.
+HELD_MAX: Final = 200
+
+
+class _Pushed(msgspec.Struct):
+    """A body that did not yield: the direction [rad] of the push, and the ticks since the latest contact."""
+
+    direction_rad: float
+    apart_ticks: int = 0
+
+
+class Bodies:
+    """The bodies that one walking robot touches. `dead` are the robots that it knows to be dead, which may change."""
+
+    def __init__(self, motion: Locomotion, dead: Collection[int]) -> None:
+        self._motion = motion
+        self._dead = dead
+        self._push: Drive | None = None
+        self._firm: dict[int, _Pushed] = {}  # bodies that did not yield
+        self._again: dict[int, None] = {}  # bodies that did not yield in another direction
+        self._living: dict[int, None] = {}  # robots that pushed back
+
+    @property
+    def step_m(self) -> float:
+        """Length of a full step [m]."""
+        return self._motion.step_m
+
+    def begin(self) -> None:
+        """Begin another drive, and forget the bodies."""
+        self._push = None
+        self._firm, self._again, self._living = {}, {}, {}
+
+    def is_body(self, node: int | None) -> bool:
+        """Return whether a robot in touch is dead, as far as is known."""
+        return node in self._dead and node not in self._living
+
+    def contacts(self) -> list[Touched]:
+        """Return the contacts that stop the robot: bodies that do not yield are walls, and others stop nothing."""
+        return [
+            Touched(each.bearing_rad, None) if each.node in self._firm else each
+            for each in self._motion.frame.contacts
+            if each.node in self._firm or not self.is_body(each.node)
+        ]
+
+    def firm(self) -> tuple[float, ...]:
+        """Return the directions [rad] of the bodies in touch that do not yield; none if another robot is in touch."""
+        contacts = [each for each in self._motion.frame.contacts if each.node is not None]
+        if any(not self.is_body(each.node) for each in contacts):
+            return ()
+        return tuple(each.bearing_rad for each in contacts if each.node in self._firm)
+
+    def step(self, moved_m: float, heading_rad: float) -> BodyVelocity | None:
+        """Return the velocity of a push, or None if there is none now.
+
+        Takes the length [m] and the heading [rad] of the latest step.
+        """
+        self._watch()
+        if self._push is None:
+            node = self._in_the_way(moved_m, heading_rad)
+            self._push = None if node is None else self._straight(node)
+        velocity = None if self._push is None else next(self._push, None)
+        if velocity is None:
+            self._push = None
+        return velocity
+
+    def _touched(self) -> dict[int, float]:
+        """Return the bodies in touch, and their bearings [rad]."""
+        return {
+            each.node: each.bearing_rad
+            for each in self._motion.frame.contacts
+            if each.node is not None and self.is_body(each.node)
+        }
+
+    def _watch(self) -> None:
+        """Find the bodies that must be pushed again."""
+        touched = self._touched()
+        for node, pushed in tuple(self._firm.items()):
+            pushed.apart_ticks = 0 if node in touched else pushed.apart_ticks + 1
+            if pushed.apart_ticks > APART_TICKS or not self.is_body(node):
+                del self._firm[node]
+            elif node in touched and _apart(touched[node], pushed.direction_rad) > AGAIN_RAD:
+                del self._firm[node]
+                self._again[node] = None
+
+    def _in_the_way(self, moved_m: float, heading_rad: float) -> int | None:
+        """Return the body to push now, or None."""
+        touched = {node: bearing for node, bearing in self._touched().items() if node not in self._firm}
+        again = [node for node in touched if node in self._again]
+        if again:
+            return again[0]
+        off = {node: _apart(bearing, heading_rad) for node, bearing in touched.items()}
+        nearest = min(off, key=lambda node: off[node], default=None)
+        stopped = moved_m < STOPPED_FRACTION * self._motion.step_m
+        return nearest if stopped and nearest is not None and off[nearest] < math.pi / 2.0 else None
+
+    def _straight(self, node: int) -> Drive:
+        """Push straight at a body, and find out whether it yields."""
+        motion = self._motion
+        self._again.pop(node, None)
+        direction_rad, way_m = 0.0, 0.0
+        for tick in range(PUSH_TICKS):
+            touched = self._touched()
+            if node not in touched:
+                return
+            direction_rad, before = touched[node], motion.position
+            ux, uy = unit(direction_rad)
+            yield motion.velocity(ux * motion.step_m, uy * motion.step_m)
+            if tick > 0:
+                way_m += (motion.position[0] - before[0]) * ux + (motion.position[1] - before[1]) * uy
+        if node not in self._touched() or way_m > YIELD_FRACTION * motion.step_m * (PUSH_TICKS - 1):
+            return
+        before = motion.position
+        for _ in range(REST_TICKS):
+            yield STOP
+        if math.dist(before, motion.position) > YIELD_FRACTION * motion.step_m:
+            self._living[node] = None
+        elif node in self._touched():
+            self._firm[node] = _Pushed(direction_rad)
+
+
+class HeldPoints:
+    """Reports the points of a walk to `report`, and holds those at bodies back until walls alone are in touch again."""
+
+    def __init__(self, bodies: Bodies, report: Callable[[Waypoint], None]) -> None:
+        self._bodies = bodies
+        self._report = report
+        self._held: list[tuple[Waypoint, tuple[float, ...]]] = []
+        self._firm: list[tuple[float, ...]] = []  # directions [rad] of bodies that did not yield
+        self._at = 0.0, 0.0  # where the robot touched one of these last [m]
+
+    def take(self, point: Waypoint) -> None:
+        """Take in a point, at which the robot is now."""
+        firm, at = self._bodies.firm(), (point.x_m, point.y_m)
+        at_body = any(self._bodies.is_body(each) for each in point.robots)
+        if firm:
+            self._firm.append(firm)
+            self._at = at
+        elif at_body and math.dist(at, self._at) > STOPPED_FRACTION * self._bodies.step_m:
+            self._firm = []  # a body has yielded
+        if at_body or (self._held and not point.touched):
+            self._held.append((point, firm))
+            if len(self._held) > HELD_MAX:
+                self.end()
+            return
+        ends = self._firm[:1] and (self._firm[0], self._firm[-1])
+        self._release(bool(ends) and min(_apart(a, b) for a in ends[0] for b in ends[1]) >= ROUND_RAD)
+        self._report(point)
+
+    def end(self) -> None:
+        """Report the points that are held back: the bodies there are no wall."""
+        self._release(False)
+
+    def _release(self, at_walls: bool) -> None:
+        held, self._held, self._firm = self._held, [], []
+        for point, firm in held:
+            if at_walls:
+                robots = tuple(each for each in point.robots if not self._bodies.is_body(each))
+                point = msgspec.structs.replace(point, touched=point.touched or firm, robots=robots)
+            self._report(point)
+
+
+def _apart(a_rad: float, b_rad: float) -> float:
+    return abs(math.remainder(a_rad - b_rad, math.tau))
