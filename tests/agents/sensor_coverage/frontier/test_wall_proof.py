@@ -9,7 +9,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof, WallStep
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, Arc, TouchCounter, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import RESENT_POINTS, Sightlines
 from zwerm.maths.simplicial import FlagComplex
@@ -66,6 +66,33 @@ def test_points_without_a_contact_close_nothing_unless_the_wall_comes_back(count
     free = [WalkPoint({0: math.radians(10 * (each + 1))}, (), ()) for each in range(count)]
     walk = Walk(0, -1, (WalkPoint({0: 0.0}, (0.0,), ()), *free))
     assert opened(walk) == [(0, 360)]
+
+
+def touched_since(*points: tuple[tuple[int, ...], bool]) -> int:
+    """Return since which point the wall is followed; a point is the directions [deg] of walls, and whether at a body."""
+    counter = TouchCounter()
+    for number, (walls, at_body) in enumerate(points):
+        counter.take(number, tuple(math.radians(each) for each in walls), at_body)
+    return counter.since
+
+
+@pytest.mark.parametrize(
+    ("points", "since"),
+    [
+        pytest.param([((0,), True), ((20,), True), ((-10,), False)], 0, id="the same wall stays in touch"),
+        pytest.param([((0,), False), ((0, 90), True), ((90,), True)], 0, id="two walls of a corner"),
+        pytest.param([((0,), False), ((-90,), False)], 0, id="another wall without a body"),
+        pytest.param([((0,), False), ((-90,), True)], 1, id="another wall at a body"),
+        pytest.param([((0,), True), ((-90,), False)], 1, id="another wall after a body"),
+        pytest.param([((0,), False), ((), True), ((0,), False)], 2, id="body between two walls"),
+        pytest.param([((0,), True), ((), False), ((0,), False)], 2, id="out of touch after a body"),
+        pytest.param([((0,), False), ((), False), ((-90,), False)], 0, id="corner without a body"),
+        pytest.param([((0,), False), *[((), False)] * (BLIND_MAX + 1), ((0,), False)], BLIND_MAX + 2, id="wall lost"),
+    ],
+)
+def test_a_body_between_two_walls_breaks_a_walk(points: list[tuple[tuple[int, ...], bool]], since: int) -> None:
+    """It may fill an opening. Without a body, the robot turned round a corner."""
+    assert touched_since(*points) == since
 
 
 def test_a_robot_may_lose_a_walk_behind_a_corner_that_another_robot_sees() -> None:

@@ -1,0 +1,194 @@
+"""Bodies of dead robots beside a walking robot: which yield, which push back, and which points of the walk are at walls."""
+
+import math
+from collections.abc import Collection, Sequence
+from typing import cast
+
+import pytest
+
+from zwerm.agents.sensor_coverage.messages.commands import Waypoint
+from zwerm.agents.sensor_coverage.motion.bodies import HELD_MAX, PUSH_TICKS, REST_TICKS, Bodies, HeldPoints
+from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Locomotion
+from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
+from zwerm.wire.messages import BodyVelocity
+
+BODY, OTHER = 9, 4
+EAST = 0.0
+
+
+class AtBody:
+    """A robot in touch with a body. A velocity moves it by `fraction` of a full step; without one `back_m` moves it."""
+
+    step_m = 0.05
+
+    def __init__(self, fraction: float, back_m: float = 0.0) -> None:
+        self.position = 0.0, 0.0
+        self.frame = OdometryFrame()
+        self.fraction, self._back_m = fraction, back_m
+        self.touch((BODY, EAST))
+
+    def touch(self, *contacts: tuple[int | None, float]) -> None:
+        """Touch robots or walls (None) in these directions [deg], and nothing else."""
+        self.frame.contacts = tuple(Touched(math.radians(degrees), node) for node, degrees in contacts)
+
+    def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        return BodyVelocity(x_m, y_m)
+
+    def drive(self, velocity: BodyVelocity) -> None:
+        """Move as one tick of this velocity does."""
+        x, y = self.position
+        back_m = self._back_m if velocity == STOP else 0.0
+        self.position = x + self.fraction * velocity.forward_m_s - back_m, y + self.fraction * velocity.left_m_s
+
+
+def bodies_of(robot: AtBody) -> Bodies:
+    return Bodies(cast(Locomotion, robot), (BODY,))
+
+
+def push(robot: AtBody, bodies: Bodies, moved_m: float = 0.0) -> list[BodyVelocity]:
+    """Carry out the push that begins after a step of this length [m] to the east, and return its velocities."""
+    velocities = []
+    while (velocity := bodies.step(moved_m, math.radians(EAST))) is not None:
+        velocities.append(velocity)
+        robot.drive(velocity)
+    return velocities
+
+
+def test_a_robot_pushes_a_body_that_stops_it_and_stands_still_then() -> None:
+    robot = AtBody(fraction=0.0)
+    assert push(robot, bodies_of(robot)) == [BodyVelocity(robot.step_m, 0.0)] * PUSH_TICKS + [STOP] * REST_TICKS
+
+
+def test_a_body_that_does_not_yield_counts_as_wall() -> None:
+    robot = AtBody(fraction=0.0)
+    bodies = bodies_of(robot)
+    push(robot, bodies)
+    assert bodies.firm() == (EAST,)
+    assert bodies.contacts() == [Touched(EAST, None)]
+
+
+def test_a_body_that_yields_stops_nothing_and_is_no_wall() -> None:
+    robot = AtBody(fraction=0.5)
+    bodies = bodies_of(robot)
+    push(robot, bodies)
+    assert bodies.firm() == ()
+    assert bodies.contacts() == []
+
+
+def test_a_robot_that_pushes_back_lives_and_is_no_wall() -> None:
+    robot = AtBody(fraction=0.0, back_m=0.02)
+    bodies = bodies_of(robot)
+    push(robot, bodies)
+    assert not bodies.is_body(BODY)
+    assert bodies.firm() == ()
+    assert bodies.contacts() == [Touched(EAST, BODY)]
+    assert push(robot, bodies) == []
+
+
+@pytest.mark.parametrize(
+    ("moved_m", "contact"),
+    [
+        pytest.param(0.0, (OTHER, 0.0), id="a living robot"),
+        pytest.param(0.0, (BODY, 120.0), id="a body behind"),
+        pytest.param(0.03, (BODY, 0.0), id="a body that the robot drives past"),
+    ],
+)
+def test_a_robot_does_not_push(moved_m: float, contact: tuple[int, float]) -> None:
+    robot = AtBody(fraction=0.0)
+    robot.touch(contact)
+    assert push(robot, bodies_of(robot), moved_m) == []
+
+
+@pytest.mark.parametrize(("turned_deg", "pushes"), [(20.0, False), (30.0, True)])
+def test_a_body_is_pushed_again_in_another_direction(turned_deg: float, pushes: bool) -> None:
+    robot = AtBody(fraction=0.0)
+    bodies = bodies_of(robot)
+    push(robot, bodies)
+    robot.touch((BODY, turned_deg))
+    assert bool(push(robot, bodies, moved_m=robot.step_m)) == pushes
+    assert bodies.firm() == (math.radians(turned_deg),)
+
+
+def test_no_body_counts_as_wall_while_another_robot_is_in_touch() -> None:
+    """The other robot may have held the body, and it may leave."""
+    robot = AtBody(fraction=0.0)
+    bodies = bodies_of(robot)
+    push(robot, bodies)
+    robot.touch((BODY, 0.0), (OTHER, 90.0))
+    assert bodies.firm() == ()
+
+
+def test_a_walk_forgets_the_bodies_of_the_walk_before() -> None:
+    robot = AtBody(fraction=0.0)
+    bodies = bodies_of(robot)
+    push(robot, bodies)
+    bodies.begin()
+    assert bodies.contacts() == []
+
+
+# --- points of a walk -------------------------------------------------------------------------------------------------
+
+Touch = tuple[tuple[int | None, float], ...]
+WALL_EAST: Touch = ((None, 0.0),)
+WALL_SOUTH: Touch = ((None, -90.0),)
+
+
+def reported(touches: Sequence[Touch], yields: Collection[int] = ()) -> list[Waypoint]:
+    """Return the points that a robot reports of a walk that touches these things.
+
+    The body yields to pushes at the points with the numbers `yields`.
+    """
+    robot = AtBody(fraction=0.0)
+    bodies, points = bodies_of(robot), list[Waypoint]()
+    held = HeldPoints(bodies, points.append)
+    for number, touch in enumerate(touches):
+        robot.touch(*touch)
+        robot.fraction = 0.5 if number in yields else 0.0
+        push(robot, bodies)
+        contacts = robot.frame.contacts
+        walls = tuple(each.bearing_rad for each in contacts if each.node is None)
+        robots = tuple(each.node for each in contacts if each.node is not None)
+        held.take(Waypoint(*robot.position, (), walls, robots))
+    held.end()
+    return points
+
+
+def body_from(first_deg: float, last_deg: float) -> list[Touch]:
+    """Return points of a walk from a wall to another one, at a body of which the direction turns."""
+    return [WALL_EAST, ((BODY, first_deg),), ((BODY, (first_deg + last_deg) / 2.0),), ((BODY, last_deg),), WALL_SOUTH]
+
+
+def test_a_body_in_a_corner_counts_as_wall() -> None:
+    """The robot turns round it by a quarter turn, from one wall of the corner to the other."""
+    points = reported(body_from(0.0, -90.0))
+    assert [[round(math.degrees(each)) for each in point.touched] for point in points] == [[0], [0], [-45], [-90], [-90]]
+    assert not any(point.robots for point in points)
+
+
+def test_a_body_that_the_robot_does_not_turn_round_is_no_wall() -> None:
+    """It may lie in a bend, and fill the way on."""
+    points = reported(body_from(0.0, -55.0))
+    assert [bool(point.touched) for point in points] == [True, False, False, False, True]
+    assert [point.robots for point in points[1:4]] == [(BODY,)] * 3
+
+
+def test_a_body_that_yields_on_the_way_round_is_no_wall() -> None:
+    """The robot has pushed it to another place: there may be a way where it was."""
+    points = reported(body_from(0.0, -90.0), yields=(2,))
+    assert [bool(point.touched) for point in points] == [True, False, False, False, True]
+
+
+def test_points_at_a_body_are_reported_when_the_walk_ends_and_are_no_wall() -> None:
+    points = reported(body_from(0.0, -90.0)[:-1])
+    assert [bool(point.touched) for point in points] == [True, False, False, False]
+
+
+def test_points_at_a_body_are_held_back_up_to_a_number() -> None:
+    robot = AtBody(fraction=0.0)
+    points = list[Waypoint]()
+    held = HeldPoints(bodies_of(robot), points.append)
+    for _ in range(HELD_MAX):
+        held.take(Waypoint(0.0, 0.0, (), (), (BODY,)))
+    assert not points
+    held.take(Waypoint(0.0, 0.0, (), (), (BODY,)))
+    assert len(points) == HELD_MAX + 1
