@@ -73,6 +73,11 @@ class Bodies:
         """Return whether a robot in touch is dead, as far as is known."""
         return node in self._dead and node not in self._living
 
+    @property
+    def in_touch(self) -> bool:
+        """True if a robot in touch is known to be dead, even if it seemed to push back."""
+        return any(each.node in self._dead for each in self._motion.frame.contacts)
+
     def contacts(self) -> list[Touched]:
         """Return the contacts that stop the robot: bodies that do not yield are walls, and others stop nothing."""
         return [

@@ -68,10 +68,14 @@ DriveToWalk = Generator[BodyVelocity, None, WalkResult]
 
 
 class NearPoint(NamedTuple):
-    """A point [m] of the way along a wall close to the start, and the directions of touched walls [rad]."""
+    """A point [m] of the way along a wall close to the start, and the directions of touched walls [rad].
+
+    `at_body` is true if a dead robot is in touch.
+    """
 
     at: Vector
     walls: tuple[float, ...]
+    at_body: bool = False
 
 
 class WallWalk:
@@ -267,7 +271,7 @@ class WallWalk:
         )
 
     def _near_point(self) -> NearPoint:
-        return NearPoint(self._motion.position, self._motion.frame.touched)
+        return NearPoint(self._motion.position, self._motion.frame.touched, self._bodies.in_touch)
 
     def _waypoint(self) -> Waypoint:
         frame = self._motion.frame
@@ -322,12 +326,16 @@ def arcs_around(
 
     Two successive points close the arc between them, if the wall is beyond. Two successive contacts with the same wall
     close the arc between the touched points of the wall. So do two contacts at the same point, because a body does not pass
-    between them.
+    between them. A dead robot may fill an opening: from there on only the same wall closes an arc, up to the next wall.
     """
     found = []
+    at_body = False
     for before, point in pairwise(points):
+        at_body = before.at_body or (at_body and not before.walls)
+        same = [(a, b) for a in before.walls for b in point.walls if _apart(a, b) < SAME_WALL_RAD]
         near_m = min(math.dist(start, each.at) for each in (before, point))
-        if (before.walls or point.walls) and near_m > NEAR_M_MIN:
+        follows = bool(before.walls or point.walls) and not (at_body or point.at_body)
+        if (same or follows) and near_m > NEAR_M_MIN:
             step = _between(start, before.at, point.at)
             if step[1] * hand < 0.0:  # the start and the wall are on different sides of the step
                 found.append(step)
@@ -335,7 +343,7 @@ def arcs_around(
             if _apart(a, b) < CORNER_RAD:
                 ends = (_touched_point(point.at, each, radius_m) for each in (a, b))
                 found.append(_between(start, *ends))
-        for a, b in ((a, b) for a in before.walls for b in point.walls if _apart(a, b) < SAME_WALL_RAD):
+        for a, b in same:
             found.append(_between(start, _touched_point(before.at, a, radius_m), _touched_point(point.at, b, radius_m)))
     return tuple((a, width) if width >= 0.0 else (a + width, -width) for a, width in found)
 

@@ -88,6 +88,20 @@ def test_a_robot_in_touch_is_no_wall_beside_a_slot() -> None:
     assert arcs_around((0.0, 0.0), way, 1, 0.07) == arcs_around((0.0, 0.0), way, -1, 0.07) == ()
 
 
+@pytest.mark.parametrize(("at_body", "closed_deg"), [(False, 17), (True, 0)])
+def test_a_dead_body_between_two_walls_closes_no_arc_beside_a_slot(at_body: bool, closed_deg: int) -> None:
+    """The slot is at the mouth of a passage in the east. The robot turns round in it, before the body."""
+    north, south = math.pi / 2.0, -math.pi / 2.0
+    way = [((0.2, 0.03), (north,), at_body), ((0.21, 0.0), (), at_body), ((0.2, -0.03), (south,))]
+    arcs = arcs_around((0.0, 0.0), [NearPoint(*each) for each in way], 1, 0.07)
+    assert round(math.degrees(sum(width for _, width in arcs))) == closed_deg
+
+
+def test_a_wall_that_stays_in_touch_closes_the_arc_past_a_dead_body() -> None:
+    way = [NearPoint((0.05 * each, 0.03), (math.pi / 2.0,), True) for each in range(1, 5)]
+    assert united([Arc(*each) for each in arcs_around((0.0, 0.0), way, 1, 0.07)])
+
+
 class Wedged:
     """A robot in touch with two walls, of which no velocity moves it."""
 
