@@ -161,7 +161,13 @@ def body_from(first_deg: float, last_deg: float) -> list[Touch]:
 def test_a_body_in_a_corner_counts_as_wall() -> None:
     """The robot turns round it by a quarter turn, from one wall of the corner to the other."""
     points = reported(body_from(0.0, -90.0))
-    assert [[round(math.degrees(each)) for each in point.touched] for point in points] == [[0], [0], [-45], [-90], [-90]]
+    assert [[round(math.degrees(each)) for each in point.touched] for point in points] == [
+        [0],
+        [0],
+        [-45],
+        [-90],
+        [-90],
+    ]
     assert not any(point.robots for point in points)
 
 

@@ -41,16 +41,18 @@ class CrashInOpening(Crash):
         return self.nodes
 
 
-def building(polygon: str, opening: tuple[float, float, float, float]) -> tuple[str, ...]:
-    """Return the settings of a building with noise-free odometry, in which a robot dies in an opening."""
+def building(
+    polygon: str, opening: tuple[float, float, float, float], pose: str = "[0.2,0.6,0.3]", at_s: float = 1.0
+) -> tuple[str, ...]:
+    """Return the settings of a building with noise-free odometry, in which a robot dies in an opening after `at_s`."""
     names = ("x_min", "x_max", "y_min", "y_max")
     bounds = ", ".join(f"{name}={value}" for name, value in zip(names, opening, strict=True))
     return (
         f"arena.polygon={polygon}",
-        "base.pose=[0.2,0.6,0.3]",
+        f"base.pose={pose}",
         "robots.count=25",
         "robots.sensors.2.distance_sd_fraction=0.0",
-        f'faults=[{{kind="{__name__}:CrashInOpening", at_s=1.0, {bounds}}}]',
+        f'faults=[{{kind="{__name__}:CrashInOpening", at_s={at_s}, {bounds}}}]',
     )
 
 
@@ -63,6 +65,13 @@ BEND = building(
     "[[0,0],[1.2,0],[1.2,0.5],[1.6,0.5],[1.6,1.2],[2.6,1.2],[2.6,2.2],[1.4,2.2],[1.4,0.7],[1.2,0.7],[1.2,1.2],[0,1.2]]",
     (1.36, 1.6, 0.5, 0.74),
 )
+# A door of 0.25 m in a corner of both rooms.
+CORNER = building(
+    "[[0,0],[1.2,0],[1.2,0.02],[1.3,0.02],[1.3,0],[2.5,0],[2.5,1.2],[1.3,1.2],[1.3,0.271],[1.2,0.271],[1.2,1.2],[0,1.2]]",
+    (1.13, 1.37, 0.0, 0.291),
+    "[0.2,0.52,0.31]",
+    39.1,
+)
 ALONE = ("services.path=gradient",)
 HIDDEN = "a walk passes the body, and the proof closes without the room behind it"
 
@@ -74,6 +83,7 @@ HIDDEN = "a walk passes the body, and the proof closes without the room behind i
         pytest.param(BEND, id="central bend", marks=pytest.mark.xfail(reason=HIDDEN)),
         pytest.param((*DOOR, *ALONE), id="decentralised door"),
         pytest.param((*BEND, *ALONE), id="decentralised bend"),
+        pytest.param((*CORNER, *ALONE), id="decentralised door in a corner"),
     ],
 )
 def test_a_dead_body_in_an_opening_hides_no_room(settings: tuple[str, ...]) -> None:

@@ -92,8 +92,8 @@ def test_a_robot_in_touch_is_no_wall_beside_a_slot() -> None:
 def test_a_dead_body_between_two_walls_closes_no_arc_beside_a_slot(at_body: bool, closed_deg: int) -> None:
     """The slot is at the mouth of a passage in the east. The robot turns round in it, before the body."""
     north, south = math.pi / 2.0, -math.pi / 2.0
-    way = [((0.2, 0.03), (north,), at_body), ((0.21, 0.0), (), at_body), ((0.2, -0.03), (south,))]
-    arcs = arcs_around((0.0, 0.0), [NearPoint(*each) for each in way], 1, 0.07)
+    first, turning = NearPoint((0.2, 0.03), (north,), at_body), NearPoint((0.21, 0.0), (), at_body)
+    arcs = arcs_around((0.0, 0.0), [first, turning, NearPoint((0.2, -0.03), (south,))], 1, 0.07)
     assert round(math.degrees(sum(width for _, width in arcs))) == closed_deg
 
 
