@@ -11,6 +11,7 @@ from msgspec import Meta, Struct
 
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.errors import ProtocolError
+from zwerm.maths.sums import added
 from zwerm.wire.checksum import seal, unseal
 from zwerm.wire.messages import Command, Observation, Transmission
 
@@ -44,7 +45,7 @@ class Averaging(Controller):
                 self.refused += 1
         table: Any = self.parameters
         if received:
-            self.value += table.gain * (sum(received) / len(received) - self.value)
+            self.value += table.gain * (added(received) / len(received) - self.value)
         outbox: tuple[Transmission, ...] = ()
         if observation.tick % table.every_ticks == 0:
             frame = seal(_LAYOUT.pack(self.value))

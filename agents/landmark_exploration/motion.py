@@ -14,6 +14,7 @@ import numpy as np
 from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnapshot, to_rad
 from zwerm.agents.landmark_exploration.mapping.landmark_complex import SHARED_MIN
 from zwerm.agents.landmark_exploration.view import ExplorerView, apart_rad
+from zwerm.maths.sums import added
 
 Direction = float | None
 Outcome = Literal["cleared", "boundary", "timed-out", "unreached", "arrived"]
@@ -177,7 +178,7 @@ def wander(view: ExplorerView, random: np.random.Generator, turn_sd_rad: float =
     while True:
         if any(math.cos(direction - contact) > 0.0 for contact in view.contacts):
             away = math.atan2(
-                -sum(math.sin(each) for each in view.contacts), -sum(math.cos(each) for each in view.contacts)
+                -added(math.sin(each) for each in view.contacts), -added(math.cos(each) for each in view.contacts)
             )
             direction = away + float(random.uniform(-1.2, 1.2))
         else:

@@ -17,6 +17,7 @@ from zwerm.agents.landmark_exploration.mapping.bearing_steps import BearingSnaps
 from zwerm.agents.landmark_exploration.mapping.landmark_complex import SHARED_MIN
 from zwerm.agents.landmark_exploration.motion import Drive
 from zwerm.agents.landmark_exploration.view import ExplorerView
+from zwerm.maths.sums import added
 
 # Ticks after which the place of a landmark that is not seen is dropped.
 DROP_TICKS: Final = 120
@@ -119,7 +120,7 @@ def _onto_circle(place: Place, centre: Place, radius: float) -> Place:
 def _mean(places: Sequence[Place]) -> Place | None:
     if not places:
         return None
-    return sum(x for x, _ in places) / len(places), sum(y for _, y in places) / len(places)
+    return added(x for x, _ in places) / len(places), added(y for _, y in places) / len(places)
 
 
 def seek(

@@ -34,6 +34,7 @@ from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, FEEL_M, FIRST
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
 from zwerm.coordinator.sensor_coverage.sources import Sources
+from zwerm.maths.sums import added
 
 # A leg closes something if the open arcs become smaller by this [rad].
 PROGRESS_RAD: Final = 0.1
@@ -187,7 +188,7 @@ class WallWalks:
 
     def _open(self, scan: ScanResult) -> float:
         """Return the sum of all open arcs [rad]."""
-        return sum(arc.width_rad for arcs in self._walls.open_arcs(scan).values() for arc in arcs)
+        return added(arc.width_rad for arcs in self._walls.open_arcs(scan).values() for arc in arcs)
 
     def _measure(self, leader: int, waypoints: Sequence[Waypoint]) -> None:
         """Find the distances of the leader's new slot to the robots in view, by their bearings along the walk and odometry."""
@@ -210,10 +211,10 @@ def _line(waypoints: Sequence[Waypoint]) -> float | None:
     touching = [(each.x_m, each.y_m) for each in waypoints if each.touched]
     if len(touching) < LINE_POINTS_MIN:
         return None
-    mx, my = (sum(each) / len(touching) for each in zip(*touching, strict=True))
-    xx = sum((x - mx) ** 2 for x, _ in touching)
-    yy = sum((y - my) ** 2 for _, y in touching)
-    xy = sum((x - mx) * (y - my) for x, y in touching)
+    mx, my = (added(each) / len(touching) for each in zip(*touching, strict=True))
+    xx = added((x - mx) ** 2 for x, _ in touching)
+    yy = added((y - my) ** 2 for _, y in touching)
+    xy = added((x - mx) * (y - my) for x, y in touching)
     middle, half = (xx + yy) / 2.0, math.hypot((xx - yy) / 2.0, xy)
     if middle - half > len(touching) * LINE_OFF_M**2 or middle + half < len(touching) * LINE_ALONG_M**2:
         return None

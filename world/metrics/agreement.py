@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+from zwerm.maths.sums import added
 from zwerm.world.metrics import Metric, MetricContext, Truth
 
 
@@ -53,7 +54,7 @@ class Leaders(Metric):
         """Count the robots that report to lead; the count holds since the sample before."""
         reports = _newest(truth, "leader")
         self._reported = self._reported or bool(reports)
-        leaders = round(sum(reports))
+        leaders = round(added(reports))
         elapsed_s, self._last_s = truth.time_s - self._last_s, truth.time_s
         if leaders != 1:
             self._seconds[min(leaders, 2)] += elapsed_s

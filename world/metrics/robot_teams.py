@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
+from zwerm.maths.sums import added
 from zwerm.world.metrics import Metric, MetricContext, Truth
 from zwerm.world.tick.telemetry import TelemetryRecord
 
@@ -68,7 +69,7 @@ def coverage(
     starts = np.array([path[0] for path in paths])
     area = sweepable(free, starts, radius_m, footprint_m)
     done = swept(paths, footprint_m, free)
-    length_m = sum(float(np.hypot(*np.diff(path, axis=0).T).sum()) for path in paths)
+    length_m = added(float(np.hypot(*np.diff(path, axis=0).T).sum()) for path in paths)
     return {
         "coverage_fraction": done.intersection(area).area / area.area,
         "repeat_coverage_fraction": length_m * 2.0 * footprint_m / area.area - 1.0,
@@ -143,6 +144,6 @@ class TeamCoverage(Metric):
             "time_over_lower_bound": time_s / bound_s,
             "certificate_satisfied": float(bool(living) and all(n.get("certificate_satisfied") for n in living)),
             "critical_points": max([numbers.get("critical_points", 0.0) for numbers in living], default=0.0),
-            "divisions": sum([numbers.get("divisions", 0.0) for numbers in self._numbers.values()]),
-            "merges": sum([numbers.get("merges", 0.0) for numbers in self._numbers.values()]),
+            "divisions": added([numbers.get("divisions", 0.0) for numbers in self._numbers.values()]),
+            "merges": added([numbers.get("merges", 0.0) for numbers in self._numbers.values()]),
         }

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.fence import SIXTY_RAD, Side, Views
 from zwerm.maths.simplicial import FlagComplex, hole_cycles
+from zwerm.maths.sums import added
 
 
 class Corner(NamedTuple):
@@ -38,7 +39,7 @@ def holes(views: Views, complex_: FlagComplex) -> list[Hole]:
         for oriented in (cycle, cycle[::-1]):
             corners = _corners(views, oriented)
             # With the hole on the left, the turns of the cycle add up to one full turn to the left.
-            if math.pi < sum(math.pi - each.width_rad for each in corners) < 3.0 * math.pi:
+            if math.pi < added(math.pi - each.width_rad for each in corners) < 3.0 * math.pi:
                 found.append(corners)
     return found
 

@@ -30,6 +30,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     united,
 )
 from zwerm.maths.simplicial import FlagComplex
+from zwerm.maths.sums import added
 
 # A triangle closes more than another one only if the difference is larger than this [rad].
 EQUAL_RAD: Final = 1e-6
@@ -195,7 +196,7 @@ class SwarmProof:
             opened = {each: complement(self._closed_without_fans(each)) for each in (pair if points else ())}
             for point in points:
                 arcs = ((a, arc_between(views[a][b], point.seen[a])), (b, arc_between(views[b][a], point.seen[b])))
-                gain = sum(overlap(arc, each) for slot, arc in arcs for each in opened[slot])
+                gain = added(overlap(arc, each) for slot, arc in arcs for each in opened[slot])
                 side = side_of(point, a, views[a][b])
                 if side not in best or gain > best[side][0] + EQUAL_RAD:
                     best[side] = gain, point
