@@ -5,8 +5,6 @@ Directions are in the frame of the base.
 
 from msgspec import Struct
 
-from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
-
 
 class _WalkMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, which begins with its tag."""
@@ -38,10 +36,13 @@ class ArcClosed(_WalkMessage, frozen=True, tag="arc-closed"):
 
 
 class NeighbourProved(_WalkMessage, frozen=True, tag="neighbour-proved"):
-    """To the robot at a slot: the sender has proved an arc there, by points of a walk that the receiver did not see."""
+    """To the robot at a slot: the sender has proved an arc there, by points of a walk that the receiver did not see.
+
+    `arc` is a `ProvedArc`, as in the messages of pushes.
+    """
 
     slot: int
-    arc: ProvedArc
+    arc: tuple[tuple[int, ...], tuple[int, ...], float, float]
 
 
 class WalkOver(_WalkMessage, frozen=True, tag="walk-over"):

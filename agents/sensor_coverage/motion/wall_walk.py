@@ -3,7 +3,7 @@
 The robot keeps a hand on the wall: of all directions that its contacts allow, it takes the one that turns most towards
 the hand. So it enters every opening that is wider than its body, and turns back at the end of every niche. Robots in
 its way are passed in the same manner, but the robot does not press against them. It pushes bodies of dead robots, and
-passes those as walls that do not yield (`bodies`).
+passes those as walls that do not yield (`dead_bodies`).
 """
 
 import math
@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.wall_proof import SAME_WALL_RAD
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
-from zwerm.agents.sensor_coverage.motion.bodies import Bodies, HeldPoints
+from zwerm.agents.sensor_coverage.motion.dead_bodies import DeadBodies, HeldPoints
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
@@ -88,7 +88,7 @@ class WallWalk:
     def __init__(self, motion: Locomotion, dead: Collection[int] = ()) -> None:
         self.on_step: Callable[[Waypoint], None] = lambda _: None
         self._motion = motion
-        self._bodies = Bodies(motion, dead)
+        self._bodies = DeadBodies(motion, dead)
         self._latest = motion.position, 0.0  # where the latest step began, and its heading [rad]
         self._wall_rad = 0.0
         self._trail: list[Vector] = []

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Collection, Sequence
-from typing import cast
 
 import pytest
 
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
-from zwerm.agents.sensor_coverage.motion.bodies import HELD_MAX, PUSH_TICKS, REST_TICKS, Bodies, HeldPoints
-from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Locomotion
+from zwerm.agents.sensor_coverage.motion.dead_bodies import HELD_MAX, PUSH_TICKS, REST_TICKS, DeadBodies, HeldPoints
+from zwerm.agents.sensor_coverage.motion.locomotion import STOP
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
 from zwerm.wire.messages import BodyVelocity
 
@@ -41,11 +40,11 @@ class AtBody:
         self.position = x + self.fraction * velocity.forward_m_s - back_m, y + self.fraction * velocity.left_m_s
 
 
-def bodies_of(robot: AtBody) -> Bodies:
-    return Bodies(cast(Locomotion, robot), (BODY,))
+def bodies_of(robot: AtBody) -> DeadBodies:
+    return DeadBodies(robot, (BODY,))
 
 
-def push(robot: AtBody, bodies: Bodies, moved_m: float = 0.0) -> list[BodyVelocity]:
+def push(robot: AtBody, bodies: DeadBodies, moved_m: float = 0.0) -> list[BodyVelocity]:
     """Carry out the push that begins after a step of this length [m] to the east, and return its velocities."""
     velocities = []
     while (velocity := bodies.step(moved_m, math.radians(EAST))) is not None:

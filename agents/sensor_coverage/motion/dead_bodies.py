@@ -11,14 +11,13 @@ are in touch again. The bodies count only if their direction turned by `ROUND_RA
 """
 
 import math
-from collections.abc import Callable, Collection
-from typing import Final
+from collections.abc import Callable, Collection, Generator, Sequence
+from typing import Final, Protocol
 
 import msgspec
 
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
-from zwerm.agents.sensor_coverage.motion.homing import unit
-from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive, Locomotion
+from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
 from zwerm.wire.messages import BodyVelocity
 
@@ -48,13 +47,38 @@ class _Pushed(msgspec.Struct):
     apart_ticks: int = 0
 
 
-class Bodies:
+class Touching(Protocol):
+    """What the contacts of the walking robot are read from."""
+
+    @property
+    def contacts(self) -> Sequence[Touched]:
+        """What the robot touches."""
+
+
+class Pusher(Protocol):
+    """The walking robot: the length [m] of a full step, its position [m] by odometry, and its contacts."""
+
+    step_m: float
+
+    @property
+    def frame(self) -> Touching:
+        """Its latest reading."""
+
+    @property
+    def position(self) -> Vector:
+        """Its position [m] by odometry."""
+
+    def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        """Return the velocity that moves it by (x, y) [m] within one tick."""
+
+
+class DeadBodies:
     """The bodies that one walking robot touches. `dead` are the robots that it knows to be dead, which may change."""
 
-    def __init__(self, motion: Locomotion, dead: Collection[int]) -> None:
+    def __init__(self, motion: Pusher, dead: Collection[int]) -> None:
         self._motion = motion
         self._dead = dead
-        self._push: Drive | None = None
+        self._push: Generator[BodyVelocity, None, None] | None = None
         self._firm: dict[int, _Pushed] = {}  # bodies that did not yield
         self._again: dict[int, None] = {}  # bodies that did not yield in another direction
         self._living: dict[int, None] = {}  # robots that pushed back
@@ -137,7 +161,7 @@ class Bodies:
         stopped = moved_m < STOPPED_FRACTION * self._motion.step_m
         return nearest if stopped and nearest is not None and off[nearest] < math.pi / 2.0 else None
 
-    def _straight(self, node: int) -> Drive:
+    def _straight(self, node: int) -> Generator[BodyVelocity, None, None]:
         """Push straight at a body, and find out whether it yields."""
         motion = self._motion
         self._again.pop(node, None)
@@ -155,7 +179,7 @@ class Bodies:
             return
         before = motion.position
         for _ in range(REST_TICKS):
-            yield STOP
+            yield BodyVelocity()
         if math.dist(before, motion.position) > YIELD_FRACTION * motion.step_m:
             self._living[node] = None
         elif node in self._touched():
@@ -165,7 +189,7 @@ class Bodies:
 class HeldPoints:
     """Reports the points of a walk to `report`, and holds those at bodies back until walls alone are in touch again."""
 
-    def __init__(self, bodies: Bodies, report: Callable[[Waypoint], None]) -> None:
+    def __init__(self, bodies: DeadBodies, report: Callable[[Waypoint], None]) -> None:
         self._bodies = bodies
         self._report = report
         self._held: list[tuple[Waypoint, tuple[float, ...]]] = []
