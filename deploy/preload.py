@@ -6,6 +6,7 @@ here, once. They are also exempt from garbage collection, which would write to t
 for the world.
 """
 
+import difflib  # noqa: F401 (for hints in errors: a robot with a user of its own may not read Python's library)
 import gc
 
 import msgspec  # noqa: F401

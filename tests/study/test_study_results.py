@@ -90,7 +90,7 @@ def test_a_metric_that_no_scenario_measures_is_refused_before_the_first_trial(
     [line] = caught.value.mistakes
     assert "metrics: expected names of metrics that its scenarios measure (" in line
     assert "cell_coverage_fraction, " in line
-    assert line.endswith("got 'cel_coverage'")
+    assert line.endswith("got 'cel_coverage'; did you mean cell_coverage_fraction?")
     assert not list(tmp_path.glob("out.parquet*"))
 
 

@@ -98,9 +98,17 @@ def _similar_module(module_name: str, object_name: str) -> str:
     """
     stem = Path(module_name).name.removesuffix(".py")
     folders = dict.fromkeys(Path(each) for each in sys.path[:2])  # those of the scenario and of the command
-    files = sorted(file.stem for folder in folders for file in folder.glob("*.py"))
+    files = sorted(name for folder in folders for name in _modules_in(folder))
     found = [stem] if stem in files else nearest(stem, files)
     return f"; did you mean {found[0]}:{object_name}?" if found else ""
+
+
+def _modules_in(folder: Path) -> list[str]:
+    """Return the names of the Python files in a folder; none where this user may not read it."""
+    try:
+        return [file.stem for file in folder.glob("*.py")]
+    except OSError:
+        return []
 
 
 def _syntax_error(error: SyntaxError) -> str:

@@ -314,7 +314,7 @@ def test_without_locks_late_advice_opens_holes() -> None:
 
 # Robots stand so near to each other that now and then one is redundant. No robot walks along walls, which takes long.
 HALL = (
-    *("arena.size_m=[2.2,1.8]", "base.pose=[0.2,0.9,0.0]", "robots.count=24"),
+    *("arena.size_m=[2.6,2.0]", "base.pose=[0.2,1.0,0.0]", "robots.count=30"),
     *("robots.parameters.margin_m=0.45", "base.parameters.margin_m=0.45"),
     *('robots.parameters.walls="paper"', 'base.parameters.walls="paper"'),
     *("services.path=gradient", "services.redundancy=coordinator"),
@@ -349,7 +349,7 @@ def test_a_redundant_robot_leaves_by_advice_without_a_hole_at_a_loss_of_30_perce
 
 def test_a_deployment_goes_on_without_its_advisor_and_no_robot_leaves_any_more() -> None:
     result = run("sensor-coverage", seed=2, runner="inline", overrides=[*HALL, crash()])
-    assert result.crashed == [24]
+    assert result.crashed == [30]
     assert result.outcome == "completed"
     assert result.metrics["coverage_fraction"] >= 0.98
     assert result.metrics["removals"] == 0.0
@@ -357,7 +357,7 @@ def test_a_deployment_goes_on_without_its_advisor_and_no_robot_leaves_any_more()
 
 def test_a_restarted_advisor_without_memory_advises_again() -> None:
     result = run("sensor-coverage", seed=2, runner="inline", overrides=[*HALL, crash(for_s=3.0)])
-    assert result.restarted == [24]
+    assert result.restarted == [30]
     assert result.outcome == "completed"
     assert result.metrics["removals"] >= 1.0
     assert result.metrics["unsafe_removals"] == 0.0
