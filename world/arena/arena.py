@@ -64,8 +64,8 @@ class Arena:
         xmin, ymin, xmax, ymax = map(float, free.bounds)
         self.bounds = (xmin, ymin, xmax, ymax)
         self.is_convex = not self.walls and len(rings) == 1 and _is_convex(rings[0])
-        self._px, self._py, self._qx, self._qy = (np.ascontiguousarray(column) for column in self.segments.T)
         self._pieces = Segments.of(self.segments)
+        self._qx, self._qy = (np.ascontiguousarray(column) for column in self.segments.T[2:])
         self._index = WallIndex(self.segments)
         self._tree = shapely.STRtree(shapely.linestrings(self.segments.reshape(-1, 2, 2)))
 
@@ -88,7 +88,7 @@ class Arena:
             return np.zeros(count, dtype=np.bool_)
         if count * len(self.segments) <= _DENSE_LINES:
             a, b = start.T[:, :, None], end.T[:, :, None]
-            hit = _crosses(a[0], a[1], b[0], b[1], self._px, self._py, self._qx, self._qy)
+            hit = _crosses(a[0], a[1], b[0], b[1], self._pieces.px, self._pieces.py, self._qx, self._qy)
             dense: Bools = np.logical_or.reduce(hit, axis=1)
             return dense
         if len(self.segments) <= _FEW_SEGMENTS:
@@ -98,7 +98,9 @@ class Arena:
         blocked = np.zeros(count, dtype=np.bool_)
         line, wall = self._index.candidates(start, end)
         a, b = start[line].T, end[line].T
-        crossing = _crosses(a[0], a[1], b[0], b[1], self._px[wall], self._py[wall], self._qx[wall], self._qy[wall])
+        crossing = _crosses(
+            a[0], a[1], b[0], b[1], self._pieces.px[wall], self._pieces.py[wall], self._qx[wall], self._qy[wall]
+        )
         blocked[line[crossing]] = True
         return blocked
 
