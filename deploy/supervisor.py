@@ -283,8 +283,8 @@ class LocalSupervisor:
         with _starting:
             process.start()
             _robots.update([] if process.pid is None else [process.pid])
-            # multiprocessing asks each process that it has started whether it has ended, whenever it starts another one: a
-            # quarter of the time in which 1,000 robots start. This class ends its robots itself.
+            # multiprocessing asks each process that it has started whether it has ended, whenever it starts another one: 2 s of
+            # processor time while 1,000 robots start. This class ends its robots itself.
             _STARTED.discard(process)
         self._processes[credential.node] = process
         return process
