@@ -89,9 +89,13 @@ class SlotProof:
         ]
         return complement([*self._by_view, *self._at_walls, *walks])
 
+    def _open_rad(self) -> float:
+        """Return the sum of all open arcs [rad]."""
+        return added(each.width_rad for each in self.open_arcs())
+
     def pass_step(self, slot: int, earlier: WallStep | None, step: WallStep) -> bool:
         """Take in a step of a walk whose end this slot sees, and the step before; return whether the open arcs are smaller."""
-        old = added(each.width_rad for each in self.open_arcs())
+        old = self._open_rad()
         if step.before is None or step.before is not self._stretch_end or step.witnesses:
             self._stretch = []
         self._stretch += arcs_of_step(slot, step.before, step.point, step.hand)
@@ -102,7 +106,7 @@ class SlotProof:
         self._add_fan(slot, step.point, [step])
         if earlier is not None and earlier.point is step.before:
             self._add_fan(slot, earlier.point, [earlier, step])
-        return added(each.width_rad for each in self.open_arcs()) < old - NEWS_RAD
+        return self._open_rad() < old - NEWS_RAD
 
     def _add_fan(self, slot: int, point: WalkPoint, steps: Sequence[WallStep]) -> None:
         """Add the triangles of this slot, a neighbour and a point, if the space beyond them is proved by these steps."""
@@ -135,10 +139,10 @@ class SlotProof:
 
     def accept(self, proved: ProvedArc) -> bool:
         """Take in an arc that a neighbour has proved; return whether the open arcs are smaller."""
-        old = added(each.width_rad for each in self.open_arcs())
+        old = self._open_rad()
         needed, seen, start, width = proved
         self._add(needed, seen, Arc(start, width))
-        return added(each.width_rad for each in self.open_arcs()) < old - NEWS_RAD
+        return self._open_rad() < old - NEWS_RAD
 
     def _add(self, needed: Iterable[int], seen: Iterable[int], arc: Arc) -> None:
         """Add an arc that counts while the slots `needed` stand, until one of the slots `seen` is lost, which saw the walk."""

@@ -16,6 +16,7 @@ from typing import Final, Protocol
 
 import msgspec
 
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
@@ -146,7 +147,7 @@ class DeadBodies:
             pushed.apart_ticks = 0 if node in touched else pushed.apart_ticks + 1
             if pushed.apart_ticks > APART_TICKS or not self.is_body(node):
                 del self._firm[node]
-            elif node in touched and _apart(touched[node], pushed.direction_rad) > AGAIN_RAD:
+            elif node in touched and angle_between(touched[node], pushed.direction_rad) > AGAIN_RAD:
                 del self._firm[node]
                 self._again[node] = None
 
@@ -156,7 +157,7 @@ class DeadBodies:
         again = [node for node in touched if node in self._again]
         if again:
             return again[0]
-        off = {node: _apart(bearing, heading_rad) for node, bearing in touched.items()}
+        off = {node: angle_between(bearing, heading_rad) for node, bearing in touched.items()}
         nearest = min(off, key=lambda node: off[node], default=None)
         stopped = moved_m < STOPPED_FRACTION * self._motion.step_m
         return nearest if stopped and nearest is not None and off[nearest] < math.pi / 2.0 else None
@@ -211,7 +212,7 @@ class HeldPoints:
                 self.end()
             return
         ends = self._firm[:1] and (self._firm[0], self._firm[-1])
-        self._release(bool(ends) and min(_apart(a, b) for a in ends[0] for b in ends[1]) >= ROUND_RAD)
+        self._release(bool(ends) and min(angle_between(a, b) for a in ends[0] for b in ends[1]) >= ROUND_RAD)
         self._report(point)
 
     def end(self) -> None:
@@ -225,7 +226,3 @@ class HeldPoints:
                 robots = tuple(each for each in point.robots if not self._bodies.is_body(each))
                 point = msgspec.structs.replace(point, touched=point.touched or firm, robots=robots)
             self._report(point)
-
-
-def _apart(a_rad: float, b_rad: float) -> float:
-    return abs(math.remainder(a_rad - b_rad, math.tau))

@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Sequence
 from itertools import count
 from typing import Final, NamedTuple
 
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.messages.commands import Landmark, Sighting
 from zwerm.agents.sensor_coverage.motion.homing import Vector, slide, unit
 from zwerm.agents.sensor_coverage.motion.landmark_target import TargetPoint, target_point
@@ -83,7 +84,7 @@ def deploy(
         now = (frame.x_m - start[0]) * ux + (frame.y_m - start[1]) * uy
         stuck = stuck + 1 if now < done + STUCK_FRACTION * motion.step_m else 0
         done = max(done, now)
-        ahead = [each for each in frame.touched if _apart(each, bearing_rad) < AHEAD_RAD]
+        ahead = [each for each in frame.touched if angle_between(each, bearing_rad) < AHEAD_RAD]
         if ahead or stuck > STUCK_TICKS:
             touched = tuple(ahead)
             robots = tuple(each for each in frame.contacts if each.node is not None)
@@ -249,7 +250,7 @@ def correct(motion: Locomotion, anchors: Sequence[Sighting]) -> DriveToResult:
         away = math.atan2(-ay, -ax)
         driven_m = 0.0
         while anchor.node in frame.seen and driven_m < BREAK_M_MAX:
-            if any(_apart(each, away) < AHEAD_RAD for each in frame.touched):
+            if any(angle_between(each, away) < AHEAD_RAD for each in frame.touched):
                 break
             driven_m += p.creep_m
             yield motion.velocity(-ax * p.creep_m, -ay * p.creep_m)
@@ -268,7 +269,3 @@ def correct(motion: Locomotion, anchors: Sequence[Sighting]) -> DriveToResult:
 
 def _offset(motion: Locomotion, goal: Vector) -> Vector:
     return goal[0] - motion.frame.x_m, goal[1] - motion.frame.y_m
-
-
-def _apart(a_rad: float, b_rad: float) -> float:
-    return abs(math.remainder(a_rad - b_rad, math.tau))

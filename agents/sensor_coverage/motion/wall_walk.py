@@ -11,6 +11,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Mapping, 
 from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.wall_proof import SAME_WALL_RAD
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.dead_bodies import DeadBodies, HeldPoints
@@ -117,7 +118,9 @@ class WallWalk:
         ux, uy = unit(bearing_rad)
         done, stuck = 0.0, 0
         while True:
-            ahead = [each for each in self._bodies.contacts() if _apart(each.bearing_rad, bearing_rad) < AHEAD_RAD]
+            ahead = [
+                each for each in self._bodies.contacts() if angle_between(each.bearing_rad, bearing_rad) < AHEAD_RAD
+            ]
             now = (frame.x_m - start[0]) * ux + (frame.y_m - start[1]) * uy
             stuck = stuck + 1 if now < done + STUCK_FRACTION * motion.step_m else 0
             done = max(done, now)
@@ -130,7 +133,7 @@ class WallWalk:
             yield motion.velocity(ux * left + uy * aside * 0.5, uy * left - ux * aside * 0.5)
             self._trail.append(motion.position)
         touched = tuple(each.bearing_rad for each in ahead if each.node is None)
-        beside = [each for each in frame.contacts if _apart(each.bearing_rad, bearing_rad) < math.pi / 2.0]
+        beside = [each for each in frame.contacts if angle_between(each.bearing_rad, bearing_rad) < math.pi / 2.0]
         if not ahead and beside and all(each.node is None for each in beside):  # wedged between walls
             touched = (bearing_rad,)
         if done < feel_m and touched:
@@ -251,7 +254,7 @@ class WallWalk:
                 self._blind_rad = 0.0
             elif self._blind_rad > math.tau and walls:
                 # There is no wall at the hand: the robot circles, and touches another wall once in each turn.
-                self._wall_rad = min(walls, key=lambda each: _apart(each, self._wall_rad))
+                self._wall_rad = min(walls, key=lambda each: angle_between(each, self._wall_rad))
             self._was_in_touch = True
         heading, self._wall_rad = hand_on_wall(self._wall_rad, contacts, hand)
         ux, uy = unit(heading)
@@ -332,7 +335,7 @@ def arcs_around(
     at_body = False
     for before, point in pairwise(points):
         at_body = before.at_body or (at_body and not before.walls)
-        same = [(a, b) for a in before.walls for b in point.walls if _apart(a, b) < SAME_WALL_RAD]
+        same = [(a, b) for a in before.walls for b in point.walls if angle_between(a, b) < SAME_WALL_RAD]
         near_m = min(math.dist(start, each.at) for each in (before, point))
         follows = bool(before.walls or point.walls) and not (at_body or point.at_body)
         if (same or follows) and near_m > NEAR_M_MIN:
@@ -340,7 +343,7 @@ def arcs_around(
             if step[1] * hand < 0.0:  # the start and the wall are on different sides of the step
                 found.append(step)
         for a, b in combinations(point.walls, 2):
-            if _apart(a, b) < CORNER_RAD:
+            if angle_between(a, b) < CORNER_RAD:
                 ends = (_touched_point(point.at, each, radius_m) for each in (a, b))
                 found.append(_between(start, *ends))
         for a, b in same:
@@ -355,7 +358,7 @@ def is_farther(distance_m: float, moved_m: Vector, before_rad: float, now_rad: f
     """
     ux, uy = unit(now_rad)
     across_m = abs(moved_m[0] * uy - moved_m[1] * ux)
-    return across_m > ACROSS_M_MIN and _apart(before_rad, now_rad) * distance_m < across_m
+    return across_m > ACROSS_M_MIN and angle_between(before_rad, now_rad) * distance_m < across_m
 
 
 def _touched_point(at: Vector, bearing_rad: float, radius_m: float) -> Vector:
@@ -372,7 +375,3 @@ def _between(start: Vector, a: Vector, b: Vector) -> tuple[float, float]:
 def _hands(contacts: Iterable[Touched]) -> tuple[object, ...]:
     """Return what decides whether a waypoint is new: the touched robots, and whether there is a wall."""
     return (any(each.node is None for each in contacts), *(each.node for each in contacts if each.node is not None))
-
-
-def _apart(a_rad: float, b_rad: float) -> float:
-    return abs(math.remainder(a_rad - b_rad, math.tau))
