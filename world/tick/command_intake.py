@@ -64,8 +64,9 @@ class CommandIntake:
         self._tick = -1
         self._nodes: Sequence[int] = ()
         self._observations: Sequence[bytes] = ()
-        self._pending: dict[int, None] = {}
-        self._accepted: dict[int, tuple[bytes, Command | Failure]] = {}
+        # By observed node, ascending: its answer, None while it is pending, and the bytes of it.
+        self._answers: dict[int, Command | Failure | None] = {}
+        self._payloads: dict[int, bytes] = {}
         self._traced: dict[int, bytes] = {}  # the traced bytes of the accepted commands with telemetry
         self._late: list[NodeAnswer] = []
         self._newest: dict[int, int] = {}  # the tick that a node answered last, where answers may be late
@@ -73,8 +74,8 @@ class CommandIntake:
     def begin_tick(self, tick: int, nodes: Sequence[int], observations: Sequence[bytes]) -> None:
         """Expect an answer from each of `nodes`, ascending, which are sent `observations` at `tick`."""
         self._tick, self._nodes, self._observations = tick, nodes, observations
-        self._pending = dict.fromkeys(nodes)
-        self._accepted = {}
+        self._answers = dict.fromkeys(nodes)
+        self._payloads = dict.fromkeys(nodes, NO_ANSWER)
         self._traced = {}
         self.observed_count += len(nodes)
 
@@ -85,7 +86,7 @@ class CommandIntake:
         """
         try:
             answer = open_answer(payload)
-            late = answer.tick != self._tick or node not in self._pending
+            late = answer.tick != self._tick or self._answers.get(node, answer) is not None
             if late:
                 self._check_late(node, answer.tick, late_allowed)
             if type(answer) is Command and (
@@ -99,8 +100,8 @@ class CommandIntake:
             self._late.append((node, answer))
             self.late_count += 1
         else:
-            self._accepted[node] = payload, answer
-            del self._pending[node]
+            self._answers[node] = answer
+            self._payloads[node] = payload
             if type(answer) is Command and (answer.telemetry or answer.snapshot):
                 self._traced[node] = traced_bytes(answer, payload)
         if late_allowed:
@@ -109,7 +110,7 @@ class CommandIntake:
 
     def is_pending(self, node: int) -> bool:
         """Return whether a node's answer to the observation of this tick has not been accepted."""
-        return node in self._pending
+        return node in self._answers and self._answers[node] is None
 
     def newest_tick(self, node: int) -> int:
         """Return the tick of the newest answer accepted from a node, where answers may be late; -1 for none."""
@@ -117,17 +118,16 @@ class CommandIntake:
 
     def pending(self) -> list[int]:
         """Return the observed nodes whose answer has not been accepted, ascending."""
-        return list(self._pending)
+        return [node for node, answer in self._answers.items() if answer is None]
 
     def end_tick(self) -> list[NodeAnswer]:
         """End the tick: set `exchange`, and return all accepted answers, late ones first and then by node id."""
-        accepted, nodes = self._accepted, self._nodes
-        commands = [accepted[node][0] if node in accepted else NO_ANSWER for node in nodes]
-        answers = self._late + [(node, accepted[node][1]) for node in nodes if node in accepted]
+        commands = list(self._payloads.values())
+        answers = self._late + [(node, answer) for node, answer in self._answers.items() if answer is not None]
         traced = commands
         if self._traced:
-            traced = [self._traced.get(node, command) for node, command in zip(nodes, commands, strict=True)]
-        self.exchange = Exchange(self._tick, nodes, self._observations, commands, traced)
+            traced = list((self._payloads | self._traced).values())
+        self.exchange = Exchange(self._tick, self._nodes, self._observations, commands, traced)
         self._late = []
         self.begin_tick(self._tick + 1, (), ())
         return answers
@@ -138,7 +138,7 @@ class CommandIntake:
             return
         if tick != self._tick:
             raise ProtocolError("out-of-order", f"node {node} answers tick {tick} at tick {self._tick}")
-        if node not in self._accepted:
+        if self._answers.get(node) is None:
             raise ProtocolError("unasked", f"node {node} was sent no observation at tick {tick}")
         raise ProtocolError("duplicate", f"node {node} answers tick {tick} again")
 

@@ -50,6 +50,8 @@ class NodeStatus:
     @property
     def dead(self) -> list[int]:
         """The nodes that are down and never return, ascending."""
+        if not (self.crashed or self.gone):
+            return []
         return sorted({*self.crashed, *self.gone})
 
     def ever(self, event: Event) -> list[int]:
