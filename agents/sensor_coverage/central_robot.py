@@ -18,6 +18,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Deploy,
     Emerged,
     FollowWall,
+    FollowWallPastDead,
     Move,
     NegotiateLeave,
     Release,
@@ -27,6 +28,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     ScanRequest,
     Sighting,
     ToWall,
+    ToWallPastDead,
     Walked,
     read_request,
     write,
@@ -56,7 +58,8 @@ class CentralRobot(Controller):
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
         self.motion = Locomotion(self.parameters, setup)
-        self.wall_walk = WallWalk(self.motion)
+        self._dead: dict[int, None] = {}  # as far as the coordinator has said
+        self.wall_walk = WallWalk(self.motion, self._dead)
         self.commands = RequestDeduplicator(int(self.random.integers(1, INCARNATIONS)), self._on_command)
         self.components = ComponentLoop(self._make_components(), self._make_codecs(), setup.incarnation)
         self._activity: Drive | None = self._emerge()
@@ -99,6 +102,9 @@ class CentralRobot(Controller):
 
     def _begin(self, command: RobotCommand) -> Drive | None:
         """Return the activity that carries out a command."""
+        self._dead.clear()
+        if isinstance(command, ToWallPastDead | FollowWallPastDead):
+            self._dead.update(dict.fromkeys(command.dead))
         match command:
             case RollCall(cycle):
                 self.motion.rest = None  # a robot that was driving stands where it is

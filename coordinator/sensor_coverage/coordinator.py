@@ -93,7 +93,10 @@ class SensorCoverageCoordinator:
         )
         self.pushing = PushExecution(parameters, self.slots, self.mailbox, self.sources, planner)
         self.walls = planner.walls
-        self.walking = WallWalks(self.slots, self.mailbox, self.sources, self.pushing, planner, planner.walls)
+        self._silent: dict[int, None] = {}
+        self.walking = WallWalks(
+            self.slots, self.mailbox, self.sources, self.pushing, planner, planner.walls, self._silent
+        )
         self.scan = ScanResult({}, FlagComplex({}), ())
         self.redundant: tuple[int, ...] = ()
         self.outcome = ""
@@ -103,7 +106,6 @@ class SensorCoverageCoordinator:
         self._leave_requests = LeaveRequests(parameters.corner_margin_rad, self.slots, self.mailbox)
         self._redundancy = setup.services.get("redundancy", "coordinator")
         self._redundancy_at = 0  # number of pushes when redundant robots were last searched
-        self._silent: dict[int, None] = {}
         self._telemetry: dict[str, float | bool] = {}
         self._snapshot = b""
         self._routine = self._run()

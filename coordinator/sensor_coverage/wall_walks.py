@@ -6,7 +6,7 @@ continues from that slot.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
@@ -22,9 +22,10 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     STRETCH,
     Arrived,
     FollowWall,
+    FollowWallPastDead,
     Move,
-    RobotCommand,
     ToWall,
+    ToWallPastDead,
     Walked,
     Waypoint,
 )
@@ -48,10 +49,15 @@ AXIS_BEARINGS_RAD: Final = tuple(math.radians(each) for each in (180, -90, 90, 0
 LINE_POINTS_MIN: Final = 4
 LINE_OFF_M: Final = 0.02
 LINE_ALONG_M: Final = 0.1
+# Dead robots that a command names at most: the ones that fell silent last. An id has 5 bytes at most.
+DEAD_MAX: Final = 500
 
 
 class WallWalks:
-    """Walks along walls. `idle` are the slots at which a robot stands after a walk, and is not needed."""
+    """Walks along walls. `idle` are the slots at which a robot stands after a walk, and is not needed.
+
+    `silent` are the robots that do not answer, which may change: a walking robot pushes their bodies.
+    """
 
     def __init__(
         self,
@@ -61,6 +67,7 @@ class WallWalks:
         pushing: PushExecution,
         frontier: FrontierService,
         walls: WallPlans,
+        silent: Collection[int] = (),
     ) -> None:
         self.idle: dict[int, None] = {}
         self.walks = 0
@@ -70,6 +77,7 @@ class WallWalks:
         self._pushing = pushing
         self._frontier = frontier
         self._walls = walls
+        self._silent = silent
 
     def walk(self, plan: Plan, scan: ScanResult) -> Routine[Moved]:
         """Carry out a plan to follow walls, and return the robots that have moved; `scan` has no idle robots."""
@@ -198,12 +206,23 @@ class WallWalks:
             if node in slot_of:
                 self._slots.length_m[here, slot_of[node]] = self._slots.length_m[slot_of[node], here] = length
 
-    def _order(self, robot: int, command: RobotCommand) -> Routine[Walked | None]:
-        """Return how a walk ended, or None if the robot does not answer."""
-        self._mailbox.send(robot, command, drive=True)
+    def _order(self, robot: int, command: ToWall | FollowWall) -> Routine[Walked | None]:
+        """Return how a walk ended, or None if the robot does not answer. The command names the dead robots."""
+        self._mailbox.send(robot, past_dead(command, self._silent), drive=True)
         answers = yield from self._mailbox.answers([robot], Walked)
         answer = answers.get(robot)
         return answer if isinstance(answer, Walked) else None
+
+
+def past_dead(command: ToWall | FollowWall, silent: Collection[int]) -> ToWall | FollowWall:
+    """Return the command that names the robots that are silent; the same command if there are none."""
+    dead = tuple(silent)[-DEAD_MAX:]
+    if not dead:
+        return command
+    fields = {name: getattr(command, name) for name in command.__struct_fields__}
+    return (
+        ToWallPastDead(**fields, dead=dead) if isinstance(command, ToWall) else FollowWallPastDead(**fields, dead=dead)
+    )
 
 
 def _line(waypoints: Sequence[Waypoint]) -> float | None:

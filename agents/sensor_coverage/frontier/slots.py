@@ -161,6 +161,7 @@ class Slots:
                 },
                 tuple(bearing + heading for bearing in each.touched),
                 tuple(standing[node] for node in each.robots if node in standing),
+                any(node not in standing for node in each.robots),
             )
             for each in waypoints
         )

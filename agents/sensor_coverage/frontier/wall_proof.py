@@ -51,12 +51,13 @@ class Arc(NamedTuple):
 class WalkPoint(NamedTuple):
     """A point of a walk: the direction [rad] to it from each slot that it sees, the directions of walls that it touches.
 
-    `robots` are the slots that the walking robot touches.
+    `robots` are the slots that the walking robot touches. `at_body` is true if it touches a robot that stands at no slot.
     """
 
     seen: Mapping[int, float]
     walls: tuple[float, ...]
     robots: tuple[int, ...]
+    at_body: bool = False
 
     @property
     def is_blind(self) -> bool:
@@ -71,7 +72,10 @@ class WalkPoint(NamedTuple):
     def turned(self, by: float) -> "WalkPoint":
         """Return the same point with all directions turned by an angle [rad]."""
         return WalkPoint(
-            {slot: each + by for slot, each in self.seen.items()}, tuple(each + by for each in self.walls), self.robots
+            {slot: each + by for slot, each in self.seen.items()},
+            tuple(each + by for each in self.walls),
+            self.robots,
+            self.at_body,
         )
 
 

@@ -145,6 +145,18 @@ class FollowWall(_UplinkMessage, frozen=True, tag="follow-wall"):
     meet: tuple[int, ...]
 
 
+class ToWallPastDead(ToWall, frozen=True, tag="to-wall-past-dead"):
+    """The same drive to a wall. The robots in `dead` do not answer, and may be pushed."""
+
+    dead: tuple[int, ...]
+
+
+class FollowWallPastDead(FollowWall, frozen=True, tag="follow-wall-past-dead"):
+    """The same drive along a wall. The robots in `dead` do not answer, and may be pushed."""
+
+    dead: tuple[int, ...]
+
+
 # --- from a robot ---------------------------------------------------------------------------------------------------
 
 
@@ -221,7 +233,19 @@ class Ack(_UplinkMessage, frozen=True, tag="ack"):
     """The command has arrived and is being carried out."""
 
 
-RobotCommand = RollCall | ScanRequest | NegotiateLeave | Release | Deploy | Move | Correct | ToWall | FollowWall
+RobotCommand = (
+    RollCall
+    | ScanRequest
+    | NegotiateLeave
+    | Release
+    | Deploy
+    | Move
+    | Correct
+    | ToWall
+    | FollowWall
+    | ToWallPastDead
+    | FollowWallPastDead
+)
 Answer = Report | LeftComplex | Released | Emerged | Cleared | Arrived | Walked | Ack
 
 # --- how they cross the radio ---------------------------------------------------------------------------------------

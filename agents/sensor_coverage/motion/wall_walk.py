@@ -182,10 +182,16 @@ class WallWalk:
         last place with a margin of `margin_m`). MET (a robot of `meet` and another one are in sight). SHUT (no wall any
         more, or the robot is wedged).
         """
-        held = HeldPoints(self._bodies, lambda point: self.on_step(point))
-        ended = yield from self._along(hand, length_m, keep, meet, margin_m, held)
+        reported = list[Waypoint]()
+
+        def report(point: Waypoint) -> None:
+            reported.append(point)
+            self.on_step(point)
+
+        held = HeldPoints(self._bodies, report)
+        end, way, kept = yield from self._along(hand, length_m, keep, meet, margin_m, held)
         held.end()
-        return ended
+        return WalkResult(end, way, (), tuple(reported[each] for each in kept))
 
     def _along(
         self,
@@ -195,25 +201,26 @@ class WallWalk:
         meet: Collection[int],
         margin_m: float,
         held: HeldPoints,
-    ) -> DriveToWalk:
+    ) -> Generator[BodyVelocity, None, tuple[str, float, Sequence[int]]]:
+        """Return the end, the way [m], and the numbers of the points that are waypoints."""
         motion, frame = self._motion, self._motion.frame
         frame.forget()
         self._bodies.begin()
         yield from self._back_into_sight(keep)
         if not self._sees(keep):
-            return WalkResult(LOST)
+            return LOST, 0.0, ()
         self._trail = [motion.position]
         self._blind_rad, self._out_of_reach = 0.0, frozenset()
-        points = [self._waypoint()]
-        held.take(points[0])
+        held.take(self._waypoint())
+        number, kept = 0, [0]
         seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
         last, way, stuck = motion.position, 0.0, 0
         while way < length_m:
             if self._meets(meet):
-                return WalkResult(MET, way, (), tuple(points))
+                return MET, way, kept
             if self._blind_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
-                return WalkResult(SHUT, way, (), tuple(points))
-            before, before_point, seen_before = motion.position, self._waypoint(), frame.seen
+                return SHUT, way, kept
+            before, seen_before = motion.position, frame.seen
             yield self._step(hand)
             self._check_contacts(before, seen_before)
             step_m = math.dist(before, motion.position)
@@ -221,19 +228,20 @@ class WallWalk:
             stuck = stuck + 1 if step_m < STUCK_FRACTION * motion.step_m else 0
             if not self._sees(keep):
                 yield from self._back(margin_m, keep)
-                return WalkResult(LOST, way, (), tuple(points))
+                return LOST, way, kept
             self._trail.append(motion.position)
             held.take(self._waypoint())
+            number += 1
             now, touch = tuple(sorted(frame.seen)), _hands(frame.contacts)
             if now != seen or touch != hands:
                 if before != last:
-                    points.append(before_point)
-                points.append(self._waypoint())
+                    kept.append(number - 1)
+                kept.append(number)
                 seen, hands, last = now, touch, motion.position
             elif math.dist(last, motion.position) >= SPACING_M:
-                points.append(self._waypoint())
+                kept.append(number)
                 last = motion.position
-        return WalkResult(STRETCH, way, (), tuple(points))
+        return STRETCH, way, kept
 
     # --- one step ---------------------------------------------------------------------------------------------------
 

@@ -226,6 +226,14 @@ def test_a_walk_past_a_robot_is_no_wall() -> None:
     assert arcs[0] == [(0.0, math.tau)]
 
 
+@pytest.mark.parametrize(("at_body", "open_deg"), [(False, 280), (True, 320)])
+def test_a_walk_past_a_body_without_a_slot_closes_no_arc_there(at_body: bool, open_deg: int) -> None:
+    """The robot loses the wall at the body, and touches a wall again: the body may fill an opening."""
+    touched: list[tuple[float, ...]] = [(0.0,), (0.0,), (), (0.0,), (0.0,)]
+    points = [WalkPoint({0: math.radians(20 * n)}, each, (), at_body and not each) for n, each in enumerate(touched)]
+    assert _degrees(open_arcs(ALONE, (Walk(0, -1, tuple(points)),))) == {0: open_deg}
+
+
 def test_a_walk_that_touches_robot_and_wall_closes_the_pocket_between_them() -> None:
     walk = Walk(0, 1, (WalkPoint({0: 0.0}, (math.pi / 2.0,), (0,)),))
     assert opened(walk) == [(55, 305)]
@@ -242,6 +250,15 @@ def test_walks_turn_with_the_frame_in_which_they_were_seen() -> None:
     slots.take_walk(8, 1, (Waypoint(0.0, 0.0, (Sighting(7, 0.25),), (1.0,), (7,)),))
     assert slots.walks[1] == Walk(7, 1, (WalkPoint({0: 0.75 + math.pi}, (1.5,), (0,)),))
     assert slots.walks[1].turned(3, 1.0) == Walk(3, 1, (WalkPoint({0: 1.75 + math.pi}, (2.5,), (0,)),))
+
+
+def test_a_walking_robot_remembers_that_it_touched_a_robot_without_a_slot() -> None:
+    slots = Slots()
+    for robot in (7, 8):
+        slots.add(robot)
+    slots.take_walk(8, 1, (Waypoint(0.0, 0.0, (), (), (5,)),))
+    assert slots.walks[0] == Walk(8, 1, (WalkPoint({}, (), (), True),))
+    assert slots.walks[0].turned(3, 1.0).points[0].at_body
 
 
 # --- without a coordinator: the proof at one slot -----------------------------------------------------------------------

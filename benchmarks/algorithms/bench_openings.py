@@ -1,0 +1,117 @@
+"""Sensor coverage in small drawn buildings with openings as narrow as a body: whether `completed` is true.
+
+The seed draws the building (`benchmarks/common/small_buildings.py`), the pose of the base, and the noise of odometry. Each
+building is run with and without a coordinator, and with and without a robot that dies in an opening. A run is *right* if it
+is `completed` with a reachable coverage of at least 0.98, and *false* if it is `completed` with less. Every other run
+ended as `failed`, with its reason, or at the time limit.
+
+    python -m benchmarks.algorithms.bench_openings --rows rows.csv --seeds 1 20
+    python -m benchmarks.algorithms.bench_openings --rows rows.csv --variant decentralised --noise 0.0436332 --death yes
+
+With `--rows FILE` each run is stored when it ends, and runs that are stored are not repeated.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import msgspec
+
+from benchmarks.common.campaign import add_campaign_options, carry_out, grouped
+from benchmarks.common.csv_rows import write_csv
+from benchmarks.common.small_buildings import small_building
+from zwerm import run
+
+ENOUGH: Final = 0.98
+# 1.3 times the diameter of a body.
+SURE_M: Final = 0.182
+DURATION_S: Final = 3000.0
+VARIANTS: Final = {"central": (), "decentralised": ("services.path=gradient",)}
+
+
+class Case(msgspec.Struct, frozen=True):
+    """One run: its seed, the noise of bearings [rad], whether a robot dies in an opening, and its variant."""
+
+    seed: str
+    noise_rad: str
+    death: str
+    variant: str
+
+
+def cases(asked: argparse.Namespace) -> Iterator[Case]:
+    """Yield the runs that are asked for, with the seed as the slowest index."""
+    for seed in range(asked.seeds[0], asked.seeds[1] + 1):
+        for noise in asked.noise:
+            for death in asked.death:
+                for variant in asked.variant:
+                    yield Case(str(seed), f"{noise:g}", death, variant)
+
+
+def one_run(case: Case, more: Sequence[str]) -> dict[str, str]:
+    """Carry out one run, and return its row."""
+    building = small_building(int(case.seed))
+    settings = [*building.settings(), "robots.count=30", f"time.duration_s={DURATION_S}"]
+    settings += [f"robots.sensors.0.sd_rad={case.noise_rad}", *VARIANTS[case.variant], *more]
+    if case.death == "yes":
+        settings.append(building.death())
+    began = time.process_time()
+    result = run("sensor-coverage-narrow", seed=int(case.seed), runner="inline", overrides=settings)
+    seen = result.metrics["reachable_coverage_fraction"]
+    completed = "right" if seen >= ENOUGH else "false"
+    return {
+        **msgspec.structs.asdict(case),
+        "joints": building.joints,
+        "narrowest_m": f"{building.narrowest_m:.4f}",
+        "verdict": completed if result.outcome == "completed" else result.outcome,
+        "died": f"{1 - result.metrics['faults_missed']:g}" if case.death == "yes" else "0",
+        "reachable_coverage": f"{seen:.4f}",
+        "robots": f"{result.metrics['robots_deployed']:g}",
+        "duration_s": f"{result.sim_s:.1f}",
+        "reason": result.reason,
+        "cpu_s": f"{time.process_time() - began:.1f}",
+    }
+
+
+def summary(rows: Sequence[dict[str, str]]) -> list[dict[str, str]]:
+    """Return one row for each variant, death, and class of openings."""
+    classed = [
+        {**row, "class": f"{SURE_M:g} m and wider" if float(row["narrowest_m"]) >= SURE_M else f"below {SURE_M:g} m"}
+        for row in rows
+    ]
+    return [
+        {"variant": variant, "a death": death, "openings": size, **numbers_of(group)}
+        for (variant, death, size), group in sorted(grouped(classed, "variant", "death", "class").items())
+    ]
+
+
+def numbers_of(group: Sequence[dict[str, str]]) -> dict[str, str]:
+    """Return what a table says about a group of runs."""
+    right, false = (sum(row["verdict"] == each for row in group) for each in ("right", "false"))
+    return {
+        "runs": str(len(group)),
+        "right": str(right),
+        "completed falsely": str(false),
+        "failed": str(len(group) - right - false),
+        "failed with 0.98 or more in sight": str(
+            sum(
+                row["verdict"] not in ("right", "false") and float(row["reachable_coverage"]) >= ENOUGH for row in group
+            )
+        ),
+    }
+
+
+def main() -> None:
+    """Run every building with every variant, and print a row each."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--variant", choices=VARIANTS, nargs="+", default=list(VARIANTS))
+    parser.add_argument("--noise", type=float, nargs="+", default=[0.0, 0.0436332], metavar="RAD", help="of bearings")
+    parser.add_argument("--death", choices=("no", "yes"), nargs="+", default=["no", "yes"])
+    add_campaign_options(parser, last_seed=2)
+    asked = parser.parse_args()
+    rows = carry_out(asked, cases(asked), lambda case: one_run(case, asked.set))
+    write_csv(asked.csv, summary(rows))
+
+
+if __name__ == "__main__":
+    main()
