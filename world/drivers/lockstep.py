@@ -77,7 +77,7 @@ class LockStep(Driver):
             for arrival in arrivals:
                 node, payload = arrival
                 if payload is None:
-                    self._take(arrival)
+                    self._lose(node, EXIT_CODE_S)
                     missing = len(world.awaited())
                     continue
                 try:

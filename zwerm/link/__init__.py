@@ -33,8 +33,8 @@ class WorldLink(Protocol):
     def receive(self, timeout_s: float) -> Arrival | None:
         """Return the next arrival, or None after `timeout_s` seconds without one."""
 
-    def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
-        """Return all arrivals once there are `count`, or a node is lost, or `timeout_s` seconds have passed."""
+    def receive_many(self, count: int, timeout_s: float) -> Sequence[tuple[int, bytes | None]]:
+        """Return all arrivals, as pairs, once there are `count`, or a node is lost, or `timeout_s` seconds have passed."""
 
     def idle(self, nodes: Sequence[int], timeout_s: float) -> list[int]:
         """Dismiss `nodes`, whose answers are missing, and return those that leave within `timeout_s` without an answer.

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from zwerm.errors import LinkError
-from zwerm.link import Answer, Arrival, arrival
+from zwerm.link import Answer, Arrival
 from zwerm.wire.refusals import Refusals
 
 
@@ -38,14 +38,14 @@ class MemoryLink:
             return self._losses.popleft()
         if self._unanswered:
             node, payload = self._unanswered.popleft()
-            return arrival((node, self._nodes[node](payload)))
+            return Arrival(node, self._nodes[node](payload))
         return None
 
-    def receive_many(self, count: int, timeout_s: float) -> list[Arrival]:
+    def receive_many(self, count: int, timeout_s: float) -> list[tuple[int, bytes | None]]:
         """Return all losses and answers, at once: nothing arrives later in memory."""
         losses, unanswered, nodes = self._losses, self._unanswered, self._nodes
         self._losses, self._unanswered = deque(), deque()
-        answers = [arrival((node, nodes[node](payload))) for node, payload in unanswered]
+        answers: list[tuple[int, bytes | None]] = [(node, nodes[node](payload)) for node, payload in unanswered]
         return [*losses, *answers] if losses else answers
 
     def idle(self, nodes: Sequence[int], timeout_s: float) -> list[int]:

@@ -90,13 +90,19 @@ class History:
     def append(self, moment: SceneLike, dead: Sequence[int] = ()) -> None:
         """Copy `moment` and the dead robots at that time; ids above those of the robots are ignored."""
         robots = len(moment.present)
-        down = np.zeros(robots, dtype=np.bool_)
-        down[[robot for robot in dead if robot < robots]] = True
+        down: NDArray[np.bool_] | bool = False  # of all robots, mostly
+        if dead:
+            down = np.zeros(robots, dtype=np.bool_)
+            down[[robot for robot in dead if robot < robots]] = True
         is_held = self._seen % self._stride == 0
         self._seen += 1
         if not is_held:
             self._newest = HistorySample(
-                moment.time_s, moment.position.copy(), moment.heading.copy(), moment.present.copy(), down
+                moment.time_s,
+                moment.position.copy(),
+                moment.heading.copy(),
+                moment.present.copy(),
+                np.broadcast_to(down, robots),
             )
             return
         self._newest = None
