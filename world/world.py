@@ -271,7 +271,7 @@ class World:
                 self._wakes.sleep(node, wake, tick)
             if answer.telemetry or answer.snapshot:
                 self.telemetry.accept(self.scene, node, answer, self.status.down)
-            if answer.gave_up:
+            if answer.gave_up or completion.any_gave_up:
                 completion.give_up(node, answer.gave_up, self.status.dead)
             if answer.release:
                 self.bodies.release(node)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Generator
+from inspect import GEN_CREATED, getgeneratorstate
 from typing import Annotated, ClassVar, Final
 
 from msgspec import Meta, Struct
@@ -36,6 +37,7 @@ from zwerm.agents.robot_teams.protocols.team_messages import (
     read_beacon,
     write_beacon,
 )
+from zwerm.agents.robot_teams.task_end import TaskEnd
 from zwerm.agents.robot_teams.team_lead import TeamLead, findings
 from zwerm.agents.robot_teams.work import Lost, NoRoute, Work
 from zwerm.agents.runtime.contract import Controller, Setup
@@ -126,7 +128,7 @@ class TeamRobot(Controller):
         self._every = max(1, round(table.beacon_s / setup.dt_s))
         self._urgent = False
         self._reported = -1, False, 0, 0
-        self._done = False
+        self._task = TaskEnd(self.map, self._grid, body.radius_m)
         self._left_off = False
 
     def step(self, observation: Observation) -> Command:
@@ -144,8 +146,9 @@ class TeamRobot(Controller):
             self._view = membership.view
             self.lead.begin(tick)
             self._urgent = True
-        self._done = self.map.complete_from(self.work.here)
-        vx, vy = self._stand(senses) if self._done else self._move(senses)
+        task = self._task
+        task.judge(self.work.here, senses)
+        vx, vy = self._stand(senses) if task.over else self._move(senses)
         if membership.leads and tick % DECIDE_TICKS == 0 and tick * self.setup.dt_s >= GATHER_S:
             membership.roster.statuses[self.setup.node] = self._status(senses, tick)
             membership.roster.news_tick[self.setup.node] = tick
@@ -154,13 +157,20 @@ class TeamRobot(Controller):
         sensing = self._sensing
         drive = BodyVelocity(sensing.cos * vx + sensing.sin * vy, sensing.cos * vy - sensing.sin * vx, 0.0)
         telemetry, snapshot = self._telemetry(), self._snapshot()
-        return Command(drive=drive, outbox=outbox, done=self._done, telemetry=telemetry, snapshot=snapshot)
+        return Command(
+            drive=drive,
+            outbox=outbox,
+            done=task.done,
+            gave_up=task.gave_up,
+            telemetry=telemetry,
+            snapshot=snapshot,
+        )
 
     # --- moving -------------------------------------------------------------------------------------------------------
 
     def _stand(self, senses: Senses) -> tuple[float, float]:
         """Stop work, and move aside for others."""
-        self._left_off = True
+        self._left_off = getgeneratorstate(self._activity) != GEN_CREATED
         return self.pilot.stand(senses)
 
     def _move(self, senses: Senses) -> tuple[float, float]:
@@ -195,6 +205,8 @@ class TeamRobot(Controller):
                     # A wreck may hide the end at which the robot stood.
                     side = TOP if self.work.failures == 0 or self.random.random() < 0.5 else BOTTOM
                     yield from self.work.localise(side, self._swept_by_others)
+                if not self._task.is_placed:
+                    yield from self.work.approach_again()
                 plan = latest_plans(self.lead.plans, self.membership.view).get(self.setup.node)
                 if plan is not None and (plan.epoch, plan.number) != (self._epoch, self._number):
                     self._epoch, self._number = plan.epoch, plan.number
@@ -305,7 +317,7 @@ class TeamRobot(Controller):
             epoch,
             number,
             work.phase,
-            work.at,
+            work.at if self._task.is_placed else None,
             work.found,
             work.spare,
             work.claim,
@@ -339,11 +351,11 @@ class TeamRobot(Controller):
     def _telemetry(self) -> dict[str, float | bool]:
         """Return the certificate and the team's results, whenever one of them may have changed."""
         membership = self.membership
-        news = len(self.map.facts), self._done, membership.divisions, membership.merges
+        news = len(self.map.facts), self._task.done, membership.divisions, membership.merges
         if news == self._reported:
             return {}
         self._reported = news
-        return {"certificate_satisfied": self._done, **findings(self.map, self.membership)}
+        return {"certificate_satisfied": self._task.done, **findings(self.map, self.membership)}
 
     def _snapshot(self) -> bytes:
         """Return what this robot has found since the last tick, encoded; empty where it found nothing."""

@@ -234,6 +234,14 @@ class Work:
         if approach.hidden:
             raise Lost
 
+    def approach_again(self) -> Activity:
+        """Go back to the end where the robot last was: a wreck that was found since may divide the two."""
+        at = self.here
+        if at is None:
+            raise Lost
+        yield from self._go_to(at)
+        yield None
+
     # --- a corridor ---------------------------------------------------------------------------------------------------
 
     def corridor(self, plan: CorridorPlan, mates: "Mates") -> Activity:

@@ -13,6 +13,7 @@ from zwerm.agents.robot_teams.mapping.slice_map import SliceMap
 from zwerm.agents.robot_teams.protocols.central_membership import CoordinatorMembership
 from zwerm.agents.robot_teams.protocols.fact_exchange import FactExchange
 from zwerm.agents.robot_teams.protocols.team_messages import TeamBeacon, read_beacon, write_beacon
+from zwerm.agents.robot_teams.task_end import reason
 from zwerm.agents.robot_teams.team_lead import TeamLead, findings
 from zwerm.wire.messages import Command, Observation, Transmission
 
@@ -92,18 +93,25 @@ class TeamCoordinator:
                 urgent = True
             if tick % DECIDE_TICKS == 0 and self.lead.decide(tick):
                 urgent = True
-        done = self._is_done()
+        over, certificate = self._is_over(), self.map.certificate
+        done = over and certificate.complete
+        gave_up = reason(certificate) if over and not done else ""
         outbox = self._outgoing(tick) if urgent or tick % self._every == 0 else ()
         telemetry: dict[str, float | bool] = {}
         if (len(self.map.facts), done) != self._reported:
             self._reported = len(self.map.facts), done
             telemetry = {"certificate_satisfied": done, **findings(self.map, self.membership)}
-        return Command(outbox=outbox, done=done, telemetry=telemetry)
+        return Command(outbox=outbox, done=done, gave_up=gave_up, telemetry=telemetry)
 
-    def _is_done(self) -> bool:
-        """Return whether all space that any robot in reach can drive to is covered."""
+    def _is_over(self) -> bool:
+        """Return whether all space that any robot in reach can drive to is covered.
+
+        After a wreck was found, a robot has no place until it stood at an end again.
+        """
         statuses, members = self.membership.roster.statuses, self.membership.view.members
         places = [statuses[node].at for node in members]
+        if self.map.wrecks and None in places:
+            return False
         return bool(members) and all(
             self.map.complete_from(None if place is None else self.map.end(place)) for place in places
         )

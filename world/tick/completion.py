@@ -5,8 +5,9 @@ A run ends for one of these reasons, in this order of precedence:
 1. A node crashed, and the scenario has `robots.on_crash = "fail"`.
 2. A deciding node gave up.
 3. The task is done.
-4. Every robot is lost for good.
-5. The time limit is reached.
+4. Without a deciding node: every living robot is done or gave up.
+5. Every robot is lost for good.
+6. The time limit is reached.
 
 Both drivers apply this rule after every tick.
 """
@@ -53,7 +54,9 @@ class Completion:
         self._deciding = [*centre, *stations]
         self._done: Bools = np.zeros(self._robots + (self._coordinator is not None), dtype=np.bool_)
         self.any_done = False
+        self.any_gave_up = False
         self._gave_up = ""
+        self._robots_gave_up: dict[int, str] = {}
 
     def report(self, node: int, done: bool) -> None:
         """Take the `done` field of a node's newest command. A false `done` needs no call while no node has reported
@@ -62,17 +65,25 @@ class Completion:
         self.any_done = True
 
     def give_up(self, node: int, reason: str, dead: Collection[int]) -> None:
-        """Record that a node gave up; it has an effect only if the node decides.
+        """Record that a node gave up; where any node decides, it has an effect only if this one does.
 
-        A base station decides beside a deciding coordinator only while the coordinator is in `dead`.
+        A base station decides beside a deciding coordinator only while the coordinator is in `dead`. Where no node decides, a
+        robot withdraws it with an empty `reason`.
         """
         centre = self._coordinator
+        if not self._deciding:
+            self._robots_gave_up.pop(node, None)
+            if reason:
+                self._robots_gave_up[node] = printable_line(reason)
+                self.any_gave_up = True
+            return
         if node in self._deciding and (centre not in self._deciding or node == centre or centre in dead):
             self._gave_up = f"node {node} gave up: {printable_line(reason)}"
 
     def restart(self, node: int) -> None:
         """Drop a node's report: its program lost its memory."""
         self._done[node] = False
+        self._robots_gave_up.pop(node, None)
 
     @property
     def done_fraction(self) -> float:
@@ -108,6 +119,10 @@ class Completion:
             return Ending(FAILED, self._gave_up)
         if self.completed(exited, dead):
             return Ending(COMPLETED)
+        if self._robots_gave_up:
+            left = [node for node in self._robots_gave_up if node not in dead and node not in exited]
+            if left and self.completed({*exited, *left}, dead):
+                return Ending(FAILED, f"node {min(left)} gave up: {self._robots_gave_up[min(left)]}")
         if len(dead) >= self._robots and all(robot in dead for robot in range(self._robots)):
             return Ending(FAILED, "every robot was lost")
         return Ending(TIME_LIMIT) if tick >= self._last_tick else None

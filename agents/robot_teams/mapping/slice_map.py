@@ -9,7 +9,7 @@ obstacle between two slices that no arc reaches hides nothing.
 A wreck may hide ends. They are ignored while the wreck is there: its own footprint covers that place, and arcs lead
 around it. A wreck also blocks ways that were free. Ways therefore prefer segments and arcs that were observed beside
 the wreck. An end may have no way to any open end or port. Then all that a robot can reach from it is covered if and
-only if every end within reach has a mate and two arcs, none of them blocked.
+only if every end within reach has a mate and two arcs, none of them blocked. The rest of the map is still open.
 
 A slice may graze an obstacle: one robot stops there, and another sweeps past. An end inside a swept segment ends no
 space that is left to cover, and is ignored too.
@@ -25,7 +25,7 @@ import heapq
 from collections.abc import Collection, Iterable
 from typing import Final, NamedTuple
 
-from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, End, Fact, FactSet, SweptSegment, TracedArc, Void
+from zwerm.agents.robot_teams.mapping.facts import LEFT, RIGHT, End, Fact, FactSet, SweptSegment, TracedArc, Void, Wreck
 
 TOLERANCE_MM: Final = 120
 
@@ -68,6 +68,7 @@ class SliceMap:
         self._arcs: dict[Port, Step] = {}
         self._by_slice: dict[int, list[SweptSegment]] = {}
         self._voids: list[Void] = []
+        self._wrecks: frozenset[Wreck] = frozenset()
         self._across: dict[End, Step] = {}
         self._closed: dict[End, bool] = {}
         self._distances: dict[End, dict[End, int]] = {}
@@ -124,6 +125,12 @@ class SliceMap:
         """The ends that wrecks hide."""
         self._derive()
         return self._voids
+
+    @property
+    def wrecks(self) -> frozenset[Wreck]:
+        """The wrecks that any fact names: each may divide the space that was joined before."""
+        self._derive()
+        return self._wrecks
 
     def complete_from(self, at: End | None) -> bool:
         """Return whether all is covered that a robot at the known end `at` can reach; None: it is somewhere else."""
@@ -207,6 +214,8 @@ class SliceMap:
         self._distances.clear()
         segments, arcs, voids = self.facts.segments, self.facts.arcs, self.facts.voids
         self._voids = voids
+        named = [fact.wrecks for fact in segments] + [fact.wrecks for fact in arcs] + [fact.wrecks for fact in voids]
+        self._wrecks = frozenset([wreck for wrecks in named for wreck in wrecks])
         measured = [end for arc in arcs for end in (arc.start, arc.stop)]
         measured += [end for segment in segments for end in segment.ends]
         measured += [end for cut in self.facts.cuts for end in cut.ends]

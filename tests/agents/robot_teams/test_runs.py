@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from random_arenas import ORIGIN_M, random_arena
+from random_arenas import ORIGIN_M, random_arena, start_group
+from shapely.geometry import Polygon
 
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs
@@ -192,3 +193,11 @@ def test_the_trace_is_the_same_inline_and_in_processes_and_another_with_another_
 def test_slices_too_far_apart_are_refused() -> None:
     with pytest.raises((ScenarioError, Exception), match=r"spacing_m: expected at most 2 footprint_m"):
         cover(team(1, robots=team(1).robots.model_dump() | {"parameters": {"spacing_m": 1.1}}))
+
+
+def test_a_robot_behind_a_wreck_in_the_only_way_sweeps_its_side() -> None:
+    """Robot 1 dies in a passage. Robot 0 is behind it, and its last end is on the other side."""
+    arena = random_arena(91, 1)[0]
+    free = Polygon(arena["polygon"], arena["obstacles"])
+    poses = start_group(np.random.default_rng([91, 4]), free, 4, ORIGIN_M)
+    check(cover(team(4, arena, poses, faults=[{"kind": "crash", "nodes": [1], "at_s": 75.0}]), 91))

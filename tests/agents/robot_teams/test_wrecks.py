@@ -165,11 +165,69 @@ def test_a_robot_whose_end_a_wreck_hides_looks_for_another_end(hidden: bool) -> 
     robot.work.at = End(0, TOP, 5_000)
     states = []
     for tick in range(2):
-        pose = Pose(0.5, 4.9, 0.0)
+        pose = Pose(0.05, 4.95, 0.0)
         robot.step(Observation(tick, tick * DT_S, touch=(), neighbours=(), pose=pose))
         states.append(robot.pilot.state)
         robot.map.add(Void(0, -300, 4_600 if hidden else 5_600, 5_400 if hidden else 6_400, WRECK))
     assert states == [IDLE, RUNNING if hidden else IDLE]
+
+
+def robot_at(facts: list[Fact]) -> TeamRobot:
+    """Return a robot whose place in the map is the top end of slice 0."""
+    body = Body("holonomic", 0.25, 1.0, 1.0)
+    robot = TeamRobot(Setup(0, "robot", DT_S, TeamRobot.sensors, bytes(16), body, ("radio",)))
+    robot.map.merge(facts)
+    robot.work.at = End(0, TOP, 5_000)
+    return robot
+
+
+def answer(robot: TeamRobot, x_m: float, y_m: float, tick: int = 0) -> tuple[bool, str]:
+    """Return whether the robot is done, and why it gave up, at (x, y)."""
+    pose = Pose(x_m, y_m, 0.0)
+    command = robot.step(Observation(tick, tick * DT_S, touch=(), neighbours=(), pose=pose))
+    return command.done, command.gave_up
+
+
+FAR_WRECK = Void(1, 950, 2_500, 3_500, WRECK)
+
+
+def test_a_robot_that_a_wreck_may_divide_from_its_end_is_not_done_before_it_stands_at_an_end() -> None:
+    robot = robot_at(room(2))
+    assert answer(robot, 0.5, 3.0) == (True, "")
+    robot.map.add(FAR_WRECK)
+    assert answer(robot, 0.5, 3.0, 1) == (False, "")
+    assert robot.pilot.state == RUNNING, "the robot goes back to its end"
+    assert answer(robot, 0.05, 5.0, 2) == (True, "")
+    assert answer(robot, 0.5, 3.0, 3) == (True, ""), "others may push it away: the wreck stays where it is"
+    robot.map.add(Void(1, 950, 500, 1_500, Wreck(2, 300)))
+    assert answer(robot, 0.5, 3.0, 4) == (False, ""), "a new wreck"
+
+
+def test_a_robot_gives_up_where_nothing_that_it_reaches_is_open_and_something_else_is() -> None:
+    robot = robot_at([*room(2), SweptSegment(9, 0, 5_000)])
+    assert answer(robot, 0.0, 5.0) == (False, "blocked: no way leads to 4 open ends and ports")
+    robot.map.merge([arc(End(9, side, y), way, End(9, -side, 5_000 - y)) for side, y, way in OVAL])
+    assert answer(robot, 0.0, 5.0, 1) == (True, "")
+
+
+OVAL = ((TOP, 5_000, RIGHT), (TOP, 5_000, LEFT))
+
+
+@pytest.mark.parametrize(("x_mm", "way", "hidden"), [(6_700, RIGHT, True), (6_700, LEFT, False), (6_600, LEFT, True)])
+def test_an_end_at_a_wreck_is_hidden_if_its_open_arc_goes_towards_the_wreck(x_mm: int, way: int, hidden: bool) -> None:
+    """The end is 0.01 m farther from the wreck than what the wreck hides. Slice 7 is at x = 6.65 m."""
+    beyond: list[Fact] = [
+        SweptSegment(7, 0, 5_000),
+        arc(End(7, TOP, 5_000), -way, End(7, BOTTOM, 0)),
+        arc(End(7, BOTTOM, 0), way, End(7, BOTTOM, 300)),
+        SweptSegment(7, 300, 4_300),
+        arc(End(7, TOP, 4_300), way, End(7, BOTTOM, 300)),
+        Void(7, x_mm, 3_920, 4_990, WRECK),
+    ]
+    robot = robot_at([*room(2), *beyond])
+    assert robot.map.certificate.open_ports[-1] == (End(7, TOP, 5_000), way)
+    robot._task.hide_closed_ports()
+    assert (End(7, TOP, 5_000) not in [end for end, _ in robot.map.certificate.open_ports]) is hidden
 
 
 @pytest.mark.parametrize("y_mm", [-1_500, -900, -500, -200, -100, 0, 100])

@@ -1,15 +1,18 @@
 """Cells planned by the coordinator: the hall is covered with no radio between robots, under loss, and when a robot dies."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
+from zwerm.agents.robot_teams.mapping.facts import BOTTOM, LEFT, RIGHT, TOP, End, SweptSegment, TracedArc, Void, Wreck
 from zwerm.agents.robot_teams.protocols.central_membership import CoordinatedMembership, CoordinatorMembership
-from zwerm.agents.robot_teams.protocols.team_messages import READY, Status, TeamBeacon, View
+from zwerm.agents.robot_teams.protocols.team_messages import READY, Status, TeamBeacon, View, write_beacon
+from zwerm.coordinator.robot_teams.team_coordinator import TeamCoordinator
 from zwerm.run.runner import run
 from zwerm.scenario.load import tables_of, validate
 from zwerm.scenario.tables import Scenario
+from zwerm.wire.messages import Observation, Packet
 
 
 def hall(count: int, **tables: Any) -> Scenario:
@@ -85,3 +88,37 @@ def test_a_robot_takes_later_views_that_include_it_and_no_others() -> None:
         membership.poll(tick)
     assert membership.view == View(3, COORDINATOR, (0, 1))
     assert not membership.leads
+
+
+class CoordinatorSetup:
+    """The setup of a coordinator that decides from the first tick on."""
+
+    node, dt_s = COORDINATOR, 1.0
+    parameters: ClassVar[dict[str, object]] = {}
+
+
+@pytest.mark.parametrize(
+    ("wreck", "placed", "unswept", "done", "gave_up"),
+    [
+        (False, False, False, True, ""),
+        (True, False, False, False, ""),
+        (True, True, False, True, ""),
+        (True, True, True, False, "blocked: no way leads to 4 open ends and ports"),
+    ],
+)
+def test_after_a_wreck_the_coordinator_waits_until_each_robot_has_a_place_again(
+    wreck: bool, placed: bool, unswept: bool, done: bool, gave_up: str
+) -> None:
+    """The map is one swept slice; a wreck on the next slice hides nothing of it."""
+    top, bottom = End(0, TOP, 5_000), End(0, BOTTOM, 0)
+    coordinator = TeamCoordinator(CoordinatorSetup())
+    coordinator.map.merge([SweptSegment(0, 0, 5_000)])
+    coordinator.map.merge([TracedArc(top, way, bottom, 9_000, 0, 0) for way in (LEFT, RIGHT)])
+    coordinator.map.merge([Void(1, 950, 2_000, 3_000, Wreck(1, 5))] if wreck else [])
+    coordinator.map.merge([SweptSegment(9, 0, 5_000)] if unswept else [])
+    status = Status(0, 1, 0, 0, 1, 0, READY, top if placed else None, False, False, None, None, None, (1, 0))
+    views = (View(4, 0, (0,)),)
+    sent = write_beacon(TeamBeacon(0, views, (), (), (status,), 0, 0))
+    for tick in range(2):
+        command = coordinator.step(Observation(tick, float(tick), inbox=(Packet("uplink", sent, 0),)))
+    assert (command.done, command.gave_up) == (done, gave_up)

@@ -66,6 +66,22 @@ def test_only_a_deciding_node_gives_up_for_all_and_a_station_only_without_its_co
     assert ending(0, [4], **BASE, **COORDINATOR) == Ending(FAILED, "node 0 gave up: lost")
 
 
+def test_where_no_node_decides_the_run_fails_once_every_living_robot_is_done_or_gave_up() -> None:
+    found = completion([0])
+    found.give_up(2, "blocked", [])
+    found.give_up(3, "cut off", [])
+    assert found.ending(0, {}, [], []) is None
+    assert found.ending(0, {}, [], [1]) == Ending(FAILED, "node 2 gave up: blocked")
+    assert found.ending(0, {}, [1], []) == Ending(FAILED, "node 2 gave up: blocked")
+    assert found.ending(0, {}, [], [1, 2]) == Ending(FAILED, "node 3 gave up: cut off")
+    assert found.ending(0, {}, [], [1, 2, 3]) == Ending(COMPLETED), "those that gave up died"
+    found.give_up(2, "", [])
+    assert found.ending(0, {}, [], [1]) is None
+    found.give_up(2, "blocked", [])
+    found.restart(2)
+    assert found.ending(0, {}, [], [1]) is None
+
+
 def test_a_crash_takes_precedence_over_the_end_of_the_task_and_that_over_the_time_limit() -> None:
     found = completion([0, 1, 2, 3])
     crash = Ending(FAILED, "node 2 crashed at tick 20: Oops")
