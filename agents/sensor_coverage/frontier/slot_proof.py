@@ -100,7 +100,11 @@ class SlotProof:
             self._stretch = []
         self._stretch += arcs_of_step(slot, step.before, step.point, step.hand)
         self._stretch_end = step.point
-        seen = (*step.witnesses, *step.point.seen, *(() if step.before is None else step.before.seen))
+        seen = (
+            *step.witnesses,
+            *_witnesses_of(step.point),
+            *(() if step.before is None else _witnesses_of(step.before)),
+        )
         for arc in arcs_of_step(slot, step.before, step.point, step.hand):
             self._add(step.witnesses, seen, arc)
         self._add_fan(slot, step.point, [step])
@@ -132,10 +136,10 @@ class SlotProof:
             for pair in fan:
                 if slot in pair:
                     other = sum(pair) - slot
-                    self._add(needed, point.seen, arc_between(views[slot][other], point.seen[slot]))
+                    self._add(needed, _witnesses_of(point), arc_between(views[slot][other], point.seen[slot]))
                     if slot in views[other] and not all(other in each.seen for each in points):
                         arc = arc_between(views[other][slot], point.seen[other])
-                        self.for_neighbours.append((other, (tuple(needed), tuple(point.seen), *arc)))
+                        self.for_neighbours.append((other, (tuple(needed), _witnesses_of(point), *arc)))
 
     def accept(self, proved: ProvedArc) -> bool:
         """Take in an arc that a neighbour has proved; return whether the open arcs are smaller."""
@@ -176,3 +180,8 @@ class SlotProof:
         self._by_walks = {}
         for needed, seen, start, width in memory:
             self._by_walks.setdefault((needed, seen), []).append(Arc(start, width))
+
+
+def _witnesses_of(point: WalkPoint) -> tuple[int, ...]:
+    """Return the slots that saw a point, and the marks of robots that saw it and of which no slot is known."""
+    return (*point.seen, *point.unplaced)

@@ -11,10 +11,11 @@ frame of one robot, at first the robot's own. Two frames that meet become one.
 import cmath
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import pairwise
 from operator import itemgetter
 
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_heading, refined_reference
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint, drives_away
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
 
@@ -152,6 +153,7 @@ class Slots:
         """Store a walk of a robot along a wall, in sight of robots that stand at their slots."""
         heading, frame, slot_of = self.heading[robot], self.frame[robot], self.slot_of()
         standing = {node: slot for node, slot in slot_of.items() if node != robot and self.frame[node] == frame}
+        waypoints = tuple(waypoints)
         points = tuple(
             WalkPoint(
                 {
@@ -162,8 +164,9 @@ class Slots:
                 tuple(bearing + heading for bearing in each.touched),
                 tuple(standing[node] for node in each.robots if node in standing),
                 any(node not in standing for node in each.robots),
+                drives_away(hand, before.touched, each.touched, each.x_m - before.x_m, each.y_m - before.y_m),
             )
-            for each in waypoints
+            for before, each in pairwise(waypoints[:1] + waypoints)
         )
         self.walks.append(Walk(frame, hand, points))
 

@@ -239,7 +239,7 @@ def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     last: dict[int, SeenPoint] = {}
     touch = TouchCounter()
     for number, point in enumerate(walk.points):
-        touch.take(number, point.walls, point.at_body)
+        touch.take(number, point.walls, point.at_body, point.left_walls)
         if point.is_blind:
             continue
         now = SeenPoint(number, point)

@@ -19,8 +19,9 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Final, NamedTuple
 
-# An open arc narrower than this [rad] counts as closed: a body at r_v is 8 degrees wide.
-GAP_RAD: Final = math.radians(6.0)
+# An open arc narrower than this [rad] counts as closed: ends of arcs that join differ by less. An opening that a robot sees
+# along the wall may be 2 degrees wide, as a door of 0.25 m is at 0.6 m from a robot in touch with its wall.
+GAP_RAD: Final = math.radians(1.5)
 # A wall in touch with a standing robot closes this angle [rad] on both sides of its direction.
 TOUCH_RAD: Final = math.radians(45.0)
 # The touched wall lies within this angle [rad] of the direction: half a switch.
@@ -31,6 +32,14 @@ POCKET_RAD: Final = math.radians(55.0)
 BLIND_MAX: Final = 3
 # Contacts at two points that differ by less than this [rad] are with the same wall: a switch is 30 degrees wide.
 SAME_WALL_RAD: Final = math.radians(35.0)
+# A robot with a hand on a wall has it on the side of the hand, and behind while it turns round a corner. It leaves the wall
+# if it drives in a direction farther than the first angle [rad] from it with the wall at the other side, or than the second
+# with the wall at the side of the hand. The direction of a contact is known within 15 degrees.
+LEAVING_RAD: Final = math.radians(110.0)
+ROUNDING_RAD: Final = math.radians(150.0)
+# A way [m] shorter than the first has no direction. One longer than the second is not a single step.
+LEAVING_M_MIN: Final = 0.015
+LEAVING_M_MAX: Final = 0.07
 # Largest arc [rad] behind a corner in which a slot may lose sight of a walking robot that stays in touch with the wall.
 HIDDEN_RAD: Final = math.radians(30.0)
 # A point of a walk is news for the walking robot if the open arcs become smaller by this [rad].
@@ -52,12 +61,16 @@ class WalkPoint(NamedTuple):
     """A point of a walk: the direction [rad] to it from each slot that it sees, the directions of walls that it touches.
 
     `robots` are the slots that the walking robot touches. `at_body` is true if it touches a robot that stands at no slot.
+    `left_walls` is true if it drove away from all walls that it touched at the point before (`drives_away`).
+    `unplaced` are the marks (`mark_of`) of robots that see the point, and of which no slot is known.
     """
 
     seen: Mapping[int, float]
     walls: tuple[float, ...]
     robots: tuple[int, ...]
     at_body: bool = False
+    left_walls: bool = False
+    unplaced: tuple[int, ...] = ()
 
     @property
     def is_blind(self) -> bool:
@@ -76,6 +89,8 @@ class WalkPoint(NamedTuple):
             tuple(each + by for each in self.walls),
             self.robots,
             self.at_body,
+            self.left_walls,
+            self.unplaced,
         )
 
 
@@ -91,12 +106,19 @@ class Walk(NamedTuple):
         return Walk(frame, self.hand, tuple(each.turned(by) for each in self.points))
 
 
+def mark_of(node: int) -> int:
+    """Return the number that stands for a robot among slots. It is no slot, and not NOWHERE."""
+    return -2 - node
+
+
 class TouchCounter:
     """Counts since which point of a walk the robot follows the wall. It may be out of touch for a few points at corners.
 
     It turns towards the wall meanwhile, and so enters each opening that its body fits through. A robot in touch is no wall:
     a walk around a robot in an opening leads past the opening. A dead body may fill an opening that nobody keeps. So where a
-    body is in touch, the robot follows the wall only as long as the same wall stays in touch, too.
+    body is in touch, the robot follows the wall only as long as the same wall stays in touch, too. A robot that drives away
+    from the wall, because it has turned round in front of a robot, does not follow it any more: the next wall that it touches
+    may be on the other side of a passage.
     """
 
     def __init__(self) -> None:
@@ -105,8 +127,13 @@ class TouchCounter:
         self._walls: Collection[float] = ()
         self._at_body = False  # whether a body was in touch at the latest point with a wall, or after it
 
-    def take(self, number: int, walls: Collection[float], at_body: bool = False) -> None:
-        """Take in the directions [rad] of walls in touch at the point with this number, and whether a body is in touch."""
+    def take(self, number: int, walls: Collection[float], at_body: bool = False, left_walls: bool = False) -> None:
+        """Take in the directions [rad] of walls in touch at the point with this number.
+
+        `at_body` and `left_walls` have the meaning of `WalkPoint`.
+        """
+        if left_walls:
+            self._blind, self._walls = BLIND_MAX + 1, ()
         if not walls:
             self._at_body = self._at_body or at_body
             self._blind += 1
@@ -119,6 +146,19 @@ class TouchCounter:
         if self._blind > BLIND_MAX or ((self._at_body or at_body) and not stays):
             self.since = number
         self._blind, self._walls, self._at_body = 0, walls, at_body
+
+
+def drives_away(hand: int, before: Collection[float], now: Collection[float], x_m: float, y_m: float) -> bool:
+    """Return whether a step (x, y) [m] leads away from all walls `before` it [rad]; `now` are the walls in touch after it.
+
+    The walking robot has the wall at its `hand`, +1 left, -1 right.
+    """
+    if not before or not LEAVING_M_MIN < math.hypot(x_m, y_m) < LEAVING_M_MAX:
+        return False
+    heading = math.atan2(y_m, x_m)
+    stays = any(abs(math.remainder(a - b, math.tau)) < SAME_WALL_RAD for a in before for b in now)
+    sides = [hand * math.remainder(each - heading, math.tau) for each in before]
+    return not stays and not any(-LEAVING_RAD < each < ROUNDING_RAD for each in sides)
 
 
 class SeenPoint(NamedTuple):

@@ -45,10 +45,17 @@ class NeighbourProved(_WalkMessage, frozen=True, tag="neighbour-proved"):
     arc: tuple[tuple[int, ...], tuple[int, ...], float, float]
 
 
+class DeadInSight(_WalkMessage, frozen=True, tag="dead-in-sight"):
+    """To the walking robot: it sees or touches these robots, and the sender has found that they are dead."""
+
+    push: int
+    robots: tuple[int, ...]
+
+
 class WalkOver(_WalkMessage, frozen=True, tag="walk-over"):
     """To all, forwarded once by each robot: the walk of a push has ended."""
 
     push: int
 
 
-WalkMessage = PassedPoint | ArcClosed | NeighbourProved | WalkOver
+WalkMessage = PassedPoint | ArcClosed | NeighbourProved | DeadInSight | WalkOver

@@ -15,6 +15,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.wall_proof import mark_of
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
@@ -143,7 +144,7 @@ class LocalMap(NeighbourTable):
         self.path_vectors.forget(node, slot)
         self._planner.attempt_log.forget_gaps()
         self._planner.walls.tried.clear()
-        self.proof.lose(slot)
+        self.proof.lose(slot, mark_of(node))
         if node in self._bodies.stopped.values():
             self.reopen()  # a drive that pushes its body finds out what is behind it
         self._plan_basis = None
@@ -151,7 +152,7 @@ class LocalMap(NeighbourTable):
 
     def restarted(self, node: int) -> None:
         """Forget a robot that has lost its memory, and end the claims of its slot."""
-        self.proof.lose(self.slot_of(node))
+        self.proof.lose(self.slot_of(node), mark_of(node))
         self.path_vectors.forget(node, self.slot_of(node))
         super().restarted(node)
 

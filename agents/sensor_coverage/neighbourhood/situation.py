@@ -1,6 +1,7 @@
 """One decentralised robot's situation, which its components share: readings, activity, local map, and mailbox."""
 
 import math
+from collections import ChainMap
 from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from typing import Final
 
@@ -56,7 +57,8 @@ class Situation:
         self.motion = Locomotion(parameters, setup)
         self.motion.rest = 0.0, 0.0
         self.failure_detector = FailureDetector()
-        self.wall_walk = WallWalk(self.motion, self.failure_detector.dead)
+        self.said_dead: dict[int, None] = {}  # robots that others have found to be dead, for the present walk
+        self.wall_walk = WallWalk(self.motion, ChainMap(self.failure_detector.dead, self.said_dead))
         planner_parameters = PlannerParameters(
             link_m=parameters.link_m, margin_m=parameters.margin_m, walls=parameters.walls
         )
@@ -102,6 +104,11 @@ class Situation:
     def active(self) -> bool:
         """True if the robot drives or averages bearings."""
         return self._activity is not None
+
+    @property
+    def dead(self) -> Collection[int]:
+        """The robots that this robot has found to be dead."""
+        return self.failure_detector.dead
 
     @property
     def bearings(self) -> Mapping[int, float]:

@@ -6,16 +6,30 @@ walking robot is out of range of its push by then. A lost message leaves an arc 
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import ClassVar, Final, NamedTuple, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof, WallStep
-from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, WalkPoint, point_before
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    SeenPoint,
+    TouchCounter,
+    WalkPoint,
+    drives_away,
+    mark_of,
+    point_before,
+)
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
-from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, NeighbourProved, PassedPoint, WalkMessage, WalkOver
+from zwerm.agents.sensor_coverage.messages.walls import (
+    ArcClosed,
+    DeadInSight,
+    NeighbourProved,
+    PassedPoint,
+    WalkMessage,
+    WalkOver,
+)
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.walls.kept_points import KeptPoints, Neighbourhood
 
@@ -54,6 +68,14 @@ class WalkSituation(Protocol):
     @property
     def wall_walk(self) -> StepReporter:
         """The robot's own walk."""
+
+    @property
+    def dead(self) -> Collection[int]:
+        """The robots that this robot has found to be dead."""
+
+    @property
+    def said_dead(self) -> dict[int, None]:
+        """The robots that others have found to be dead, for the present walk."""
 
     @property
     def node(self) -> int:
@@ -112,7 +134,7 @@ class WallProtocol(Component):
     """One robot's part in walks, its own and those of others."""
 
     channel: ClassVar[str] = CHANNEL
-    accepts: ClassVar[tuple[type, ...]] = (PassedPoint, ArcClosed, NeighbourProved, WalkOver)
+    accepts: ClassVar[tuple[type, ...]] = (PassedPoint, ArcClosed, NeighbourProved, DeadInSight, WalkOver)
 
     def __init__(self, situation: WalkSituation, on_over: Callable[[int], None] = lambda _: None) -> None:
         """Call `on_over` with the number of the push when a walk has ended."""
@@ -128,6 +150,8 @@ class WallProtocol(Component):
         self._kept = KeptPoints()
         self._replan_at: int | None = None
         self._over: dict[int, None] = {}
+        self._latest: Waypoint | None = None
+        self._warned: dict[tuple[int, int], None] = {}  # (push, dead robot) that the walking robot was told
 
     # --- this robot's own walk ----------------------------------------------------------------------------------------
 
@@ -136,6 +160,8 @@ class WallProtocol(Component):
         if push != self._push:
             self._push, self._hand, self._number = push, hand, 0
             self._touch, self._sightlines = TouchCounter(), Sightlines()
+            self._latest = None
+            self._situation.said_dead.clear()
         self._closed = False
         self._situation.wall_walk.on_step = self._announce
 
@@ -152,8 +178,14 @@ class WallProtocol(Component):
     def _announce(self, at: Waypoint) -> None:
         local_map = self._situation.local_map
         heading = local_map.heading or 0.0
+        before, self._latest = self._latest, at
         self._number += 1
-        self._touch.take(self._number, at.touched, any(each not in local_map.states for each in at.robots))
+        said_dead = self._situation.said_dead
+        at_body = any(each not in local_map.states or each in said_dead for each in at.robots)
+        left = before is not None and drives_away(
+            self._hand, before.touched, at.touched, at.x_m - before.x_m, at.y_m - before.y_m
+        )
+        self._touch.take(self._number, at.touched, at_body, left)
         point = PassedPoint(
             self._push or 0,
             self._number,
@@ -175,6 +207,8 @@ class WallProtocol(Component):
                 self._hear(sender, message, tick)
             case ArcClosed(push):
                 self._closed = self._closed or push == self._push
+            case DeadInSight(push, robots) if push == self._push:
+                self._situation.said_dead.update(dict.fromkeys(robots))
             case NeighbourProved():
                 self._accept(message, tick)
             case WalkOver(push) if push not in self._over:
@@ -192,6 +226,7 @@ class WallProtocol(Component):
     def _hear(self, sender: int, passed: PassedPoint, tick: int) -> None:
         """Take a point into the proof of this robot's slot, or keep it until the proof has a view of the slot."""
         local_map = self._situation.local_map
+        self._warn(sender, passed)
         if not self._proves:
             return
         if local_map.proof.ready:
@@ -199,6 +234,14 @@ class WallProtocol(Component):
             self._pass(sender, passed, slots, tick)
         else:
             self._kept.keep(sender, passed, local_map)
+
+    def _warn(self, sender: int, passed: PassedPoint) -> None:
+        """Tell the walking robot once which robots that it sees or touches are dead: it may not have asked them."""
+        named = (*(node for node, _ in passed.seen), *passed.robots)
+        dead = [node for node in self._situation.dead if node in named and (passed.push, node) not in self._warned]
+        if dead:
+            self._warned.update(dict.fromkeys((passed.push, node) for node in dead))
+            self._outbox.append(Outgoing(sender, DeadInSight(passed.push, tuple(dead))))
 
     def _take_kept(self, tick: int) -> None:
         """Take the points into the proof that were received before it had a view of the slot."""
@@ -215,7 +258,8 @@ class WallProtocol(Component):
         point = WalkPoint(
             {slots[node]: direction for node, direction in passed.seen if node in slots},
             passed.walls,
-            tuple(slots[node] for node in passed.robots if node in slots),
+            tuple(slots.get(node, NOWHERE) for node in passed.robots),
+            unplaced=tuple(mark_of(node) for node, _ in passed.seen if node not in slots),
         )
         if slot not in point.seen or point.is_blind:
             return

@@ -9,7 +9,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof, WallStep
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
-from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, Arc, TouchCounter, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, Arc, TouchCounter, Walk, WalkPoint, drives_away
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import RESENT_POINTS, Sightlines
 from zwerm.maths.simplicial import FlagComplex
@@ -232,6 +232,52 @@ def test_a_walk_past_a_body_without_a_slot_closes_no_arc_there(at_body: bool, op
     touched: list[tuple[float, ...]] = [(0.0,), (0.0,), (), (0.0,), (0.0,)]
     points = [WalkPoint({0: math.radians(20 * n)}, each, (), at_body and not each) for n, each in enumerate(touched)]
     assert _degrees(open_arcs(ALONE, (Walk(0, -1, tuple(points)),))) == {0: open_deg}
+
+
+def test_a_narrow_arc_is_open_because_an_opening_may_be_seen_along_its_wall() -> None:
+    walks = around(0, 100, 200, 299, hand=-1), around(301, 330, 360, hand=-1)
+    assert opened(*walks) == [(299, 2)]
+
+
+SOUTH_DEG, NORTH_DEG = -90.0, 90.0
+
+
+@pytest.mark.parametrize(
+    ("hand", "wall_deg", "way_deg", "away"),
+    [
+        pytest.param(-1, SOUTH_DEG, 0.0, False, id="along the wall"),
+        pytest.param(1, SOUTH_DEG, 40.0, True, id="away from a wall at the other side"),
+        pytest.param(-1, SOUTH_DEG, NORTH_DEG, True, id="to the other side of a passage"),
+        pytest.param(-1, SOUTH_DEG, 180.0, False, id="back along the wall"),
+        pytest.param(-1, 135.0, -90.0, False, id="round a corner that is behind on the right"),
+        pytest.param(1, -135.0, 90.0, False, id="round a corner that is behind on the left"),
+    ],
+)
+def test_a_robot_that_drives_away_from_a_wall_does_not_follow_it(
+    hand: int, wall_deg: float, way_deg: float, away: bool
+) -> None:
+    wall, way = math.radians(wall_deg), math.radians(way_deg)
+    assert drives_away(hand, (wall,), (), 0.05 * math.cos(way), 0.05 * math.sin(way)) is away
+    assert not drives_away(hand, (wall,), (wall,), 0.05 * math.cos(way), 0.05 * math.sin(way)), "it stays in touch"
+
+
+@pytest.mark.parametrize(("left_walls", "open_deg"), [(False, 280), (True, 320)])
+def test_a_walk_across_a_passage_closes_no_arc(left_walls: bool, open_deg: int) -> None:
+    """The robot touches a wall, drives across the passage without a contact, and touches the other wall."""
+    touched: list[tuple[float, ...]] = [SOUTH, SOUTH, (), (math.pi / 2.0,), (math.pi / 2.0,)]
+    points = [
+        WalkPoint({0: math.radians(20 * n)}, each, (), left_walls=left_walls and not each)
+        for n, each in enumerate(touched)
+    ]
+    assert _degrees(open_arcs(ALONE, (Walk(0, -1, tuple(points)),))) == {0: open_deg}
+
+
+def test_a_walking_robot_remembers_that_it_drove_across_a_passage() -> None:
+    slots = Slots()
+    slots.add(8)
+    ways = (0.0, ()), (0.05, (-1.5,)), (0.1, ()), (0.15, (1.5,))
+    slots.take_walk(8, -1, [Waypoint(0.0, y_m, (), walls, ()) for y_m, walls in ways])
+    assert [each.left_walls for each in slots.walks[0].points] == [False, False, True, False]
 
 
 def test_a_walk_that_touches_robot_and_wall_closes_the_pocket_between_them() -> None:

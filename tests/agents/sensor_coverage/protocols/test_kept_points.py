@@ -9,7 +9,7 @@ from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
-from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, NeighbourProved, PassedPoint
+from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, DeadInSight, NeighbourProved, PassedPoint
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.component import Outgoing
 from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
@@ -38,6 +38,7 @@ class Here:
         self.local_map.heading = 0.0
         self.hear_neighbour(1, 3)
         self.local_map.receive(WALKER, state(WALKER, 1, 2, True), 0)
+        self.dead, self.said_dead = dict[int, None](), dict[int, None]()
         self.walls = WallProtocol(self)
         self.sees = dict[int, float]()
 
@@ -136,3 +137,52 @@ def test_a_slot_whose_robot_has_left_during_the_walk_is_informed_of_nothing() ->
     here.watch_walk(last=1)
     assert not any(isinstance(each.message, NeighbourProved) for each in here.walls.outgoing())
     assert here.local_map.proof.for_neighbours == []
+
+
+# --- robots in touch with the walking robot, and dead robots -----------------------------------------------------------
+
+BODY = 10
+
+
+def seen_body(here: Here, number: int, direction_deg: float, walls: bool, touches: bool, sees: bool = False) -> None:
+    """Have a point of a walk received, at which the walking robot touches walls, or touches or sees a robot without a slot."""
+    seen = ((ME, math.radians(direction_deg)), *(((BODY, 1.0),) if sees else ()))
+    touched = (math.radians(-90.0),) if walls else ()
+    here.walls.receive(WALKER, PassedPoint(1, number, -1, 1, seen, touched, (BODY,) if touches else ()), 0)
+
+
+@pytest.mark.parametrize(("touches", "closed_deg"), [(False, 40.0), (True, 0.0)])
+def test_a_robot_whose_slot_is_unknown_is_no_wall(touches: bool, closed_deg: float) -> None:
+    """The walking robot turns round in front of it, from one wall of a passage to the other."""
+    here = Here()
+    here.look()
+    here.local_map.update_proof()
+    seen_body(here, 1, -70.0, True, False)
+    seen_body(here, 2, -50.0, False, touches)
+    seen_body(here, 3, -30.0, True, False)
+    assert here.closed_deg == pytest.approx(closed_deg)
+
+
+def test_points_that_a_robot_without_a_slot_saw_count_until_it_is_dead() -> None:
+    here = Here()
+    here.look()
+    here.local_map.update_proof()
+    seen_body(here, 1, -70.0, True, False, sees=True)
+    seen_body(here, 2, -30.0, True, False, sees=True)
+    assert here.closed_deg == pytest.approx(40.0)
+    here.local_map.remove_dead(BODY)
+    assert here.closed_deg == pytest.approx(0.0)
+
+
+def test_a_walking_robot_is_told_once_which_robots_in_sight_are_dead() -> None:
+    here = Here()
+    here.dead[BODY] = None
+    for number in (1, 2):
+        seen_body(here, number, -70.0, True, False, sees=True)
+    warnings = [each for each in here.walls.outgoing() if isinstance(each.message, DeadInSight)]
+    assert warnings == [Outgoing(WALKER, DeadInSight(1, (BODY,)))]
+    here.walls.begin(1, -1)
+    here.walls.receive(NEIGHBOUR, DeadInSight(1, (BODY,)), 0)
+    assert list(here.said_dead) == [BODY]
+    here.walls.begin(2, -1)
+    assert not here.said_dead, "another walk"

@@ -1,0 +1,28 @@
+"""Drawn buildings in which a narrow opening was passed by: `completed` must not be said while the space behind it is unseen."""
+
+import pytest
+
+from benchmarks.common.small_buildings import small_building
+from zwerm.run.runner import run
+
+ALONE = ("services.path=gradient",)
+
+
+@pytest.mark.parametrize(
+    ("seed", "dies", "more"),
+    [
+        pytest.param(5, False, (), id="central, a bend of 1.3 bodies"),
+        pytest.param(5, False, ALONE, id="decentralised, a bend of 1.3 bodies"),
+        pytest.param(13, True, ALONE, id="decentralised, a body in a door of 1.8 bodies"),
+    ],
+)
+def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[str, ...]) -> None:
+    building = small_building(seed)
+    settings = (
+        *building.settings(),
+        *((building.death(),) if dies else ()),
+        "robots.count=30",
+        "time.duration_s=3000.0",
+    )
+    result = run("sensor-coverage-narrow", seed, "inline", (*settings, "robots.sensors.0.sd_rad=0.0", *more))
+    assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
