@@ -17,8 +17,10 @@ from msgspec import Meta
 COUNT_BITS: Final = 24
 # Slots that restarted robots named themselves have this bit. Pushes never reach it.
 ADOPTED: Final = 1 << 56
-# Bits of a robot's id in the name of an adopted slot.
+# Bits of a robot's id in the name of an adopted slot. The bits from RETURN_BIT to that of ADOPTED count returns.
 NODE_BITS: Final = 20
+RETURN_BIT: Final = 52
+RETURNS_MAX: Final = 16
 # Means that the sender does not know the receiver's incarnation, or that the message is for all receivers.
 ANY: Final = 0
 
@@ -30,9 +32,10 @@ def first_count(incarnation: int) -> int:
     return (incarnation - 1) << COUNT_BITS
 
 
-def adopted_slot(node: int, incarnation: int) -> int:
-    """Return the name of the slot where a robot stands after its restart. No push and no other robot has this name."""
-    return ADOPTED | incarnation << NODE_BITS | node
+def adopted_slot(node: int, incarnation: int, returns: int = 0) -> int:
+    """Return the name of the slot where a robot stands after its restart, or after it came back into sight for the
+    n-th time. No push and no other robot has this name."""
+    return ADOPTED | returns % RETURNS_MAX << RETURN_BIT | incarnation << NODE_BITS | node
 
 
 class Incarnations:

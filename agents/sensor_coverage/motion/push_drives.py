@@ -46,6 +46,10 @@ BREAK_M_MAX: Final = 0.4
 RESTORE_M_MAX: Final = 0.5
 # A second anchor is skipped if less than this fraction of its direction is perpendicular to the first.
 PERPENDICULAR_MIN: Final = 0.3
+# A robot that looks for a link drives this far [m] past the place where the link was, by odometry.
+PAST_M: Final = 0.1
+# Bound of the ticks to drive back to one point of the way: a body or a wall may be in the way.
+POINT_TICKS: Final = 8
 
 
 class DriveResult(NamedTuple):
@@ -265,6 +269,46 @@ def correct(motion: Locomotion, anchors: Sequence[Sighting]) -> DriveToResult:
         if first is None:
             first = unit(frame.seen.get(anchor.node, anchor.bearing_rad))
     return DriveResult(True)
+
+
+def regain(motion: Locomotion, node: int, goal: Vector) -> DriveToResult:
+    """Drive by odometry to where a robot was in sight, until it is, and `margin_m` further; else drive back.
+
+    A wall, or noise, may have stopped a move a little before its goal. Beside a door that hides the room behind it.
+    """
+    p, frame, start = motion.parameters, motion.frame, motion.position
+    x, y = _offset(motion, goal)
+    ux, uy = unit(math.atan2(y, x))
+    way_m, seen_m = math.hypot(x, y) + PAST_M, math.inf
+    for step in range(math.ceil(way_m / p.creep_m)):
+        driven_m = step * p.creep_m
+        if node not in frame.seen:
+            seen_m = math.inf
+        elif seen_m + p.margin_m <= driven_m:
+            break
+        else:
+            seen_m = min(seen_m, driven_m)
+        yield motion.velocity(*slide(ux * p.creep_m, uy * p.creep_m, frame.touched))
+    if node not in frame.seen:
+        yield from motion.drive_to(start)
+    return DriveResult(node in frame.seen, used_odometry=True)
+
+
+def drive_back(motion: Locomotion, way: Sequence[Vector], sees: Callable[[], bool]) -> DriveToResult:
+    """Drive back on the points [m] of a way until `sees()` holds, and `margin_m` further. `ok`: it holds at the end."""
+    margin_m = motion.parameters.margin_m
+    seen_at: Vector | None = None
+    for goal in reversed(tuple(way)):
+        for _ in range(POINT_TICKS):
+            seen_at = (seen_at or motion.position) if sees() else None
+            if seen_at is not None and math.dist(seen_at, motion.position) >= margin_m:
+                return DriveResult(True, used_odometry=True)
+            x, y = motion.position
+            dx, dy = slide(goal[0] - x, goal[1] - y, motion.frame.touched)
+            if math.hypot(dx, dy) < motion.parameters.tolerance_m:
+                break
+            yield motion.velocity(dx, dy)
+    return DriveResult(sees(), used_odometry=True)
 
 
 def _offset(motion: Locomotion, goal: Vector) -> Vector:

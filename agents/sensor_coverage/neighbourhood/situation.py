@@ -12,10 +12,21 @@ from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Landmark, Sighting
-from zwerm.agents.sensor_coverage.motion.homing import Vector
+from zwerm.agents.sensor_coverage.messages.incarnations import adopted_slot
+from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive, Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
-from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult, DriveToResult, correct, deploy, move
+from zwerm.agents.sensor_coverage.motion.push_drives import (
+    AHEAD_RAD,
+    DriveResult,
+    DriveToResult,
+    correct,
+    deploy,
+    drive_back,
+    move,
+    regain,
+)
+from zwerm.agents.sensor_coverage.motion.trail import Trail
 from zwerm.agents.sensor_coverage.motion.wall_walk import (
     CLEAR_M,
     FEEL_M,
@@ -35,6 +46,13 @@ from zwerm.wire.messages import BodyVelocity, Observation
 # robot rests too near, and each pushes the other away when it returns.
 RECOVERY_TICKS: Final = 100
 RECOVERIES_MAX: Final = 4
+# Ticks that a standing robot sees no robot before it drives back on its way: one may be on its way to it.
+ALONE_TICKS: Final = 200
+
+# A robot in touch within this angle [rad] of a drive's direction has stopped the drive.
+BODY_BESIDE_RAD: Final = math.pi / 2.0
+# A robot that pushes so many bodies still has a quarter of its speed, and does not count as stuck.
+PUSHED_MAX: Final = 3
 
 # A robot within this distance [m] of the point where it came out of the depot still stands there.
 AT_BASE_M: Final = 0.05
@@ -74,6 +92,10 @@ class Situation:
         self.on_arrived: Callable[[DriveResult | WalkResult], None] = lambda _: self.stand()
         self._activity: Generator[BodyVelocity, None, DriveResult | WalkResult | None] | None = self._look_around()
         self._recoveries = self._recovered_at = 0
+        self._goal = self.motion.position  # of the latest move, by odometry
+        self._trail = Trail()
+        self._alone_since: int | None = None
+        self._returns = 0
 
     # --- every tick -------------------------------------------------------------------------------------------------
 
@@ -81,6 +103,7 @@ class Situation:
         """Take in the readings of a tick."""
         self.tick = observation.tick
         self.motion.frame.update(observation)
+        self._trail.record(self.motion.position)
         if self.negotiation is not None:
             self.negotiation.observe(self.tick, self.motion.frame.seen)
 
@@ -130,6 +153,21 @@ class Situation:
         apart = {node: angle_between(seen[node], bearing_rad) for node in self.failure_detector.dead if node in seen}
         body = min(apart, key=lambda node: apart[node], default=None)
         return body if body is not None and apart[body] < within_rad else None
+
+    def body_in_the_way(self, result: DriveResult, bearing_rad: float) -> int | None:
+        """Return the robot that stopped a drive and may hide free space, or None.
+
+        Dead robots yield to a push, and bodies are smooth. So a body ahead that does not yield stands at a wall.
+        """
+        off = [(angle_between(each.bearing_rad, bearing_rad), each.node) for each in result.robots]
+        away_rad, body = min(((angle, node) for angle, node in off if node is not None), default=(math.pi, None))
+        if result.touched or away_rad > BODY_BESIDE_RAD:
+            return None
+        seen = self.motion.frame.seen
+        dead = [node for node in self.failure_detector.dead if node in seen]
+        row = [node for node in dead if angle_between(seen[node], bearing_rad) < BODY_BESIDE_RAD]
+        at_wall = body in dead and away_rad < AHEAD_RAD and len(row) <= PUSHED_MAX
+        return None if at_wall else body
 
     @property
     def busy(self) -> bool:
@@ -185,6 +223,16 @@ class Situation:
         return away_m > 2.0 * self.motion.parameters.tolerance_m and not self.locked
 
     @property
+    def alone(self) -> bool:
+        """True if the robot stands at a slot and sees no living robot for so long that none is on its way to it."""
+        if self.bearings or self.active or self.in_push or self.local_map.slot in (0, NOWHERE):
+            self._alone_since = None
+            return False
+        if self._alone_since is None:
+            self._alone_since = self.tick
+        return self.tick - self._alone_since >= ALONE_TICKS and len(self._trail.points) > 1
+
+    @property
     def unsure(self) -> bool:
         """True if a visible robot is not averaged yet, or an averaged robot is no longer visible."""
         motion, frame = self.motion, self.motion.frame
@@ -231,7 +279,14 @@ class Situation:
 
     def move(self, bearing_rad: float, hop_m: float, landmarks: Sequence[Landmark]) -> None:
         """Begin to drive to the slot ahead."""
+        (x, y), (ux, uy) = self.motion.position, unit(bearing_rad)
+        if hop_m > 0.0:
+            self._goal = x + hop_m * ux, y + hop_m * uy
         self._drive(move(self.motion, bearing_rad, hop_m, landmarks))
+
+    def regain(self, node: int) -> None:
+        """Begin to look for a robot that was in sight from the slot to which this robot has moved."""
+        self._drive(regain(self.motion, node, self._goal))
 
     def correct(self, anchors: Sequence[Sighting]) -> None:
         """Begin to correct the scale."""
@@ -250,6 +305,11 @@ class Situation:
         walk, margin_m = self.wall_walk, self.motion.parameters.margin_m
         self._drive(walk.away_from(station, bearings_rad, FIRST_HOP_M, CLEAR_M, margin_m))
 
+    def come_back(self) -> None:
+        """Begin to drive back into sight of another robot. The robot takes a new slot there."""
+        self._alone_since = None
+        self._drive(self._come_back())
+
     def stand(self) -> None:
         """End a drive: the robot stands still, for neighbours to average its bearing."""
         self._check_at_base()
@@ -259,6 +319,12 @@ class Situation:
     def _drive(self, drive: DriveToResult | DriveToWalk) -> None:
         self.local_map.begin_drive()
         self._activity = drive
+
+    def _come_back(self) -> DriveToResult:
+        result = yield from drive_back(self.motion, self._trail.points, lambda: bool(self.bearings))
+        self._returns += 1
+        self.local_map.occupy(adopted_slot(self.node, self.incarnation, self._returns))
+        return result
 
     def _look_around(self) -> Drive:
         motion, frame = self.motion, self.motion.frame

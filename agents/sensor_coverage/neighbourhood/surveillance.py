@@ -55,6 +55,9 @@ class Surveillance(Component):
                 situation.recover()
             elif situation.unsure:
                 situation.look_around()
+            elif situation.alone:
+                situation.come_back()
+                return
         basis = local_map.version, tuple(situation.motion.frame.seen), not situation.active
         if basis != self._basis or tick >= self._next_timer():
             self._basis = basis

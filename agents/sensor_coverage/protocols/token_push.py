@@ -23,7 +23,7 @@ from typing import Any, Final, NamedTuple
 
 import msgspec
 
-from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrapped
+from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import (
@@ -37,7 +37,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     PushToken,
     TakeSlot,
 )
-from zwerm.agents.sensor_coverage.motion.push_drives import AHEAD_RAD, DriveResult
+from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, WalkResult
@@ -47,12 +47,8 @@ from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS, PushPart
 from zwerm.agents.sensor_coverage.protocols.walls.wall_push import WallPush
 
-# A dead robot's body within BODY_AHEAD_RAD of a drive's direction may stop the drive. A robot in touch within
-# BODY_BESIDE_RAD has stopped it.
+# A dead robot's body within this angle [rad] of a drive's direction may stop the drive.
 BODY_AHEAD_RAD: Final = 0.3
-BODY_BESIDE_RAD: Final = math.pi / 2.0
-# A robot that pushes so many bodies still has a quarter of its speed, and does not count as stuck.
-PUSHED_MAX: Final = 3
 
 
 class TokenPush(PushPart, WallPush):
@@ -188,7 +184,7 @@ class TokenPush(PushPart, WallPush):
     def _blocked(self, result: DriveResult) -> None:
         """End the push after a test drive that met a wall; the first robot tries its other bearings before."""
         if self._plan is not None:
-            body = self._body_in_the_way(result, wrapped(self._plan.direction - self._heading))
+            body = self._situation.body_in_the_way(result, wrapped(self._plan.direction - self._heading))
             if body is None:
                 self._map.note_failure(self._plan, result.driven_m)
             else:
@@ -203,21 +199,6 @@ class TokenPush(PushPart, WallPush):
             return
         self._situation.stand()
         self.close(PushAborted(self.id, True))
-
-    def _body_in_the_way(self, result: DriveResult, bearing_rad: float) -> int | None:
-        """Return the robot that stopped a drive and may hide free space, or None.
-
-        Dead robots yield to a push, and bodies are smooth. So a body ahead that does not yield stands at a wall.
-        """
-        off = [(angle_between(each.bearing_rad, bearing_rad), each.node) for each in result.robots]
-        away_rad, body = min(((angle, node) for angle, node in off if node is not None), default=(math.pi, None))
-        if result.touched or away_rad > BODY_BESIDE_RAD:
-            return None
-        seen = self._situation.motion.frame.seen
-        dead = [node for node in self._situation.failure_detector.dead if node in seen]
-        row = [node for node in dead if angle_between(seen[node], bearing_rad) < BODY_BESIDE_RAD]
-        at_wall = body in dead and away_rad < AHEAD_RAD and len(row) <= PUSHED_MAX
-        return None if at_wall else body
 
     def _left_station(self, result: WalkResult) -> None:
         """Stand at the new slot where the first robot got away from the base along a wall, or end the push."""
@@ -287,9 +268,10 @@ class TokenPush(PushPart, WallPush):
             self._write(AllStanding(self.id))
 
     def _straighten(self) -> None:
-        """Correct the distance in a single file, where neither bearings nor a walk determined it."""
-        by_odometry = self._result.used_odometry and self._chain.origin not in self._map.distances_m
-        if by_odometry and self._back is not None:
+        """Correct the distance in a single file, where neither bearings nor a walk determined it, or that is too long."""
+        measured = self._chain.origin in self._map.distances_m
+        lost = self._behind_settled and self._back not in self._situation.bearings
+        if self._back is not None and (lost if measured else self._result.used_odometry):
             self._enter("straightening")
             self._situation.correct((Sighting(self._back, self._back_bearing_rad()),))
         else:
@@ -299,7 +281,7 @@ class TokenPush(PushPart, WallPush):
         """Repeat the visual homing on landmarks that were moving and stand still now."""
         states = self._map.states
         if not self._result.used_moving_landmarks or self._memory is None:
-            self._settled()
+            self._regain()
             return
         self._enter("homing")
         future = self._chain.future()
@@ -307,6 +289,16 @@ class TokenPush(PushPart, WallPush):
         still = {slot: node for slot, node in future.items() if slot not in moving}
         references = [msgspec.structs.replace(r, node=still.get(r.slot, r.node)) for r in self._memory.references]
         self._situation.move(0.0, 0.0, self._chain.landmarks(references, moving, self._heading, NOWHERE))
+
+    def _regain(self) -> None:
+        """Look for the robot ahead if it is out of sight: it drove from this slot to its own, so both see each other."""
+        ahead = self._chain.ahead
+        walks = self._walks and ahead == self._chain.leader[1]
+        if ahead is None or walks or ahead in self._situation.motion.frame.seen:
+            self._settled()
+        else:
+            self._enter("regaining")
+            self._situation.regain(ahead)
 
     def _correct(self) -> None:
         self._enter("correcting")
@@ -390,7 +382,8 @@ PHASES: Final[Mapping[str, Phase]] = {
                    wake=TokenPush._wake_for_ahead),
     "standing": Phase(((TokenPush._settled_behind, TokenPush._straighten),), wake=TokenPush._wake_for_behind),
     "straightening": Phase(arrived=lambda push, _: push._home()),
-    "homing": Phase(arrived=lambda push, _: push._settled()),
+    "homing": Phase(arrived=lambda push, _: push._regain()),
+    "regaining": Phase(arrived=lambda push, _: push._settled()),
     "await": Phase(((lambda push: push._walk_over or push._waited_for_ahead(), lambda push: push.close(PushDone(push.id))),),
                    wake=TokenPush._wake_for_ahead),
     # All: wait until the view agrees with the neighbours, inform the robot behind, and end.

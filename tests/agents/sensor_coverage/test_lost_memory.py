@@ -101,7 +101,8 @@ def test_a_message_names_the_incarnations_of_its_sender_and_of_its_only_receiver
 
 def test_counts_of_later_incarnations_are_greater_and_names_of_slots_are_unique() -> None:
     assert [first_count(each) for each in (1, 2)] == [0, 1 << 24]
-    names = [adopted_slot(node, incarnation) for node in (1, 2, 99_999) for incarnation in (2, 3, 250)]
+    ways = [(incarnation, returns) for incarnation in (1, 2, 3, 250) for returns in (0, 1, 15)]
+    names = [adopted_slot(node, *each) for node in (1, 2, 99_999) for each in ways]
     assert len(set(names)) == len(names)
     assert min(names) >= ADOPTED > first_count(2**31)
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(max(names))) == max(names)
@@ -259,9 +260,9 @@ def test_a_dead_body_ahead_that_does_not_yield_stands_at_a_wall(
     bearing_deg: float, dead: tuple[int, ...], walls: tuple[float, ...], hides: int | None
 ) -> None:
     bearing = math.radians(bearing_deg)
-    _, push = pushing({4: 0.1, 5: bearing, 6: -0.1, 9: 0.2}, dead)
+    robot, _ = pushing({4: 0.1, 5: bearing, 6: -0.1, 9: 0.2}, dead)
     stopped = DriveResult(False, driven_m=0.1, touched=walls, robots=(Touched(bearing, 5),))
-    assert push._body_in_the_way(stopped, 0.0) == hides
+    assert robot.situation.body_in_the_way(stopped, 0.0) == hides
 
 
 @pytest.mark.parametrize("end", [LOST, STRETCH, SHUT])

@@ -11,7 +11,8 @@ from zwerm.agents.sensor_coverage.messages.commands import Landmark
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
-from zwerm.agents.sensor_coverage.motion.push_drives import move
+from zwerm.agents.sensor_coverage.motion.push_drives import DriveToResult, drive_back, move, regain
+from zwerm.agents.sensor_coverage.motion.trail import Trail
 from zwerm.wire.messages import BodyVelocity
 
 RADIUS_M: Final = 0.07
@@ -107,3 +108,48 @@ def test_a_robot_goes_round_a_corner_on_its_straight_way(switches_deg: float) ->
     ):
         robot.go(velocity)
     assert math.dist(robot.at, goal) < 0.05
+
+
+class BesideDoor(BesideCorner):
+    """A robot that sees robot 9, in a room behind a wall, only from a place at most `sight_m` from the point (0, 0)."""
+
+    def __init__(self, at: tuple[float, float], sight_m: float) -> None:
+        self.sight_m = sight_m
+        super().__init__(shapely.box(9.0, 9.0, 9.1, 9.1), 0.0, 0.0, at)
+        self.frame.x_m, self.frame.y_m = at
+
+    def _read(self) -> None:
+        self.frame.seen = {9: bearing(self.at, (-0.9, 0.0))} if math.dist(self.at, (0.0, 0.0)) <= self.sight_m else {}
+
+
+def carry_out(robot: BesideDoor, drive: DriveToResult) -> bool:
+    while True:
+        try:
+            robot.go(next(drive))
+        except StopIteration as end:
+            return bool(end.value.ok)
+
+
+def test_a_robot_that_stopped_before_its_slot_looks_for_the_robot_ahead() -> None:
+    robot = BesideDoor((0.15, 0.0), 0.1)
+    assert carry_out(robot, regain(robot, 9, (0.0, 0.0)))
+    assert robot.at[0] == pytest.approx(0.1 - robot.parameters.margin_m, abs=2.0 * robot.parameters.creep_m)
+
+
+def test_a_robot_that_does_not_find_the_robot_ahead_drives_back() -> None:
+    robot = BesideDoor((0.15, 0.0), 0.0)
+    robot.sight_m = -1.0
+    assert not carry_out(robot, regain(robot, 9, (0.0, 0.0)))
+    assert robot.at == pytest.approx((0.15, 0.0), abs=robot.parameters.tolerance_m)
+
+
+def test_a_robot_drives_back_on_its_way_and_not_on_its_loops() -> None:
+    trail = Trail()
+    loop = [(0.3 + 0.1 * x, 0.1 * y) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))]
+    for at in [(0.1 * step, 0.0) for step in range(3)] + loop + [(0.3, -0.1), (0.3, -0.2)]:
+        trail.record(at)
+    points = [(0.0, 0.0), (0.1, 0.0), (0.2, 0.0), (0.3, 0.0), (0.3, -0.1), (0.3, -0.2)]
+    assert [math.dist(*each) for each in zip(trail.points, points, strict=True)] == pytest.approx([0.0] * 6)
+    robot = BesideDoor((0.3, -0.2), 0.15)
+    assert carry_out(robot, drive_back(robot, trail.points, lambda: 9 in robot.frame.seen))
+    assert robot.at == pytest.approx((0.1, 0.0), abs=0.06)
