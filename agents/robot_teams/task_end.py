@@ -8,7 +8,8 @@ from zwerm.agents.robot_teams.mapping.slice_map import CoverageCertificate, Slic
 from zwerm.agents.robot_teams.motion.manoeuvres import SliceGrid
 from zwerm.agents.robot_teams.motion.senses import DEAD_M, GAP_M, Senses
 
-# A robot nearer than this to an end stands in the same part of the free space: no wall and no wreck fits between [m].
+# A robot nearer than this to an end, or to its segment, stands in the same part of the free space: no wall and no wreck
+# fits between [m].
 AT_PLACE_M: Final = 0.1
 
 
@@ -41,7 +42,7 @@ class TaskEnd:
 
     @property
     def is_placed(self) -> bool:
-        """True if the robot stood at an end since it learned of the newest wreck, so that no wreck divides the two."""
+        """True if the robot stood at its end since it learned of the newest wreck, so that no wreck divides the two."""
         return self._placed >= self._map.wrecks
 
     def judge(self, here: End | None, senses: Senses) -> None:
@@ -76,5 +77,9 @@ class TaskEnd:
                     self._map.add(void._replace(low_mm=low, high_mm=high))
 
     def _is_at(self, end: End, senses: Senses) -> bool:
-        dx, dy = senses.x_m - self._grid.x_m(end.slice), senses.y_m - end.y_mm / 1000.0
+        """Return whether the robot stands at an end, or on the swept segment to its mate, and no wreck blocks that."""
+        mate = self._map.mate(end)
+        low, high = sorted((end.y_mm, end.y_mm if mate is None else mate.stop.y_mm))
+        dx, y_m = senses.x_m - self._grid.x_m(end.slice), senses.y_m
+        dy = max(low / 1000.0 - y_m, y_m - high / 1000.0, 0.0)
         return dx * dx + dy * dy <= AT_PLACE_M**2

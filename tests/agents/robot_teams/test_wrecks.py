@@ -203,6 +203,15 @@ def test_a_robot_that_a_wreck_may_divide_from_its_end_is_not_done_before_it_stan
     assert answer(robot, 0.5, 3.0, 4) == (False, ""), "a new wreck"
 
 
+@pytest.mark.parametrize(("low_mm", "done"), [(-900, True), (3_000, False)])
+def test_a_robot_on_the_swept_segment_of_its_end_is_done_unless_a_wreck_blocks_the_segment(
+    low_mm: int, done: bool
+) -> None:
+    """Another robot may stand at the end itself."""
+    robot = robot_at([*room(2), Void(0, 300, low_mm, low_mm + 800, WRECK)])
+    assert answer(robot, 0.05, 2.5) == (done, "")
+
+
 def test_a_robot_gives_up_where_nothing_that_it_reaches_is_open_and_something_else_is() -> None:
     robot = robot_at([*room(2), SweptSegment(9, 0, 5_000)])
     assert answer(robot, 0.0, 5.0) == (False, "blocked: no way leads to 4 open ends and ports")
