@@ -11,7 +11,6 @@ from typing import Any, Final, Protocol
 import msgspec
 
 from zwerm.agents.sensor_coverage.frontier.decisions import Services
-from zwerm.agents.sensor_coverage.frontier.directions import add_wall
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
@@ -216,8 +215,7 @@ class SensorCoverageCoordinator:
         slots.learn_headings(robot for robot, report in sorted(reports.items()) if report.sightings is not None)
         slot_of = slots.slot_of()
         for robot, report in sorted(reports.items()):
-            for bearing in report.touched:
-                add_wall(slots.walls.setdefault(slot_of[robot], []), bearing + slots.heading[robot])
+            slots.touch(slot_of[robot], [bearing + slots.heading[robot] for bearing in report.touched])
         views = slots.views()
         slots.learn_references(views)
         for robot, (station, report) in at_station.items():

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from operator import itemgetter
 
-from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_heading, refined_reference
+from zwerm.agents.sensor_coverage.frontier.directions import Reference, add_wall, refined_heading, refined_reference
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint, drives_away
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
@@ -24,8 +24,9 @@ class Slots:
 
     `occupant` has the robot at each slot. `heading` [rad] and `frame` are each robot's heading and the robot in whose
     frame it is. `view` has the bearings that each robot sees in its own frame. `walls` and `blocked` have, by slot, the
-    directions of walls, and of drives that a wall stopped. `felt` has the directions of walls closer than a body, and `near`
-    the arcs in which a wall close to a slot was followed.
+    directions of walls, and of drives that a wall stopped. `touching` has the directions of the walls that the present occupant
+    touches where it stands: another occupant may stand beside an opening. `felt` has the directions of walls closer than a
+    body, and `near` the arcs in which a wall close to a slot was followed.
     `walks` are the walls that robots followed. `length_m` has the distances [m] between slots that are not a hop apart.
     """
 
@@ -35,6 +36,7 @@ class Slots:
         self.view: dict[int, dict[int, float]] = {}
         self.walls: dict[int, list[float]] = {}
         self.blocked: dict[int, list[float]] = {}
+        self.touching: dict[int, list[float]] = {}
         self.felt: dict[int, list[float]] = {}
         self.near: dict[int, list[Arc]] = {}
         self.walks: list[Walk] = []
@@ -70,12 +72,21 @@ class Slots:
         if robot is not None:
             self.view.pop(robot, None)
         self.walls.pop(slot, None)
+        self.touching.pop(slot, None)
         self.felt.pop(slot, None)
         self.near.pop(slot, None)
 
     def take(self, robot: int, sightings: Iterable[Sighting]) -> None:
         """Store the bearings that a robot reports, in its own frame."""
         self.view[robot] = {each.node: each.bearing_rad for each in sightings}
+
+    def touch(self, slot: int, directions: Iterable[float]) -> bool:
+        """Store the directions [rad] of the walls that the occupant touches now; return whether anything has changed."""
+        before, now = self.touching.get(slot, []), list(directions)
+        self.touching[slot] = now
+        walls = self.walls.setdefault(slot, [])
+        added = [each for each in now if add_wall(walls, each)]
+        return bool(added) or before != now
 
     def views(self) -> dict[int, dict[int, float]]:
         """Return the directions [rad] of the slots that each slot sees, in its frame."""
@@ -137,7 +148,7 @@ class Slots:
                 self.heading[robot] += by
                 self.frame[robot] = new
         for slot in turned:
-            for known in (self.walls, self.blocked, self.felt):
+            for known in (self.walls, self.blocked, self.touching, self.felt):
                 if slot in known:
                     known[slot] = [each + by for each in known[slot]]
             self.near[slot] = [Arc(each.start_rad + by, each.width_rad) for each in self.near.get(slot, ())]

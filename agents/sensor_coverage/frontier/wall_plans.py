@@ -41,7 +41,7 @@ class WallPlans:
     def open_arcs(self, scan: ScanResult) -> dict[int, list[Arc]]:
         """Return the arcs in which each slot is open."""
         slots = self._slots
-        touched = {slot: [*slots.walls.get(slot, ()), *slots.felt.get(slot, ())] for slot in scan.complex_.vertices}
+        touched = {slot: [*slots.touching.get(slot, ()), *slots.felt.get(slot, ())] for slot in scan.complex_.vertices}
         for slot in self._proof.update(scan, slots.walks, touched, slots.near):
             self.tried.pop(slot, None)
         return self._proof.open_arcs()

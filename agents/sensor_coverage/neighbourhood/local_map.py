@@ -10,7 +10,7 @@ from itertools import islice
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
-from zwerm.agents.sensor_coverage.frontier.directions import Reference, add_wall, refined_reference, wrapped
+from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_reference, wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof
@@ -84,13 +84,12 @@ class LocalMap(NeighbourTable):
 
     def update_walls(self, bearings: tuple[float, ...]) -> None:
         """Remember the walls that this robot touches, by their bearings [rad]."""
-        if self.heading is None or self.slot == NOWHERE:
+        heading = self.heading
+        if heading is None or self.slot == NOWHERE:
             return
-        walls = self._slots.walls.setdefault(self.slot, [])
-        for bearing in bearings:
-            if add_wall(walls, wrapped(bearing + self.heading)):
-                self._plan_basis = None
-                self.change()
+        if self._slots.touch(self.slot, [wrapped(each + heading) for each in bearings]):
+            self._plan_basis = None
+            self.change()
 
     def memory(self) -> SlotMemory:
         """Return the memory of this slot, for its next occupant."""
@@ -272,7 +271,7 @@ class LocalMap(NeighbourTable):
         """Take the present view into the proof of coverage."""
         me, slots = self.slot, self._slots
         self.proof.lose(*(each.slot for each in self.states.values() if each.redundant))
-        self.proof.update(me, scan or self.scan(), (*slots.walls.get(me, ()), *slots.felt.get(me, ())))
+        self.proof.update(me, scan or self.scan(), (*slots.touching.get(me, ()), *slots.felt.get(me, ())))
 
     def scan(self) -> ScanResult:
         """Return the views of this robot and its neighbours as a scan, by this robot's slot."""

@@ -1,5 +1,7 @@
 """Complete runs of sensor coverage without a coordinator in a small hall: the end, the deciding node, and no lost robot."""
 
+import math
+
 import pytest
 
 from zwerm.agents.runtime.node import Node
@@ -209,6 +211,19 @@ def test_the_next_robot_at_a_slot_inherits_the_distances_that_a_walk_measured() 
     assert second.distances_m == {3: 0.24}
     second.vacate()
     assert second.distances_m == {}
+
+
+def test_a_wall_that_only_the_former_occupant_of_a_slot_touched_proves_nothing() -> None:
+    """The new occupant stands a few centimetres beside it, and that may be in front of a door."""
+    first, second = (LocalMap(node, PlannerParameters(walls="followed"), Planner) for node in (7, 8))
+    first.heading = second.heading = 0.0
+    first.occupy(5)
+    first.update_walls((0.0,))
+    first.update_proof()
+    assert [round(math.degrees(each.width_rad)) for each in first.proof.open_arcs()] == [270]
+    second.inherit(first.memory())
+    second.update_proof()
+    assert [round(math.degrees(each.width_rad)) for each in second.proof.open_arcs()] == [360]
 
 
 # --- who provides what ----------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ ALONE = ("services.path=gradient",)
         pytest.param(5, False, (), id="central, a bend of 1.3 bodies"),
         pytest.param(5, False, ALONE, id="decentralised, a bend of 1.3 bodies"),
         pytest.param(13, True, ALONE, id="decentralised, a body in a door of 1.8 bodies"),
+        pytest.param(38, False, ALONE, id="decentralised, a robot in a door beside which another one touched the wall"),
     ],
 )
 def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[str, ...]) -> None:
