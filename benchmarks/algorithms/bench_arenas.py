@@ -28,9 +28,10 @@ from typing import Final
 
 import msgspec
 
-from benchmarks.algorithms.bench_buildings import ENOUGH, VARIANTS, numbers_of
+from benchmarks.algorithms.bench_buildings import numbers_of
 from benchmarks.common.campaign import add_campaign_options, carry_out, commit_of_copy, grouped
 from benchmarks.common.csv_rows import write_csv
+from benchmarks.common.verdicts import ENOUGH, VARIANTS, verdict
 from zwerm import run
 from zwerm.scenario.load import load
 
@@ -116,10 +117,8 @@ def one_run(case: Case, folder: Path, more: Sequence[str]) -> dict[str, str]:
     else:
         found, outcome, reason, sim_s = result.metrics, result.outcome, result.reason, result.sim_s
     seen = found.get("reachable_coverage_fraction", math.nan)
-    if outcome == "completed":
-        outcome = "right" if seen >= ENOUGH else "false"
     return row | {
-        "verdict": outcome,
+        "verdict": verdict(outcome, seen),
         "reachable_coverage": f"{seen:.4f}",
         "robots": f"{found.get('robots_deployed', math.nan):g}",
         "robots_over_hexagonal": f"{found.get('robots_over_hexagonal', math.nan):.3f}",

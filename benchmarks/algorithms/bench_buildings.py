@@ -24,13 +24,12 @@ import msgspec
 
 from benchmarks.common.campaign import add_campaign_options, carry_out, grouped
 from benchmarks.common.csv_rows import write_csv
+from benchmarks.common.verdicts import VARIANTS, verdict
 from tests.helpers.random_buildings import KINDS, random_building
 from zwerm import run
 
-ENOUGH: Final = 0.98
 WELL: Final = 0.99
 BODY_M: Final = 0.14
-VARIANTS: Final = {"central": (), "decentralised": ("services.path=gradient",)}
 # The latest death [s]. Buildings are covered after 400 to 2,500 s.
 LATEST_S: Final = {"central": 1500, "decentralised": 1000}
 ONE_BY_ONE: Final = ",".join(['{kind="crash", fraction=0.01, between_s=[10.0, LATEST]}'] * 10)
@@ -79,10 +78,9 @@ def one_run(case: Case, more: Sequence[str]) -> dict[str, str]:
     result = run("sensor-coverage-map", seed=int(case.seed), runner="inline", overrides=settings)
     found = result.metrics
     seen = found["reachable_coverage_fraction"]
-    completed = "right" if seen >= ENOUGH else "false"
     return {
         **msgspec.structs.asdict(case),
-        "verdict": completed if result.outcome == "completed" else result.outcome,
+        "verdict": verdict(result.outcome, seen),
         "reachable_coverage": f"{seen:.4f}",
         "robots": f"{found['robots_deployed']:g}",
         "robots_over_hexagonal": f"{found['robots_over_hexagonal']:.3f}",

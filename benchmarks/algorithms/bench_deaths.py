@@ -24,13 +24,12 @@ import msgspec
 import numpy as np
 
 from benchmarks.common.campaign import add_campaign_options, carry_out, commit_of_copy, grouped
+from benchmarks.common.chosen_crash import ChosenCrash
 from benchmarks.common.csv_rows import write_csv
+from benchmarks.common.verdicts import ENOUGH
 from zwerm import RunResult, run
-from zwerm.scenario.tables import Scenario
-from zwerm.world.faults.programs.crash import Crash
-from zwerm.world.scene import Scene
+from zwerm.world.scene import Ints, Scene
 
-ENOUGH: Final = 0.98
 VERDICTS: Final = ("right", "honest", "wrong")
 
 
@@ -60,22 +59,13 @@ SILENT_S: Final = 240.0
 DURATION_S: Final = 8_000.0
 
 
-class CrashBesideBase(Crash):
+class CrashBesideBase(ChosenCrash):
     """The robots in sight of the base crash for good."""
 
-    @classmethod
-    def check(cls, parameters: Any, scenario: Scenario) -> list[str]:
-        """Return no mistake."""
-        return []
-
-    def strike(self, scene: Scene, dead: Sequence[int]) -> Sequence[int]:
-        """Choose the robots within the range of the base, once there is one."""
-        if self.nodes:
-            return ()
-        robots = np.setdiff1d(scene.present_ids(), [0, *dead])
+    def choose(self, scene: Scene, robots: Ints) -> list[int]:
+        """Return the robots within the range of the base."""
         away_m = np.hypot(*(scene.position[robots] - scene.position[0]).T)
-        self.nodes = sorted(robots[away_m < 1.0].tolist())
-        return self.nodes
+        return sorted(robots[away_m < 1.0].tolist())
 
 
 def schedule(kind: str, hall: Hall, seed: int) -> list[dict[str, Any]]:

@@ -21,13 +21,12 @@ import msgspec
 from benchmarks.common.campaign import add_campaign_options, carry_out, grouped
 from benchmarks.common.csv_rows import write_csv
 from benchmarks.common.small_buildings import small_building
+from benchmarks.common.verdicts import ENOUGH, VARIANTS, verdict
 from zwerm import run
 
-ENOUGH: Final = 0.98
 # 1.3 times the diameter of a body.
 SURE_M: Final = 0.182
 DURATION_S: Final = 3000.0
-VARIANTS: Final = {"central": (), "decentralised": ("services.path=gradient",)}
 
 
 class Case(msgspec.Struct, frozen=True):
@@ -58,12 +57,11 @@ def one_run(case: Case, more: Sequence[str]) -> dict[str, str]:
     began = time.process_time()
     result = run("sensor-coverage-narrow", seed=int(case.seed), runner="inline", overrides=settings)
     seen = result.metrics["reachable_coverage_fraction"]
-    completed = "right" if seen >= ENOUGH else "false"
     return {
         **msgspec.structs.asdict(case),
         "joints": building.joints,
         "narrowest_m": f"{building.narrowest_m:.4f}",
-        "verdict": completed if result.outcome == "completed" else result.outcome,
+        "verdict": verdict(result.outcome, seen),
         "died": f"{1 - result.metrics['faults_missed']:g}" if case.death == "yes" else "0",
         "reachable_coverage": f"{seen:.4f}",
         "robots": f"{result.metrics['robots_deployed']:g}",

@@ -10,17 +10,16 @@ chicane    a passage with two right-angled bends
 Some rooms have a niche of the same widths. The base stands at a drawn place of the first room, with a drawn heading.
 """
 
-from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import shapely
 import shapely.affinity
 from shapely.geometry import Polygon, box
 
-from zwerm.scenario.tables import Scenario
-from zwerm.world.faults.programs.crash import Crash, CrashTable
-from zwerm.world.scene import Scene
+from benchmarks.common.chosen_crash import ChosenCrash
+from zwerm.world.faults.programs.crash import CrashTable
+from zwerm.world.scene import Ints, Scene
 
 OPENINGS_M: Final = (0.17, 0.45)
 # A third of the openings is narrower than this [m], twice the width of a body.
@@ -69,26 +68,18 @@ class OpeningTable(CrashTable):
     y_max: float
 
 
-class CrashInOpening(Crash):
+class CrashInOpening(ChosenCrash):
     """The first robot in a rectangle crashes for good."""
 
     Parameters = OpeningTable
 
-    @classmethod
-    def check(cls, parameters: Any, scenario: Scenario) -> list[str]:
-        """Return no diagnostics."""
-        return []
-
-    def strike(self, scene: Scene, dead: Sequence[int]) -> Sequence[int]:
-        """Return the robot that is dead."""
-        if self.nodes:
-            return ()
+    def choose(self, scene: Scene, robots: Ints) -> list[int]:
+        """Return the robot of the smallest id in the rectangle."""
         table = self.parameters
-        robots = np.setdiff1d(scene.present_ids(), [0, *dead])
         x, y = scene.position[robots].T
         inside = (table.x_min < x) & (x < table.x_max) & (table.y_min < y) & (y < table.y_max)
-        self.nodes = robots[inside][:1].tolist()
-        return self.nodes
+        chosen: list[int] = robots[inside][:1].tolist()
+        return chosen
 
 
 def small_building(seed: int) -> SmallBuilding:

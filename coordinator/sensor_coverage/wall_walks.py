@@ -9,6 +9,8 @@ import math
 from collections.abc import Collection, Sequence
 from typing import Final
 
+import msgspec
+
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
@@ -219,10 +221,8 @@ def past_dead(command: ToWall | FollowWall, silent: Collection[int]) -> ToWall |
     dead = tuple(silent)[-DEAD_MAX:]
     if not dead:
         return command
-    fields = {name: getattr(command, name) for name in command.__struct_fields__}
-    return (
-        ToWallPastDead(**fields, dead=dead) if isinstance(command, ToWall) else FollowWallPastDead(**fields, dead=dead)
-    )
+    named = ToWallPastDead if isinstance(command, ToWall) else FollowWallPastDead
+    return named(**msgspec.structs.asdict(command), dead=dead)
 
 
 def _line(waypoints: Sequence[Waypoint]) -> float | None:
