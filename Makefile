@@ -9,6 +9,7 @@ UV ?= uv
 
 RUN_READY := $(VENV)/.run-ready
 DEV_READY := $(VENV)/.dev-ready
+COMPILED := $(VENV)/.compiled
 
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
@@ -17,18 +18,14 @@ COMPILE := $(UV) pip compile --quiet --universal --python-version 3.11 --generat
 .DEFAULT_GOAL := help
 APT_TOOLS := iproute2 nftables ffmpeg chromium
 
-.PHONY: help setup dev compile tools run test lint format pages docs bench regressions fidelity package lock clean
+.PHONY: help setup dev tools run test lint format pages docs bench regressions fidelity package lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: $(RUN_READY)  ## make .venv with the zwerm command in it
+setup: $(RUN_READY) $(COMPILED)  ## make .venv with the zwerm command in it
 
-dev: $(DEV_READY)  ## add what tests, linters and documentation need
-
-compile: dev  ## make a C extension of the inner loop of Voronoi coverage (needs a C compiler)
-	ZWERM_COMPILE=1 $(BIN)/python setup.py -q build_ext --inplace
-	@echo "compile: done; what is changed in zwerm/maths/cached_voronoi_cell.py from now on counts after the next make compile or make clean"
+dev: $(DEV_READY) $(COMPILED)  ## add what tests, linters and documentation need
 
 tools:  ## install what the twin on a real network, MP4 and the test of the search need (as root, with apt-get; else say so)
 	@missing=; for each in ip tc nft ffmpeg chromium; do command -v $$each >/dev/null || missing=1; done; \
@@ -61,9 +58,7 @@ pages: dev  ## write the generated parts of the documentation into its pages
 docs: dev  ## build the documentation into site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-bench: dev  ## run the benchmarks, Voronoi coverage compiled where there is a C compiler
-	@if command -v cc >/dev/null && $(BIN)/python -c "import os, sys, sysconfig as s; sys.exit(not os.path.exists(s.get_path('include') + '/Python.h'))"; \
-	then $(MAKE) --no-print-directory compile; else echo "bench: Voronoi coverage is interpreted, there is no C compiler"; fi
+bench: dev  ## run the benchmarks
 	@for each in benchmarks/*/bench_*.py; do \
 	  module=$$(echo "$${each%.py}" | tr / .); echo "== $$module"; $(BIN)/python -m "$$module" || exit 1; done
 
@@ -95,4 +90,13 @@ $(RUN_READY): requirements.txt pyproject.toml
 $(DEV_READY): $(RUN_READY) requirements-dev.txt
 	@echo "Installing what requirements-dev.txt locks into $(VENV)"
 	@$(PIP) install --quiet --require-hashes -r requirements-dev.txt
+	@touch $@
+
+# The extension counts, once it is there, in place of its source: so a change of the source makes it anew.
+$(COMPILED): $(RUN_READY) setup.py zwerm/maths/cached_voronoi_cell.py zwerm/maths/polygons.py
+	@rm -f zwerm/maths/*.so
+	@if [ "$(INTERPRETED)" = 1 ]; then echo "INTERPRETED=1: Voronoi coverage stays interpreted"; \
+	elif ZWERM_COMPILE=1 $(BIN)/python setup.py -q build_ext --inplace >$(VENV)/compile.log 2>&1; then echo "Compiled the inner loop of Voronoi coverage"; \
+	else rm -f zwerm/maths/*.so; echo "No C extension could be made ($(VENV)/compile.log says why): Voronoi coverage stays interpreted, with the same traces"; fi
+	@rm -rf build
 	@touch $@

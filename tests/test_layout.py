@@ -370,7 +370,7 @@ for module in pkgutil.walk_packages(zwerm.__path__, "zwerm."):
         importlib.import_module(module.name)
 files = collections.defaultdict(list)
 for name, module in list(sys.modules.items()):
-    if getattr(module, "__file__", None):
+    if getattr(module, "__file__", None) and not name.endswith("__mypyc"):  # the shared part of a compiled module
         files[os.path.realpath(module.__file__)].append(name)
 ours = {file: names for file, names in files.items() if file.startswith(sys.argv[1] + os.sep) and ".venv" not in file}
 print(len(ours))

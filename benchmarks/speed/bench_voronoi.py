@@ -51,7 +51,7 @@ def main() -> None:
     arguments = parser.parse_args()
     code = "interpreted" if cached_voronoi_cell.__file__.endswith(".py") else "compiled"
     if arguments.code not in (None, code):
-        parser.error(f"the cell is {code}; for the other run `make compile`, or remove zwerm/maths/*.so")
+        parser.error(f"the cell is {code}; for the other run `make -B setup` with or without INTERPRETED=1")
     rows = []
     print(f"best of {arguments.repeats}, the cell {code}")
     print(f"{'robots':>6} {'x real time':>12} {'target':>7} {'us/robot-tick':>14} {'controller us':>14}")

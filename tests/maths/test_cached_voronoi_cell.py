@@ -2,6 +2,8 @@
 
 import importlib.util
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +11,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from zwerm import run
 from zwerm.maths import cached_voronoi_cell
 from zwerm.maths.cached_voronoi_cell import CachedVoronoiCell
 from zwerm.maths.polygons import estimated_centroid, nearest_point, voronoi_cell
 from zwerm.wire.messages import Neighbour
 from zwerm.world.geometry.tessellation import Tessellation
+
+COMPILED = pytest.mark.skipif(
+    cached_voronoi_cell.__file__.endswith(".py"), reason="the C extension of the cell has not been made: no C compiler"
+)
+# Prints the trace of a run, with the source of the cell where the extension is.
+INTERPRETED = """
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+spec = spec_from_file_location("zwerm.maths.cached_voronoi_cell", sys.argv[1])
+module = sys.modules[spec.name] = module_from_spec(spec)
+spec.loader.exec_module(module)
+from zwerm import run
+print(run("voronoi-coverage-table1", runner="inline", overrides=sys.argv[2:]).trace)
+assert sys.modules[spec.name] is module
+"""
 
 SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 ANGLES = np.arange(7) * (math.tau / 7)
@@ -79,7 +97,7 @@ def test_the_cache_changes_no_bit_of_an_answer():
     assert 100 < found_anew < 1000  # of 1800: orders were kept, and orders were found
 
 
-@pytest.mark.skipif(cached_voronoi_cell.__file__.endswith(".py"), reason="make compile has not been run")
+@COMPILED
 def test_the_compiled_cell_is_that_of_its_source_to_the_bit_and_no_older():
     source = Path(cached_voronoi_cell.__file__).with_name("cached_voronoi_cell.py")
     assert Path(cached_voronoi_cell.__file__).stat().st_mtime >= source.stat().st_mtime
@@ -93,6 +111,15 @@ def test_the_compiled_cell_is_that_of_its_source_to_the_bit_and_no_older():
             corners, others = seen(position, robot, SQUARE)
             found = plain.target(corners, others, 1.0, 0.3, -0.2)
             assert compiled.target(corners, others, 1.0, 0.3, -0.2) == found
+
+
+@COMPILED
+def test_a_run_has_the_same_trace_interpreted():
+    overrides = ["robots.count=12", "time.duration_s=5.0"]
+    source = Path(cached_voronoi_cell.__file__).with_name("cached_voronoi_cell.py")
+    command = [sys.executable, "-c", INTERPRETED, str(source), *overrides]
+    interpreted = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    assert run("voronoi-coverage-table1", runner="inline", overrides=overrides).trace == interpreted
 
 
 @settings(max_examples=150, deadline=None)
