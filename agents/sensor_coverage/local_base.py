@@ -23,7 +23,6 @@ class LocalBase(LocalNode):
         situation.local_map.heading = 0.0
         self.schedule = PushScheduler(situation, self.beaconing, self.completion)
         membership: list[Component] = []
-        situation.local_map.home = 0
         if situation.negotiation is not None:
             membership = [Membership(situation, situation.negotiation, self.advice_client)]
         self.components = ComponentLoop(

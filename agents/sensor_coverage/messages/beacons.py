@@ -56,7 +56,7 @@ class PathVector(_BeaconMessage, frozen=True, tag="path"):
     """The route from a slot, by the robot at the slot; `number` counts the sender's path vectors.
 
     `ended` has (slot, claim): this claim of the slot and all earlier ones have ended, the newest last. `home` is the
-    number of hops to the base, or FAR if unknown.
+    number of hops to the base, or FAR if unknown, and `base_count` the base's count that came that way.
     """
 
     number: int
@@ -64,6 +64,7 @@ class PathVector(_BeaconMessage, frozen=True, tag="path"):
     route: Route | None
     ended: tuple[tuple[int, int], ...] = ()
     home: int = FAR
+    base_count: int = 0
 
 
 # The path vector of a robot that has sent none.

@@ -1,4 +1,4 @@
-"""The way that a robot came, by odometry. A robot that sees no other robot any more drives back on it."""
+"""The way that a robot came, by odometry. A robot that lost sight of others drives back on it."""
 
 import math
 from typing import Final
@@ -27,3 +27,9 @@ class Trail:
                 return
         points.append(at)
         del points[:-POINTS_MAX]
+
+    def since(self, at: Vector) -> list[Vector]:
+        """Return the points after the latest one beside a position, with that position as the first."""
+        points = self.points
+        beside = (index for index in range(len(points) - 1, -1, -1) if math.dist(at, points[index]) < SPACING_M)
+        return [at, *points[next(beside, len(points)) + 1 :]]

@@ -117,7 +117,10 @@ class Beaconing(Component):
     def _path_vector(self) -> PathVector:
         """Return the path vector with the present route."""
         self._sent_at = self._tick
-        slot, route, home = self._local_map.slot, self._local_map.route, self._local_map.home
-        if (self._sent.slot, self._sent.route, self._sent.home) != (slot, route, home):
-            self._sent = PathVector(self._sent.number + 1, slot, route, self._local_map.path_vectors.ended, home)
+        local_map, sent = self._local_map, self._sent
+        reach = local_map.reach
+        new = local_map.slot, local_map.route, reach.hops, reach.count
+        if (sent.slot, sent.route, sent.home, sent.base_count) != new:
+            slot, route, hops, count = new
+            self._sent = PathVector(sent.number + 1, slot, route, local_map.path_vectors.ended, hops, count)
         return self._sent

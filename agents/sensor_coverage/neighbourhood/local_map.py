@@ -167,6 +167,7 @@ class LocalMap(NeighbourTable):
         self._planner = self._make_planner(self.parameters, self._slots)
         self._drop_plans()
         self.proof, self.distances_m = SlotProof(), {}
+        self.reach.leave()
         self._bodies.stopped = {}
         self._plan_basis = None
         self._led = None

@@ -14,6 +14,7 @@ import msgspec
 from zwerm.agents.sensor_coverage.frontier.directions import refined_heading
 from zwerm.agents.sensor_coverage.messages.beacons import FAR, NOWHERE, StateBeacon
 from zwerm.agents.sensor_coverage.messages.incarnations import first_count
+from zwerm.agents.sensor_coverage.neighbourhood.base_reach import BaseReach
 
 # Bound of the ticks that a slot may take to pass from one robot to the next.
 HANDOVER_TICKS_MAX: Final = 80
@@ -32,7 +33,7 @@ class NeighbourTable:
 
     `at_base`: the robot stands at the base's own point, where it came out of the depot; None while it does not know,
     which is so after a restart. `slot` is where the robot stands. `redundant`: it has left the complex, and its body
-    still stands there. `home` is the number of hops to the base. `epoch` counts its drives, and `samples` its averages
+    still stands there. `reach` has the hops to the base. `epoch` counts its drives, and `samples` its averages
     of bearings. `heading` [rad] is in the base's frame, or None if unknown. `distances_m` has the distances [m] from its slot
     to others that are not a hop away, as a walk measured them. `version` counts all changes: between two
     changes, no decision changes.
@@ -43,7 +44,7 @@ class NeighbourTable:
         self.at_base = True if incarnation == 1 else None
         self.slot = NOWHERE
         self.redundant = False
-        self.home = FAR
+        self.reach = BaseReach(FAR)
         self.epoch = first_count(incarnation)
         self.moving = False
         self.heading: float | None = None

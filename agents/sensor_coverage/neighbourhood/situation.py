@@ -10,7 +10,7 @@ import numpy as np
 from zwerm.agents.runtime.contract import Setup
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
-from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.beacons import FAR, NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Landmark, Sighting
 from zwerm.agents.sensor_coverage.messages.incarnations import adopted_slot
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
@@ -49,6 +49,8 @@ RECOVERIES_MAX: Final = 4
 # Ticks that a standing robot sees no robot before it drives back on its way: one may be on its way to it.
 ALONE_TICKS: Final = 200
 
+# A dead robot's body within this angle [rad] of a drive's direction may stop the drive.
+BODY_AHEAD_RAD: Final = 0.3
 # A robot in touch within this angle [rad] of a drive's direction has stopped the drive.
 BODY_BESIDE_RAD: Final = math.pi / 2.0
 # A robot that pushes so many bodies still has a quarter of its speed, and does not count as stuck.
@@ -92,10 +94,12 @@ class Situation:
         self.on_arrived: Callable[[DriveResult | WalkResult], None] = lambda _: self.stand()
         self._activity: Generator[BodyVelocity, None, DriveResult | WalkResult | None] | None = self._look_around()
         self._recoveries = self._recovered_at = 0
-        self._goal = self.motion.position  # of the latest move, by odometry
+        self._start = self._goal = self.motion.position  # of the latest push, by odometry
         self._trail = Trail()
         self._alone_since: int | None = None
         self._returns = 0
+        self._company: dict[int, None] = {}  # robots of this robot's part of the swarm, since the base is out of reach
+        self._cut_at = 0
 
     # --- every tick -------------------------------------------------------------------------------------------------
 
@@ -153,6 +157,11 @@ class Situation:
         apart = {node: angle_between(seen[node], bearing_rad) for node in self.failure_detector.dead if node in seen}
         body = min(apart, key=lambda node: apart[node], default=None)
         return body if body is not None and apart[body] < within_rad else None
+
+    def clear_m(self, bearing_rad: float, wanted_m: float) -> float:
+        """Return how far [m] a leader has to get: less where a dead robot's body stands, which it sees past."""
+        in_the_way = self.dead_ahead(bearing_rad, BODY_AHEAD_RAD)
+        return wanted_m if in_the_way is None else min(wanted_m, self.local_map.parameters.near_wall_m)
 
     def body_in_the_way(self, result: DriveResult, bearing_rad: float) -> int | None:
         """Return the robot that stopped a drive and may hide free space, or None.
@@ -233,6 +242,25 @@ class Situation:
         return self.tick - self._alone_since >= ALONE_TICKS and len(self._trail.points) > 1
 
     @property
+    def homes(self) -> dict[int, tuple[int, int]]:
+        """The neighbours' hops to the base, and the count of the base that came that way."""
+        homes = self.local_map.path_vectors.homes
+        return {node: homes.get(state.slot, (FAR, 0)) for node, state in self.local_map.mutual().items()}
+
+    def is_cut_off(self) -> bool:
+        """Return whether the base is out of reach of this robot and its neighbours, and it is this robot's turn to drive back.
+
+        A robot that sees the base is not: the base's radio may have failed.
+        """
+        local_map = self.local_map
+        if self.active or self.in_push or not self.calm or local_map.slot in (0, NOWHERE):
+            return False
+        homes = self.homes
+        if not homes or local_map.at(0) in self.bearings:
+            return False
+        return local_map.reach.is_turn(self.tick, self.node, {node: hops for node, (hops, _) in homes.items()})
+
+    @property
     def unsure(self) -> bool:
         """True if a visible robot is not averaged yet, or an averaged robot is no longer visible."""
         motion, frame = self.motion, self.motion.frame
@@ -275,12 +303,14 @@ class Situation:
 
     def deploy(self, bearing_rad: float, hop_m: float, clear_m: float) -> None:
         """Begin to drive into unknown space."""
+        self._start = self.motion.position
         self._drive(deploy(self.motion, bearing_rad, hop_m, clear_m, lambda: self.on_cleared()))
 
     def move(self, bearing_rad: float, hop_m: float, landmarks: Sequence[Landmark]) -> None:
         """Begin to drive to the slot ahead."""
         (x, y), (ux, uy) = self.motion.position, unit(bearing_rad)
         if hop_m > 0.0:
+            self._start = x, y
             self._goal = x + hop_m * ux, y + hop_m * uy
         self._drive(move(self.motion, bearing_rad, hop_m, landmarks))
 
@@ -306,9 +336,21 @@ class Situation:
         self._drive(walk.away_from(station, bearings_rad, FIRST_HOP_M, CLEAR_M, margin_m))
 
     def come_back(self) -> None:
-        """Begin to drive back into sight of another robot. The robot takes a new slot there."""
+        """Begin to drive back into sight of a robot that is not of this part of the swarm. The robot takes a new slot there."""
         self._alone_since = None
+        reach = self.local_map.reach
+        if reach.newest != self._cut_at:
+            self._company.clear()
+        self._cut_at = reach.newest
+        self._company |= dict.fromkeys(self.bearings)
+        for node in self.bearings:
+            state = self.local_map.states.get(node)
+            self._company |= dict.fromkeys(each.node for each in state.seen) if state is not None else {}
         self._drive(self._come_back())
+
+    def come_back_to(self, node: int) -> None:
+        """Begin to drive back into sight of a robot that stands where this robot stood before the push, or stay."""
+        self._drive(self._come_back_to(node, [*self._trail.since(self._start), self.motion.position]))
 
     def stand(self) -> None:
         """End a drive: the robot stands still, for neighbours to average its bearing."""
@@ -321,9 +363,18 @@ class Situation:
         self._activity = drive
 
     def _come_back(self) -> DriveToResult:
-        result = yield from drive_back(self.motion, self._trail.points, lambda: bool(self.bearings))
+        result = yield from drive_back(
+            self.motion, self._trail.points, lambda: any(each not in self._company for each in self.bearings)
+        )
         self._returns += 1
+        self.local_map.reach.tried(self.tick)
         self.local_map.occupy(adopted_slot(self.node, self.incarnation, self._returns))
+        return result
+
+    def _come_back_to(self, node: int, way: Sequence[Vector]) -> DriveToResult:
+        result = yield from drive_back(self.motion, way, lambda: node in self.bearings)
+        if not result.ok:
+            yield from drive_back(self.motion, way[::-1], lambda: False)
         return result
 
     def _look_around(self) -> Drive:

@@ -3,7 +3,7 @@
 from typing import ClassVar, Final
 
 from zwerm.agents.sensor_coverage.messages.beacons import PathVector, StateBeacon
-from zwerm.agents.sensor_coverage.messages.incarnations import adopted_slot
+from zwerm.agents.sensor_coverage.messages.incarnations import adopted_slot, first_count
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.component import Component
@@ -48,14 +48,17 @@ class Surveillance(Component):
     def poll(self, tick: int) -> None:
         """Update the local map if anything has changed; do nothing during a drive."""
         situation, local_map = self._situation, self._situation.local_map
+        if local_map.slot == 0:
+            local_map.reach.be_base(tick, first_count(situation.incarnation))
         if local_map.moving:
             return
+        local_map.reach.update(tick, situation.homes.values())
         if not situation.active:
             if situation.displaced:
                 situation.recover()
             elif situation.unsure:
                 situation.look_around()
-            elif situation.alone:
+            elif situation.alone or situation.is_cut_off():
                 situation.come_back()
                 return
         basis = local_map.version, tuple(situation.motion.frame.seen), not situation.active

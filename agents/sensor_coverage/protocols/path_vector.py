@@ -30,13 +30,13 @@ ENDED_MAX: Final = 6
 class PathVectorProtocol:
     """One robot's `route`, and those of its neighbours. `version` counts what was new in their messages.
 
-    `homes` has the number of hops to the base, by slot.
+    `homes` has the number of hops to the base, and the base's count that came that way, by slot.
     """
 
     def __init__(self) -> None:
         self.route: Route | None = None
         self.version = 0
-        self.homes: dict[int, int] = {}
+        self.homes: dict[int, tuple[int, int]] = {}
         self._numbers: dict[int, int] = {}  # robot: number of its newest message
         self._routes: dict[int, Route | None] = {}  # slot: the route that begins there
         self._claims: dict[int, int] = {}  # slot: the newest claim that was received
@@ -50,7 +50,7 @@ class PathVectorProtocol:
         self._numbers[sender] = message.number
         for slot, claim in message.ended:
             self._end(slot, claim)
-        self.homes[message.slot] = message.home
+        self.homes[message.slot] = message.home, message.base_count
         if message.route is not None:
             self._hear(message.route)
         if message.slot != NOWHERE and self._routes.get(message.slot) != message.route:

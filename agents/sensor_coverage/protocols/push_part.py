@@ -5,7 +5,7 @@ has a bound.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Final, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrapped
@@ -50,6 +50,10 @@ class PushSituation(Protocol):
     @property
     def bearings(self) -> Mapping[int, float]:
         """Bearings [rad] of the visible robots that are not declared dead."""
+
+    @property
+    def dead(self) -> Collection[int]:
+        """The robots that this robot has found to be dead."""
 
     @property
     def clear(self) -> bool:
@@ -133,6 +137,17 @@ class PushPart:
         back_rad = direction_to(memory, self._chain.origin)
         seen_rad = self._situation.bearings[leader] + self._heading
         return back_rad is not None and angle_between(back_rad + math.pi, seen_rad) > BACK_RAD
+
+    def _has_lost_behind(self) -> bool:
+        """Return whether this robot does not see the robot behind, which is not known to be dead or without memory."""
+        gone = self._back in self._situation.dead or self._back in self._lost
+        return not gone and self._back not in self._situation.bearings
+
+    def _is_apart(self) -> bool:
+        """Return whether this robot does not see the robot behind, nor any robot that sees it."""
+        states = self._map.states
+        between = (states[node].seen for node in self._situation.bearings if node in states)
+        return self._has_lost_behind() and not any(each.node == self._back for seen in between for each in seen)
 
     def _back_bearing_rad(self) -> float:
         """Return the approximate bearing of the robot that has taken this robot's former slot."""

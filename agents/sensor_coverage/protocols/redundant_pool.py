@@ -22,7 +22,6 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     RedundantPushEnd,
     RelayedMessage,
 )
-from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.component import Component
 
@@ -84,7 +83,6 @@ class RedundantPool(Component):
     def poll(self, tick: int) -> None:
         """Offer if it is time, and send the pending messages to the neighbour that is nearest to the base."""
         local_map = self._situation.local_map
-        local_map.home = _hops_to_base(local_map)
         if not local_map.redundant:
             self._offer_at, self._wait_ticks = None, OFFER_TICKS
         elif self._offer_at is None:
@@ -93,7 +91,7 @@ class RedundantPool(Component):
             self._offer_at = tick + self._wait_ticks
             self._wait_ticks = min(2 * self._wait_ticks, OFFER_TICKS_MAX)
             self._pending.append(RedundantOffer(0, (local_map.slot,)))
-        towards = _neighbour_nearest_to_base(local_map) if self._pending else None
+        towards = _neighbour_nearest_to_base(self._situation) if self._pending else None
         if towards is not None:
             for each in self._pending:
                 self._situation.mailbox.write(towards, each)
@@ -121,21 +119,6 @@ class RedundantPool(Component):
         self._pending.append(RedundantPushEnd(call.push, False, False))
 
 
-def _hops_to_base(local_map: LocalMap) -> int:
-    """Return the number of hops to the base, by the neighbours' latest messages."""
-    homes = local_map.path_vectors.homes
-    if local_map.slot == 0:
-        return 0
-    nearest = FAR
-    for state in local_map.mutual().values():
-        hops = 1 + homes.get(state.slot, FAR)
-        if hops < nearest:
-            nearest = hops
-    return nearest
-
-
-def _neighbour_nearest_to_base(local_map: LocalMap) -> int | None:
-    homes = local_map.path_vectors.homes
-    neighbours = ((homes.get(state.slot, FAR), node) for node, state in local_map.mutual().items())
-    found = min(neighbours, default=None)
+def _neighbour_nearest_to_base(situation: Situation) -> int | None:
+    found = min(((hops, node) for node, (hops, _) in situation.homes.items()), default=None)
     return found[1] if found is not None and found[0] < FAR else None

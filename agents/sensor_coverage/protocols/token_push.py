@@ -47,9 +47,6 @@ from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS, PushPart
 from zwerm.agents.sensor_coverage.protocols.walls.wall_push import WallPush
 
-# A dead robot's body within this angle [rad] of a drive's direction may stop the drive.
-BODY_AHEAD_RAD: Final = 0.3
-
 
 class TokenPush(PushPart, WallPush):
     """One robot's part in one push: what it does on messages, at the end of drives, and at the end of a wait."""
@@ -157,16 +154,15 @@ class TokenPush(PushPart, WallPush):
         parameters = self._map.parameters
         if self._first_bearings:
             bearing_rad = self._first_bearings[0]
-            self._situation.deploy(bearing_rad, parameters.hop_m, self._clear_m(bearing_rad, parameters.clear_m))
+            self._situation.deploy(
+                bearing_rad, parameters.hop_m, self._situation.clear_m(bearing_rad, parameters.clear_m)
+            )
         elif self._plan is not None:
             self._map.note_attempt(self._plan)
             bearing_rad = wrapped(self._plan.direction - self._heading)
-            self._situation.deploy(bearing_rad, self._plan.hop_m, self._clear_m(bearing_rad, self._plan.clear_m))
-
-    def _clear_m(self, bearing_rad: float, wanted_m: float) -> float:
-        """Return how far [m] the leader has to get: less where a dead robot's body stands, which it sees past."""
-        in_the_way = self._situation.dead_ahead(bearing_rad, BODY_AHEAD_RAD)
-        return wanted_m if in_the_way is None else min(wanted_m, self._map.parameters.near_wall_m)
+            self._situation.deploy(
+                bearing_rad, self._plan.hop_m, self._situation.clear_m(bearing_rad, self._plan.clear_m)
+            )
 
     def _deployed(self, result: DriveResult) -> None:
         if not result.ok:
@@ -270,8 +266,9 @@ class TokenPush(PushPart, WallPush):
     def _straighten(self) -> None:
         """Correct the distance in a single file, where neither bearings nor a walk determined it, or that is too long."""
         measured = self._chain.origin in self._map.distances_m
-        lost = self._behind_settled and self._back not in self._situation.bearings
-        if self._back is not None and (lost if measured else self._result.used_odometry):
+        if self._back is not None and (
+            self._behind_settled and self._has_lost_behind() if measured else self._result.used_odometry
+        ):
             self._enter("straightening")
             self._situation.correct((Sighting(self._back, self._back_bearing_rad()),))
         else:
@@ -295,10 +292,18 @@ class TokenPush(PushPart, WallPush):
         ahead = self._chain.ahead
         walks = self._walks and ahead == self._chain.leader[1]
         if ahead is None or walks or ahead in self._situation.motion.frame.seen:
-            self._settled()
+            self._return()
         else:
             self._enter("regaining")
             self._situation.regain(ahead)
+
+    def _return(self) -> None:
+        """Drive back into sight of the robot behind if no robot is between them: the swarm may hang together by the two."""
+        if self._back is not None and self._is_apart():
+            self._enter("returning")
+            self._situation.come_back_to(self._back)
+        else:
+            self._settled()
 
     def _correct(self) -> None:
         self._enter("correcting")
@@ -369,7 +374,7 @@ PHASES: Final[Mapping[str, Phase]] = {
     "approaching": Phase(arrived=TokenPush._approached),
     "out": Phase(((TokenPush._settled_behind, TokenPush._go_on),), wake=TokenPush._wake_for_behind),
     "walking": Phase(arrived=TokenPush._walked),
-    "correcting": Phase(arrived=lambda push, _: push._settled()),
+    "correcting": Phase(arrived=lambda push, _: push._return()),
     # Follower of the leader: wait until the leader's slot is vacant.
     "armed": Phase(((lambda push: push._leader_is_back() or push._waited > ARMED_TICKS,
                      lambda push: push.close(PushAborted(push.id, True))),
@@ -383,7 +388,8 @@ PHASES: Final[Mapping[str, Phase]] = {
     "standing": Phase(((TokenPush._settled_behind, TokenPush._straighten),), wake=TokenPush._wake_for_behind),
     "straightening": Phase(arrived=lambda push, _: push._home()),
     "homing": Phase(arrived=lambda push, _: push._regain()),
-    "regaining": Phase(arrived=lambda push, _: push._settled()),
+    "regaining": Phase(arrived=lambda push, _: push._return()),
+    "returning": Phase(arrived=lambda push, _: push._settled()),
     "await": Phase(((lambda push: push._walk_over or push._waited_for_ahead(), lambda push: push.close(PushDone(push.id))),),
                    wake=TokenPush._wake_for_ahead),
     # All: wait until the view agrees with the neighbours, inform the robot behind, and end.
