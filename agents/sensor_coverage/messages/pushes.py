@@ -104,19 +104,21 @@ class TakeSlot(_PushMessage, frozen=True, tag="take-slot"):
 class PushAborted(_PushMessage, frozen=True, tag="aborted"):
     """The push has ended and no robot has moved. `tried`: its leader tried to drive.
 
-    `felt` are directions [rad] of walls that a leader felt close to the base's point.
+    `felt` are directions [rad] of walls that a leader felt close to the base's point, and `near` arcs (start, width) [rad]
+    around that point, in which it followed a wall.
     """
 
     push: int
     tried: bool
     felt: tuple[float, ...] = ()
+    near: tuple[tuple[float, float], ...] = ()
 
 
 class AllStanding(_PushMessage, frozen=True, tag="all-standing"):
     """All robots ahead of the receiver stand still.
 
-    From the leader to its follower, `near` has arcs (start, width) [rad] around the slot that the leader has left, in which
-    it followed a wall close to that slot.
+    From the leader to its follower, or from the base's point to the base, `near` has arcs (start, width) [rad] around the
+    slot that the leader has left, in which it followed a wall close to that slot.
     """
 
     push: int

@@ -10,6 +10,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
 from zwerm.agents.sensor_coverage.messages.incarnations import first_count
 from zwerm.agents.sensor_coverage.messages.pushes import (
+    AllStanding,
     PushAborted,
     PushDone,
     PushToken,
@@ -52,6 +53,7 @@ class PushScheduler(Component):
         StateBeacon,
         PushToken,
         PushAborted,
+        AllStanding,
         PushDone,
         RedundantOffer,
         RedundantPushEnd,
@@ -113,10 +115,12 @@ class PushScheduler(Component):
                 self._situation.mailbox.write(sender, PushAborted(push, False))
             case RedundantOffer(_, slots):
                 self._offers[slots[0]] = slots
-            case PushAborted(push, tried, felt) if push == self._active:
-                if felt:
-                    self._map.note_walls(felt)
+            case PushAborted(push, tried, felt, near) if push == self._active:
+                if felt or near:
+                    self._map.note_walls(felt, near)
                 self._end(tried)
+            case AllStanding(push, near) if push == self._active and near:
+                self._map.note_walls((), near)
             case PushDone(push) if push == self._active:
                 self._end(True, True)
             case RedundantPushEnd(push, tried, done) if push == self._active:

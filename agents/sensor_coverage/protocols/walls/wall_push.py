@@ -122,7 +122,7 @@ class WallPush:
             if not at_base:
                 self._map.note_walls(felt, near)
             self._situation.stand()
-            self.close(PushAborted(self.id, True, felt if at_base else ()))
+            self.close(PushAborted(self.id, True, felt, near) if at_base else PushAborted(self.id, True))
             return
         self._walks = result.end != OPEN
         self._anchors = () if self._walks else self._find_anchors()
