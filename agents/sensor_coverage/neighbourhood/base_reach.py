@@ -47,7 +47,11 @@ class BaseReach:
             if newer > LAG or (fewer >= 0 and newer > 0) or (fewer > 0 and newer >= -LAG):
                 self.hops, self.count = hops + 1, count
             if count > self.newest:
-                self.newest, self._newest_at = count, tick
+                self.newest, self._newest_at, self._turn_since = count, tick, None
+
+    def is_lost(self, tick: int) -> bool:
+        """Return whether the base is out of reach, as far as this robot knows."""
+        return tick - self._newest_at > CUT_TICKS
 
     def is_turn(self, tick: int, node: int, neighbours: Mapping[int, int]) -> bool:
         """Return whether the base is out of reach, and no neighbour has fewer hops, so this robot is to drive back.
@@ -55,7 +59,7 @@ class BaseReach:
         `neighbours` has the hops of the neighbours; of equal hops, the smaller id is first.
         """
         first = all((self.hops, node) < (hops, other) for other, hops in neighbours.items())
-        if not first or tick - self._newest_at <= CUT_TICKS:
+        if not (first and neighbours and self.is_lost(tick)):
             self._turn_since = None
             return False
         if self._turn_since is None:

@@ -100,6 +100,7 @@ class Situation:
         self._returns = 0
         self._company: dict[int, None] = {}  # robots of this robot's part of the swarm, since the base is out of reach
         self._cut_at = 0
+        self._base: int | None = None
 
     # --- every tick -------------------------------------------------------------------------------------------------
 
@@ -250,15 +251,15 @@ class Situation:
     def is_cut_off(self) -> bool:
         """Return whether the base is out of reach of this robot and its neighbours, and it is this robot's turn to drive back.
 
-        A robot that sees the base is not: the base's radio may have failed.
+        A robot that sees the base is not, even if the base counts as dead: its radio may have failed.
         """
         local_map = self.local_map
-        if self.active or self.in_push or not self.calm or local_map.slot in (0, NOWHERE):
+        base = local_map.at(0)
+        self._base = self._base if base is None else base
+        stands = self.calm and not (self.active or self.in_push) and local_map.slot not in (0, NOWHERE)
+        if not (stands and local_map.reach.is_lost(self.tick)) or self._base in self.motion.frame.seen:
             return False
-        homes = self.homes
-        if not homes or local_map.at(0) in self.bearings:
-            return False
-        return local_map.reach.is_turn(self.tick, self.node, {node: hops for node, (hops, _) in homes.items()})
+        return local_map.reach.is_turn(self.tick, self.node, {node: hops for node, (hops, _) in self.homes.items()})
 
     @property
     def unsure(self) -> bool:
@@ -343,9 +344,8 @@ class Situation:
             self._company.clear()
         self._cut_at = reach.newest
         self._company |= dict.fromkeys(self.bearings)
-        for node in self.bearings:
-            state = self.local_map.states.get(node)
-            self._company |= dict.fromkeys(each.node for each in state.seen) if state is not None else {}
+        states = [self.local_map.states[node] for node in self.bearings if node in self.local_map.states]
+        self._company |= dict.fromkeys(each.node for state in states for each in state.seen)
         self._drive(self._come_back())
 
     def come_back_to(self, node: int) -> None:

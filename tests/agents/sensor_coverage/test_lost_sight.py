@@ -231,6 +231,9 @@ def test_a_robot_that_sees_the_base_or_a_robot_nearer_to_it_stays() -> None:
     robot.local_map.states[0] = msgspec.structs.replace(seeing(), slot=0)
     robot.situation.motion.frame.seen[0] = 2.0
     assert waits(robot)
+    robot.local_map.remove_dead(0)
+    robot.situation.failure_detector.dead[0] = None
+    assert waits(robot)
     robot = cut_off()
     robot.local_map.path_vectors.receive(5, PathVector(2, 9, None, (), 1, 10))
     assert waits(robot)
