@@ -61,6 +61,8 @@ class WallPush:
     _situation: WallSituation
     _map: LocalMap
     _legs = _idle_legs = 0
+    _has_helped = False  # the walk has closed a part of an arc
+    _is_idle = False  # the walk has closed nothing, and ended where the robot behind is out of sight
     _near: tuple[tuple[float, float], ...] = ()  # arcs around this robot's slot that the leader has closed
     _is_spare = False  # the walk has ended in sight of the swarm, which needs no robot there
 
@@ -152,9 +154,10 @@ class WallPush:
 
     def _walked(self, result: DriveResult | WalkResult) -> None:
         """Follow the wall further while that closes something; else stand at the new slot where the walk has ended."""
-        protocol = self.walls
+        plan, protocol = self._plan, self.walls
         closed = protocol is not None and protocol.has_closed()
         self._idle_legs = 0 if closed else self._idle_legs + 1
+        self._has_helped = self._has_helped or closed
         on = isinstance(result, WalkResult) and result.end == STRETCH
         if on and self._legs < LEGS_MAX and self._idle_legs < IDLE_LEGS_MAX:
             self._walk()
@@ -162,6 +165,7 @@ class WallPush:
         if protocol is not None:
             protocol.end(self.id)
         self._is_spare = isinstance(result, WalkResult) and result.end != LOST
+        self._is_idle = plan is not None and plan.beside and not self._is_spare and not self._has_helped
         if isinstance(result, WalkResult):
             self._map.note_distances(distances_m(result.waypoints))
         self._settled()
@@ -169,5 +173,6 @@ class WallPush:
     def _leave_if_spare(self) -> None:
         """Leave the complex after a walk, unless that would part the robots around."""
         slot = self._map.slot
-        if self._is_spare and may_leave(slot, self._map.scan().complex_.neighbours):
+        idle = self._is_idle and self._plan is not None and self._map.path_vectors.is_claimed(self._plan.mover)
+        if (self._is_spare or idle) and may_leave(slot, self._map.scan().complex_.neighbours):
             self._map.leave_complex()

@@ -1,0 +1,53 @@
+"""A robot whose walk along a wall closed nothing does not keep a slot where the walk ended."""
+
+import pytest
+
+from zwerm.agents.runtime.node import Node
+from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan
+from zwerm.agents.sensor_coverage.local_robot import LocalRobot
+from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, PathVector, Route, SeenRobot, StateBeacon
+from zwerm.agents.sensor_coverage.messages.commands import LOST, STRETCH
+from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
+from zwerm.agents.sensor_coverage.protocols.token_push import TokenPush
+from zwerm.deploy.node_specs import node_specs
+from zwerm.scenario.load import load
+
+CLAIM = Route(20_000.0, (9,), 1)
+
+
+def walking(beside: bool) -> tuple[LocalRobot, TokenPush]:
+    """Return robot 3 at slot 8, which has walked from slot 9, where robot 5 stands; both see each other."""
+    robot = Node(*node_specs(load("sensor-coverage", ("robots.count=14", "services.path=gradient")), 1)[3])._controller
+    assert isinstance(robot, LocalRobot)
+    local_map = robot.local_map
+    local_map.occupy(8)
+    local_map.heading = 0.0
+    robot.situation.motion.frame.seen = {5: 1.0}
+    seen = (SeenRobot(3, local_map.epoch, 8, 0.0),)
+    local_map.receive(5, StateBeacon(1, 9, 0, False, False, 1, seen, (), (), NO_PATH_VECTOR), 1)
+    local_map.update_bearings({5: 1.0})
+    push = robot.pushing._join(7, 8, ((9, 5), (9, 3)), 5)
+    push._plan = Plan((9, 1, 0, WALLS), 9, 1.0, 0.95, 0.0, (9,), walk=True, beside=beside)
+    return robot, push
+
+
+@pytest.mark.parametrize(
+    ("beside", "end", "closed", "open_arc", "leaves"),
+    [
+        (True, LOST, False, True, True),
+        (True, LOST, True, True, False),
+        (True, LOST, False, False, False),
+        (False, LOST, False, True, False),
+        (False, STRETCH, False, True, True),
+    ],
+    ids=["closed nothing", "closed a part", "closes by standing there", "no other robot further on", "in sight"],
+)
+def test_a_robot_leaves_after_a_walk_that_closed_nothing(
+    beside: bool, end: str, closed: bool, open_arc: bool, leaves: bool
+) -> None:
+    robot, push = walking(beside)
+    robot.local_map.path_vectors.receive(5, PathVector(1, 9, CLAIM if open_arc else None))
+    push._has_helped, push._idle_legs = closed, IDLE_LEGS_MAX
+    push._walked(WalkResult(end, 0.4))
+    push._leave_if_spare()
+    assert robot.local_map.redundant is leaves
