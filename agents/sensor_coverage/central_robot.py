@@ -138,7 +138,17 @@ class CentralRobot(Controller):
         self.motion.settle()
         x_m, y_m = self.wall_walk.way
         self.commands.answer(
-            Walked(cycle, result.end, x_m, y_m, result.driven_m, result.touched, result.waypoints, result.near)
+            Walked(
+                cycle,
+                result.end,
+                x_m,
+                y_m,
+                result.driven_m,
+                result.touched,
+                result.waypoints,
+                result.near,
+                self.motion.radius_m,
+            )
         )
 
     def _clear(self, cycle: int) -> None:

@@ -16,6 +16,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS, Emerged, Report, RollCall, ScanRequest
 from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_complex
 from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
@@ -82,7 +83,7 @@ class SensorCoverageCoordinator:
         incarnation = int(stream(setup.stream_key).integers(1, INCARNATIONS))
         self.mailbox = CommandMailbox(setup.dt_s, incarnation, parameters.survey_ticks_max, parameters.drive_ticks_max)
         self.sources = Sources(setup.bases, self.slots, self.mailbox)
-        planner = Planner(parameters, self.slots)
+        planner = Planner(parameters, self.slots, SwarmProof())
         self.services = Services(
             planner,
             Dijkstra(parameters.obstacle_cost),

@@ -183,13 +183,15 @@ class WallWalks:
     def _legs(self, leader: int, leg: FollowWall, scan: ScanResult) -> Routine[None]:
         """Follow the wall, leg by leg. The robot got clear with the wall at its other hand: so it passes its first slot."""
         slots, idle_legs = self._slots, 0
+        number: int | None = None
         left = self._open(scan)
         while (left > 0.0 or leg.meet) and idle_legs < IDLE_LEGS_MAX:
             walked = yield from self._order(leader, leg)
             if walked is None:
                 return
-            slots.take_walk(leader, leg.hand, walked.waypoints)
-            if walked.end in (LOST, MET):
+            stays = walked.end in (LOST, MET)
+            number = slots.take_walk(leader, leg.hand, walked.waypoints, walked.radius_m, number, stays)
+            if stays:
                 self._measure(leader, walked.waypoints)
                 return
             before, left = left, self._open(scan)

@@ -11,11 +11,30 @@ from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
 from zwerm.agents.sensor_coverage.frontier.fence import Fence
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk
 from zwerm.maths.simplicial import Edge, FlagComplex
 
 # Returns the cheapest routes from sources (slot: cost to start there) through a complex.
 FindRoutes = Callable[[FlagComplex, Mapping[int, float]], CheapestRoutes]
+
+
+class CoverageProof(Protocol):
+    """Finds the open arcs of all slots where walls are followed."""
+
+    def update(
+        self,
+        scan: ScanResult,
+        walks: Sequence[Walk],
+        touched: Mapping[int, Sequence[float]],
+        near: Mapping[int, Sequence[Arc]],
+    ) -> tuple[int, ...]:
+        """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.
+
+        Return the slots around which points of walks count no more, because a slot that saw them is gone.
+        """
+
+    def open_arcs(self) -> dict[int, list[Arc]]:
+        """Return the arcs in which each slot is open, without the slots that are open in none."""
 
 
 class WallService(Protocol):

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
+from zwerm.agents.sensor_coverage.frontier.decisions import CoverageProof
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.fence import SIXTY_RAD, VERTEX_BESIDE_RAD, Fence, Side, fence, wedges
 from zwerm.agents.sensor_coverage.frontier.holes import holes, is_bare, sides
@@ -39,13 +40,14 @@ WHOLE_HOP: Final = 0.98
 class Planner:
     """The frontier service by the rules of the paper, on the memory in `slots`."""
 
-    def __init__(self, parameters: PlannerParameters, slots: Slots) -> None:
+    def __init__(self, parameters: PlannerParameters, slots: Slots, proof: CoverageProof | None = None) -> None:
+        """`proof` is that of all slots, with a coordinator. Without one each robot has the proof of its own slot."""
         self.attempt_log = AttemptLog(parameters.attempts_max, parameters.near_wall_m, slots.blocked)
         self.fence = Fence((), ())
         self.frontier: tuple[Edge, ...] = ()
         self.obstacle: tuple[Edge, ...] = ()
         self._parameters = parameters
-        self.walls = WallPlans(parameters, slots)
+        self.walls = WallPlans(parameters, slots, proof)
         self._slots = slots
         self._follows_walls = parameters.walls == "followed"
         self._whole_hops = False

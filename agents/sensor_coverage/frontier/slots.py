@@ -15,8 +15,11 @@ from itertools import pairwise
 from operator import itemgetter
 
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, add_wall, refined_heading, refined_reference
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint, drives_away
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint, drives_away, tail, turned_vector
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
+
+# Length [m] of a leg of a walk that the next leg repeats, so that the wall between them is one stretch.
+JOINED_M = 1.0
 
 
 class Slots:
@@ -160,8 +163,19 @@ class Slots:
 
     # --- walls that were followed -----------------------------------------------------------------------------------
 
-    def take_walk(self, robot: int, hand: int, waypoints: Iterable[Waypoint]) -> None:
-        """Store a walk of a robot along a wall, in sight of robots that stand at their slots."""
+    def take_walk(
+        self,
+        robot: int,
+        hand: int,
+        waypoints: Iterable[Waypoint],
+        radius_m: float = 0.0,
+        after: int | None = None,
+        stays: bool = False,
+    ) -> int:
+        """Store a walk of a robot along a wall, in sight of robots that stand at their slots, and return its number.
+
+        It continues the walk with the number `after`. The robot stays at its end if `stays`.
+        """
         heading, frame, slot_of = self.heading[robot], self.frame[robot], self.slot_of()
         standing = {node: slot for node, slot in slot_of.items() if node != robot and self.frame[node] == frame}
         waypoints = tuple(waypoints)
@@ -176,10 +190,14 @@ class Slots:
                 tuple(standing[node] for node in each.robots if node in standing),
                 any(node not in standing for node in each.robots),
                 drives_away(hand, before.touched, each.touched, each.x_m - before.x_m, each.y_m - before.y_m),
+                (),
+                turned_vector((each.x_m, each.y_m), heading),
             )
             for before, each in pairwise(waypoints[:1] + waypoints)
         )
-        self.walks.append(Walk(frame, hand, points))
+        before_it = () if after is None else tail(self.walks[after].points, JOINED_M)
+        self.walks.append(Walk(frame, hand, before_it + points, radius_m, slot_of.get(robot) if stays else None))
+        return len(self.walks) - 1
 
     # --- directions between slots -----------------------------------------------------------------------------------
 

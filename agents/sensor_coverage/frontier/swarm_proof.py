@@ -10,6 +10,15 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
+    Crossing,
+    arc_beyond_pocket,
+    arcs_into,
+    crossing_of_pocket,
+    crossings_of_step,
+)
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import StretchEnd
+from zwerm.agents.sensor_coverage.frontier.strips.stretches import Pocket, stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     Arc,
@@ -19,7 +28,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     Walk,
     WalkPoint,
     arc_between,
-    arcs_of_step,
     arcs_of_walls,
     complement,
     ends_at,
@@ -40,7 +48,8 @@ class Passed(NamedTuple):
     """A point of a walk that a slot saw, the point before it if that closes an arc, and the hand at the wall.
 
     `number` counts the points of all walks. The slot did not see the points between these two. Each of them was seen by
-    other slots.
+    other slots. `stretch` is the number of the first point of the stretch of wall, and `ends` are the ends of the wall from the
+    point before to this one. `pocket` is set if the walking robot touched the slot's robot at an end of the stretch.
     """
 
     number: int
@@ -48,6 +57,9 @@ class Passed(NamedTuple):
     point: WalkPoint
     hand: int
     between: tuple[Collection[int], ...]
+    stretch: int = -1
+    ends: tuple[StretchEnd, ...] = ()
+    pocket: Pocket | None = None
 
 
 class ArcBasis(NamedTuple):
@@ -128,7 +140,8 @@ class SwarmProof:
         for walk in walks[self._count :]:
             for slot, passed in _passes(walk, len(self._points)):
                 self._passed.setdefault(slot, []).append(passed)
-                for each in dict.fromkeys(each for witnesses in passed.between for each in witnesses):
+                relied = (*passed.between, *(each.ties for each in passed.ends))
+                for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
                     self._witnessed.setdefault(each, {})[slot] = None
             self._points += walk.points
         self._count = len(walks)
@@ -207,11 +220,20 @@ class SwarmProof:
         """Return the arcs at a slot that end at followed walls or at contacts. They are disjoint."""
         around = self._around[slot]
         found = [*arcs_of_walls(around.touched, CONTACT_RAD), *around.near]
-        for _, before, point, hand, between in self._passed.get(slot, ()):
+        crossings: dict[int, list[Crossing]] = {}
+        for _, before, point, hand, between, stretch, ends, pocket in self._passed.get(slot, ()):
             if not self._counts(point) or (before is not None and not self._counts(before)):
                 continue
             if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
-                found += arcs_of_step(slot, before, point, hand)
+                loose = [each for each in ends if not each.is_tied(self._neighbours)]
+                crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
+            if pocket is not None:
+                crossing = crossing_of_pocket(slot, point, hand, pocket)
+                crossings.setdefault(stretch, []).append(crossing)
+                if crossing.into > 0:
+                    found.append(arc_beyond_pocket(slot, point, pocket))
+        for each in crossings.values():
+            found += arcs_into(each)
         return united(found)
 
     def _counts(self, point: WalkPoint) -> bool:
@@ -238,14 +260,21 @@ def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     """
     last: dict[int, SeenPoint] = {}
     touch = TouchCounter()
+    stretch_of = stretches_of(walk)
     for number, point in enumerate(walk.points):
         touch.take(number, point.walls, point.at_body, point.left_walls)
         if point.is_blind:
             continue
         now = SeenPoint(number, point)
+        here = stretch_of.get(number)
         for slot in point.seen:
             since = last[slot].number if slot in last else number
             between = tuple(each.seen.keys() for each in walk.points[since:number] if slot not in each.seen)
             before = point_before(slot, last.get(slot), now, touch.since, bool(between))
-            yield slot, Passed(first + number, before, point, walk.hand, between if before is not None else ())
+            there = stretch_of.get(since) if before is not None else None
+            ends = () if here is None or there is None else (there.first, here.last)
+            pocket = None if here is None or slot not in point.robots else here.pocket(number)
+            number_of = -1 if here is None else first + here.first_number
+            between = between if before is not None else ()
+            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pocket)
             last[slot] = now

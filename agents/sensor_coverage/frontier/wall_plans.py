@@ -7,11 +7,11 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Final
 
+from zwerm.agents.sensor_coverage.frontier.decisions import CoverageProof
 from zwerm.agents.sensor_coverage.frontier.directions import add_wall
 from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc
 
 # Fourth element of the keys of plans to join two parts of the swarm.
@@ -30,21 +30,23 @@ class WallPlans:
     `unproven` are the slots that stay open after all attempts. `tried` has the directions [rad] of the attempts, by slot.
     """
 
-    def __init__(self, parameters: PlannerParameters, slots: Slots) -> None:
+    def __init__(self, parameters: PlannerParameters, slots: Slots, proof: CoverageProof | None) -> None:
         self.unproven: tuple[int, ...] = ()
         self._parameters = parameters
         self._slots = slots
-        self._proof = SwarmProof()
+        self._proof = proof
         self.tried: dict[int, list[float]] = {}
         self._joined: dict[tuple[int, tuple[int, ...]], int] = {}
 
     def open_arcs(self, scan: ScanResult) -> dict[int, list[Arc]]:
         """Return the arcs in which each slot is open."""
-        slots = self._slots
+        slots, proof = self._slots, self._proof
+        if proof is None:
+            raise RuntimeError("the arcs of all slots are known with a coordinator only")
         touched = {slot: [*slots.touching.get(slot, ()), *slots.felt.get(slot, ())] for slot in scan.complex_.vertices}
-        for slot in self._proof.update(scan, slots.walks, touched, slots.near):
+        for slot in proof.update(scan, slots.walks, touched, slots.near):
             self.tried.pop(slot, None)
-        return self._proof.open_arcs()
+        return proof.open_arcs()
 
     def plans(self, scan: ScanResult) -> Iterator[Plan]:
         """Yield a plan for each open arc that has attempts left."""

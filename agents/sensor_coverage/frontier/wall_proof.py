@@ -16,7 +16,7 @@ these stand.
 """
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 # An open arc narrower than this [rad] counts as closed: ends of arcs that join differ by less. An opening that a robot sees
@@ -62,7 +62,8 @@ class WalkPoint(NamedTuple):
 
     `robots` are the slots that the walking robot touches. `at_body` is true if it touches a robot that stands at no slot.
     `left_walls` is true if it drove away from all walls that it touched at the point before (`drives_away`).
-    `unplaced` are the marks (`mark_of`) of robots that see the point, and of which no slot is known.
+    `unplaced` are the marks (`mark_of`) of robots that see the point, and of which no slot is known. `at` is the place [m] of
+    the walking robot by its odometry, in the frame of the directions.
     """
 
     seen: Mapping[int, float]
@@ -71,6 +72,7 @@ class WalkPoint(NamedTuple):
     at_body: bool = False
     left_walls: bool = False
     unplaced: tuple[int, ...] = ()
+    at: tuple[float, float] = (0.0, 0.0)
 
     @property
     def is_blind(self) -> bool:
@@ -91,24 +93,45 @@ class WalkPoint(NamedTuple):
             self.at_body,
             self.left_walls,
             self.unplaced,
+            turned_vector(self.at, by),
         )
 
 
 class Walk(NamedTuple):
-    """A stretch of wall that a robot followed, in the frame of one robot; `hand` is +1 if the wall was on the left."""
+    """A stretch of wall that a robot followed, in the frame of one robot; `hand` is +1 if the wall was on the left.
+
+    `radius_m` is the radius of its body. `end` is the slot of the walking robot if it stands at the end of the walk.
+    """
 
     frame: int
     hand: int
     points: tuple[WalkPoint, ...]
+    radius_m: float = 0.0
+    end: int | None = None
 
     def turned(self, frame: int, by: float) -> "Walk":
         """Return the walk in another frame."""
-        return Walk(frame, self.hand, tuple(each.turned(by) for each in self.points))
+        return self._replace(frame=frame, points=tuple(each.turned(by) for each in self.points))
+
+
+def turned_vector(vector: tuple[float, float], by: float) -> tuple[float, float]:
+    """Return a vector turned by an angle [rad]."""
+    cos, sin = math.cos(by), math.sin(by)
+    return cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1]
 
 
 def mark_of(node: int) -> int:
     """Return the number that stands for a robot among slots. It is no slot, and not NOWHERE."""
     return -2 - node
+
+
+def tail(points: Sequence[WalkPoint], length_m: float) -> tuple[WalkPoint, ...]:
+    """Return the last points of a walk, over a length [m]."""
+    left, first = length_m, len(points)
+    while first > 0 and left > 0.0:
+        first -= 1
+        left -= math.dist(points[first].at, points[first - 1].at) if first else 0.0
+    return tuple(points[first:])
 
 
 class TouchCounter:

@@ -227,6 +227,7 @@ class Walked(_UplinkMessage, frozen=True, tag="walked"):
     touched: tuple[float, ...]
     waypoints: tuple[Waypoint, ...]
     near: tuple[tuple[float, float], ...] = ()
+    radius_m: float = 0.0
 
 
 class Ack(_UplinkMessage, frozen=True, tag="ack"):

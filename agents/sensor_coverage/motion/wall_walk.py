@@ -8,15 +8,14 @@ passes those as walls that do not yield (`dead_bodies`).
 
 import math
 from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
-from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
-from zwerm.agents.sensor_coverage.frontier.wall_proof import SAME_WALL_RAD
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.dead_bodies import DeadBodies, HeldPoints
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
+from zwerm.agents.sensor_coverage.motion.near_arcs import NearPoint, arcs_around
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
 from zwerm.agents.sensor_coverage.motion.wall_heading import TURN_RAD, hand_on_wall
 from zwerm.wire.messages import BodyVelocity
@@ -39,14 +38,10 @@ CLEARING_M_MAX: Final = 3.0
 FEEL_M: Final = 0.12
 # The walking robot leaves its slot by this distance [m] before the next robot takes it: two bodies and some space.
 CLEAR_M: Final = 0.3
-# Points closer [m] to the start have no direction from there.
-NEAR_M_MIN: Final = 0.02
 # A robot in sight is not in touch if its bearing shows a distance of more than this many radii of a body. It shows none
 # unless the walking robot moved by this distance [m] across its line of sight: a bearing's noise would decide.
 TOUCHING_RADII_MAX: Final = 4.0
 ACROSS_M_MIN: Final = 0.03
-# Two contacts at the same point that differ by less than this [rad] are the walls of a corner.
-CORNER_RAD: Final = math.radians(125.0)
 # Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
 LEG_M: Final = 3.0
 # Longest way [m] of a station's first robot to a wall.
@@ -66,17 +61,6 @@ class WalkResult(NamedTuple):
 
 
 DriveToWalk = Generator[BodyVelocity, None, WalkResult]
-
-
-class NearPoint(NamedTuple):
-    """A point [m] of the way along a wall close to the start, and the directions of touched walls [rad].
-
-    `at_body` is true if a dead robot is in touch.
-    """
-
-    at: Vector
-    walls: tuple[float, ...]
-    at_body: bool = False
 
 
 class WallWalk:
@@ -330,35 +314,6 @@ class WallWalk:
             yield motion.velocity(dx, dy)
 
 
-def arcs_around(
-    start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float
-) -> tuple[tuple[float, float], ...]:
-    """Return the arcs (start, width) [rad] around a start in which a wall was followed in touch, by odometry.
-
-    Two successive points close the arc between them, if the wall is beyond. Two successive contacts with the same wall
-    close the arc between the touched points of the wall. So do two contacts at the same point, because a body does not pass
-    between them. A dead robot may fill an opening: from there on only the same wall closes an arc, up to the next wall.
-    """
-    found = []
-    at_body = False
-    for before, point in pairwise(points):
-        at_body = before.at_body or (at_body and not before.walls)
-        same = [(a, b) for a in before.walls for b in point.walls if angle_between(a, b) < SAME_WALL_RAD]
-        near_m = min(math.dist(start, each.at) for each in (before, point))
-        follows = bool(before.walls or point.walls) and not (at_body or point.at_body)
-        if (same or follows) and near_m > NEAR_M_MIN:
-            step = _between(start, before.at, point.at)
-            if step[1] * hand < 0.0:  # the start and the wall are on different sides of the step
-                found.append(step)
-        for a, b in combinations(point.walls, 2):
-            if angle_between(a, b) < CORNER_RAD:
-                ends = (_touched_point(point.at, each, radius_m) for each in (a, b))
-                found.append(_between(start, *ends))
-        for a, b in same:
-            found.append(_between(start, _touched_point(before.at, a, radius_m), _touched_point(point.at, b, radius_m)))
-    return tuple((a, width) if width >= 0.0 else (a + width, -width) for a, width in found)
-
-
 def is_farther(distance_m: float, moved_m: Vector, before_rad: float, now_rad: float) -> bool:
     """Return whether a point is farther away than a distance, by its bearings before and after a drive by `moved_m`.
 
@@ -367,17 +322,6 @@ def is_farther(distance_m: float, moved_m: Vector, before_rad: float, now_rad: f
     ux, uy = unit(now_rad)
     across_m = abs(moved_m[0] * uy - moved_m[1] * ux)
     return across_m > ACROSS_M_MIN and angle_between(before_rad, now_rad) * distance_m < across_m
-
-
-def _touched_point(at: Vector, bearing_rad: float, radius_m: float) -> Vector:
-    ux, uy = unit(bearing_rad)
-    return at[0] + radius_m * ux, at[1] + radius_m * uy
-
-
-def _between(start: Vector, a: Vector, b: Vector) -> tuple[float, float]:
-    """Return the direction [rad] of a point from the start, and the angle from there to another point."""
-    first, second = (math.atan2(y - start[1], x - start[0]) for x, y in (a, b))
-    return first, math.remainder(second - first, math.tau)
 
 
 def _hands(contacts: Iterable[Touched]) -> tuple[object, ...]:

@@ -9,10 +9,11 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, united
 from zwerm.agents.sensor_coverage.messages.commands import SHUT, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
+from zwerm.agents.sensor_coverage.motion.near_arcs import NearPoint, arcs_around
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.wall_heading import swept
-from zwerm.agents.sensor_coverage.motion.wall_walk import WEDGED_TICKS, NearPoint, WallWalk, arcs_around
+from zwerm.agents.sensor_coverage.motion.wall_walk import WEDGED_TICKS, WallWalk
 from zwerm.run.runner import run
 from zwerm.wire.messages import BodyVelocity
 
@@ -57,6 +58,13 @@ def test_a_wall_followed_close_to_a_slot_closes_the_arc_of_the_corner() -> None:
     first, last = closed[0].start_rad, closed[0].start_rad + closed[0].width_rad
     assert math.degrees(first) < 65.0
     assert math.degrees(last) == pytest.approx(180.0)
+
+
+def test_a_wall_followed_close_to_a_slot_closes_directions_up_to_the_touched_point_only() -> None:
+    """The robot stops at 67 degrees, and touches the wall in the east at 56 degrees. The slot sees past it in between."""
+    points = [NearPoint((0.13, 0.05 * each), (0.0,)) for each in range(7)]
+    closed = united([Arc(*each) for each in arcs_around((0.0, 0.0), points, -1, 0.07)])
+    assert [round(math.degrees(each.start_rad + each.width_rad)) for each in closed] == [56]
 
 
 def seen_along(way: list[tuple[float, float]], *robots: tuple[float, float]) -> list[Waypoint]:

@@ -10,6 +10,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.maths.simplicial import FlagComplex
 
@@ -111,7 +112,7 @@ def planner(slots: Positions, wall_at: int | None = None) -> Planner:
     if wall_at is not None:
         x, y = slots[wall_at]
         known.walls[wall_at] = [math.atan2(-y, -x)]
-    add = Planner(PlannerParameters(), known)
+    add = Planner(PlannerParameters(), known, SwarmProof())
     add.update(ScanResult(views, complex_, (0,)))
     return add
 

@@ -280,11 +280,6 @@ def test_a_walking_robot_remembers_that_it_drove_across_a_passage() -> None:
     assert [each.left_walls for each in slots.walks[0].points] == [False, False, True, False]
 
 
-def test_a_walk_that_touches_robot_and_wall_closes_the_pocket_between_them() -> None:
-    walk = Walk(0, 1, (WalkPoint({0: 0.0}, (math.pi / 2.0,), (0,)),))
-    assert opened(walk) == [(55, 305)]
-
-
 def test_walks_turn_with_the_frame_in_which_they_were_seen() -> None:
     slots = Slots()
     for robot in (7, 8):

@@ -1,0 +1,1 @@
+"""The strips between the ways of walking robots and the walls that they followed."""

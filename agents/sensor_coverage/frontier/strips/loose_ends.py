@@ -1,0 +1,101 @@
+"""The ends of a stretch of wall that a robot followed: directions in which a slot looks past them, between robot and wall.
+
+A step of a walk closes the directions in which a slot sees it, because the wall is beyond. A slot that looks along the wall
+sees past the last step, between the walking robot and the point of the wall that it touched: there the wall may end, and an
+opening begin. So a direction counts only if its ray from the step does not leave the strip between the walk and the wall at
+an end of the stretch.
+
+An end is tied where another robot is responsible for the space beyond: the walking robot touched a standing robot there, or
+stands there itself. It is loose when this robot is gone.
+"""
+
+import math
+from collections.abc import Collection, Iterable, Sequence
+from typing import Final, NamedTuple
+
+Vector = tuple[float, float]
+
+# Bisections of a step.
+HALVINGS: Final = 12
+# Distance from the ends of a step at which it is tested, as a fraction of its length.
+INWARD: Final = 1e-3
+
+
+class StretchEnd(NamedTuple):
+    """The walking robot's place [m] at an end of a stretch, the point of the wall that it touched, and the slots of `ties`.
+
+    Any slot of `ties` ties the end as long as it is occupied.
+    """
+
+    at: Vector
+    touched: Vector
+    ties: tuple[int, ...] = ()
+
+    def is_tied(self, standing: Collection[int]) -> bool:
+        """Return whether a standing robot is responsible for the space beyond."""
+        return any(each in standing for each in self.ties)
+
+
+def direction_of(a: Vector, b: Vector) -> float:
+    """Return the direction [rad] from a to b."""
+    return math.atan2(b[1] - a[1], b[0] - a[0])
+
+
+# A place [m] of the walking robot, and the directions of walls that it touches there.
+Contact = tuple[Vector, Sequence[float]]
+
+
+def ends_of_stretch(contacts: Sequence[Contact], hand: int, radius_m: float) -> tuple[StretchEnd, StretchEnd]:
+    """Return the two ends of a stretch of wall that a robot followed with the wall at its `hand`."""
+    return _end(contacts, hand, radius_m, False), _end(contacts, hand, radius_m, True)
+
+
+def _end(contacts: Sequence[Contact], hand: int, radius_m: float, ahead: bool) -> StretchEnd:
+    """Return the end of a stretch: its last place if `ahead`, else its first one."""
+    at, walls = contacts[-1 if ahead else 0]
+    heading = walls[0] - hand * math.pi / 2.0
+    if len(contacts) > 1:
+        (ax, ay), (bx, by) = (each for each, _ in (contacts[-2:] if ahead else contacts[:2]))
+        heading = math.atan2(by - ay, bx - ax)
+    # The robot has the wall at its side, and in a corner comes to the wall ahead after that.
+    sides = {each: hand * math.remainder(each - heading, math.tau) for each in walls}
+    bearing = (min if ahead else max)(sides, key=lambda each: sides[each])
+    return StretchEnd(at, (at[0] + radius_m * math.cos(bearing), at[1] + radius_m * math.sin(bearing)))
+
+
+def kept_part(
+    start: Vector, end: Vector, there_rad: float, step_rad: float, ends: Iterable[StretchEnd]
+) -> tuple[float, float]:
+    """Return the first and the last fraction of a step in whose directions a slot does not see past an end.
+
+    The step leads from `start` to `end` [m]. The slot sees them in the directions `there_rad` and `there_rad + step_rad`.
+    """
+    low, high = 0.0, 1.0
+
+    def leaks(part: float, stretch_end: StretchEnd) -> bool:
+        part = min(max(part, INWARD), 1.0 - INWARD)
+        at = start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1])
+        return _crosses(at, there_rad + part * step_rad, stretch_end.at, stretch_end.touched)
+
+    for each in ends:
+        first, last = leaks(low, each), leaks(high, each)
+        if first and last:
+            return 0.0, 0.0
+        if first or last:
+            inside, outside = (high, low) if first else (low, high)
+            for _ in range(HALVINGS):
+                middle = (inside + outside) / 2.0
+                inside, outside = (inside, middle) if leaks(middle, each) else (middle, outside)
+            low, high = (inside, high) if first else (low, inside)
+    return low, high
+
+
+def _crosses(at: Vector, direction_rad: float, a: Vector, b: Vector) -> bool:
+    """Return whether a ray from a point crosses the line between two others."""
+    direction = math.cos(direction_rad), math.sin(direction_rad)
+    ax, ay, bx, by = a[0] - at[0], a[1] - at[1], b[0] - at[0], b[1] - at[1]
+    left, right = direction[0] * ay - direction[1] * ax, direction[0] * by - direction[1] * bx
+    if left * right >= 0.0:
+        return False
+    part = left / (left - right)
+    return (ax + part * (bx - ax)) * direction[0] + (ay + part * (by - ay)) * direction[1] > 0.0
