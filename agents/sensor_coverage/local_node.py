@@ -6,6 +6,7 @@ from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.messages import advice, peers
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS
+from zwerm.agents.sensor_coverage.motion.locomotion import STOP
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
@@ -40,6 +41,9 @@ class LocalNode(Controller):
             self.advice_client = AdviceClient(setup.dt_s)
         self._claimed: bool | None = False if setup.incarnation == 1 else None  # a former one may have claimed
         self._search = 0
+        self._due: int | None = (
+            None  # the tick of the wake-up with which the robot fell asleep, None during an activity
+        )
 
     @property
     def node(self) -> int:
@@ -52,14 +56,25 @@ class LocalNode(Controller):
         return self.situation.local_map
 
     def step(self, observation: Observation) -> Command:
-        """Observe, receive messages, go on with the activity, poll the components, and send their messages."""
+        """Observe, receive messages, go on with the activity, poll the components, and send their messages.
+
+        Most packets repeat what the robot knows: neighbours repeat their states, because packets are lost. A robot that
+        only such packets have woken sleeps on.
+        """
         situation = self.situation
         situation.observe(observation)
         silent, seen = situation.failure_detector.dead, situation.motion.frame.seen
         dead = [node for node in silent if node in seen] if silent else ()
         unproven = situation.local_map.unproven
         self.completion.update(situation.tick, situation.bearings, situation.claims, self._occupied, dead, unproven)
-        self.components.deliver(observation.inbox, situation.tick)
+        news = self.components.deliver(observation.inbox, situation.tick)
+        if (
+            not news
+            and self._due is not None
+            and situation.tick < self._due
+            and self.components.is_idle(situation.tick)
+        ):
+            return Command(drive=STOP, wake=self._wake_at(self._due))
         velocity = situation.advance()
         if self.completion.search != self._search:
             self._search = self.completion.search
@@ -87,7 +102,10 @@ class LocalNode(Controller):
 
     def _wake(self) -> Wake | None:
         """Return the next wake-up: the next tick during an activity, else the earliest of the components'."""
-        due = self.components.next_wake()
-        if self.situation.active or due is None:
-            return None
+        due = None if self.situation.active else self.components.next_wake()
+        self._due = due
+        return None if due is None else self._wake_at(due)
+
+    def _wake_at(self, due: int) -> Wake:
+        """Return the wake-up at a tick, the next one at the earliest, or at a packet."""
         return Wake(at_s=max(self.situation.tick + 1, due) * self.setup.dt_s, on_packet=True)

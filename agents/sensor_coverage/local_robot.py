@@ -64,21 +64,23 @@ class PushParticipant(Component):
 
     # --- messages -----------------------------------------------------------------------------------------------------
 
-    def receive(self, sender: int, message: PushToken | PushMessage | SlotVacated, tick: int) -> None:
-        """Take in a token, or a message of the present push."""
+    def receive(self, sender: int, message: PushToken | PushMessage | SlotVacated, tick: int) -> bool:
+        """Take in a token, or a message of the present push; return False for news of a push that is not its own."""
         mine = self.push is not None and self.push.id == message.push
         match message:
             case PushToken():
                 self._take_token(sender, message, tick)
             case SlotVacated():
-                if self.push is not None and mine:
-                    self.push.leader_vacated()
+                if self.push is None or not mine:
+                    return False
+                self.push.leader_vacated()
             case _ if self.push is not None and mine:
                 self.push.receive(message)
             case TakeSlot() if self._situation.free and self._has_me(message.chain):
                 self._join(message.push, NOWHERE, message.chain, None).receive(message)
             case _:
                 pass
+        return True
 
     def begin_push(self, push: int) -> None:
         """Be the rear of a push that the base has called for."""
@@ -133,6 +135,10 @@ class PushParticipant(Component):
             self.push.member_lost(node)
 
     # --- every tick ---------------------------------------------------------------------------------------------------
+
+    def is_idle(self, tick: int) -> bool:
+        """Return whether the robot is in no push."""
+        return self.push is None
 
     def poll(self, tick: int) -> None:
         """Take in acknowledgements, and go on with the push."""

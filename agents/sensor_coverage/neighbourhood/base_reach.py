@@ -38,16 +38,18 @@ class BaseReach:
         """Forget the hops: they are those of the former slot."""
         self.hops, self.count = self._unknown, 0
 
-    def update(self, tick: int, neighbours: Iterable[tuple[int, int]]) -> None:
-        """Take in the hops and the counts of the neighbours."""
+    def update(self, tick: int, neighbours: Iterable[tuple[int, int]]) -> bool:
+        """Take in the hops and the counts of the neighbours; return whether that changed anything."""
+        changed = False
         for hops, count in neighbours:
             if hops >= self._unknown:
                 continue
             fewer, newer = self.hops - (hops + 1), count - self.count
             if newer > LAG or (fewer >= 0 and newer > 0) or (fewer > 0 and newer >= -LAG):
-                self.hops, self.count = hops + 1, count
+                self.hops, self.count, changed = hops + 1, count, True
             if count > self.newest:
-                self.newest, self._newest_at, self._turn_since = count, tick, None
+                self.newest, self._newest_at, self._turn_since, changed = count, tick, None, True
+        return changed
 
     def is_lost(self, tick: int) -> bool:
         """Return whether the base is out of reach, as far as this robot knows."""

@@ -271,6 +271,8 @@ class NeighbourTable:
         )
 
     def _changes_hands(self, tick: int) -> bool:
+        if not self._handovers:
+            return False
         self._handovers = {slot: since for slot, since in self._handovers.items() if tick - since < HANDOVER_TICKS_MAX}
         return bool(self._handovers)
 

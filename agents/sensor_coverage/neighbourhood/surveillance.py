@@ -24,14 +24,14 @@ class Surveillance(Component):
         self._basis: object = None
         self._route_basis = 0
         self._doubt_at: int | None = None
+        self._reach_changed = False  # when it was polled last
 
-    def receive(self, sender: int, message: StateBeacon | PathVector, tick: int) -> None:
-        """Take in a neighbour's state or route."""
+    def receive(self, sender: int, message: StateBeacon | PathVector, tick: int) -> bool:
+        """Take in a neighbour's state or route; return False if it only repeats what this robot knows."""
         situation, local_map = self._situation, self._situation.local_map
         if isinstance(message, PathVector):
-            local_map.path_vectors.receive(sender, message)
-            return
-        local_map.path_vectors.receive(sender, message.path_vector)
+            return local_map.path_vectors.receive(sender, message)
+        news, version = local_map.path_vectors.receive(sender, message.path_vector), local_map.version
         if situation.failure_detector.answered(sender):
             local_map.unblock(sender)
             local_map.change()
@@ -39,6 +39,7 @@ class Surveillance(Component):
             self._beaconing.missed(tick)
         if local_map.receive(sender, message, tick):
             situation.motion.frame.forget((sender,))
+        return news or local_map.version != version
 
     def restarted(self, node: int, tick: int) -> None:
         """Forget a robot that has lost its memory, and average its bearing again."""
@@ -52,7 +53,7 @@ class Surveillance(Component):
             local_map.reach.be_base(tick, first_count(situation.incarnation))
         if local_map.moving:
             return
-        local_map.reach.update(tick, situation.homes.values())
+        self._reach_changed = local_map.reach.update(tick, situation.homes.values())
         if not situation.active:
             if situation.displaced:
                 situation.recover()
@@ -61,7 +62,7 @@ class Surveillance(Component):
             elif situation.alone or situation.is_cut_off():
                 situation.come_back()
                 return
-        basis = local_map.version, tuple(situation.motion.frame.seen), not situation.active
+        basis = self._present_basis()
         if basis != self._basis or tick >= self._next_timer():
             self._basis = basis
             self._update(tick)
@@ -75,9 +76,24 @@ class Surveillance(Component):
 
     def next_wake(self) -> int | None:
         """Return the tick at which a handover or the time without doubt ends."""
-        tick, doubt_at = self._situation.tick, self._doubt_at
-        times = (self._situation.local_map.handovers_until, doubt_at if doubt_at is None or doubt_at > tick else None)
-        return min((each for each in times if each is not None), default=None)
+        handover, doubt_at = self._situation.local_map.handovers_until, self._doubt_at
+        if doubt_at is None or doubt_at <= self._situation.tick:
+            return handover
+        return doubt_at if handover is None else min(handover, doubt_at)
+
+    def is_idle(self, tick: int) -> bool:
+        """Return whether the robot stands, and knows and sees what it knew and saw when it was polled last."""
+        situation, local_map = self._situation, self._situation.local_map
+        known = local_map.path_vectors.version == self._route_basis and self._present_basis() == self._basis
+        if not known or tick >= self._next_timer():
+            return False
+        reaches = not (self._reach_changed or local_map.reach.is_lost(tick))
+        return reaches and bool(situation.bearings) and not situation.displaced
+
+    def _present_basis(self) -> object:
+        """Return what plans depend on."""
+        situation = self._situation
+        return situation.local_map.version, tuple(situation.motion.frame.seen), not situation.active
 
     def _find_slot(self) -> None:
         """After a restart away from the base, take the place where the robot stands as a new slot."""

@@ -24,13 +24,17 @@ class Component(Protocol):
     channel: ClassVar[str] = ""
     accepts: ClassVar[tuple[type[Any], ...]] = ()
 
-    def receive(self, sender: int, message: Any, tick: int) -> None:
-        """Take in a message of one of the accepted types."""
-        return
+    def receive(self, sender: int, message: Any, tick: int) -> bool | None:
+        """Take in a message of one of the accepted types; return False if it says nothing new."""
+        return None
 
     def restarted(self, node: int, tick: int) -> None:
         """Forget the messages of a former incarnation of another robot: it has lost its memory. Its first message follows."""
         return
+
+    def is_idle(self, tick: int) -> bool:
+        """Return whether `poll` has nothing to do before the latest `next_wake`, unless a message says something new."""
+        return True
 
     def poll(self, tick: int) -> None:
         """Act on the state of this tick, after all messages have been received and the drive has gone on."""

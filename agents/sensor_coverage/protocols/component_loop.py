@@ -34,6 +34,7 @@ class ComponentLoop:
     def __init__(self, components: Sequence[Component], codecs: Mapping[str, Codec], incarnation: int = 1) -> None:
         self._components = components
         # A robot that hears its neighbours steps often, and most components do not take part in each stage.
+        self._idle = [each.is_idle for each in components if type(each).is_idle is not Component.is_idle]
         self._polled = [each.poll for each in components if type(each).poll is not Component.poll]
         self._senders = [
             (each.channel, each.outgoing) for each in components if type(each).outgoing is not Component.outgoing
@@ -48,10 +49,14 @@ class ComponentLoop:
             for kind in component.accepts:
                 self._receivers.setdefault(kind, []).append(component)
 
-    def deliver(self, inbox: Sequence[Packet], tick: int) -> None:
-        """Read the packets of this tick, and dispatch their messages; corrupt packets and copies are ignored."""
+    def deliver(self, inbox: Sequence[Packet], tick: int) -> bool:
+        """Read the packets of this tick, and dispatch their messages; corrupt packets and copies are ignored.
+
+        Return whether any of them said something new.
+        """
         if not inbox:
-            return
+            return False
+        news = False
         arrived: dict[tuple[int, bytes], int] = {}
         for packet in inbox:
             codec = self._codecs.get(packet.channel)
@@ -61,11 +66,12 @@ class ComponentLoop:
             if codec.in_envelopes:
                 arrived[sender, packet.payload] = arrived.get((sender, packet.payload), 0) + 1
             elif (message := codec.read(packet.payload)) is not None:
-                self.dispatch(sender, message, tick)
+                news |= self.dispatch(sender, message, tick)
         for (sender, payload), copies in arrived.items():
             message = self._opened(sender, payload, copies, tick)
             if message is not None:
-                self.dispatch(sender, message, tick)
+                news |= self.dispatch(sender, message, tick)
+        return news
 
     def _opened(self, sender: int, payload: bytes, arrived: int, tick: int) -> Any:
         """Return the message in an envelope; None if it is corrupt, or from or to a former incarnation."""
@@ -80,10 +86,20 @@ class ComponentLoop:
             self.losses.receive(sender, envelope.number, envelope.copies, arrived)
         return envelope.message
 
-    def dispatch(self, sender: int, message: Any, tick: int) -> None:
-        """Give one message to every component that accepts its type."""
+    def dispatch(self, sender: int, message: Any, tick: int) -> bool:
+        """Give one message to every component that accepts its type; return whether it said something new to any."""
+        news = False
         for component in self._receivers.get(type(message), ()):
-            component.receive(sender, message, tick)
+            if component.receive(sender, message, tick) is not False:
+                news = True
+        return news
+
+    def is_idle(self, tick: int) -> bool:
+        """Return whether no component has anything to do before `next_wake`, if no message said something new."""
+        for is_idle in self._idle:  # noqa: SIM110 (asked at most steps: a generator takes twice as long)
+            if not is_idle(tick):
+                return False
+        return True
 
     def poll(self, tick: int) -> None:
         """Poll every component."""

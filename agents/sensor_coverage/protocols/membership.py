@@ -43,6 +43,10 @@ class Membership(Component):
         self._negotiation.update(self._situation.stands)
         self._negotiation.receive(sender, message, tick)
 
+    def is_idle(self, tick: int) -> bool:
+        """Return False: locks end at times of their own."""
+        return False
+
     def poll(self, tick: int) -> None:
         """Go on with the negotiation, and leave the complex once all neighbours have agreed."""
         situation, negotiation, local_map = self._situation, self._negotiation, self._situation.local_map

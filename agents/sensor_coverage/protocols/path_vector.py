@@ -43,10 +43,10 @@ class PathVectorProtocol:
         self._ended: dict[int, int] = {}  # slot: the newest claim that has ended, the latest news last
         self._claimed_at = 0  # tick of this robot's newest claim
 
-    def receive(self, sender: int, message: PathVector) -> None:
-        """Take in a neighbour's route; an old or repeated message changes nothing."""
+    def receive(self, sender: int, message: PathVector) -> bool:
+        """Take in a neighbour's route; return False for an old or repeated message, which changes nothing."""
         if message.number <= self._numbers.get(sender, -1):
-            return
+            return False
         self._numbers[sender] = message.number
         for slot, claim in message.ended:
             self._end(slot, claim)
@@ -56,6 +56,7 @@ class PathVectorProtocol:
         if message.slot != NOWHERE and self._routes.get(message.slot) != message.route:
             self._routes[message.slot] = message.route
             self.version += 1
+        return True
 
     def forget(self, sender: int, slot: int) -> None:
         """Forget a neighbour that is dead or lost its memory, and end the claims of its slot."""

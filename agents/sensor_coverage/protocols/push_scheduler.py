@@ -135,6 +135,10 @@ class PushScheduler(Component):
         if self._active is not None and node == self._rear:
             self._end(False)
 
+    def is_idle(self, tick: int) -> bool:
+        """Return False: pushes and the end have times of their own."""
+        return False
+
     def poll(self, tick: int) -> None:
         """Give up a push if its first message was lost, and start the next push if it is time."""
         mailbox = self._situation.mailbox

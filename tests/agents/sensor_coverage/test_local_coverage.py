@@ -12,6 +12,7 @@ from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHER
 from zwerm.agents.sensor_coverage.messages.peers import read, write
 from zwerm.agents.sensor_coverage.messages.pushes import PushDone, PushToken, Segment, SegmentAck
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
+from zwerm.agents.sensor_coverage.protocols.component_loop import ComponentLoop
 from zwerm.agents.sensor_coverage.protocols.transport.mailbox import TRIES_MAX, ReliableMailbox
 from zwerm.deploy.node_specs import node_specs
 from zwerm.errors import ScenarioError
@@ -159,6 +160,25 @@ def test_decentralised_robots_leave_the_same_trace_inline_and_in_processes() -> 
     inline, processes = runs
     assert inline.outcome == processes.outcome == "completed"
     assert inline.trace == processes.trace
+
+
+def test_a_robot_that_hears_nothing_new_does_what_it_would_have_done_in_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    lossy = load("sensor-coverage", (*ALONE, "radio.loss=0.3"))
+    shortened = 0
+    is_idle = ComponentLoop.is_idle
+
+    def counted(loop: ComponentLoop, tick: int) -> bool:
+        nonlocal shortened
+        idle = is_idle(loop, tick)
+        shortened += idle
+        return idle
+
+    monkeypatch.setattr(ComponentLoop, "is_idle", counted)
+    trace = run(lossy, 1, "inline").trace
+    assert shortened > 100
+    monkeypatch.setattr(ComponentLoop, "is_idle", lambda *_: False)
+    assert run(lossy, 1, "inline").trace == trace
+    assert run(lossy, 2, "inline").trace != trace
 
 
 def test_the_decentralised_base_reports_an_empty_depot() -> None:

@@ -89,6 +89,10 @@ class CompletionProtocol(Component):
         """Take in a message of the census."""
         self._outbox += self._census.receive(sender, message, tick * self._dt_s)
 
+    def is_idle(self, tick: int) -> bool:
+        """Return whether no answer is missing."""
+        return not self._census.waits
+
     def poll(self, tick: int) -> None:
         """Ask neighbours again that have not answered; at the base, begin a wave when it is due."""
         if self._asks():

@@ -322,6 +322,10 @@ class WallProtocol(Component):
         self._received.pop(node, None)
         self._kept.forget(node)
 
+    def is_idle(self, tick: int) -> bool:
+        """Return whether no points are kept."""
+        return not self._kept
+
     def poll(self, tick: int) -> None:
         """Take in the points that were kept, and make plans again once a walk has passed."""
         if self._kept and self._situation.settled:
