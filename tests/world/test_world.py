@@ -267,7 +267,9 @@ def test_precomputing_changes_no_trace_when_robots_enter_leave_sleep_or_lose_the
 
 def test_precomputed_readings_are_not_sensed_again() -> None:
     body = {"kind": "holonomic", "latency_ticks": 1}
-    world = world_at((1.0, 1.0, 0.0), (2.0, 1.0, 0.0), robots={"sensors": [{"kind": "bearings"}], "body": body})
+    world = world_at(
+        (1.0, 1.0, 0.0), (2.0, 1.0, 0.0), robots={"sensors": [{"kind": "bearings", "sd_rad": 0.1}], "body": body}
+    )
     (sensor,) = world._sensing.sensors.values()
     asked = []
     read = sensor.read

@@ -59,6 +59,8 @@ class Sensor(ABC):
     sees_beacons: ClassVar[bool] = False
     # The reading is a tuple of items, of which a fault may hide one or add a phantom.
     has_items: ClassVar[bool] = False
+    # The reading depends on poses and on nothing else: while no body moves, it stays the same. An instance may set it.
+    steady: bool = False
     # The reading has floats, to which a fault may add noise and bias.
     has_floats: ClassVar[bool] = True
 

@@ -41,6 +41,7 @@ class Bearings(Sensor):
     def __init__(self, parameters: BearingsTable, surroundings: Surroundings) -> None:
         self._sight = (parameters.range_m, parameters.through_walls, parameters.robots_occlude)
         self._sd_rad, self._bias_rad = parameters.sd_rad, parameters.bias_rad
+        self.steady = self._sd_rad == 0.0
         self._visibility = surroundings.visibility
         self._count = surroundings.count
 

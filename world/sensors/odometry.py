@@ -8,7 +8,7 @@ noise.
 """
 
 import math
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from zwerm.scenario.types import NonNegative, Table
 from zwerm.wire.messages import Displacement
 from zwerm.world.scene import Floats, Ints, Scene
 from zwerm.world.sensors import Sensor, Surroundings, in_body_frames
+
+# Keeps a division by a distance of zero finite.
+_TINY: Final = np.finfo(np.float64).tiny
 
 
 class OdometryTable(Table):
@@ -65,13 +68,13 @@ class Odometry(Sensor):
         forward, left = in_body_frames(dx, dy, self._heading, robots)
         turn = now - heading
         self._position[robots], self._heading[robots] = here, now
-        if any(self._distance_noise):
+        if any(self._distance_noise) and moved.any():
             distance = np.hypot(dx, dy)
             draw = scene.draws.normal("sensor.odometry.distance", scene.tick, robots)
             # 1 + error / distance, finite also where there was no motion.
-            scale = 1.0 + draw * _sd(distance, *self._distance_noise) / np.maximum(distance, np.finfo(np.float64).tiny)
+            scale = 1.0 + draw * _sd(distance, *self._distance_noise) / np.maximum(distance, _TINY)
             forward, left = forward * scale, left * scale
-        if any(self._turn_noise):
+        if any(self._turn_noise) and turn.any():
             draw = scene.draws.normal("sensor.odometry.turn", scene.tick, robots)
             turn = turn + draw * _sd(np.abs(turn), *self._turn_noise)
         return list(map(Displacement, forward.tolist(), left.tolist(), wrap(turn).tolist()))

@@ -50,6 +50,7 @@ class Touch(Sensor):
     def __init__(self, parameters: TouchTable, surroundings: Surroundings) -> None:
         self._reach_m = parameters.reach_m
         self._false_negative, self._false_positive = parameters.false_negative, parameters.false_positive
+        self.steady = not (self._false_negative or self._false_positive)
         self._sector_rad = 2.0 * math.pi / parameters.switches
         self._switch = np.arange(parameters.switches)
         bearings = wrap(self._switch * self._sector_rad).tolist()
@@ -66,8 +67,7 @@ class Touch(Sensor):
         walls = self._walls(scene, robots, here)
         # A wall between two bodies in reach is in reach of both, so no line between bodies has to be tested.
         others = self._visibility.sightings(scene, robots, 2.0 * scene.radius_m + self._reach_m, through_walls=True)
-        errs = self._false_negative > 0.0 or self._false_positive > 0.0
-        if not (errs or len(walls[0]) or len(others.observer)):
+        if self.steady and not (len(walls[0]) or len(others.observer)):
             return [()] * len(robots)
         row = np.concatenate([walls[0], np.searchsorted(robots, others.observer)])
         place = np.concatenate([walls[1], scene.position[others.seen]])
@@ -75,7 +75,7 @@ class Touch(Sensor):
         dx, dy = (place - here[row]).T
         bearing = np.arctan2(dy, dx) - scene.heading[robots[row]]
         closed[row, np.rint(bearing / self._sector_rad).astype(np.int64) % len(self._switch)] = True
-        if errs:
+        if not self.steady:
             draw = scene.draws.uniform("sensor.touch", scene.tick, robots[:, None], self._switch)
             closed ^= draw < np.where(closed, self._false_negative, self._false_positive)
         row, switch = closed.nonzero()

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, repeat
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from zwerm.world.sensors import Sensor
 from zwerm.world.tick.precompute import PrecomputedReadings, Readings
 
 Inboxes = Sequence[tuple[Packet, ...]]
+
+# Before the first tick, and not followed by it.
+_NEVER: Final = -2
 
 
 class Sensing:
@@ -27,6 +30,9 @@ class Sensing:
         self._columns = SENSOR_FIELDS[: last + 1]
         self._robots: Ints = np.zeros(0, dtype=np.int64)  # observed last
         self._precomputed: PrecomputedReadings | None = None
+        # Readings of steady sensors by field and robot, and the tick of the newest scene in which they hold, or _NEVER.
+        self._kept: dict[str, dict[int, Any]] = {field: {} for field, sensor in self.sensors.items() if sensor.steady}
+        self._kept_tick = _NEVER
 
     def readings(self, scene: Scene, robots: Ints) -> Readings:
         """Return the readings of each of `robots` in `scene`, by field; empty without robots."""
@@ -71,4 +77,23 @@ class Sensing:
         return map(encode, made)
 
     def _read_all(self, scene: Scene, robots: Ints) -> Readings:
-        return {field: self.read(field, scene, robots) for field in self.sensors}
+        if self.faults or not self._kept or scene.moved.any():
+            self._kept_tick = _NEVER
+            return {field: self.read(field, scene, robots) for field in self.sensors}
+        if scene.tick - self._kept_tick not in (0, 1):
+            for kept in self._kept.values():
+                kept.clear()
+        self._kept_tick = scene.tick
+        return {
+            field: self._read_kept(field, scene, robots) if field in self._kept else sensor.read(scene, robots)
+            for field, sensor in self.sensors.items()
+        }
+
+    def _read_kept(self, field: str, scene: Scene, robots: Ints) -> Sequence[Any]:
+        """Return the readings of a steady sensor. Only robots that were not read since a body moved are read."""
+        kept, ids = self._kept[field], robots.tolist()
+        new = [robot for robot in ids if robot not in kept]
+        if new:
+            unread = robots if len(new) == len(ids) else np.array(new)
+            kept.update(zip(new, self.sensors[field].read(scene, unread), strict=True))
+        return [kept[robot] for robot in ids]
