@@ -9,6 +9,7 @@ on the fence proves coverage; `find_redundant` looks for such a cycle.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cached_property
 from typing import NamedTuple
 
 Edge = tuple[int, int]
@@ -33,13 +34,21 @@ class FlagComplex:
         self.vertices: tuple[int, ...] = tuple(self.neighbours)
         self.edges: tuple[Edge, ...] = tuple((i, j) for i, each in self.neighbours.items() for j in each if i < j)
         self._known = frozenset(self.edges)
-        self.triangles: tuple[Triangle, ...] = tuple(
-            (i, j, k) for i, j in self.edges for k in self.neighbours[j] if k > j and (i, k) in self._known
-        )
+
+    @cached_property
+    def triangles(self) -> tuple[Triangle, ...]:
+        """All triangles, ascending; found when they are first needed."""
+        return tuple((i, j, k) for i, j in self.edges for k in self.neighbours[j] if k > j and (i, k) in self._known)
 
     def __contains__(self, simplex: Edge) -> bool:
         """True if the complex contains the ordered simplex."""
         return simplex in self._known
+
+    def triangles_at(self, i: int) -> tuple[Triangle, ...]:
+        """Return the triangles that contain a vertex, ascending."""
+        around = self.neighbours[i]
+        beside = ((j, k) for n, j in enumerate(around) for k in around[n + 1 :] if (j, k) in self._known)
+        return tuple(sorted((i, j, k) if i < j else (j, i, k) if i < k else (j, k, i) for j, k in beside))
 
     def common(self, i: int, j: int) -> tuple[int, ...]:
         """Return the vertices that see both i and j, ascending."""

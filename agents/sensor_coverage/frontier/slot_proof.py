@@ -73,10 +73,9 @@ class SlotProof:
         touched = tuple(touched)
         self._at_walls, self._contacts = arcs_of_walls(touched), arcs_of_walls(touched, CONTACT_RAD)
         self._by_view = []
-        for triangle in scan.complex_.triangles:
-            if slot in triangle:
-                a, b = (each for each in triangle if each != slot)
-                self._by_view.append(arc_between(view[a], view[b]))
+        for triangle in scan.complex_.triangles_at(slot):
+            a, b = (each for each in triangle if each != slot)
+            self._by_view.append(arc_between(view[a], view[b]))
 
     def open_arcs(self) -> list[Arc]:
         """Return the arcs that nothing closes."""
