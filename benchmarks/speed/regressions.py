@@ -46,6 +46,7 @@ class Case:
 
 RADIO: Final = ("arena.size_m=[12, 12]", "radio.range_m=1.5")
 SMALL_HALL: Final = ("arena.size_m=[2.0, 1.5]", "robots.count=30", "base.pose=[0.2, 0.5, 0.0]")
+LOSSY_HALL: Final = ("arena.size_m=[4.0, 3.0]", "robots.count=40", "base.pose=[0.2, 1.5, 0.0]")
 FIVE_MODELS: Final = (
     'radio.models=[{kind="range", range_m=9}, {kind="line_of_sight"}, {kind="loss", fraction=0.1}, '
     '{kind="gilbert_elliott", loss_fraction=0.1, burst_packets=4}, {kind="delay", jitter_s=0.1, distribution="exponential"}]'
@@ -71,6 +72,7 @@ MORE: Final = {
         "beacon", ("robots.count=100", "time.duration_s=4", "arena.size_m=[12, 12]", FIVE_MODELS)
     ),
     "sensor-coverage-decentralised": Case("sensor-coverage", (*SMALL_HALL, "services.path=gradient")),
+    "sensor-coverage-lossy": Case("sensor-coverage", (*LOSSY_HALL, "services.path=gradient", "radio.loss=0.3")),
     "robot-teams": Case("robot-teams", ("time.duration_s=60",)),
     "landmark-free": Case("landmark-free", ("time.duration_s=60",)),
     "lock-step-25": Case("computation-free", ("time.duration_s=30",), "processes"),
