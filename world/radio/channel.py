@@ -126,11 +126,13 @@ class Channel:
         traffic = Transmissions(scene, self.dt_s, np.array(senders), np.array(ranks), payloads)
         self.ledger.transmit(traffic.sender, traffic.sizes())
         bound = None if faults and not self._bound_leads else self._bound
-        link, transmission = self._links_of(traffic, np.array(addressees), absent, off, bound)
+        to = np.array(addressees)
+        link, transmission = self._links_of(traffic, to, absent, off, bound)
         key = key_part(_stamp(traffic))[transmission]
         packets = Packets(self.links, link, transmission, transmission, key)
-        judges: list[PacketJudge] = [absent, off, *self.models[: self._leading], *faults, *self.models[self._leading :]]
-        for model in judges:
+        # Broadcasts find available receivers only.
+        availability: list[PacketJudge] = [] if (to == _EVERYONE).all() else [absent, off]
+        for model in (*availability, *self.models[: self._leading], *faults, *self.models[self._leading :]):
             if not len(packets):
                 return
             packets = self._apply(model.judge(traffic, packets), model, traffic, packets)
@@ -146,8 +148,10 @@ class Channel:
         sender, scene, ledger = traffic.sender, traffic.scene, self.ledger
         broadcast = to == _EVERYONE
         which, alone = np.flatnonzero(broadcast), np.flatnonzero(~broadcast)
-        link, transmission = self.links.rows(sender[alone], to[alone]), alone
-        ledger.send(link, addressed=True)
+        link, transmission = alone, alone
+        if len(alone):
+            link = self.links.rows(sender[alone], to[alone])
+            ledger.send(link, addressed=True)
         if not len(which):
             return link, transmission
         found = self._reach.find(scene, off.off, sender[which], _reach_m(bound))

@@ -60,10 +60,10 @@ class Reach:
             ids, counts = self._near(scene.position, senders, bound_m * _SLACK)
         else:
             ids, counts = self._kept(scene.position, senders, bound_m * _SLACK)
-        here = np.ones(len(senders), dtype=np.bool_)
-        bodies = senders < len(scene.present)
-        here[bodies] = scene.present[senders[bodies]]
-        absent = self._absent - ~here
+        absent = np.full(len(senders), self._absent)
+        if not hears.all():
+            bodies = senders < len(scene.present)
+            absent[bodies] -= ~scene.present[senders[bodies]]
         return Receivers(ids, counts, absent, len(self._members) - 1 - absent - everyone, everyone - counts)
 
     def _listen(self, scene: Scene, off: Bools) -> None:
@@ -91,8 +91,9 @@ class Reach:
             here = position[chosen]
             near = (x - here[:, :1]) ** 2 + (y - here[:, 1:]) ** 2 <= bound_m**2
             near &= self._ids != chosen[:, None]
-            ids.append(self._ids[near.nonzero()[1]])
-            counts.append(np.count_nonzero(near, axis=1))
+            row, column = near.nonzero()
+            ids.append(self._ids[column])
+            counts.append(np.bincount(row, minlength=len(chosen)))
         return np.concatenate(ids), np.concatenate(counts)
 
     def _kept(self, position: Floats, senders: Ints, bound_m: float) -> tuple[Ints, Ints]:

@@ -21,12 +21,15 @@ class LineOfSightModel(RadioModel):
     memoryless: ClassVar[bool] = True
 
     def __init__(self, parameters: RadioModelTable, context: ModelContext) -> None:
+        self._never_blocks = context.arena.is_convex
         self._blocked = StaticLinkValues(
             context.links, lambda start, end: context.arena.blocked(start, end).astype(np.float64)
         )
 
     def judge(self, sent: Transmissions, packets: Packets) -> Verdict:
         """Test the segment between both positions against every wall."""
+        if self._never_blocks:
+            return Verdict()
         return Verdict(self._blocked.between(sent.scene, packets) > 0.0)
 
     @classmethod
