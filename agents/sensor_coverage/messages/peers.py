@@ -1,6 +1,7 @@
 """All messages between neighbours on the robots' radio channel, in envelopes that are sealed under a checksum."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Annotated, Final
 
 from msgspec import Meta, Struct
@@ -45,8 +46,11 @@ class Envelope(Struct, frozen=True, array_like=True, forbid_unknown_fields=True)
     message: PeerMessage
 
 
+# Packets whose message is kept: inline, all receivers of a broadcast read the same one at the same tick.
+_KEPT: Final = 64
+
 _sealed: Final = Sealed(Envelope)
-read_envelope: Final[Callable[[bytes], Envelope | None]] = _sealed.read
+read_envelope: Final[Callable[[bytes], Envelope | None]] = lru_cache(_KEPT)(_sealed.read)
 
 
 def write(message: PeerMessage, sender: int = 1, receiver: int = ANY, number: int = 0, copies: int = 1) -> bytes:
