@@ -64,6 +64,8 @@ class Wakes:
         self._on_packet[node] = wake.on_packet
         for field, event in self.events.items():
             watching = getattr(wake, event.asked_by)
+            if not (watching or self._watched[field]):
+                continue
             self._watched[field] += watching - int(self._watching[field][node])
             self._watching[field][node] = watching
             if watching and node in self._newest[field]:
@@ -119,7 +121,7 @@ class Wakes:
         self._asleep.pop(node, None)
         self._on_packet[node] = False
         for field, watching in self._watching.items():
-            if watching[node]:
+            if self._watched[field] and watching[node]:
                 watching[node] = False
                 self._watched[field] -= 1
 
