@@ -5,7 +5,7 @@ and side. The planner moves no robot.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
@@ -17,6 +17,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, overlap
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
 # Directions to try into a wide gap around one robot, as offsets from the bisector of the gap.
@@ -51,6 +52,7 @@ class Planner:
         self._slots = slots
         self._follows_walls = parameters.walls == "followed"
         self._whole_hops = False
+        self._open: Mapping[int, Sequence[Arc]] | None = None  # the open arcs of all slots, once walls were followed
         self._views, self._complex, self._bases = ScanResult({}, FlagComplex({}), ())
         self._plans: list[Plan] = []
 
@@ -58,6 +60,7 @@ class Planner:
         """Take a new scan, and find the fence, or the part of it on `edges`. Algorithm 3."""
         self._views, self._complex, self._bases = scan
         self._whole_hops = self._follows_walls and edges is None
+        self._open = self.walls.open_arcs(scan) if self._whole_hops and self._slots.walks else None
         found = self.fence = fence(self._views, self._complex, self._parameters.corner_margin_rad, edges)
         obstacle = dict.fromkeys(found.corners)
         self._plans = []
@@ -113,11 +116,14 @@ class Planner:
         if key in self.attempt_log.closed:
             return []
         hop = self._parameters.hop_m
-        plans = []
-        for mover, other, sign, near, far in (
+        ends = (
             (side.i, side.j, side.sign, side.angle_i_rad, side.angle_j_rad),
             (side.j, side.i, -side.sign, side.angle_j_rad, side.angle_i_rad),
-        ):
+        )
+        if not any(self._is_open(slot, self._views[slot][other], sign * near) for slot, other, sign, near, _ in ends):
+            return []
+        plans = []
+        for mover, other, sign, near, far in ends:
             if mover in self._bases:
                 continue
             towards = self._slots.direction(mover, other)
@@ -165,6 +171,8 @@ class Planner:
                     continue
                 if any(angle_between(each, direction) < BLOCKED_RAD for each in self.attempt_log.blocked.get(i, ())):
                     continue
+                if not self._is_open(i, direction - BLOCKED_RAD, 2.0 * BLOCKED_RAD):
+                    continue
                 yield Plan(key, i, direction, hop, self._parameters.clear_vertex_m, (i,))
 
     def _hole_plans(self) -> Iterator[Plan]:
@@ -186,7 +194,8 @@ class Planner:
                 direction = self._views[i][a] + gap / 2.0 + turn
                 key = (i, a, 0, LAST + number)
                 narrow = gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD
-                if not narrow and key not in self.attempt_log.closed and not self._walled(i, direction):
+                walled = self._walled(i, direction) or not self._is_open(i, direction - BLOCKED_RAD, 2.0 * BLOCKED_RAD)
+                if not narrow and key not in self.attempt_log.closed and not walled:
                     yield Plan(key, i, direction, hop, clear, (i,))
 
     # --- obstacles ----------------------------------------------------------------------------------------------------
@@ -198,3 +207,10 @@ class Planner:
 
     def _walled(self, slot: int, direction: float) -> bool:
         return any(angle_between(each, direction) < SIXTY_RAD for each in self._slots.walls.get(slot, ()))
+
+    def _is_open(self, slot: int, direction: float, turn_rad: float) -> bool:
+        """Return whether some direction [rad] between this one and `turn_rad` to its left is not proved to be closed."""
+        if self._open is None:
+            return True
+        sector = Arc(direction + min(turn_rad, 0.0), abs(turn_rad))
+        return any(overlap(sector, each) > 0.0 for each in self._open.get(slot, ()))

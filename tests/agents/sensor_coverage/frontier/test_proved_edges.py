@@ -1,0 +1,40 @@
+"""Where walls were followed, no robot is pushed to a side of an edge that is proved to be closed."""
+
+import math
+
+from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.planner import Planner
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk
+from zwerm.maths.simplicial import Edge, FlagComplex
+
+PLACES = {0: (0.0, 0.0), 1: (1.0, 0.0), 2: (0.5, 0.87)}
+SOUTH: Edge = (0, 1)
+
+
+def frontier(closed: tuple[int, ...], walks: int) -> tuple[set[Edge], set[Edge]]:
+    """Return frontier and obstacle edges of a triangle, with the south closed around some slots, after some walks."""
+    slots = Slots()
+    for robot in PLACES:
+        slots.add(robot)
+    for slot in closed:
+        slots.near[slot] = [Arc(-math.pi, math.pi)]
+    slots.walks += [Walk(0, 1, ())] * walks
+    views = {
+        i: {j: math.atan2(b[1] - a[1], b[0] - a[0]) for j, b in PLACES.items() if j != i} for i, a in PLACES.items()
+    }
+    planner = Planner(PlannerParameters(walls="followed"), slots, SwarmProof())
+    planner.update(ScanResult(views, FlagComplex({i: set(seen) for i, seen in views.items()}), ()))
+    return set(planner.frontier), set(planner.obstacle)
+
+
+def test_an_edge_is_frontier_until_both_of_its_ends_are_proved_to_be_closed() -> None:
+    for closed in ((), (0,), (1,)):
+        assert frontier(closed, walks=1) == ({(0, 1), (0, 2), (1, 2)}, set())
+    assert frontier((0, 1), walks=1) == ({(0, 2), (1, 2)}, {SOUTH})
+
+
+def test_before_the_first_walk_every_edge_counts() -> None:
+    assert SOUTH in frontier((0, 1), walks=0)[0]
