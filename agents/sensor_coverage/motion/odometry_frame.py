@@ -34,6 +34,7 @@ class OdometryFrame:
         self.seen: dict[int, float] = {}
         self.contacts: tuple[Touched, ...] = ()
         self.touched: tuple[float, ...] = ()
+        self._touch: tuple[Contact, ...] = ()
         self._sums: dict[int, tuple[complex, int]] = {}
 
     def update(self, observation: Observation) -> None:
@@ -46,19 +47,28 @@ class OdometryFrame:
             self.turned_rad += moved.turn_rad
         turned = self.turned_rad
         self.seen = {each.node: each.bearing_rad + turned for each in observation.bearings or ()}
+        self._touch = observation.touch or ()
         if observation.touch:
             self.contacts = tuple(self._contact(each, turned) for each in observation.touch)
             self.touched = tuple(each.bearing_rad for each in self.contacts if each.node is None)
         else:
             self.contacts = self.touched = ()
 
+    def touched_among(self) -> list[tuple[int, ...]]:
+        """Return for each closed switch that faces robots those robots, the nearest to its direction first."""
+        return [faced for each in self._touch if (faced := self._faced(each, self.turned_rad))]
+
     def _contact(self, contact: Contact, turned: float) -> Touched:
         """Return what a closed switch faces: the visible robot nearest to its direction, or a wall."""
+        nearest = next(iter(self._faced(contact, turned)), None)
+        return Touched(contact.bearing_rad + turned, None) if nearest is None else Touched(self.seen[nearest], nearest)
+
+    def _faced(self, contact: Contact, turned: float) -> tuple[int, ...]:
+        """Return the visible robots that a closed switch may face, the nearest to its direction first."""
         direction = contact.bearing_rad + turned
         beside = contact.half_width_rad + ROBOT_BESIDE_RAD
         off = [(abs(math.remainder(bearing - direction, math.tau)), node) for node, bearing in self.seen.items()]
-        nearest = min((each for each in off if each[0] < beside), default=None)
-        return Touched(direction, None) if nearest is None else Touched(self.seen[nearest[1]], nearest[1])
+        return tuple(node for _, node in sorted(each for each in off if each[0] < beside))
 
     # --- averages -----------------------------------------------------------------------------------------------------
 

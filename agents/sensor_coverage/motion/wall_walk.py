@@ -17,7 +17,8 @@ from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.near_arcs import NearPoint, arcs_around
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
-from zwerm.agents.sensor_coverage.motion.wall_heading import TURN_RAD, hand_on_wall
+from zwerm.agents.sensor_coverage.motion.touched_robots import TouchedRobots
+from zwerm.agents.sensor_coverage.motion.wall_heading import hand_on_wall
 from zwerm.wire.messages import BodyVelocity
 
 # The robot is lost in free space after so much turning without a contact.
@@ -77,9 +78,10 @@ class WallWalk:
         self._latest = motion.position, 0.0  # where the latest step began, and its heading [rad]
         self._wall_rad = 0.0
         self._trail: list[Vector] = []
-        self._blind_rad = 0.0
-        self._was_in_touch = False  # whether there was a contact at the latest step
+        self._turned_rad = 0.0  # towards the hand, since a wall was at the hand
+        self._latest_wall_rad = 0.0  # the direction of that wall
         self._start = motion.position
+        self._touched = TouchedRobots(motion.radius_m, self.on_step)
         self._out_of_reach: frozenset[int] = frozenset()  # robots in the direction of a contact that are not in touch
 
     @property
@@ -123,11 +125,13 @@ class WallWalk:
         if done < feel_m and touched:
             yield from motion.drive_to(start)
             return WalkResult(SHUT, done, touched)
-        self._wall_rad, self._blind_rad = bearing_rad, 0.0
-        way, stuck = 0.0, 0
+        # Without a wall ahead, the robot has stopped at the one beside it.
+        others = [] if ahead else [each.bearing_rad for each in self._bodies.contacts()]
+        self._wall_rad = min(others, key=lambda each: angle_between(each, bearing_rad), default=bearing_rad)
+        self._turned_rad, self._latest_wall_rad, way, stuck = 0.0, self._wall_rad, 0.0, 0
         near = [self._near_point()]
         while math.hypot(frame.x_m - start[0], frame.y_m - start[1]) < clear_m:
-            if way > CLEARING_M_MAX or self._blind_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
+            if way > CLEARING_M_MAX or self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
                 yield from motion.drive_to(start)
                 return WalkResult(SHUT, done, touched, near=arcs_around(start, near, hand, motion.radius_m))
             before = motion.position
@@ -172,9 +176,11 @@ class WallWalk:
             reported.append(point)
             self.on_step(point)
 
-        held = HeldPoints(self._bodies, report)
+        self._touched = TouchedRobots(self._motion.radius_m, report)
+        held = HeldPoints(self._bodies, self._touched.take)
         end, way, kept = yield from self._along(hand, length_m, keep, meet, margin_m, held)
         held.end()
+        self._touched.end()
         return WalkResult(end, way, (), tuple(reported[each] for each in kept))
 
     def _along(
@@ -194,15 +200,15 @@ class WallWalk:
         if not self._sees(keep):
             return LOST, 0.0, ()
         self._trail = [motion.position]
-        self._blind_rad, self._out_of_reach = 0.0, frozenset()
-        held.take(self._waypoint())
+        self._turned_rad, self._out_of_reach = 0.0, frozenset()
+        self._report(held)
         number, kept = 0, [0]
         seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
         last, way, stuck = motion.position, 0.0, 0
         while way < length_m:
             if self._meets(meet):
                 return MET, way, kept
-            if self._blind_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
+            if self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
                 return SHUT, way, kept
             before, seen_before = motion.position, frame.seen
             yield self._step(hand)
@@ -214,7 +220,7 @@ class WallWalk:
                 yield from self._back(margin_m, keep)
                 return LOST, way, kept
             self._trail.append(motion.position)
-            held.take(self._waypoint())
+            self._report(held)
             number += 1
             now, touch = tuple(sorted(frame.seen)), _hands(frame.contacts)
             if now != seen or touch != hands:
@@ -237,18 +243,19 @@ class WallWalk:
             self._latest = motion.position, self._latest[1]
             return push
         contacts = self._bodies.contacts()
-        if not contacts:
-            self._blind_rad += TURN_RAD
-            self._was_in_touch = False
-        else:
-            walls = [each.bearing_rad for each in contacts if each.node is None]
-            if self._was_in_touch:
-                self._blind_rad = 0.0
-            elif self._blind_rad > math.tau and walls:
-                # There is no wall at the hand: the robot circles, and touches another wall once in each turn.
-                self._wall_rad = min(walls, key=lambda each: angle_between(each, self._wall_rad))
-            self._was_in_touch = True
-        heading, self._wall_rad = hand_on_wall(self._wall_rad, contacts, hand)
+        heading, wall_rad = hand_on_wall(self._wall_rad, contacts, hand)
+        walls = [each.bearing_rad for each in contacts if each.node is None]
+        if any(angle_between(each, wall_rad) < 1e-6 for each in walls):
+            self._turned_rad, self._latest_wall_rad = 0.0, wall_rad
+        else:  # no wall at the hand
+            self._turned_rad = max(0.0, self._turned_rad + hand * (wall_rad - self._wall_rad))
+            if self._turned_rad > math.tau and walls:
+                # The robot circles, alone or round a robot, and touches a wall at its other side, or none at all.
+                nearest = min(walls, key=lambda each: angle_between(each, self._wall_rad))
+                heading, wall_rad = hand_on_wall(nearest, contacts, hand)
+            elif self._turned_rad > math.tau and not contacts:
+                heading = wall_rad = self._latest_wall_rad
+        self._wall_rad = wall_rad
         ux, uy = unit(heading)
         self._latest = motion.position, heading
         return motion.velocity(ux * motion.step_m, uy * motion.step_m)
@@ -264,6 +271,12 @@ class WallWalk:
             and node in seen_before
             and is_farther(TOUCHING_RADII_MAX * motion.radius_m, moved, seen_before[node], seen[node])
         )
+
+    def _report(self, held: HeldPoints) -> None:
+        """Report the point at which the robot is now."""
+        point = self._waypoint()
+        self._touched.note(point.x_m, point.y_m, self._motion.frame.touched_among())
+        held.take(point)
 
     def _near_point(self) -> NearPoint:
         return NearPoint(self._motion.position, self._motion.frame.touched, self._bodies.in_touch)

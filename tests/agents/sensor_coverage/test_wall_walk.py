@@ -168,6 +168,75 @@ def test_a_robot_at_a_wall_that_sees_no_other_robot_drives_back_to_its_slot() ->
     assert [each.node for each in seen[0]] == [9]
 
 
+class Beside(Wedged):
+    """A robot that is stopped after 0.9 m to the east by a wall at its left, 6 degrees behind a right angle."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.frame.contacts = (Touched(math.radians(96.0), None),)
+
+    def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        self.position = min(0.9, self.position[0] + self.step_m), 0.0
+        self.frame.x_m = self.position[0]
+        return BodyVelocity(x_m, y_m)
+
+
+def test_a_robot_that_slid_along_a_wall_follows_that_wall() -> None:
+    """It did not meet the wall that it was sent to. With the wall at the right it goes back."""
+    walk = WallWalk(cast(Locomotion, Beside()))
+    for _ in walk.to_wall(0.0, 0.95, 0.0, 0.3, 1):
+        pass
+    assert next(walk.along(-1, 3.0, (), (), 0.05)).forward_m_s < 0.0
+
+
+class Plain(Wedged):
+    """A robot north of a wall, at first in touch with a robot that leaves."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._read(0.0, 0.0)
+        self.frame.contacts = (*self.frame.contacts, Touched(math.radians(100.0), 9))
+
+    def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        self._read(self.position[0] + x_m, max(0.0, self.position[1] + y_m))
+        return BodyVelocity(x_m, y_m)
+
+    def _read(self, x_m: float, y_m: float) -> None:
+        self.position = self.frame.x_m, self.frame.y_m = x_m, y_m
+        self.frame.contacts = (Touched(math.radians(-79.0), None),) if y_m < 0.01 else ()
+
+
+def test_a_robot_that_circles_beside_a_wall_follows_it() -> None:
+    """Each turn of the circle has two contacts with the wall, none of them at the hand."""
+    robot = Plain()
+    walk = WallWalk(cast(Locomotion, robot))
+    for _ in walk.to_wall(math.radians(100.0), 0.95, 0.0, 0.0, 1):
+        pass
+    for _ in walk.along(-1, 3.0, (), (), 0.05):
+        pass
+    assert robot.position[0] > 1.0
+
+
+class Displaced(Plain):
+    """A robot that another one pushes away from the wall."""
+
+    def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        was = self.position[0]
+        command = super().velocity(x_m, y_m)
+        if was < 0.5 <= self.position[0]:
+            self._read(self.position[0], 0.3)
+        return command
+
+
+def test_a_robot_that_has_lost_the_wall_goes_back_to_it() -> None:
+    """The circle that it drives is too small to meet the wall again."""
+    robot = Displaced()
+    walk = WallWalk(cast(Locomotion, robot))
+    for _ in walk.along(-1, 3.0, (), (), 0.05):
+        pass
+    assert robot.position[0] > 1.0
+
+
 class Passing(Wedged):
     """A robot that moves to the east below a wall, at a robot in the south-east, from which it is `away_m`."""
 

@@ -1,0 +1,65 @@
+"""Which of several robots in one direction a walking robot touches: the next steps of its walk show it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
+from zwerm.agents.sensor_coverage.motion.touched_robots import POINTS_MAX, TouchedRobots
+
+RADIUS_M = 0.07
+NOISE_RAD = math.pi / 72.0
+# The walking robot comes from the west along a wall, touches robot 7 at (0, 0), and passes it. Robot 8 is behind robot 7.
+PLACES = {7: (0.14, 0.0), 8: (0.74, 0.0)}
+CONTACT = (0.0, 0.0)
+PASSING = ((0.0, 0.05), (0.04, 0.1), (0.09, 0.13), (0.14, 0.14), (0.19, 0.13), (0.24, 0.1))
+
+
+def points(way: tuple[tuple[float, float], ...], supposed: int, seed: int) -> list[Waypoint]:
+    """Return the points of a walk. At the first one the contact is supposed to be with one robot."""
+    random = np.random.Generator(np.random.Philox(seed))
+    found = []
+    for x_m, y_m in way:
+        seen = tuple(
+            Sighting(node, math.atan2(y - y_m, x - x_m) + random.normal(0.0, NOISE_RAD))
+            for node, (x, y) in PLACES.items()
+        )
+        touched = (supposed,) if (x_m, y_m) == CONTACT else ()
+        found.append(Waypoint(x_m, y_m, seen, (-math.pi / 2.0,) if touched else (), touched))
+    return found
+
+
+def reported(way: tuple[tuple[float, float], ...], supposed: int, seed: int = 1) -> list[Waypoint]:
+    """Return the points that are reported; each contact may be with robot 7 or with robot 8."""
+    found = list[Waypoint]()
+    judge = TouchedRobots(RADIUS_M, found.append)
+    for point in points(way, supposed, seed):
+        if point.robots:
+            judge.note(point.x_m, point.y_m, [(supposed, 15 - supposed)])
+        judge.take(point)
+    judge.end()
+    return found
+
+
+@pytest.mark.parametrize("supposed", [7, 8])
+@pytest.mark.parametrize("seed", range(20))
+def test_the_robot_in_touch_is_the_one_whose_bearing_changes(supposed: int, seed: int) -> None:
+    found = reported((CONTACT, *PASSING), supposed, seed)
+    assert [(each.x_m, each.y_m) for each in found] == [CONTACT, *PASSING]
+    assert [each.robots for each in found] == [(7,), *[()] * len(PASSING)]
+
+
+def test_a_contact_that_stays_uncertain_is_with_none() -> None:
+    """The walking robot turns back on the line on which both robots are."""
+    back = tuple((-0.05 * step, 0.0) for step in range(1, POINTS_MAX + 2))
+    assert [each.robots for each in reported((CONTACT, *back), 7)] == [()] * (POINTS_MAX + 2)
+
+
+def test_points_with_one_robot_in_the_direction_of_a_contact_are_not_held_back() -> None:
+    found = list[Waypoint]()
+    judge = TouchedRobots(RADIUS_M, found.append)
+    first = points((CONTACT,), 7, 1)[0]
+    judge.note(*CONTACT, [(7,)])
+    judge.take(first)
+    assert found == [first]
