@@ -33,7 +33,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
 )
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
-from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, FEEL_M, FIRST_HOP_M, IDLE_LEGS_MAX, LEG_M
+from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, FIRST_HOP_M, IDLE_LEGS_MAX, LEG_M
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
 from zwerm.coordinator.sensor_coverage.sources import Sources
@@ -96,15 +96,13 @@ class WallWalks:
             leader = slots.occupant[plan.mover]
             yield from pushing.prepare(plan)
         heading = slots.heading[leader]
-        to_wall = ToWall(pushing.cycle, wrapped(plan.direction - heading), plan.hop_m, FEEL_M, CLEAR_M, -plan.hand)
+        to_wall = ToWall(pushing.cycle, wrapped(plan.direction - heading), plan.hop_m, 0.0, CLEAR_M, -plan.hand)
         walked = yield from self._order(leader, to_wall)
         if walked is None:  # dead
             self._sources.waiting.pop(plan.mover, None)
             return (leader,)
         self._walls.note_near(plan.mover, [(start + heading, width) for start, width in walked.near])
         if walked.end == SHUT:
-            for each in walked.touched:
-                self._walls.note_wall(plan.mover, each + heading)
             pushing.stopped += 1
             return (leader,)
         followers: Sequence[int] = ()
@@ -125,7 +123,7 @@ class WallWalks:
             return (*followers, leader)
         keep = (slots.occupant[plan.mover],) if plan.beside and plan.mover in slots.occupant else ()
         meet = tuple(slots.occupant[each] for each in plan.meet if each in slots.occupant)
-        yield from self._legs(leader, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
+        yield from self._legs(leader, plan.mover, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
         return (*followers, leader)
 
     def axis(self, base: int) -> Routine[Sequence[float]]:
@@ -180,8 +178,11 @@ class WallWalks:
                 return (robot,)
         return ()
 
-    def _legs(self, leader: int, leg: FollowWall, scan: ScanResult) -> Routine[None]:
-        """Follow the wall, leg by leg. The robot got clear with the wall at its other hand: so it passes its first slot."""
+    def _legs(self, leader: int, origin: int, leg: FollowWall, scan: ScanResult) -> Routine[None]:
+        """Follow the wall, leg by leg, from the slot `origin`.
+
+        The robot got clear with the wall at its other hand: so it passes its first slot.
+        """
         slots, idle_legs = self._slots, 0
         number: int | None = None
         left = self._open(scan)
@@ -193,6 +194,9 @@ class WallWalks:
             number = slots.take_walk(leader, leg.hand, walked.waypoints, walked.radius_m, number, stays)
             if stays:
                 self._measure(leader, walked.waypoints)
+                here = slots.slot_of()[leader]
+                if origin in slots.occupant:
+                    slots.length_m[here, origin] = slots.length_m[origin, here] = math.hypot(walked.x_m, walked.y_m)
                 return
             before, left = left, self._open(scan)
             idle_legs = idle_legs + 1 if left > before - PROGRESS_RAD or walked.end == SHUT else 0

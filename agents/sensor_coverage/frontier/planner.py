@@ -111,7 +111,7 @@ class Planner:
     def _edge_plans(self, side: Side, key: tuple[int, ...], walls_matter: bool = True) -> list[Plan]:
         """Return the plans to expand one side of an edge; none if it is an obstacle edge. Section III-A, i to iv.
 
-        With `walls_matter` a wall beside the direction excludes a mover.
+        With `walls_matter` a wall beside the direction excludes a mover, and a side that is proved to be closed the edge.
         """
         if key in self.attempt_log.closed:
             return []
@@ -120,7 +120,8 @@ class Planner:
             (side.i, side.j, side.sign, side.angle_i_rad, side.angle_j_rad),
             (side.j, side.i, -side.sign, side.angle_j_rad, side.angle_i_rad),
         )
-        if not any(self._is_open(slot, self._views[slot][other], sign * near) for slot, other, sign, near, _ in ends):
+        is_open = any(self._is_open(slot, self._views[slot][other], sign * near) for slot, other, sign, near, _ in ends)
+        if walls_matter and not is_open:
             return []
         plans = []
         for mover, other, sign, near, far in ends:

@@ -43,7 +43,7 @@ class WallPlans:
         slots, proof = self._slots, self._proof
         if proof is None:
             raise RuntimeError("the arcs of all slots are known with a coordinator only")
-        touched = {slot: [*slots.touching.get(slot, ()), *slots.felt.get(slot, ())] for slot in scan.complex_.vertices}
+        touched = {slot: slots.touching.get(slot, ()) for slot in scan.complex_.vertices}
         for slot in proof.update(scan, slots.walks, touched, slots.near):
             self.tried.pop(slot, None)
         return proof.open_arcs()
