@@ -117,8 +117,8 @@ class CentralRobot(Controller):
                 return self._drive(cycle, move(self.motion, bearing_rad, hop_m, landmarks))
             case Correct(cycle, anchors):
                 return self._drive(cycle, correct(self.motion, anchors))
-            case ToWall(cycle, bearing_rad, hop_m, feel_m, clear_m, hand):
-                return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, feel_m, clear_m, hand))
+            case ToWall(cycle, bearing_rad, hop_m, clear_m, hand):
+                return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, 0.0, clear_m, hand))
             case FollowWall(cycle, length_m, hand, keep, meet):
                 margin_m = self.motion.parameters.margin_m
                 return self._walk(cycle, self.wall_walk.along(hand, length_m, keep, meet, margin_m))
@@ -144,7 +144,6 @@ class CentralRobot(Controller):
                 x_m,
                 y_m,
                 result.driven_m,
-                result.touched,
                 result.waypoints,
                 result.near,
                 self.motion.radius_m,

@@ -41,9 +41,8 @@ class LocalNode(Controller):
             self.advice_client = AdviceClient(setup.dt_s)
         self._claimed: bool | None = False if setup.incarnation == 1 else None  # a former one may have claimed
         self._search = 0
-        self._due: int | None = (
-            None  # the tick of the wake-up with which the robot fell asleep, None during an activity
-        )
+        # The tick of the wake-up with which the robot fell asleep; None during an activity.
+        self._due: int | None = None
 
     @property
     def node(self) -> int:

@@ -96,7 +96,7 @@ class WallWalks:
             leader = slots.occupant[plan.mover]
             yield from pushing.prepare(plan)
         heading = slots.heading[leader]
-        to_wall = ToWall(pushing.cycle, wrapped(plan.direction - heading), plan.hop_m, 0.0, CLEAR_M, -plan.hand)
+        to_wall = ToWall(pushing.cycle, wrapped(plan.direction - heading), plan.hop_m, CLEAR_M, -plan.hand)
         walked = yield from self._order(leader, to_wall)
         if walked is None:  # dead
             self._sources.waiting.pop(plan.mover, None)
@@ -137,7 +137,7 @@ class WallWalks:
             return FIRST_BEARINGS_RAD
         cycle = self._pushing.cycle
         for bearing in AXIS_BEARINGS_RAD:
-            walked = yield from self._order(robot, ToWall(cycle, bearing, AXIS_HOP_M, 0.0, 0.0, 1))
+            walked = yield from self._order(robot, ToWall(cycle, bearing, AXIS_HOP_M, 0.0, 1))
             if walked is None:
                 break
             found = None
@@ -163,7 +163,7 @@ class WallWalks:
         robot = self._sources.waiting[base]
         cycle, station = self._pushing.cycle, self._slots.occupant[base]
         for bearing in FIRST_BEARINGS_RAD:
-            to_wall = ToWall(cycle, bearing, FIRST_HOP_M, 0.0, 0.0, -1)
+            to_wall = ToWall(cycle, bearing, FIRST_HOP_M, 0.0, -1)
             walked = yield from self._order(robot, to_wall)
             for hand in (1, -1) if walked is not None else ():
                 walked = yield from self._order(robot, FollowWall(cycle, LEG_M, hand, (station,), ()))

@@ -120,8 +120,9 @@ class Planner:
             (side.i, side.j, side.sign, side.angle_i_rad, side.angle_j_rad),
             (side.j, side.i, -side.sign, side.angle_j_rad, side.angle_i_rad),
         )
-        is_open = any(self._is_open(slot, self._views[slot][other], sign * near) for slot, other, sign, near, _ in ends)
-        if walls_matter and not is_open:
+        if walls_matter and not any(
+            self._is_open(slot, self._views[slot][other], sign * near) for slot, other, sign, near, _ in ends
+        ):
             return []
         plans = []
         for mover, other, sign, near, far in ends:
@@ -168,11 +169,9 @@ class Planner:
                 direction = self._views[i][a] + gap / 2.0 + turn
                 key = (i, a, 0, END_FIRST + number if end else number)
                 narrow = gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD
-                if narrow or key in self.attempt_log.closed or self._walled(i, direction):
+                if narrow or key in self.attempt_log.closed or self._is_shut(i, direction):
                     continue
                 if any(angle_between(each, direction) < BLOCKED_RAD for each in self.attempt_log.blocked.get(i, ())):
-                    continue
-                if not self._is_open(i, direction - BLOCKED_RAD, 2.0 * BLOCKED_RAD):
                     continue
                 yield Plan(key, i, direction, hop, self._parameters.clear_vertex_m, (i,))
 
@@ -195,8 +194,7 @@ class Planner:
                 direction = self._views[i][a] + gap / 2.0 + turn
                 key = (i, a, 0, LAST + number)
                 narrow = gap / 2.0 - abs(turn) < VERTEX_BESIDE_RAD
-                walled = self._walled(i, direction) or not self._is_open(i, direction - BLOCKED_RAD, 2.0 * BLOCKED_RAD)
-                if not narrow and key not in self.attempt_log.closed and not walled:
+                if not narrow and key not in self.attempt_log.closed and not self._is_shut(i, direction):
                     yield Plan(key, i, direction, hop, clear, (i,))
 
     # --- obstacles ----------------------------------------------------------------------------------------------------
@@ -208,6 +206,10 @@ class Planner:
 
     def _walled(self, slot: int, direction: float) -> bool:
         return any(angle_between(each, direction) < SIXTY_RAD for each in self._slots.walls.get(slot, ()))
+
+    def _is_shut(self, slot: int, direction: float) -> bool:
+        """Return whether a wall is beside a direction [rad], or what is around it is proved to be closed."""
+        return self._walled(slot, direction) or not self._is_open(slot, direction - BLOCKED_RAD, 2.0 * BLOCKED_RAD)
 
     def _is_open(self, slot: int, direction: float, turn_rad: float) -> bool:
         """Return whether some direction [rad] between this one and `turn_rad` to its left is not proved to be closed."""

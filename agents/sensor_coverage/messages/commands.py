@@ -121,13 +121,12 @@ class Correct(_UplinkMessage, frozen=True, tag="correct"):
 class ToWall(_UplinkMessage, frozen=True, tag="to-wall"):
     """Drive along a bearing [rad] to a wall within `hop_m`, and along it until `clear_m` from the start.
 
-    A wall within `feel_m` is only felt, and the robot returns. `hand` is +1 if the wall is on the left, else -1.
+    The robot returns if there is no such way. `hand` is +1 if the wall is on the left, else -1.
     """
 
     cycle: int
     bearing_rad: float
     hop_m: float
-    feel_m: float
     clear_m: float
     hand: int
 
@@ -214,9 +213,9 @@ class Arrived(_UplinkMessage, frozen=True, tag="arrived"):
 class Walked(_UplinkMessage, frozen=True, tag="walked"):
     """The end of a drive to a wall or along it, after `driven_m`; `end` is one of OPEN, SHUT, STRETCH, LOST and MET.
 
-    (x, y) [m] is the way from the place where the robot stood before it drove to the wall, by odometry. `touched` are
-    bearings [rad] of the wall that stopped a drive to it. `near` has arcs (start, width) [rad] around that place in which
-    the robot followed a wall close to it.
+    (x, y) [m] is the way from the place where the robot stood before it drove to the wall, by odometry. `near` has
+    arcs (start, width) [rad] around that place in which the robot followed a wall close to it, and `radius_m` is that of
+    its body.
     """
 
     cycle: int
@@ -224,7 +223,6 @@ class Walked(_UplinkMessage, frozen=True, tag="walked"):
     x_m: float
     y_m: float
     driven_m: float
-    touched: tuple[float, ...]
     waypoints: tuple[Waypoint, ...]
     near: tuple[tuple[float, float], ...] = ()
     radius_m: float = 0.0

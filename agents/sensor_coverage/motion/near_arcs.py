@@ -6,9 +6,14 @@ from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import ends_of_stretch, kept_part
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
+    direction_of,
+    ends_of_stretch,
+    kept_part,
+    touched_point,
+)
 from zwerm.agents.sensor_coverage.frontier.wall_proof import SAME_WALL_RAD
-from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
+from zwerm.agents.sensor_coverage.motion.homing import Vector
 
 # Points closer [m] to the start have no direction from there.
 NEAR_M_MIN: Final = 0.02
@@ -50,10 +55,10 @@ def arcs_around(
             stretch = []
         for a, b in combinations(point.walls, 2):
             if angle_between(a, b) < CORNER_RAD:
-                ends = (_touched_point(point.at, each, radius_m) for each in (a, b))
+                ends = (touched_point(point.at, each, radius_m) for each in (a, b))
                 found.append(_between(start, *ends))
         for a, b in same:
-            found.append(_between(start, _touched_point(before.at, a, radius_m), _touched_point(point.at, b, radius_m)))
+            found.append(_between(start, touched_point(before.at, a, radius_m), touched_point(point.at, b, radius_m)))
     found += _arcs_of_stretch(start, stretch, hand, radius_m)
     return tuple((a, width) if width >= 0.0 else (a + width, -width) for a, width in found)
 
@@ -76,12 +81,7 @@ def _arcs_of_stretch(
                 yield first + low * width, (high - low) * width
 
 
-def _touched_point(at: Vector, bearing_rad: float, radius_m: float) -> Vector:
-    ux, uy = unit(bearing_rad)
-    return at[0] + radius_m * ux, at[1] + radius_m * uy
-
-
 def _between(start: Vector, a: Vector, b: Vector) -> tuple[float, float]:
     """Return the direction [rad] of a point from the start, and the angle from there to another point."""
-    first, second = (math.atan2(y - start[1], x - start[0]) for x, y in (a, b))
-    return first, math.remainder(second - first, math.tau)
+    first = direction_of(start, a)
+    return first, math.remainder(direction_of(start, b) - first, math.tau)

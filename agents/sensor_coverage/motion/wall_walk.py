@@ -249,8 +249,8 @@ class WallWalk:
             self._turned_rad, self._latest_wall_rad = 0.0, wall_rad
         else:  # no wall at the hand
             self._turned_rad = max(0.0, self._turned_rad + hand * (wall_rad - self._wall_rad))
+            # After a whole turn it circles, alone or round a robot, and touches a wall at its other side, or none at all.
             if self._turned_rad > math.tau and walls:
-                # The robot circles, alone or round a robot, and touches a wall at its other side, or none at all.
                 nearest = min(walls, key=lambda each: angle_between(each, self._wall_rad))
                 heading, wall_rad = hand_on_wall(nearest, contacts, hand)
             elif self._turned_rad > math.tau and not contacts:

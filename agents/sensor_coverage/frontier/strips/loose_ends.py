@@ -41,6 +41,11 @@ def direction_of(a: Vector, b: Vector) -> float:
     return math.atan2(b[1] - a[1], b[0] - a[0])
 
 
+def touched_point(at: Vector, bearing_rad: float, radius_m: float) -> Vector:
+    """Return the point [m] of a wall that a body at a place touches in a direction."""
+    return at[0] + radius_m * math.cos(bearing_rad), at[1] + radius_m * math.sin(bearing_rad)
+
+
 # A place [m] of the walking robot, and the directions of walls that it touches there.
 Contact = tuple[Vector, Sequence[float]]
 
@@ -60,7 +65,7 @@ def _end(contacts: Sequence[Contact], hand: int, radius_m: float, ahead: bool) -
     # The robot has the wall at its side, and in a corner comes to the wall ahead after that.
     sides = {each: hand * math.remainder(each - heading, math.tau) for each in walls}
     bearing = (min if ahead else max)(sides, key=lambda each: sides[each])
-    return StretchEnd(at, (at[0] + radius_m * math.cos(bearing), at[1] + radius_m * math.sin(bearing)))
+    return StretchEnd(at, touched_point(at, bearing, radius_m))
 
 
 def kept_part(
