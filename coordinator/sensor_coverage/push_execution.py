@@ -157,8 +157,8 @@ class PushExecution:
         slots.add(leader)
         there = there or leader in arrived
         followers, going = self._without_lost(followers, going, arrived)
+        arrived = arrived | (yield from self._home_again(followers, going, arrived))  # others use them as a ruler
         yield from self._straighten(followers, going, path[0], arrived)
-        yield from self._home_again(followers, going, arrived)
         return followers, there
 
     # --- steps of a push ----------------------------------------------------------------------------------------------
@@ -231,25 +231,34 @@ class PushExecution:
                 yield from self.correct(robot, [(slots.occupant[rear], back - slots.heading[robot])])
             rear = slot
 
-    def _home_again(self, robots: Sequence[int], goals: Sequence[int], arrived: Mapping[int, Arrived]) -> Routine[None]:
+    def _home_again(
+        self, robots: Sequence[int], goals: Sequence[int], arrived: Mapping[int, Arrived]
+    ) -> Routine[dict[int, Arrived]]:
         """Home again on landmarks that were moving before, in groups of robots that are no landmarks of each other.
 
-        A robot that must use a landmark of a later group goes once more.
+        A robot that has not returned to its slot yet is no landmark of others. A robot that needs it goes once more. Return
+        the last arrivals of these robots.
         """
-        pending = {
+        last: dict[int, Arrived] = {}
+        unsettled = {
             slot: robot for slot, robot in zip(goals, robots, strict=True) if _used_moving_landmarks(arrived, robot)
         }
         for _ in range(HOMING_ATTEMPTS):
-            again: dict[int, int] = {}
+            pending = dict(unsettled)
             while pending:
                 knows = {slot: [other for other, _ in self._slots.known_from(slot)] for slot in pending}
                 group = {slot: pending[slot] for slot in no_landmarks_of_each_other(knows)}
                 pending = {slot: robot for slot, robot in pending.items() if slot not in group}
                 for slot, robot in group.items():
-                    self._move([robot], [slot], [slot], pending)
+                    self._move([robot], [slot], [slot], unsettled)
                 arrived = yield from self._arrivals(list(group.values()))
-                again |= {slot: robot for slot, robot in group.items() if _used_moving_landmarks(arrived, robot)}
-            pending = again
+                last |= arrived
+                unsettled = {
+                    slot: robot
+                    for slot, robot in unsettled.items()
+                    if slot not in group or _used_moving_landmarks(arrived, robot)
+                }
+        return last
 
     def correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Routine[None]:
         """Correct a robot's scale by anchors with their approximate bearings [rad]."""

@@ -198,8 +198,8 @@ class Arrived(_UplinkMessage, frozen=True, tag="arrived"):
     """The end of a drive.
 
     With `ok` False the robot is back at its start, or did not reach its goal. `used_odometry`: bearings did not
-    determine the distance. `used_moving_landmarks`: some landmarks were driving themselves. `touched` are bearings
-    [rad] of touched walls.
+    determine the distance. `used_moving_landmarks`: the landmarks that stood still did not determine the goal, but others
+    were driving themselves. `touched` are bearings [rad] of touched walls.
     """
 
     cycle: int

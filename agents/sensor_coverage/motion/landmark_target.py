@@ -11,8 +11,8 @@ from zwerm.agents.sensor_coverage.motion.homing import Offset, Vector, offset, u
 class TargetPoint(NamedTuple):
     """The offset [m] to the goal of a move.
 
-    `used_odometry`: odometry determined part of it. `used_moving_landmarks`: some landmarks were driving. `spread` is
-    the variance of the offset per variance of a bearing.
+    `used_odometry`: odometry determined part of it, because the bearings of all landmarks do not. `used_moving_landmarks`: the
+    landmarks that stand still do not determine it. `spread` is the variance of the offset per variance of a bearing.
     """
 
     x: float
@@ -32,7 +32,9 @@ def target_point(
 ) -> TargetPoint:
     """Return the offset to the goal of a move; `by_odometry` is its offset [m] by odometry alone.
 
-    Landmarks that stand still are preferred if there are enough of them. A single landmark determines no offset.
+    Landmarks that stand still determine it if there are enough of them. A single landmark determines no offset. A landmark
+    that drives is up to a hop away from the place that its bearing refers to, and odometry is off by a small fraction of
+    a hop. So odometry determines the offset until enough landmarks stand.
     """
     rx, ry = by_odometry
     found, pairs = Offset(0.0, 0.0, None, False), []
@@ -44,7 +46,8 @@ def target_point(
         ]
         found = offset(pairs)
         if found.known and found.blind is None:
-            return TargetPoint(found.x * hop_m, found.y * hop_m, False, not still, found.spread)
+            x, y = (found.x * hop_m, found.y * hop_m) if still else by_odometry
+            return TargetPoint(x, y, False, not still, found.spread)
     if len(pairs) < 2 or not found.known or found.blind is None:
         return TargetPoint(rx, ry, used_odometry=True)
     bx, by = found.blind

@@ -119,13 +119,13 @@ def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequen
     goal = start[0] + ux * hop_m, start[1] + uy * hop_m
     scale_m = min(hop_m, motion.hop_m) if hop_m > 0.0 else motion.hop_m
     noisy = motion.samples > 1
-    near_m = NOISY_NEAR_M if noisy else p.tolerance_m
     lost = 0
     target = TargetPoint(0.0, 0.0)
     passing = _Passing(motion)
     for _ in range(p.drive_ticks_max):
         target = target_point(landmarks, frame.seen, _offset(motion, goal), scale_m)
-        if target.distance_m < near_m:
+        approaches = noisy and not target.used_moving_landmarks  # else odometry leads to the goal
+        if target.distance_m < (NOISY_NEAR_M if approaches else p.tolerance_m):
             break
         lost = 0 if frame.seen else lost + 1
         if lost > LOST_TICKS:
