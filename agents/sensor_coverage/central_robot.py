@@ -118,7 +118,7 @@ class CentralRobot(Controller):
             case Correct(cycle, anchors):
                 return self._drive(cycle, correct(self.motion, anchors))
             case ToWall(cycle, bearing_rad, hop_m, clear_m, hand):
-                return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, 0.0, clear_m, hand))
+                return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, clear_m, hand))
             case FollowWall(cycle, length_m, hand, keep, meet):
                 margin_m = self.motion.parameters.margin_m
                 return self._walk(cycle, self.wall_walk.along(hand, length_m, keep, meet, margin_m))

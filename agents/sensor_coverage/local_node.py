@@ -4,12 +4,13 @@ from typing import Final
 
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
+from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.messages import advice, peers
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
-from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
+from zwerm.agents.sensor_coverage.neighbourhood.local_map import FrontierMakers, LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.advice_client import AdviceClient
 from zwerm.agents.sensor_coverage.protocols.component_loop import Codec, ComponentLoop
@@ -20,6 +21,7 @@ CODECS: Final = {
     peers.CHANNEL: Codec(peers.read, peers.write, in_envelopes=True),
     advice.CHANNEL: Codec(advice.read, advice.write),
 }
+MAKERS: Final = FrontierMakers(Planner, SlotProof)
 
 
 class LocalNode(Controller):
@@ -32,7 +34,7 @@ class LocalNode(Controller):
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
         self.random.integers(1, INCARNATIONS)  # not used; keeps the later draws as they were in earlier versions
-        self.situation = Situation(setup, self.parameters, self.random, Planner)
+        self.situation = Situation(setup, self.parameters, self.random, MAKERS)
         self.beaconing = Beaconing(self.situation.local_map, lambda: self.situation.waiting)
         base = setup.role == "base"
         self.completion = CompletionProtocol(setup, self.random, base, lambda: self._takes_census)

@@ -11,7 +11,9 @@ from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
 from zwerm.agents.sensor_coverage.frontier.fence import Fence
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WallStep
+from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
 from zwerm.maths.simplicial import Edge, FlagComplex
 
 # Returns the cheapest routes from sources (slot: cost to start there) through a complex.
@@ -37,6 +39,51 @@ class CoverageProof(Protocol):
         """Return the arcs in which each slot is open, without the slots that are open in none."""
 
 
+class SlotCoverageProof(Protocol):
+    """Finds the open arcs of one slot, for the robot there, where walls are followed.
+
+    `around` has the directions [rad] of the slots that share an edge with it. `for_neighbours` has (neighbouring slot, arc
+    there) of what this slot proves for it.
+    """
+
+    around: Mapping[int, float]
+    for_neighbours: list[tuple[int, ProvedArc]]
+
+    @property
+    def ready(self) -> bool:
+        """True once the proof has a view of its slot."""
+
+    def update(self, slot: int, scan: ScanResult, touched: Iterable[float]) -> None:
+        """Take in the slot's view and the complex around it, and the directions [rad] of walls in touch."""
+
+    def open_arcs(self) -> list[Arc]:
+        """Return the arcs that nothing closes."""
+
+    def pass_step(self, walk: int, earlier: WallStep | None, step: WallStep, stretch: FollowedStretch | None) -> bool:
+        """Take in a step of a walk whose end this slot sees, and the step before; return whether the open arcs are smaller."""
+
+    def extend(self, walk: int, stretch: FollowedStretch) -> bool:
+        """Take in how far a stretch of wall was followed; return whether this slot saw a part of it, and it is news."""
+
+    def end_walk(self, walk: int) -> None:
+        """Keep the arcs that a walk has closed, but not its steps: it is over."""
+
+    def accept(self, proved: ProvedArc) -> bool:
+        """Take in an arc that a neighbour has proved; return whether the open arcs are smaller."""
+
+    def lose(self, *slots: int) -> None:
+        """Forget the arcs of walks that one of these slots saw: its robot has died or left, and no robot takes it over."""
+
+    def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
+        """Add arcs (start, width) [rad] in which a wall close to the slot was followed."""
+
+    def memory(self) -> tuple[ProvedArc, ...]:
+        """Return the arcs that walks closed, for the slot's next occupant."""
+
+    def inherit(self, memory: Iterable[ProvedArc]) -> None:
+        """Take over the arcs that walks closed from the slot's former occupant."""
+
+
 class WallService(Protocol):
     """Finds where a robot must follow a wall. `tried` has the directions [rad] of the attempts, by slot."""
 
@@ -44,9 +91,6 @@ class WallService(Protocol):
 
     def plans_at(self, slot: int, beside: int, arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
         """Return a plan for each open arc of a slot that has attempts left, and the number of arcs that have none."""
-
-    def note_wall(self, slot: int, direction: float) -> None:
-        """Record a wall closer than a body [rad] beside a slot."""
 
 
 class FrontierService(Protocol):

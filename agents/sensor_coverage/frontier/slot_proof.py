@@ -1,14 +1,17 @@
 """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
+from zwerm.agents.sensor_coverage.frontier.strips.seen_stretch import SeenStep, SeenStretch, SeenTouch
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    BLIND_MAX,
     CONTACT_RAD,
     NEWS_RAD,
     Arc,
     WalkPoint,
+    WallStep,
     arc_between,
     arcs_of_step,
     arcs_of_walls,
@@ -26,20 +29,8 @@ from zwerm.maths.sums import added
 Witnesses = tuple[tuple[int, ...], tuple[int, ...]]
 
 
-class WallStep(NamedTuple):
-    """A point of a walk, the point before it if the wall was followed since, and the hand at the wall.
-
-    `witnesses` are the slots that saw the way between, where this slot did not.
-    """
-
-    before: WalkPoint | None
-    point: WalkPoint
-    hand: int
-    witnesses: tuple[int, ...] = ()
-
-
 class SlotProof:
-    """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator. It keeps no walks.
+    """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator. It keeps no walks that are over.
 
     `around` are the slots that share an edge with it, and their directions [rad]. An arc that other standing robots closed
     together with a walk counts while they stand within two hops. `lose` names the neighbours' slots that are lost for good.
@@ -53,10 +44,13 @@ class SlotProof:
         self._slot = NOWHERE
         self._scan = ScanResult({}, FlagComplex({}), ())
         self._by_view: list[Arc] = []
+        self._touched: tuple[float, ...] = ()
         self._at_walls: list[Arc] = []  # arcs of walls in touch
         self._contacts: list[Arc] = []  # the directions of their contacts
         self._by_walks: dict[Witnesses, list[Arc]] = {}
-        # Arcs that end at the stretch of wall up to the latest point, seen without a break.
+        self._stretches: dict[tuple[int, int], SeenStretch] = {}  # by walk, and the number of their first point
+        self._touches: dict[int, list[SeenTouch]] = {}  # by walk: the latest contacts with this slot's robot
+        # Arcs that end at the stretch of wall up to the latest point, seen without a break, as if its ends were tied.
         self._stretch: list[Arc] = []
         self._stretch_end: WalkPoint | None = None
 
@@ -70,7 +64,7 @@ class SlotProof:
         view = scan.views[slot]
         self._slot, self._scan = slot, scan
         self.around = {each: view[each] for each in scan.complex_.neighbours[slot]}
-        touched = tuple(touched)
+        self._touched = touched = tuple(touched)
         self._at_walls, self._contacts = arcs_of_walls(touched), arcs_of_walls(touched, CONTACT_RAD)
         self._by_view = []
         for triangle in scan.complex_.triangles_at(slot):
@@ -86,30 +80,62 @@ class SlotProof:
             if all(each in standing for each in needed)
             for arc in arcs
         ]
-        return complement([*self._by_view, *self._at_walls, *walks])
+        followed = [arc for each in self._stretches.values() for arc in each.arcs(standing, self._touched)]
+        return complement([*self._by_view, *self._at_walls, *walks, *followed])
 
     def _open_rad(self) -> float:
         """Return the sum of all open arcs [rad]."""
         return added(each.width_rad for each in self.open_arcs())
 
-    def pass_step(self, slot: int, earlier: WallStep | None, step: WallStep) -> bool:
-        """Take in a step of a walk whose end this slot sees, and the step before; return whether the open arcs are smaller."""
+    def pass_step(self, walk: int, earlier: WallStep | None, step: WallStep, stretch: FollowedStretch | None) -> bool:
+        """Take in a step of a walk whose end this slot sees, and the step before; return whether the open arcs are smaller.
+
+        `stretch` is the stretch of wall that the robot follows, if it has met a wall.
+        """
         old = self._open_rad()
-        if step.before is None or step.before is not self._stretch_end or step.witnesses:
+        slot, (before, point, hand, witnesses, number) = self._slot, step
+        if before is None or before is not self._stretch_end or witnesses:
             self._stretch = []
-        self._stretch += arcs_of_step(slot, step.before, step.point, step.hand)
-        self._stretch_end = step.point
-        seen = (
-            *step.witnesses,
-            *_witnesses_of(step.point),
-            *(() if step.before is None else _witnesses_of(step.before)),
-        )
-        for arc in arcs_of_step(slot, step.before, step.point, step.hand):
-            self._add(step.witnesses, seen, arc)
-        self._add_fan(slot, step.point, [step])
-        if earlier is not None and earlier.point is step.before:
+        self._stretch += arcs_of_step(slot, before, point, hand)
+        self._stretch_end = point
+        if stretch is not None:
+            seen_stretch = self._stretch_of(walk, hand, stretch)
+            seen_stretch.extend(stretch)
+            if before is not None and (earlier is None or earlier.number >= stretch.first_number):
+                saw_both = self._others((*witnesses, *_witnesses_of(point), *_witnesses_of(before)))
+                seen_stretch.add(SeenStep(before, point, self._others(witnesses), saw_both))
+        if slot in point.robots:
+            touch = SeenTouch(number, point, self._others(_witnesses_of(point)))
+            self._touches[walk] = [*self._touches.get(walk, ())[-BLIND_MAX:], touch]
+            for each in [each for key, each in self._stretches.items() if key[0] == walk]:
+                each.add_touch(touch)
+        self._add_fan(slot, point, [step])
+        if earlier is not None and earlier.point is before:
             self._add_fan(slot, earlier.point, [earlier, step])
         return self._open_rad() < old - NEWS_RAD
+
+    def _stretch_of(self, walk: int, hand: int, stretch: FollowedStretch) -> SeenStretch:
+        """Return what this slot saw of a stretch. The stretch may begin beside a robot that was touched before."""
+        key = walk, stretch.first_number
+        if key not in self._stretches:
+            known = [each.stretch for (its_walk, _), each in self._stretches.items() if its_walk == walk]
+            before = max(known, key=lambda each: each.last_number).last if known else None
+            self._stretches[key] = SeenStretch(self._slot, hand, stretch, before)
+            for each in self._touches.get(walk, ()):
+                self._stretches[key].add_touch(each)
+        return self._stretches[key]
+
+    def extend(self, walk: int, stretch: FollowedStretch) -> bool:
+        """Take in how far a stretch of wall was followed; return whether this slot saw a part of it, and it is news."""
+        known = self._stretches.get((walk, stretch.first_number))
+        return known is not None and known.extend(stretch)
+
+    def end_walk(self, walk: int) -> None:
+        """Keep the arcs that a walk has closed, but not its steps: it is over."""
+        self._touches.pop(walk, None)
+        for key in [each for each in self._stretches if each[0] == walk]:
+            for needed, seen, arc in self._stretches.pop(key).keyed_arcs(self._touched):
+                self._add(needed, seen, arc)
 
     def _add_fan(self, slot: int, point: WalkPoint, steps: Sequence[WallStep]) -> None:
         """Add the triangles of this slot, a neighbour and a point, if the space beyond them is proved by these steps."""
@@ -164,6 +190,10 @@ class SlotProof:
         self._by_walks = {
             key: arcs for key, arcs in self._by_walks.items() if not any(each in key[1] for each in slots)
         }
+        for stretch in self._stretches.values():
+            stretch.lose(slots)
+        for walk, touches in self._touches.items():
+            self._touches[walk] = [each for each in touches if not any(slot in each.seen for slot in slots)]
 
     def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
         """Add arcs (start, width) [rad] in which a wall close to the slot was followed."""
@@ -172,11 +202,13 @@ class SlotProof:
 
     def memory(self) -> tuple[ProvedArc, ...]:
         """Return the arcs that walks closed, for the slot's next occupant."""
-        return tuple((*key, *arc) for key, arcs in self._by_walks.items() for arc in arcs)
+        kept = tuple((*key, *arc) for key, arcs in self._by_walks.items() for arc in arcs)
+        followed = (arc for each in self._stretches.values() for arc in each.keyed_arcs(self._touched))
+        return kept + tuple((self._others(needed), self._others(seen), *arc) for needed, seen, arc in followed)
 
     def inherit(self, memory: Iterable[ProvedArc]) -> None:
         """Take over the arcs that walks closed from the slot's former occupant."""
-        self._by_walks = {}
+        self._by_walks, self._stretches, self._touches = {}, {}, {}
         for needed, seen, start, width in memory:
             self._by_walks.setdefault((needed, seen), []).append(Arc(start, width))
 

@@ -28,9 +28,9 @@ class Slots:
     `occupant` has the robot at each slot. `heading` [rad] and `frame` are each robot's heading and the robot in whose
     frame it is. `view` has the bearings that each robot sees in its own frame. `walls` and `blocked` have, by slot, the
     directions of walls, and of drives that a wall stopped. `touching` has the directions of the walls that the present occupant
-    touches where it stands: another occupant may stand beside an opening. `felt` has the directions of walls closer than a
-    body, and `near` the arcs in which a wall close to a slot was followed.
-    `walks` are the walls that robots followed. `length_m` has the distances [m] between slots that are not a hop apart.
+    touches where it stands: another occupant may stand beside an opening. `near` has the arcs in which a wall close to a slot
+    was followed. `walks` are the walls that robots followed. `length_m` has the distances [m] between slots that are not a hop
+    apart.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,6 @@ class Slots:
         self.walls: dict[int, list[float]] = {}
         self.blocked: dict[int, list[float]] = {}
         self.touching: dict[int, list[float]] = {}
-        self.felt: dict[int, list[float]] = {}
         self.near: dict[int, list[Arc]] = {}
         self.walks: list[Walk] = []
         self.length_m: dict[tuple[int, int], float] = {}
@@ -76,7 +75,6 @@ class Slots:
             self.view.pop(robot, None)
         self.walls.pop(slot, None)
         self.touching.pop(slot, None)
-        self.felt.pop(slot, None)
         self.near.pop(slot, None)
 
     def take(self, robot: int, sightings: Iterable[Sighting]) -> None:
@@ -151,7 +149,7 @@ class Slots:
                 self.heading[robot] += by
                 self.frame[robot] = new
         for slot in turned:
-            for known in (self.walls, self.blocked, self.touching, self.felt):
+            for known in (self.walls, self.blocked, self.touching):
                 if slot in known:
                     known[slot] = [each + by for each in known[slot]]
             self.near[slot] = [Arc(each.start_rad + by, each.width_rad) for each in self.near.get(slot, ())]

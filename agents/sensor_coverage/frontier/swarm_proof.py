@@ -7,18 +7,19 @@ the robots that saw it. When one of them is gone, nothing is known of its part: 
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     Crossing,
-    arc_beyond_pocket,
+    arcs_beside_pocket,
     arcs_into,
-    crossing_of_pocket,
+    crossings_of_pocket,
     crossings_of_step,
 )
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import StretchEnd
-from zwerm.agents.sensor_coverage.frontier.strips.stretches import Pocket, stretches_of
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd
+from zwerm.agents.sensor_coverage.frontier.strips.stretches import pocket_of, stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     Arc,
@@ -49,7 +50,8 @@ class Passed(NamedTuple):
 
     `number` counts the points of all walks. The slot did not see the points between these two. Each of them was seen by
     other slots. `stretch` is the number of the first point of the stretch of wall, and `ends` are the ends of the wall from the
-    point before to this one. `pocket` is set if the walking robot touched the slot's robot at an end of the stretch.
+    point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
+    number of the first point of its stretch.
     """
 
     number: int
@@ -59,7 +61,7 @@ class Passed(NamedTuple):
     between: tuple[Collection[int], ...]
     stretch: int = -1
     ends: tuple[StretchEnd, ...] = ()
-    pocket: Pocket | None = None
+    pockets: tuple[tuple[int, Pocket], ...] = ()
 
 
 class ArcBasis(NamedTuple):
@@ -140,7 +142,8 @@ class SwarmProof:
         for walk in walks[self._count :]:
             for slot, passed in _passes(walk, len(self._points)):
                 self._passed.setdefault(slot, []).append(passed)
-                relied = (*passed.between, *(each.ties for each in passed.ends))
+                ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
+                relied = (*passed.between, *(each.ties for each in ends))
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
                     self._witnessed.setdefault(each, {})[slot] = None
             self._points += walk.points
@@ -221,17 +224,16 @@ class SwarmProof:
         around = self._around[slot]
         found = [*arcs_of_walls(around.touched, CONTACT_RAD), *around.near]
         crossings: dict[int, list[Crossing]] = {}
-        for _, before, point, hand, between, stretch, ends, pocket in self._passed.get(slot, ()):
+        for _, before, point, hand, between, stretch, ends, pockets in self._passed.get(slot, ()):
             if not self._counts(point) or (before is not None and not self._counts(before)):
                 continue
             if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
                 loose = [each for each in ends if not each.is_tied(self._neighbours)]
                 crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
-            if pocket is not None:
-                crossing = crossing_of_pocket(slot, point, hand, pocket)
-                crossings.setdefault(stretch, []).append(crossing)
-                if crossing.into > 0:
-                    found.append(arc_beyond_pocket(slot, point, pocket))
+            for first_number, pocket in pockets:
+                is_loose = not pocket.other.is_tied(self._neighbours)
+                crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
+                found += arcs_beside_pocket(hand, pocket, around.touched)
         for each in crossings.values():
             found += arcs_into(each)
         return united(found)
@@ -261,6 +263,7 @@ def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     last: dict[int, SeenPoint] = {}
     touch = TouchCounter()
     stretch_of = stretches_of(walk)
+    stretches = list({each.first_number: each for each in stretch_of.values()}.values())
     for number, point in enumerate(walk.points):
         touch.take(number, point.walls, point.at_body, point.left_walls)
         if point.is_blind:
@@ -273,8 +276,19 @@ def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             before = point_before(slot, last.get(slot), now, touch.since, bool(between))
             there = stretch_of.get(since) if before is not None else None
             ends = () if here is None or there is None else (there.first, here.last)
-            pocket = None if here is None or slot not in point.robots else here.pocket(number)
+            pockets = tuple(_pockets(slot, number, point, stretches, first)) if slot in point.robots else ()
             number_of = -1 if here is None else first + here.first_number
             between = between if before is not None else ()
-            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pocket)
+            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets)
             last[slot] = now
+
+
+def _pockets(
+    slot: int, number: int, point: WalkPoint, stretches: Sequence[FollowedStretch], first: int
+) -> Iterator[tuple[int, Pocket]]:
+    """Yield the pockets beside a slot whose robot the walking robot touches at a point, by the numbers of their stretches."""
+    for before, each in pairwise((None, *stretches)):
+        end = None if before is None else before.last
+        pocket = None if each is None else pocket_of(each, number, point.at, point.seen[slot], end)
+        if each is not None and pocket is not None:
+            yield first + each.first_number, pocket

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import CoverageProof
-from zwerm.agents.sensor_coverage.frontier.directions import add_wall
 from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
@@ -127,7 +126,3 @@ class WallPlans:
     def note_near(self, slot: int, arcs: Iterable[tuple[float, float]]) -> None:
         """Record arcs (start, width) [rad] around a slot in which a wall close to it was followed."""
         self._slots.near[slot] = [*self._slots.near.get(slot, ()), *(Arc(*each) for each in arcs)]
-
-    def note_wall(self, slot: int, direction: float) -> None:
-        """Record a wall closer than a body [rad] beside a slot."""
-        add_wall(self._slots.felt.setdefault(slot, []), direction)

@@ -19,6 +19,8 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
+from zwerm.maths.sums import added
+
 # An open arc narrower than this [rad] counts as closed: ends of arcs that join differ by less. An opening that a robot sees
 # along the wall may be 2 degrees wide, as a door of 0.25 m is at 0.6 m from a robot in touch with its wall.
 GAP_RAD: Final = math.radians(1.5)
@@ -95,6 +97,19 @@ class WalkPoint(NamedTuple):
             self.unplaced,
             turned_vector(self.at, by),
         )
+
+
+class WallStep(NamedTuple):
+    """A point of a walk, the point before it if the wall was followed since, and the hand at the wall.
+
+    `witnesses` are the slots that saw the way between, where this slot did not. `number` counts the points of the walk.
+    """
+
+    before: WalkPoint | None
+    point: WalkPoint
+    hand: int
+    witnesses: tuple[int, ...] = ()
+    number: int = 0
 
 
 class Walk(NamedTuple):
@@ -239,10 +254,16 @@ def united(arcs: Iterable[Arc]) -> list[Arc]:
     return found
 
 
+def shared_arcs(a: Arc, b: Arc) -> list[Arc]:
+    """Return the arcs of the directions that two arcs share."""
+    off = (b.start_rad - a.start_rad) % math.tau
+    first, again = min(a.width_rad - off, b.width_rad), min(off + b.width_rad - math.tau, a.width_rad)
+    return [Arc(start, width) for start, width in ((b.start_rad, first), (a.start_rad, again)) if width > 0.0]
+
+
 def overlap(a: Arc, b: Arc) -> float:
     """Return the size [rad] of the directions that two arcs share."""
-    off = (b.start_rad - a.start_rad) % math.tau
-    return max(0.0, min(a.width_rad - off, b.width_rad)) + max(0.0, min(off + b.width_rad - math.tau, a.width_rad))
+    return added(each.width_rad for each in shared_arcs(a, b))
 
 
 def complement(arcs: Iterable[Arc]) -> list[Arc]:

@@ -41,7 +41,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     """The memory of a slot, which the next occupant inherits.
 
     `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
-    `felt` are directions [rad] of walls closer than a body. `explored` are directions of attempts to follow a wall.
+    `explored` are directions of attempts to follow a wall.
     `proved` has the arcs that walks closed. `distances_m` has (neighbouring slot, distance [m]) where a walk measured it.
     """
 
@@ -54,7 +54,6 @@ class SlotMemory(_PushMessagePart, frozen=True):
     blocked: tuple[float, ...]
     claims: int = 0
     obstructed: tuple[tuple[tuple[int, ...], int], ...] = ()
-    felt: tuple[float, ...] = ()
     explored: tuple[float, ...] = ()
     proved: tuple[ProvedArc, ...] = ()
     distances_m: tuple[tuple[int, float], ...] = ()
@@ -104,13 +103,11 @@ class TakeSlot(_PushMessage, frozen=True, tag="take-slot"):
 class PushAborted(_PushMessage, frozen=True, tag="aborted"):
     """The push has ended and no robot has moved. `tried`: its leader tried to drive.
 
-    `felt` are directions [rad] of walls that a leader felt close to the base's point, and `near` arcs (start, width) [rad]
-    around that point, in which it followed a wall.
+    `near` has arcs (start, width) [rad] around the base's point, in which the leader followed a wall.
     """
 
     push: int
     tried: bool
-    felt: tuple[float, ...] = ()
     near: tuple[tuple[float, float], ...] = ()
 
 

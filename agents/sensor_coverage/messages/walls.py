@@ -6,6 +6,32 @@ Directions are in the frame of the base.
 from msgspec import Struct
 
 
+class _WalkMessagePart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A part of a message."""
+
+
+class WallEnd(_WalkMessagePart, frozen=True):
+    """An end of a stretch of wall: the walking robot's place [m], and the point of the wall that it touched.
+
+    Places are by odometry, from any origin. `robots` were in touch, and robots that are `seen` were in sight.
+    """
+
+    at: tuple[float, float]
+    touched: tuple[float, float]
+    robots: tuple[int, ...]
+    seen: tuple[int, ...]
+
+
+class WallStretch(_WalkMessagePart, frozen=True):
+    """A stretch of wall that was followed: the numbers of its first and last points, its ends, and a body's radius [m]."""
+
+    first_number: int
+    last_number: int
+    first: WallEnd
+    last: WallEnd
+    radius_m: float
+
+
 class _WalkMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A whole message, which begins with its tag."""
 
@@ -15,8 +41,8 @@ class PassedPoint(_WalkMessage, frozen=True, tag="passed"):
 
     `seen` has (robot, direction [rad] from that robot to the point). `walls` are directions of touched walls, and
     `robots` touched robots. The walking robot follows the wall since the point with the number `touch_since`.
-    `hidden` has, for each robot that sees the walking robot again, the number of the last point that it saw before, and for
-    the points between the robots that saw them.
+    `at` is its place [m], and `stretch` the latest stretch of wall. `hidden` has, for each robot that sees the walking robot
+    again, the number of the last point that it saw before, and for the points between the robots that saw them.
     """
 
     push: int
@@ -26,6 +52,8 @@ class PassedPoint(_WalkMessage, frozen=True, tag="passed"):
     seen: tuple[tuple[int, float], ...]
     walls: tuple[float, ...]
     robots: tuple[int, ...]
+    at: tuple[float, float]
+    stretch: WallStretch | None
     hidden: tuple[tuple[int, int, tuple[tuple[int, ...], ...]], ...] = ()
 
 
@@ -53,9 +81,15 @@ class DeadInSight(_WalkMessage, frozen=True, tag="dead-in-sight"):
 
 
 class WalkOver(_WalkMessage, frozen=True, tag="walk-over"):
-    """To all, forwarded once by each robot: the walk of a push has ended."""
+    """To all, forwarded once by each robot: the walk of a push has ended.
+
+    `stretches` are the stretches of wall that were followed. The walking robot stands at the slot
+    `end`, where the last of them ends, or this is NOWHERE.
+    """
 
     push: int
+    end: int
+    stretches: tuple[WallStretch, ...]
 
 
 WalkMessage = PassedPoint | ArcClosed | NeighbourProved | DeadInSight | WalkOver

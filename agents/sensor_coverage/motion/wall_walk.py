@@ -35,14 +35,14 @@ WEDGED_TICKS: Final = 30
 SPACING_M: Final = 0.1
 # Distance [m] within which a robot must get clear of its start.
 CLEARING_M_MAX: Final = 3.0
-# A wall within this way [m] is only felt: the space between it and the robot's slot is narrower than a body.
-FEEL_M: Final = 0.12
 # The walking robot leaves its slot by this distance [m] before the next robot takes it: two bodies and some space.
 CLEAR_M: Final = 0.3
 # A robot in sight is not in touch if its bearing shows a distance of more than this many radii of a body. It shows none
 # unless the walking robot moved by this distance [m] across its line of sight: a bearing's noise would decide.
 TOUCHING_RADII_MAX: Final = 4.0
 ACROSS_M_MIN: Final = 0.03
+# A robot in touch within this angle of the direction back to the start stands there.
+ROBOT_BEHIND_RAD: Final = math.radians(60.0)
 # Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
 LEG_M: Final = 3.0
 # Longest way [m] of a station's first robot to a wall.
@@ -56,7 +56,6 @@ class WalkResult(NamedTuple):
 
     end: str
     driven_m: float = 0.0
-    touched: tuple[float, ...] = ()
     waypoints: tuple[Waypoint, ...] = ()
     near: tuple[tuple[float, float], ...] = ()
 
@@ -85,16 +84,21 @@ class WallWalk:
         self._out_of_reach: frozenset[int] = frozenset()  # robots in the direction of a contact that are not in touch
 
     @property
+    def radius_m(self) -> float:
+        """The radius [m] of the robot's body."""
+        return self._motion.radius_m
+
+    @property
     def way(self) -> Vector:
         """The way [m] by odometry from the place where the latest drive to a wall began."""
         x, y = self._motion.position
         return x - self._start[0], y - self._start[1]
 
-    def to_wall(self, bearing_rad: float, hop_m: float, feel_m: float, clear_m: float, hand: int) -> DriveToWalk:
+    def to_wall(self, bearing_rad: float, hop_m: float, clear_m: float, hand: int) -> DriveToWalk:
         """Drive along a bearing to a wall, and along the wall until the start is `clear_m` away.
 
-        A wall within `feel_m` is only felt: the robot returns to its start. Ends: SHUT (felt, or no way to get clear),
-        OPEN (no wall within `hop_m`), STRETCH (at the wall and clear).
+        Ends: SHUT (no way to get clear: the robot returns to its start), OPEN (no wall within `hop_m`), STRETCH (at the wall
+        and clear).
         """
         motion, frame = self._motion, self._motion.frame
         frame.forget()
@@ -118,13 +122,6 @@ class WallWalk:
             left = min(hop_m - done, motion.step_m)
             yield motion.velocity(ux * left + uy * aside * 0.5, uy * left - ux * aside * 0.5)
             self._trail.append(motion.position)
-        touched = tuple(each.bearing_rad for each in ahead if each.node is None)
-        beside = [each for each in frame.contacts if angle_between(each.bearing_rad, bearing_rad) < math.pi / 2.0]
-        if not ahead and beside and all(each.node is None for each in beside):  # wedged between walls
-            touched = (bearing_rad,)
-        if done < feel_m and touched:
-            yield from motion.drive_to(start)
-            return WalkResult(SHUT, done, touched)
         # Without a wall ahead, the robot has stopped at the one beside it.
         others = [] if ahead else [each.bearing_rad for each in self._bodies.contacts()]
         self._wall_rad = min(others, key=lambda each: angle_between(each, bearing_rad), default=bearing_rad)
@@ -133,7 +130,7 @@ class WallWalk:
         while math.hypot(frame.x_m - start[0], frame.y_m - start[1]) < clear_m:
             if way > CLEARING_M_MAX or self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
                 yield from motion.drive_to(start)
-                return WalkResult(SHUT, done, touched, near=arcs_around(start, near, hand, motion.radius_m))
+                return WalkResult(SHUT, done, near=arcs_around(start, near, hand, motion.radius_m))
             before = motion.position
             yield self._step(hand)
             step_m = math.dist(before, motion.position)
@@ -141,7 +138,7 @@ class WallWalk:
             stuck = stuck + 1 if step_m < STUCK_FRACTION * motion.step_m else 0
             self._trail.append(motion.position)
             near.append(self._near_point())
-        return WalkResult(STRETCH, done, touched, near=arcs_around(start, near, hand, motion.radius_m))
+        return WalkResult(STRETCH, done, near=arcs_around(start, near, hand, motion.radius_m))
 
     def away_from(
         self, station: int, bearings_rad: Iterable[float], hop_m: float, clear_m: float, margin_m: float
@@ -152,7 +149,7 @@ class WallWalk:
         """
         walked = WalkResult(SHUT)
         for bearing in bearings_rad:
-            yield from self.to_wall(bearing, hop_m, 0.0, 0.0, -1)
+            yield from self.to_wall(bearing, hop_m, 0.0, -1)
             for hand in (1, -1):
                 walked = yield from self.along(hand, LEG_M, (station,), (), margin_m)
                 if walked.end == LOST:
@@ -181,7 +178,7 @@ class WallWalk:
         end, way, kept = yield from self._along(hand, length_m, keep, meet, margin_m, held)
         held.end()
         self._touched.end()
-        return WalkResult(end, way, (), tuple(reported[each] for each in kept))
+        return WalkResult(end, way, tuple(reported[each] for each in kept))
 
     def _along(
         self,
@@ -279,7 +276,12 @@ class WallWalk:
         held.take(point)
 
     def _near_point(self) -> NearPoint:
-        return NearPoint(self._motion.position, self._motion.frame.touched, self._bodies.in_touch)
+        """Return the point at which the robot is now. The robot that stands where the way began does not count."""
+        frame, (x, y) = self._motion.frame, self.way
+        back_rad = math.atan2(-y, -x)
+        robots = [each.bearing_rad for each in frame.contacts if each.node is not None]
+        at_robot = any(angle_between(each, back_rad) > ROBOT_BEHIND_RAD for each in robots)
+        return NearPoint(self._motion.position, frame.touched, self._bodies.in_touch, at_robot)
 
     def _waypoint(self) -> Waypoint:
         frame = self._motion.frame

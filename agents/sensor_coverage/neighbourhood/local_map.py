@@ -7,13 +7,12 @@ import cmath
 import math
 from collections.abc import Callable, Iterable
 from itertools import islice
-from typing import Final
+from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
+from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService, SlotCoverageProof
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_reference, wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
-from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_proof import mark_of
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
@@ -32,7 +31,12 @@ GAP_COST: Final = 10_000.0
 # The same for a robot with an open arc, from which a robot must follow a wall. That comes after all edges and gaps.
 WALL_COST: Final = 20_000.0
 
-MakePlanner = Callable[[PlannerParameters, Slots], FrontierService]
+
+class FrontierMakers(NamedTuple):
+    """What makes the planner of a slot, and its proof of coverage."""
+
+    planner: Callable[[PlannerParameters, Slots], FrontierService]
+    proof: Callable[[], SlotCoverageProof]
 
 
 class LocalMap(NeighbourTable):
@@ -44,9 +48,7 @@ class LocalMap(NeighbourTable):
     frontier. `plan_count` counts the times that plans were made. A base station sets `guests`.
     """
 
-    def __init__(
-        self, node: int, parameters: PlannerParameters, make_planner: MakePlanner, incarnation: int = 1
-    ) -> None:
+    def __init__(self, node: int, parameters: PlannerParameters, makers: FrontierMakers, incarnation: int = 1) -> None:
         super().__init__(node, incarnation)
         self.guests: tuple[int, ...] = ()
         self.parameters = parameters
@@ -54,17 +56,17 @@ class LocalMap(NeighbourTable):
         self.gaps: list[Plan] = []
         self.wall_plans: list[Plan] = []
         self.unproven = 0
-        self.proof = SlotProof()
+        self.proof = makers.proof()
         self.path_vectors = PathVectorProtocol()
         self.obstacle: dict[Edge, None] = {}
         self.obstructed = 0
         self._bodies = Obstructions()
         self.plan_count = 0
-        self._make_planner = make_planner
+        self._makers = makers
         self._references: dict[int, Reference] = {}
         self._learned: dict[int, tuple[int, ...]] = {}
         self._slots = Slots()
-        self._planner = make_planner(parameters, self._slots)
+        self._planner = makers.planner(parameters, self._slots)
         self._plan_basis: object = None
         self._led: tuple[int, int | None] | None = None  # (new slot, follower) of a push that failed
 
@@ -109,7 +111,6 @@ class LocalMap(NeighbourTable):
             tuple(log.blocked.get(me, ())),
             self.path_vectors.newest_claim(me),
             tuple(self._bodies.stopped.items()),
-            tuple(self._slots.felt.get(me, ())),
             tuple(self._planner.walls.tried.get(me, ())),
             self.proof.memory(),
             tuple(self.distances_m.items()),
@@ -164,9 +165,9 @@ class LocalMap(NeighbourTable):
         self._references.clear()
         self._learned.clear()
         self._slots = Slots()
-        self._planner = self._make_planner(self.parameters, self._slots)
+        self._planner = self._makers.planner(self.parameters, self._slots)
         self._drop_plans()
-        self.proof, self.distances_m = SlotProof(), {}
+        self.proof, self.distances_m = self._makers.proof(), {}
         self.reach.leave()
         self._bodies.stopped = {}
         self._plan_basis = None
@@ -197,7 +198,6 @@ class LocalMap(NeighbourTable):
         log.attempts = dict(memory.attempts)
         log.blocked[me] = list(memory.blocked)
         self._bodies.stopped = dict(memory.obstructed)
-        self._slots.felt[me] = list(memory.felt)
         self._planner.walls.tried[me] = list(memory.explored)
         self.proof.inherit(memory.proved)
         self.distances_m = dict(memory.distances_m)
@@ -272,7 +272,7 @@ class LocalMap(NeighbourTable):
         """Take the present view into the proof of coverage."""
         me, slots = self.slot, self._slots
         self.proof.lose(*(each.slot for each in self.states.values() if each.redundant))
-        self.proof.update(me, scan or self.scan(), (*slots.touching.get(me, ()), *slots.felt.get(me, ())))
+        self.proof.update(me, scan or self.scan(), slots.touching.get(me, ()))
 
     def scan(self) -> ScanResult:
         """Return the views of this robot and its neighbours as a scan, by this robot's slot."""
@@ -319,10 +319,8 @@ class LocalMap(NeighbourTable):
         self._planner.note_failure(plan, driven_m)
         self.replan()
 
-    def note_walls(self, felt: Iterable[float], near: Iterable[tuple[float, float]] = ()) -> None:
-        """Record walls felt close to this slot [rad], and arcs (start, width) [rad] in which one was followed close to it."""
-        for each in felt:
-            self._planner.walls.note_wall(self.slot, each)
+    def note_near(self, near: Iterable[tuple[float, float]]) -> None:
+        """Record arcs (start, width) [rad] around this slot in which a wall close to it was followed."""
         self.proof.add_near(near)
         self.replan()
 

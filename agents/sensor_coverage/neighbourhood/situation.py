@@ -29,7 +29,6 @@ from zwerm.agents.sensor_coverage.motion.push_drives import (
 from zwerm.agents.sensor_coverage.motion.trail import Trail
 from zwerm.agents.sensor_coverage.motion.wall_walk import (
     CLEAR_M,
-    FEEL_M,
     FIRST_HOP_M,
     LEG_M,
     DriveToWalk,
@@ -37,7 +36,7 @@ from zwerm.agents.sensor_coverage.motion.wall_walk import (
     WallWalk,
 )
 from zwerm.agents.sensor_coverage.neighbourhood.failure_detector import FailureDetector
-from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap, MakePlanner
+from zwerm.agents.sensor_coverage.neighbourhood.local_map import FrontierMakers, LocalMap
 from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegotiation
 from zwerm.agents.sensor_coverage.protocols.transport.mailbox import ReliableMailbox
 from zwerm.wire.messages import BodyVelocity, Observation
@@ -69,7 +68,7 @@ class Situation:
     """
 
     def __init__(
-        self, setup: Setup, parameters: RobotParameters, random: np.random.Generator, make_planner: MakePlanner
+        self, setup: Setup, parameters: RobotParameters, random: np.random.Generator, makers: FrontierMakers
     ) -> None:
         self.node = setup.node
         self.incarnation = setup.incarnation
@@ -82,7 +81,7 @@ class Situation:
         planner_parameters = PlannerParameters(
             link_m=parameters.link_m, margin_m=parameters.margin_m, walls=parameters.walls
         )
-        self.local_map = LocalMap(setup.node, planner_parameters, make_planner, setup.incarnation)
+        self.local_map = LocalMap(setup.node, planner_parameters, makers, setup.incarnation)
         self.mailbox = ReliableMailbox()
         self.negotiation: LeaveNegotiation | None = None
         if setup.services.get("redundancy") in ("link", "coordinator"):
@@ -325,7 +324,7 @@ class Situation:
 
     def to_wall(self, bearing_rad: float, hop_m: float, hand: int) -> None:
         """Begin to drive to a wall, and along it until the start is clear."""
-        self._drive(self.wall_walk.to_wall(bearing_rad, hop_m, FEEL_M, CLEAR_M, hand))
+        self._drive(self.wall_walk.to_wall(bearing_rad, hop_m, CLEAR_M, hand))
 
     def follow_wall(self, hand: int, keep: Collection[int]) -> None:
         """Begin to follow the wall in touch, in sight of a robot of `keep`, or of any robot if `keep` is empty."""

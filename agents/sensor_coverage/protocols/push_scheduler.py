@@ -115,12 +115,12 @@ class PushScheduler(Component):
                 self._situation.mailbox.write(sender, PushAborted(push, False))
             case RedundantOffer(_, slots):
                 self._offers[slots[0]] = slots
-            case PushAborted(push, tried, felt, near) if push == self._active:
-                if felt or near:
-                    self._map.note_walls(felt, near)
+            case PushAborted(push, tried, near) if push == self._active:
+                if near:
+                    self._map.note_near(near)
                 self._end(tried)
             case AllStanding(push, near) if push == self._active and near:
-                self._map.note_walls((), near)
+                self._map.note_near(near)
             case PushDone(push) if push == self._active:
                 self._end(True, True)
             case RedundantPushEnd(push, tried, done) if push == self._active:

@@ -257,7 +257,7 @@ class TokenPush(PushPart, WallPush):
     def _report_standing(self) -> None:
         self._enter("standing")
         if self._near:
-            self._map.note_walls((), self._near)
+            self._map.note_near(self._near)
         if self._chain.is_rear:
             self._behind_settled = True
         else:

@@ -17,7 +17,7 @@ NEAR = ((0.3, 0.5), (2.0, 0.25))
 PUSH = 7
 
 
-@pytest.mark.parametrize("body", [PushAborted(PUSH, True, (1.0,), NEAR), AllStanding(PUSH, NEAR)])
+@pytest.mark.parametrize("body", [PushAborted(PUSH, True, NEAR), AllStanding(PUSH, NEAR)])
 def test_the_base_takes_the_arcs_of_a_wall_that_was_followed_beside_it_into_its_proof(
     body: PushAborted | AllStanding,
 ) -> None:
@@ -35,7 +35,7 @@ def test_a_robot_that_leads_from_the_base_reports_the_arcs_that_it_closed_there(
     robot.local_map.heading = 0.2
     push = robot.pushing._join(PUSH, PUSH, ((NOWHERE, 3),), 0)
     push.lead_from_base(1.0, 1)
-    push._approached(WalkResult(end, 0.1, (0.9,), near=NEAR))
+    push._approached(WalkResult(end, 0.1, near=NEAR))
     sent = push.end if end == SHUT else robot.situation.mailbox._queues[0].bodies[0]
     assert isinstance(sent, PushAborted | AllStanding)
     assert sent.near == tuple((pytest.approx(start + 0.2), width) for start, width in NEAR)

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from zwerm.agents.runtime.node import Node
-from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.local_node import MAKERS
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, StateBeacon
 from zwerm.agents.sensor_coverage.messages.peers import read, write
@@ -202,7 +202,7 @@ def at(slot: int) -> StateBeacon:
 def test_a_leader_that_stays_occupies_the_new_slot_if_its_follower_came_after_all(
     sender: int, slot: int, name: int
 ) -> None:
-    leader = LocalMap(7, PlannerParameters(), Planner)
+    leader = LocalMap(7, PlannerParameters(), MAKERS)
     leader.occupy(4)
     leader.abandon_push(17, 8)
     leader.resolve_duplicate()
@@ -215,7 +215,7 @@ def test_a_leader_that_stays_occupies_the_new_slot_if_its_follower_came_after_al
 @pytest.mark.parametrize(("samples", "epoch"), [(0, -1), (1, 2)], ids=["has just driven", "stood"])
 def test_a_bearing_of_a_robot_that_may_have_been_on_its_way_belongs_to_no_drive(samples: int, epoch: int) -> None:
     """A robot comes into sight during a drive. Its neighbour has not received that it moves, and averages its bearing."""
-    watcher = LocalMap(7, PlannerParameters(), Planner)
+    watcher = LocalMap(7, PlannerParameters(), MAKERS)
     watcher.update_bearings({9: 0.5})
     arrived = StateBeacon(1, 3, 2, False, False, samples, (), (), (), NO_PATH_VECTOR)
     assert watcher.receive(9, arrived, 10) is (samples == 0)
@@ -223,7 +223,7 @@ def test_a_bearing_of_a_robot_that_may_have_been_on_its_way_belongs_to_no_drive(
 
 
 def test_the_next_robot_at_a_slot_inherits_the_distances_that_a_walk_measured() -> None:
-    first, second = (LocalMap(node, PlannerParameters(), Planner) for node in (7, 8))
+    first, second = (LocalMap(node, PlannerParameters(), MAKERS) for node in (7, 8))
     first.occupy(4)
     first.receive(9, at(3), 10)
     first.note_distances({9: 0.24, 10: 0.5})
@@ -235,7 +235,7 @@ def test_the_next_robot_at_a_slot_inherits_the_distances_that_a_walk_measured() 
 
 def test_a_wall_that_only_the_former_occupant_of_a_slot_touched_proves_nothing() -> None:
     """The new occupant stands a few centimetres beside it, and that may be in front of a door."""
-    first, second = (LocalMap(node, PlannerParameters(walls="followed"), Planner) for node in (7, 8))
+    first, second = (LocalMap(node, PlannerParameters(walls="followed"), MAKERS) for node in (7, 8))
     first.heading = second.heading = 0.0
     first.occupy(5)
     first.update_walls((0.0,))

@@ -273,7 +273,7 @@ def test_a_robot_knows_how_far_it_is_from_others_after_a_walk(end: str) -> None:
     way = [(0.0, 0.02 * step) for step in range(11)]
     points = [Waypoint(x, y, (Sighting(5, math.atan2(-y, 0.3 - x)),), (math.pi,), ()) for x, y in way]
     push._idle_legs = IDLE_LEGS_MAX
-    push._walked(WalkResult(end, 0.2, (), tuple(points)))
+    push._walked(WalkResult(end, 0.2, tuple(points)))
     assert robot.local_map.distances_m == pytest.approx({4: math.hypot(0.3, 0.2)})
 
 

@@ -17,6 +17,7 @@ ALONE = (*EXACT, "services.path=gradient")
         pytest.param(5, False, NOISY, id="central, noise, a bend of 1.3 bodies"),
         pytest.param(39, True, NOISY, id="central, noise, a body behind a bend of 1.4 bodies"),
         pytest.param(5, False, ALONE, id="decentralised, a bend of 1.3 bodies"),
+        pytest.param(5, True, (*ALONE, *NOISY), id="decentralised, noise, a body in a bend of 1.3 bodies"),
         pytest.param(13, True, ALONE, id="decentralised, a body in a door of 1.8 bodies"),
         pytest.param(38, False, ALONE, id="decentralised, a robot in a door beside which another one touched the wall"),
     ],

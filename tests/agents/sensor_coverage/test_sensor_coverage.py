@@ -179,10 +179,14 @@ def test_a_small_hall_is_covered_with_no_hole_but_the_obstacle(settings: tuple[s
     assert ratio < ratio_max
 
 
-def test_the_end_of_a_single_file_looks_around_a_corner() -> None:
-    """The last robot stands just before a branch of the corridor: no drive into it reaches the distance of a new slot."""
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_end_of_a_single_file_looks_around_a_corner(seed: int) -> None:
+    """The last robot stands just before a branch of the corridor: no drive into it reaches the distance of a new slot.
+
+    The proof of coverage takes 5 to 16 robots, 9 in the mean of 26 seeds; 4 see all of it.
+    """
     branch = "arena.polygon=[[0.0,0.0],[2.15,0.0],[2.15,-1.5],[2.65,-1.5],[2.65,0.5],[0.0,0.5]]"
-    result = run("sensor-coverage-narrow", 1, "inline", [branch, "robots.count=12"])
+    result = run("sensor-coverage-narrow", seed, "inline", [branch, "robots.count=20"])
     assert result.outcome == "completed"
     assert result.metrics["coverage_fraction"] >= 0.99
 

@@ -12,14 +12,29 @@ import math
 from collections.abc import Collection, Iterable, Iterator
 from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import StretchEnd, direction_of, kept_part
-from zwerm.agents.sensor_coverage.frontier.strips.stretches import Pocket
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, WalkPoint, arc_between
-from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
+    Pocket,
+    StretchEnd,
+    Vector,
+    direction_of,
+    kept_part,
+    touched_point,
+)
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    CONTACT_RAD,
+    LEAVING_M_MIN,
+    Arc,
+    WalkPoint,
+    arc_between,
+    shared_arcs,
+)
+from zwerm.agents.sensor_coverage.motion.homing import unit
 
 # A pocket closes this part of a body's radius beyond the touched point: two of them on both sides of a robot, with an error
 # of a quarter of a radius each by the width of a switch, are narrower than an opening of 1.3 bodies.
 OVERHANG: Final = 1.0
+# An opening narrower than this many diameters of a body need not be found.
+PASSABLE: Final = 1.3
 
 
 class Crossing(NamedTuple):
@@ -40,7 +55,11 @@ def crossings_of_step(
         return
     start = before.seen[slot]
     step = math.remainder(point.seen[slot] - start, math.tau)
-    if step * hand < 0.0:  # the slot and the wall are on different sides of the step
+    beyond = step * hand < 0.0  # the slot and the wall are on different sides of the step
+    if is_backward(before, point, hand):
+        if beyond:  # they are on the same side
+            yield Crossing(arc_between(start, start + step), -1)
+    elif beyond:
         low, high = kept_part(before.at, point.at, start, step, ends)
         if low < high:
             yield Crossing(arc_between(start + low * step, start + high * step), 1)
@@ -48,28 +67,62 @@ def crossings_of_step(
         yield Crossing(arc_between(start, start + step), -1)
 
 
-def crossing_of_pocket(slot: int, point: WalkPoint, hand: int, pocket: Pocket) -> Crossing:
-    """Return the directions of a slot that cross the line from a walking robot in touch with it to the wall that it touches."""
-    there = point.seen[slot]
-    to_wall = math.remainder(direction_of(_beside(point, slot, pocket), pocket.end.touched) - there, math.tau)
+def is_backward(before: WalkPoint, point: WalkPoint, hand: int) -> bool:
+    """Return whether a step leads back along the wall in touch: a robot that has turned round has it at its other hand."""
+    dx, dy = point.at[0] - before.at[0], point.at[1] - before.at[1]
+    walls = (*before.walls, *point.walls)
+    if not walls or math.hypot(dx, dy) < LEAVING_M_MIN:
+        return False
+    heading = math.atan2(dy, dx)
+    sides = [-hand * math.remainder(each - heading, math.tau) for each in walls]
+    return all(CONTACT_RAD < each < math.pi - CONTACT_RAD for each in sides)
+
+
+def crossings_of_pocket(hand: int, pocket: Pocket, other_is_loose: bool) -> Iterator[Crossing]:
+    """Yield the directions of a slot that cross the line from a walking robot beside it to the wall that it touched.
+
+    Where the slot looks into the strip there, some directions leave it at the other end of the stretch, if that is loose.
+    """
+    place, end, other = pocket.place, pocket.end, pocket.other
+    there = direction_of(place, end.at)
+    to_wall = math.remainder(direction_of(place, end.touched) - there, math.tau)
     step = to_wall if pocket.is_last else -to_wall
-    return Crossing(arc_between(there, there + to_wall), 1 if step * hand < 0.0 else -1)
+    arc = arc_between(there, there + to_wall)
+    yield Crossing(arc, 1 if step * hand < 0.0 else -1)
+    if step * hand < 0.0 and other_is_loose:
+        past = arc_between(direction_of(place, other.at), direction_of(place, other.touched))
+        for shared in shared_arcs(arc, past):
+            yield Crossing(shared, -1)
 
 
-def _beside(point: WalkPoint, slot: int, pocket: Pocket) -> Vector:
-    """Return the place of a robot in touch with the walking robot."""
-    ux, uy = unit(point.seen[slot])
-    return point.at[0] - 2.0 * pocket.radius_m * ux, point.at[1] - 2.0 * pocket.radius_m * uy
+def arcs_beside_pocket(hand: int, pocket: Pocket, contacts: Iterable[float]) -> Iterator[Arc]:
+    """Yield the arcs at a slot that are closed beside a pocket; its robot touches walls in the directions `contacts` [rad].
+
+    No opening fits between a wall that the walking robot touched and a robot in touch with it, nor between touched points that
+    are close to each other.
+    """
+    place, touched, radius_m = pocket.place, pocket.end.touched, pocket.radius_m
+    if pocket.in_touch and next(crossings_of_pocket(hand, pocket, False)).into > 0:
+        wall = direction_of(pocket.end.at, touched)
+        side = math.remainder(direction_of(pocket.end.at, place) - wall, math.tau)
+        ux, uy = unit(wall + math.copysign(math.pi / 2.0, side))
+        beyond = touched[0] + OVERHANG * radius_m * ux, touched[1] + OVERHANG * radius_m * uy
+        yield arc_between(direction_of(place, touched), direction_of(place, beyond))
+        for each in contacts:
+            yield from _arc_between_walls(pocket, touched_point(place, each, radius_m))
+    if pocket.before is not None:
+        yield from _arc_between_walls(pocket, pocket.before.touched)
 
 
-def arc_beyond_pocket(slot: int, point: WalkPoint, pocket: Pocket) -> Arc:
-    """Return the arc at a slot beyond a wall that a robot in touch with the slot touches, towards the slot."""
-    at, touched = _beside(point, slot, pocket), pocket.end.touched
-    wall = direction_of(point.at, touched)
-    along = wall + math.copysign(math.pi / 2.0, math.remainder(point.seen[slot] + math.pi - wall, math.tau))
-    ux, uy = unit(along)
-    beyond = touched[0] + OVERHANG * pocket.radius_m * ux, touched[1] + OVERHANG * pocket.radius_m * uy
-    return arc_between(direction_of(at, touched), direction_of(at, beyond))
+def _arc_between_walls(pocket: Pocket, other: Vector) -> Iterator[Arc]:
+    """Yield the arc from the touched wall of a pocket to another touched point [m], if no opening fits in between.
+
+    Each of the two points is known within half a switch. The slot's robot does not stand between the two.
+    """
+    arc = arc_between(direction_of(pocket.place, pocket.end.touched), direction_of(pocket.place, other))
+    apart_m = math.dist(pocket.end.touched, other)
+    if apart_m <= 2.0 * (PASSABLE - math.sin(CONTACT_RAD)) * pocket.radius_m and arc.width_rad <= math.pi / 2.0:
+        yield arc
 
 
 def arcs_into(crossings: Collection[Crossing]) -> list[Arc]:

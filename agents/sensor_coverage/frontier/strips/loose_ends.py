@@ -24,16 +24,48 @@ INWARD: Final = 1e-3
 class StretchEnd(NamedTuple):
     """The walking robot's place [m] at an end of a stretch, the point of the wall that it touched, and the slots of `ties`.
 
-    Any slot of `ties` ties the end as long as it is occupied.
+    Any slot of `ties` ties the end as long as it is occupied. `seen` are the slots that saw the walking robot there. Only
+    they are responsible for what lies behind the end.
     """
 
     at: Vector
     touched: Vector
     ties: tuple[int, ...] = ()
+    seen: tuple[int, ...] = ()
 
     def is_tied(self, standing: Collection[int]) -> bool:
         """Return whether a standing robot is responsible for the space beyond."""
         return any(each in standing for each in self.ties)
+
+
+class Pocket(NamedTuple):
+    """An end of a stretch beside a standing robot at a place [m], the other end, and a body's radius [m].
+
+    `is_last` is true for the last point of the stretch. The walking robot touched the standing robot there if it is `in_touch`,
+    else a few points away, without a wall in touch. `before` is the last end of the stretch before.
+    """
+
+    end: StretchEnd
+    other: StretchEnd
+    radius_m: float
+    is_last: bool
+    place: Vector
+    in_touch: bool
+    before: StretchEnd | None = None
+
+
+class FollowedStretch(NamedTuple):
+    """A stretch of wall: the numbers of its first and last points of a walk, its ends, and the radius of a body [m]."""
+
+    first_number: int
+    last_number: int
+    first: StretchEnd
+    last: StretchEnd
+    radius_m: float
+
+    def tied_at_end(self, slot: int) -> "FollowedStretch":
+        """Return the same stretch with one more slot that ties its last end."""
+        return self._replace(last=self.last._replace(ties=tuple(dict.fromkeys((*self.last.ties, slot)))))
 
 
 def direction_of(a: Vector, b: Vector) -> float:
@@ -52,11 +84,11 @@ Contact = tuple[Vector, Sequence[float]]
 
 def ends_of_stretch(contacts: Sequence[Contact], hand: int, radius_m: float) -> tuple[StretchEnd, StretchEnd]:
     """Return the two ends of a stretch of wall that a robot followed with the wall at its `hand`."""
-    return _end(contacts, hand, radius_m, False), _end(contacts, hand, radius_m, True)
+    return end_of_stretch(contacts, hand, radius_m, False), end_of_stretch(contacts, hand, radius_m, True)
 
 
-def _end(contacts: Sequence[Contact], hand: int, radius_m: float, ahead: bool) -> StretchEnd:
-    """Return the end of a stretch: its last place if `ahead`, else its first one."""
+def end_of_stretch(contacts: Sequence[Contact], hand: int, radius_m: float, ahead: bool) -> StretchEnd:
+    """Return the end of a stretch: its last place if `ahead`, else its first one. Two contacts beside it are enough."""
     at, walls = contacts[-1 if ahead else 0]
     heading = walls[0] - hand * math.pi / 2.0
     if len(contacts) > 1:

@@ -1,62 +1,115 @@
 """The stretches of wall of a walk, and their ends."""
 
-from typing import NamedTuple
+from collections import deque
+from collections.abc import Iterable, Sequence
 
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import StretchEnd, ends_of_stretch
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
+    Contact,
+    FollowedStretch,
+    Pocket,
+    StretchEnd,
+    Vector,
+    end_of_stretch,
+)
 from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, TouchCounter, Walk
+from zwerm.agents.sensor_coverage.motion.homing import unit
 
 
-class Pocket(NamedTuple):
-    """An end of a stretch at which the walking robot touched a standing robot, and a body's radius [m].
+def pocket_of(
+    stretch: FollowedStretch, number: int, at: Vector, there_rad: float, before: StretchEnd | None = None
+) -> Pocket | None:
+    """Return the pocket beside a robot that was touched at the point with this number, or None if that is no end of a way.
 
-    `is_last` is true for the last point of the stretch.
+    The walking robot was at the place `at` then. The touched robot sees it in a direction [rad].
+    """
+    if stretch.first_number == stretch.last_number:
+        return None  # the way of a single point leads nowhere
+    is_last = stretch.last_number <= number <= stretch.last_number + BLIND_MAX
+    if not (is_last or stretch.first_number - BLIND_MAX <= number <= stretch.first_number):
+        return None
+    ux, uy = unit(there_rad)
+    place = at[0] - 2.0 * stretch.radius_m * ux, at[1] - 2.0 * stretch.radius_m * uy
+    in_touch = number in (stretch.first_number, stretch.last_number)
+    if is_last:
+        return Pocket(stretch.last, stretch.first, stretch.radius_m, True, place, in_touch)
+    return Pocket(stretch.first, stretch.last, stretch.radius_m, False, place, in_touch, before)
+
+
+class StretchTracker:
+    """Finds the stretch of wall that a walking robot follows with the wall at its `hand`. A stretch ends at standing robots.
+
+    `latest` is the latest stretch, as far as it was followed: None before the first wall. `found` has all stretches by the
+    numbers of their first points.
     """
 
-    end: StretchEnd
-    radius_m: float
-    is_last: bool
+    def __init__(self, hand: int, radius_m: float) -> None:
+        self.latest: FollowedStretch | None = None
+        self.found: dict[int, FollowedStretch] = {}
+        self._hand, self._radius_m = hand, radius_m
+        self._touch = TouchCounter()
+        self._since = -1
+        self._met = False  # robots, since the latest wall
+        self._first: list[Contact] = []  # the first two contacts of the stretch, and the last two
+        self._last: list[Contact] = []
+        self._robots: deque[Sequence[int]] = deque(maxlen=BLIND_MAX + 1)  # touched at the latest points
+        self._ties: tuple[dict[int, None], dict[int, None]] = {}, {}
 
+    @property
+    def touch_since(self) -> int:
+        """The number of the point since which the robot follows the wall."""
+        return self._touch.since
 
-class FollowedStretch(NamedTuple):
-    """A stretch of wall: the numbers of its first and last points of a walk, its ends, and the radius of a body [m]."""
+    def take(
+        self,
+        number: int,
+        at: Vector,
+        walls: Sequence[float],
+        robots: Sequence[int],
+        seen: Iterable[int],
+        at_body: bool = False,
+        left_walls: bool = False,
+    ) -> None:
+        """Take in the point with this number: the place, the walls and robots in touch, who saw it; see `WalkPoint`."""
+        self._touch.take(number, walls, at_body, left_walls)
+        self._robots.append(robots)
+        latest = self.latest
+        if not walls:
+            self._met = self._met or bool(robots)
+            if latest is not None and robots and number <= latest.last_number + BLIND_MAX:
+                self._ties[1].update(dict.fromkeys(robots))
+                self._note(latest._replace(last=latest.last._replace(ties=tuple(self._ties[1]))))
+            return
+        if latest is None or self._touch.since != self._since or self._met:
+            latest = None
+            self._first = []
+            self._last = []
+            self._ties = dict.fromkeys(each for robots in self._robots for each in robots), {}
+        self._since, self._met = self._touch.since, False
+        if len(self._first) < 2:
+            self._first.append((at, walls))
+        self._last = [*self._last[-1:], (at, walls)]
+        self._ties = self._ties[0], dict.fromkeys(robots)
+        seen = tuple(seen)
+        first_number, first_seen = (number, seen) if latest is None else (latest.first_number, latest.first.seen)
+        first = end_of_stretch(self._first, self._hand, self._radius_m, False)
+        last = end_of_stretch(self._last, self._hand, self._radius_m, True)
+        first = first._replace(ties=tuple(self._ties[0]), seen=first_seen)
+        last = last._replace(ties=tuple(self._ties[1]), seen=seen)
+        self._note(FollowedStretch(first_number, number, first, last, self._radius_m))
 
-    first_number: int
-    last_number: int
-    first: StretchEnd
-    last: StretchEnd
-    radius_m: float
-
-    def pocket(self, number: int) -> Pocket | None:
-        """Return the pocket at the point with this number, or None if it is no end of a way."""
-        if self.first_number == self.last_number or number not in (self.first_number, self.last_number):
-            return None  # the way of a single point leads nowhere
-        is_last = number == self.last_number
-        return Pocket(self.last if is_last else self.first, self.radius_m, is_last)
+    def _note(self, stretch: FollowedStretch) -> None:
+        self.latest = self.found[stretch.first_number] = stretch
 
 
 def stretches_of(walk: Walk) -> dict[int, FollowedStretch]:
     """Return the stretch of wall of each point of a walk in touch with a wall. A stretch ends at standing robots."""
-    touch = TouchCounter()
-    numbered: list[list[int]] = []
-    since, robots = -1, False
+    tracker = StretchTracker(walk.hand, walk.radius_m)
+    first_numbers: dict[int, int] = {}
     for number, point in enumerate(walk.points):
-        touch.take(number, point.walls, point.at_body, point.left_walls)
-        if not point.walls:
-            robots = robots or bool(point.robots)
-            continue
-        if touch.since != since or robots:
-            numbered.append([])
-        since, robots = touch.since, False
-        numbered[-1].append(number)
-    found: dict[int, FollowedStretch] = {}
-    for numbers in numbered:
-        contacts = [(walk.points[each].at, walk.points[each].walls) for each in numbers]
-        ends = ends_of_stretch(contacts, walk.hand, walk.radius_m)
-        first, last = numbers[0], numbers[-1]
-        beside = walk.points[max(0, first - BLIND_MAX) : first + 1], walk.points[last : last + BLIND_MAX + 1]
-        ties = [[slot for point in points for slot in point.robots] for points in beside]
-        if walk.end is not None and last + BLIND_MAX >= len(walk.points) - 1:
-            ties[1].append(walk.end)
-        tied = [end._replace(ties=tuple(dict.fromkeys(each))) for end, each in zip(ends, ties, strict=True)]
-        found |= dict.fromkeys(numbers, FollowedStretch(first, last, tied[0], tied[1], walk.radius_m))
-    return found
+        tracker.take(number, point.at, point.walls, point.robots, point.seen, point.at_body, point.left_walls)
+        if point.walls and tracker.latest is not None:
+            first_numbers[number] = tracker.latest.first_number
+    found, last = tracker.found, tracker.latest
+    if walk.end is not None and last is not None and last.last_number + BLIND_MAX >= len(walk.points) - 1:
+        found[last.first_number] = last.tied_at_end(walk.end)
+    return {number: found[first_number] for number, first_number in first_numbers.items()}

@@ -9,15 +9,19 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from typing import ClassVar, Final, NamedTuple, Protocol
 
+from zwerm.agents.sensor_coverage.frontier.decisions import SlotCoverageProof
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
-from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof, WallStep
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, StretchEnd
+from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracker
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    BLIND_MAX,
     SeenPoint,
-    TouchCounter,
     WalkPoint,
+    WallStep,
     drives_away,
     mark_of,
     point_before,
+    turned_vector,
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
@@ -29,16 +33,15 @@ from zwerm.agents.sensor_coverage.messages.walls import (
     PassedPoint,
     WalkMessage,
     WalkOver,
+    WallEnd,
+    WallStretch,
 )
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.walls.kept_points import KeptPoints, Neighbourhood
+from zwerm.agents.sensor_coverage.protocols.walls.sightlines import RESENT_POINTS, Sightlines
 
 # A robot makes plans again this many ticks after the latest point that closed something: the walk has passed.
 PASSED_TICKS: Final = 10
-# Points for which it is remembered who saw them, and points in which it is repeated who sees the walking robot again. Who
-# misses more points than the latter takes them as unseen.
-REMEMBERED_POINTS: Final = 60
-RESENT_POINTS: Final = 10
 
 
 class ProvedSlot(Neighbourhood, Protocol):
@@ -47,7 +50,7 @@ class ProvedSlot(Neighbourhood, Protocol):
     moving: bool
     redundant: bool
     heading: float | None
-    proof: SlotProof
+    proof: SlotCoverageProof
 
     def update_proof(self) -> None:
         """Take the present view into the proof."""
@@ -60,6 +63,10 @@ class StepReporter(Protocol):
     """A walk that reports each of its points to `on_step`."""
 
     on_step: Callable[[Waypoint], None]
+
+    @property
+    def radius_m(self) -> float:
+        """The radius [m] of the robot's body."""
 
 
 class WalkSituation(Protocol):
@@ -99,37 +106,6 @@ class _Received(NamedTuple):
     step: WallStep
 
 
-class _Hidden(NamedTuple):
-    """A robot sees the walking robot again at the point `number`, after `last`; and the robots that saw the points between."""
-
-    number: int
-    last: int
-    between: tuple[tuple[int, ...], ...]
-
-
-class Sightlines:
-    """Which robots saw the points of this robot's walk, and which see it again after they had lost it."""
-
-    def __init__(self) -> None:
-        self._seen: dict[int, tuple[int, ...]] = {}  # the latest points
-        self._last: dict[int, int] = {}
-        self._hidden: dict[int, _Hidden] = {}
-
-    def take(self, number: int, seen: tuple[int, ...]) -> tuple[tuple[int, int, tuple[tuple[int, ...], ...]], ...]:
-        """Take in the robots that see a point, and return those that see the walking robot again; see `PassedPoint`."""
-        for node in seen:
-            last = self._last.get(node)
-            if last is not None and last < number - 1:
-                # Points that are forgotten were seen by nobody, as far as is known.
-                between = [self._seen.get(each, ()) for each in range(last + 1, number)]
-                self._hidden[node] = _Hidden(number, last, tuple(dict.fromkeys(between)))
-            self._last[node] = number
-        self._seen[number] = seen
-        self._seen.pop(number - REMEMBERED_POINTS, None)
-        self._hidden = {node: each for node, each in self._hidden.items() if each.number > number - RESENT_POINTS}
-        return tuple((node, each.last, each.between) for node, each in self._hidden.items() if node in seen)
-
-
 class WallProtocol(Component):
     """One robot's part in walks, its own and those of others."""
 
@@ -144,12 +120,13 @@ class WallProtocol(Component):
         self._push: int | None = None  # the push of this robot's own walk
         self._hand = 1
         self._number = 0
-        self._touch, self._sightlines = TouchCounter(), Sightlines()
+        self._stretches, self._sightlines = StretchTracker(1, 0.0), Sightlines()
         self._closed = False
         self._received: dict[int, _Received] = {}
         self._kept = KeptPoints()
         self._replan_at: int | None = None
         self._over: dict[int, None] = {}
+        self._ended: list[WalkOver] = []  # walks that have ended while points were kept
         self._latest: Waypoint | None = None
         self._warned: dict[tuple[int, int], None] = {}  # (push, dead robot) that the walking robot was told
 
@@ -159,7 +136,8 @@ class WallProtocol(Component):
         """Announce the points of the walk that begins now."""
         if push != self._push:
             self._push, self._hand, self._number = push, hand, 0
-            self._touch, self._sightlines = TouchCounter(), Sightlines()
+            self._stretches = StretchTracker(hand, self._situation.wall_walk.radius_m)
+            self._sightlines = Sightlines()
             self._latest = None
             self._situation.said_dead.clear()
         self._closed = False
@@ -170,10 +148,13 @@ class WallProtocol(Component):
         return self._closed
 
     def end(self, push: int) -> None:
-        """Announce that the walk is over."""
+        """Announce that the walk is over, and which walls were followed."""
         self._push = None
         self._situation.wall_walk.on_step = lambda _: None
-        self._spread(push)
+        last = self._stretches.latest
+        reaches_end = last is not None and last.last_number + BLIND_MAX >= self._number
+        end = self._situation.local_map.slot if reaches_end else NOWHERE
+        self._spread(WalkOver(push, end, tuple(message_of(each) for each in self._stretches.found.values())))
 
     def _announce(self, at: Waypoint) -> None:
         local_map = self._situation.local_map
@@ -185,16 +166,22 @@ class WallProtocol(Component):
         left = before is not None and drives_away(
             self._hand, before.touched, at.touched, at.x_m - before.x_m, at.y_m - before.y_m
         )
-        self._touch.take(self._number, at.touched, at_body, left)
+        place = turned_vector((at.x_m, at.y_m), heading)
+        walls = tuple(wrapped(each + heading) for each in at.touched)
+        seen = tuple(each.node for each in at.sightings)
+        self._stretches.take(self._number, place, walls, at.robots, seen, at_body, left)
+        stretch = self._stretches.latest
         point = PassedPoint(
             self._push or 0,
             self._number,
             self._hand,
-            self._touch.since,
+            self._stretches.touch_since,
             tuple((each.node, wrapped(each.bearing_rad + heading + math.pi)) for each in at.sightings),
-            tuple(wrapped(each + heading) for each in at.touched),
+            walls,
             at.robots,
-            self._sightlines.take(self._number, tuple(each.node for each in at.sightings)),
+            place,
+            None if stretch is None else message_of(stretch),
+            self._sightlines.take(self._number, seen),
         )
         self._outbox.append(Outgoing(None, point))
 
@@ -212,8 +199,11 @@ class WallProtocol(Component):
             case NeighbourProved():
                 self._accept(message, tick)
             case WalkOver(push) if push not in self._over:
-                self._spread(push)
+                self._spread(message)
                 self._on_over(push)
+                self._ended.append(message)
+                if not self._kept:
+                    self._end_walks(tick)
             case _:
                 pass
 
@@ -230,10 +220,14 @@ class WallProtocol(Component):
         if not self._proves:
             return
         if local_map.proof.ready:
-            slots = {node: state.slot for node, state in local_map.mutual().items()} | {local_map.node: local_map.slot}
-            self._pass(sender, passed, slots, tick)
+            self._pass(sender, passed, self._slots(), tick)
         else:
             self._kept.keep(sender, passed, local_map)
+
+    def _slots(self) -> dict[int, int]:
+        """Return the slots of this robot and of the robots that it sees and that see it."""
+        local_map = self._situation.local_map
+        return {node: state.slot for node, state in local_map.mutual().items()} | {local_map.node: local_map.slot}
 
     def _warn(self, sender: int, passed: PassedPoint) -> None:
         """Tell the walking robot once which robots that it sees or touches are dead: it may not have asked them."""
@@ -260,21 +254,25 @@ class WallProtocol(Component):
             passed.walls,
             tuple(slots.get(node, NOWHERE) for node in passed.robots),
             unplaced=tuple(mark_of(node) for node, _ in passed.seen if node not in slots),
+            at=passed.at,
         )
+        stretch = None if passed.stretch is None else _stretch_of(passed.stretch, slots)
+        if stretch is not None:
+            local_map.proof.extend(passed.push, stretch)
         if slot not in point.seen or point.is_blind:
             return
         received = self._received.get(sender)
         if received is not None and received[:2] != (passed.push, slot):
             received = None
         now = SeenPoint(passed.number, point)
-        step = WallStep(None, point, passed.hand)
+        step = WallStep(None, point, passed.hand, (), passed.number)
         if received is not None:
             witnesses = self._witnesses(passed, received.seen.number, slots)
             before = point_before(slot, received.seen, now, passed.touch_since, bool(witnesses))
             if before is not None and witnesses is not None:
-                step = WallStep(before, point, passed.hand, witnesses)
+                step = WallStep(before, point, passed.hand, witnesses, passed.number)
         self._received[sender] = _Received(passed.push, slot, now, step)
-        if local_map.proof.pass_step(slot, None if received is None else received.step, step):
+        if local_map.proof.pass_step(passed.push, None if received is None else received.step, step, stretch):
             self._replan_at = tick + PASSED_TICKS
             self._outbox.append(Outgoing(sender, ArcClosed(passed.push)))
         nodes = {each: node for node, each in slots.items()}
@@ -311,9 +309,22 @@ class WallProtocol(Component):
                 found[known[0]] = None
         return tuple(sorted(found))
 
-    def _spread(self, push: int) -> None:
-        self._over[push] = None
-        self._outbox.append(Outgoing(None, WalkOver(push)))
+    def _end_walks(self, tick: int) -> None:
+        """Take into the proof how far walls were followed by walks that have ended."""
+        proof, slots = self._situation.local_map.proof, self._slots()
+        for over in self._ended:
+            for number, each in enumerate(over.stretches, 1):
+                stretch = _stretch_of(each, slots)
+                if number == len(over.stretches) and over.end != NOWHERE:
+                    stretch = stretch.tied_at_end(over.end)
+                if proof.extend(over.push, stretch):
+                    self._replan_at = tick + PASSED_TICKS
+            proof.end_walk(over.push)
+        self._ended.clear()
+
+    def _spread(self, over: WalkOver) -> None:
+        self._over[over.push] = None
+        self._outbox.append(Outgoing(None, over))
 
     # --- every tick ---------------------------------------------------------------------------------------------------
 
@@ -330,6 +341,7 @@ class WallProtocol(Component):
         """Take in the points that were kept, and make plans again once a walk has passed."""
         if self._kept and self._situation.settled:
             self._take_kept(tick)
+            self._end_walks(tick)
         if self._replan_at is not None and tick >= self._replan_at:
             self._replan_at = None
             self._situation.local_map.replan()
@@ -342,3 +354,23 @@ class WallProtocol(Component):
     def next_wake(self) -> int | None:
         """Return the tick at which plans are made again."""
         return self._replan_at
+
+
+def message_of(stretch: FollowedStretch) -> WallStretch:
+    """Return the message of a stretch whose ends name robots."""
+    first, last = (WallEnd(*each) for each in (stretch.first, stretch.last))
+    return WallStretch(stretch.first_number, stretch.last_number, first, last, stretch.radius_m)
+
+
+def _stretch_of(message: WallStretch, slots: Mapping[int, int]) -> FollowedStretch:
+    """Return the stretch of a message, with the slots of robots, as far as known."""
+    first, last = (
+        StretchEnd(
+            each.at,
+            each.touched,
+            tuple(slots[node] for node in each.robots if node in slots),
+            tuple(slots[node] for node in each.seen if node in slots),
+        )
+        for each in (message.first, message.last)
+    )
+    return FollowedStretch(message.first_number, message.last_number, first, last, message.radius_m)

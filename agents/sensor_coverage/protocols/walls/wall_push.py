@@ -1,6 +1,6 @@
 """The leader of a push at a wall: it drives into an open arc, its followers close up, and it follows the wall.
 
-A wall close to its slot is only felt, and the push ends there. The walk ends where it closes nothing any more. Then the
+The walk ends where it closes nothing any more. Then the
 leader leaves the complex, and the next push may begin with it. Where no standing robot sees it further on, it keeps its
 new slot, and the deployment goes on from there.
 """
@@ -114,17 +114,16 @@ class WallPush:
         self._situation.to_wall(wrapped(plan.direction - self._heading), plan.hop_m, -plan.hand)
 
     def _approached(self, result: DriveResult | WalkResult) -> None:
-        """Leave the slot to the follower, unless a wall is close to it, or there is no way on."""
+        """Leave the slot to the follower, unless there is no way to get clear of it."""
         near: tuple[tuple[float, float], ...] = ()
         if isinstance(result, WalkResult):
             near = tuple((start + self._heading, width) for start, width in result.near)
         if not isinstance(result, WalkResult) or result.end == SHUT:
-            felt = tuple(wrapped(each + self._heading) for each in result.touched)
             at_base = self._map.slot == NOWHERE
             if not at_base:
-                self._map.note_walls(felt, near)
+                self._map.note_near(near)
             self._situation.stand()
-            self.close(PushAborted(self.id, True, felt, near) if at_base else PushAborted(self.id, True))
+            self.close(PushAborted(self.id, True, near) if at_base else PushAborted(self.id, True))
             return
         self._walks = result.end != OPEN
         self._anchors = () if self._walks else self._find_anchors()

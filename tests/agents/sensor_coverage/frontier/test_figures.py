@@ -5,7 +5,7 @@ The tests use the services as the coordinator does, from bearings in randomly tu
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import pytest
@@ -248,8 +248,13 @@ def test_figure_9a_the_path_from_the_source_to_a_frontier_robot_is_12_10_6_2() -
     assert {frozenset((12, 11)), frozenset((11, 8)), frozenset((8, 9))} <= edges
 
 
-def pushed(swarm: Swarm, plan: Plan, used_odometry: bool = False) -> list[tuple[int, RobotCommand]]:
-    """Run a push to its end with robots that execute every command, robot 13 waiting in the depot; return all commands."""
+DONE = Arrived(0, True, False, False, 0.95, ())
+BY_ODOMETRY = Arrived(0, True, True, False, 0.95, ())
+ASTRAY = Arrived(0, True, False, True, 0.95, ())  # its landmarks were driving
+
+
+def pushed(swarm: Swarm, plan: Plan, ends: Mapping[int, Sequence[Arrived]]) -> list[tuple[int, RobotCommand]]:
+    """Run a push, robot 13 waiting in the depot; return all commands. `ends` has the ends of some robots' first drives."""
     mailbox = CommandMailbox(0.1)
     base = swarm.scan.bases[0]
     station = swarm.slots.occupant[base]
@@ -259,7 +264,7 @@ def pushed(swarm: Swarm, plan: Plan, used_odometry: bool = False) -> list[tuple[
     pushing.scan = swarm.scan
     said: list[tuple[int, RobotCommand]] = []
     routine = pushing.push(plan)
-    done = Arrived(0, True, used_odometry, False, 0.95, ())
+    left = {robot: list(each) for robot, each in ends.items()}
     for tick in range(50):
         try:
             next(routine)
@@ -276,9 +281,10 @@ def pushed(swarm: Swarm, plan: Plan, used_odometry: bool = False) -> list[tuple[
                 emerged = Emerged(sightings_of(swarm, station, turned=0.4))
                 answers.append((13, Response(1, 0, 0, 0, 0, emerged)))
             elif isinstance(command, Deploy):
-                answers += [(sent.to, reply(request, each)) for each in (Cleared(0), done)]
+                answers += [(sent.to, reply(request, each)) for each in (Cleared(0), DONE)]
             elif isinstance(command, Move | Correct):
-                answers.append((sent.to, reply(request, done)))
+                end = left[sent.to].pop(0) if left.get(sent.to) else DONE
+                answers.append((sent.to, reply(request, end)))
         mailbox.receive(0.1 * tick, [Packet("uplink", write(each), sender) for sender, each in answers])
     raise AssertionError("the push never ends")
 
@@ -296,16 +302,16 @@ def sightings_of(swarm: Swarm, robot: int, turned: float) -> tuple[Sighting, ...
     )
 
 
-def push_of_figure_9(used_odometry: bool = False) -> tuple[Swarm, list[tuple[int, RobotCommand]]]:
+def push_of_figure_9(ends: Mapping[int, Sequence[Arrived]]) -> tuple[Swarm, list[tuple[int, RobotCommand]]]:
     swarm = figure_9()
     slot = swarm.slot
     upwards = math.pi / 2.0 + swarm.off(2)
     plan = Plan((slot[2], slot[1], 1), slot[2], upwards, HOP_M, 0.8, (slot[2],), tuple(slot[n] for n in (12, 10, 6, 2)))
-    return swarm, pushed(swarm.update(), plan, used_odometry)
+    return swarm, pushed(swarm.update(), plan, ends)
 
 
 def test_figure_9b_robots_take_the_slots_ahead_and_robot_13_appears_beside_the_source() -> None:
-    swarm, _ = push_of_figure_9()
+    swarm, _ = push_of_figure_9({})
     now = {swarm.slots.occupant[swarm.slot[n]]: n for n in swarm.position}
     assert {robot: now[robot] for robot in (12, 13, 10, 6)} == {12: 12, 13: 10, 10: 6, 6: 2}
     assert [swarm.slots.occupant[max(swarm.slots.occupant)]] == [2], "robot 2 has a new place"
@@ -313,7 +319,7 @@ def test_figure_9b_robots_take_the_slots_ahead_and_robot_13_appears_beside_the_s
 
 
 def test_figure_9b_landmarks_are_the_future_occupants_as_seen_from_the_goal() -> None:
-    swarm, said = push_of_figure_9()
+    swarm, said = push_of_figure_9({})
     moves = {robot: command for robot, command in said if isinstance(command, Move)}
     assert sorted(moves) == [6, 10, 13]
     at_place = {13: 10, 10: 6, 6: 2}  # robot: the place where it goes, by the id of who was there
@@ -328,7 +334,7 @@ def test_figure_9b_landmarks_are_the_future_occupants_as_seen_from_the_goal() ->
 
 
 def test_figure_9b_the_new_robot_corrects_its_distance_to_the_future_occupant_of_the_anchor() -> None:
-    _, said = push_of_figure_9()
+    _, said = push_of_figure_9({})
     ((robot, command),) = [(robot, command) for robot, command in said if isinstance(command, Correct)]
     assert robot == 2
     assert isinstance(command, Correct)
@@ -337,7 +343,7 @@ def test_figure_9b_the_new_robot_corrects_its_distance_to_the_future_occupant_of
 
 def test_a_robot_that_used_odometry_corrects_its_distance_to_the_robot_behind_by_a_given_bearing() -> None:
     """The robot may have driven so far that it sees no robot behind it."""
-    swarm, said = push_of_figure_9(used_odometry=True)
+    swarm, said = push_of_figure_9({6: [BY_ODOMETRY], 10: [BY_ODOMETRY], 13: [BY_ODOMETRY]})
     commands = [(robot, command) for robot, command in said if isinstance(command, Correct)]
     assert [(robot, command.anchors[0].node) for robot, command in commands] == [(13, 12), (10, 13), (6, 10), (2, 6)]
     turned = {**swarm.turned, 13: 0.4}
@@ -346,6 +352,20 @@ def test_a_robot_that_used_odometry_corrects_its_distance_to_the_robot_behind_by
         slot, rear = (swarm.position[each] for each in behind[robot])
         there = math.remainder(direction(slot, rear) - turned[robot], math.tau)
         assert command.anchors[0].bearing_rad == pytest.approx(there)
+
+
+def test_robots_home_again_before_other_robots_correct_their_distances_to_them() -> None:
+    _, said = push_of_figure_9({13: [ASTRAY], 10: [BY_ODOMETRY]})
+    commands = [(robot, type(command)) for robot, command in said if isinstance(command, Move | Correct)]
+    assert commands[3:] == [(13, Move), (10, Correct), (2, Correct)]
+
+
+def test_a_robot_that_went_astray_is_no_landmark_of_the_next_until_it_has_returned() -> None:
+    _, said = push_of_figure_9({13: [ASTRAY, ASTRAY], 10: [ASTRAY]})
+    again = [(robot, command) for robot, command in said if isinstance(command, Move)][3:]
+    assert [robot for robot, _ in again] == [13, 10, 13]
+    still = [{each.node: each.still for each in command.landmarks} for _, command in again]
+    assert (still[0][10], still[1][13], still[2][10]) == (False, False, True)
 
 
 # --- one-sided sight, and frames ------------------------------------------------------------------------------------

@@ -7,7 +7,8 @@ import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.strips.crossings import Crossing, arcs_into
+from zwerm.agents.sensor_coverage.frontier.strips.crossings import Crossing, arcs_beside_pocket, arcs_into
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket, StretchEnd, touched_point
 from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
@@ -32,9 +33,20 @@ def direction(a: tuple[float, float], b: tuple[float, float]) -> float:
 
 def closed_deg(walk: Walk, *standing: int) -> list[tuple[int, int]]:
     """Return the first and the last closed direction [degrees], of slot 0, by its open arc, while these other slots stand."""
-    views = {each: dict[int, float]() for each in (0, *standing)}
+    return closed_ranges(proof_of(walk, (0, *standing)))
+
+
+def proof_of(walk: Walk, standing: tuple[int, ...], touched_deg: tuple[float, ...] = ()) -> SwarmProof:
+    """Return the proof of these slots, which do not see each other; slot 0 touches walls in these directions [degrees]."""
+    views = {each: dict[int, float]() for each in standing}
     proof = SwarmProof()
-    proof.update(ScanResult(views, FlagComplex(views), ()), (walk,), {}, {})
+    touched = {0: tuple(math.radians(each) for each in touched_deg)}
+    proof.update(ScanResult(views, FlagComplex(views), ()), (walk,), touched, {})
+    return proof
+
+
+def closed_ranges(proof: SwarmProof) -> list[tuple[int, int]]:
+    """Return the first and the last closed direction [degrees], of slot 0, by each open arc."""
     return [
         (
             round(math.degrees(math.remainder(each.start_rad + each.width_rad, math.tau))),
@@ -85,10 +97,52 @@ def test_a_walk_that_noise_leads_beyond_its_end_and_back_closes_no_more_than_up_
 
 
 def test_a_pocket_ends_a_body_beside_the_touched_wall() -> None:
-    """The slot touches the wall, too: the walking robot, in touch with both, touched the wall at -26.6 degrees."""
-    way = (*WEST, (0.14, RADIUS_M))
-    robot = 0.0, RADIUS_M
-    walk = way_along(robot, way, SOUTH, 1)
-    touching = walk._replace(points=(*walk.points[:-1], walk.points[-1]._replace(robots=(0,))))
-    assert closed_deg(touching) == [(-45, 0)]
+    """The walking robot, in touch with the slot's robot, touched the wall at -26.6 degrees."""
+    touching = way_to(0.0)
+    assert closed_deg(touching) == [(-45, -4)], "through the strip the slot looks past its other end, at -4.4 degrees"
+    assert closed_deg(tied(touching), 1) == [(-45, 0)]
     assert closed_deg(touching._replace(points=touching.points[-1:])) == [], "the robot touched the wall once only"
+
+
+def way_to(direction_rad: float) -> Walk:
+    """Return a walk to the west along a wall in the south, up to a robot in touch, which sees it in a direction [rad]."""
+    robot = 0.0, RADIUS_M - 2.0 * RADIUS_M * math.sin(direction_rad)
+    walk = way_along(robot, (*WEST, (2.0 * RADIUS_M * math.cos(direction_rad), RADIUS_M)), SOUTH, 1)
+    return walk._replace(points=(*walk.points[:-1], walk.points[-1]._replace(robots=(0,))))
+
+
+def tied(walk: Walk) -> Walk:
+    """Return a walk that begins in touch with the robot at slot 1."""
+    return walk._replace(points=(walk.points[0]._replace(robots=(1,)), *walk.points[1:]))
+
+
+def test_between_two_contacts_that_no_opening_fits_between_all_is_closed() -> None:
+    """The pocket ends at -40 degrees, and what the slot's robot touches at -45 degrees."""
+    proof = proof_of(tied(way_to(math.radians(5.0))), (0, 1), (-90.0,))
+    assert closed_ranges(proof) == [(-135, 1)]
+
+
+def test_a_contact_on_the_other_side_of_a_robot_closes_nothing_between() -> None:
+    """The slot's robot stands in a passage of 0.16 m: the touched points are close to each other, and it is between them."""
+    at = 0.14 * math.cos(math.radians(-120.0)), 0.14 * math.sin(math.radians(-120.0))
+    end = StretchEnd(at, touched_point(at, math.radians(30.0), RADIUS_M))
+    pocket = Pocket(end, end, RADIUS_M, True, (0.0, 0.0), True)
+    beside = [len(list(arcs_beside_pocket(-1, pocket, (math.radians(each),)))) for each in (85.0, -60.0)]
+    assert beside == [1, 2], "the arc beyond the pocket, and the one up to the contact"
+
+
+def test_close_ends_of_two_stretches_close_what_is_between_them_for_the_robot_beside() -> None:
+    """The walking robot follows a wall to the tip of a corner, where a robot stands, and goes round that robot."""
+    first = StretchEnd((0.05, 0.13), (0.1, 0.08))
+    for apart_m, closed in ((0.12, 1), (0.16, 0)):
+        end = StretchEnd((0.12, -0.07), (0.1, 0.08 - apart_m))
+        other = StretchEnd((0.4, -0.07), (0.4, 0.0))
+        pocket = Pocket(end, other, RADIUS_M, False, (0.0, 0.0), False, first)
+        assert len(list(arcs_beside_pocket(-1, pocket, ()))) == closed
+
+
+def test_a_step_back_along_the_wall_closes_nothing() -> None:
+    """The robot turns round in front of another one. Its wall is at its other hand then."""
+    back = way_along((0.0, 0.2), EAST[:3][::-1], SOUTH, -1)
+    assert closed_deg(back) == []
+    assert closed_deg(way_along((0.0, 0.2), EAST[:3], SOUTH, -1)) != []

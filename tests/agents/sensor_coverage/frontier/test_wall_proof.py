@@ -6,12 +6,21 @@ from collections.abc import Iterable, Mapping
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof, WallStep
+from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracker
 from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
-from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, Arc, TouchCounter, Walk, WalkPoint, drives_away
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    BLIND_MAX,
+    Arc,
+    TouchCounter,
+    Walk,
+    WalkPoint,
+    WallStep,
+    drives_away,
+)
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
-from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import RESENT_POINTS, Sightlines
+from zwerm.agents.sensor_coverage.protocols.walls.sightlines import RESENT_POINTS, Sightlines
 from zwerm.maths.simplicial import FlagComplex
 
 # Directions of a walk, and the walls that it touches.
@@ -202,7 +211,7 @@ def test_robots_in_touch_with_both_sides_of_a_door_do_not_close_it() -> None:
     proof.update(ScanResult(PAIR, FlagComplex(PAIR), ()), walks, {0: contacts, 1: [math.radians(-100.0)]}, {})
     assert _degrees(proof.open_arcs()) == {0: 270, 1: 270}
     local = at_slot(0, PAIR, *contacts)
-    pass_walk(local, 0, point, -1)
+    pass_walk(local, point, -1)
     assert math.degrees(open_rad(local)) == pytest.approx(270.0)
 
 
@@ -312,14 +321,16 @@ def at_slot(slot: int, views: Mapping[int, Mapping[int, float]], *walls: float) 
     return proof
 
 
-def pass_walk(proof: SlotProof, slot: int, points: Iterable[WalkPoint], hand: int) -> list[bool]:
+def pass_walk(proof: SlotProof, points: Iterable[WalkPoint], hand: int) -> list[bool]:
     """Let a walk pass a slot; return after which points the open arcs are smaller."""
     steps: list[WallStep] = []
     smaller = []
-    for point in points:
+    tracker = StretchTracker(hand, 0.0)
+    for number, point in enumerate(points):
+        tracker.take(number, point.at, point.walls, point.robots, point.seen)
         last = steps[-1] if steps else None
-        steps.append(WallStep(None if last is None else last.point, point, hand))
-        smaller.append(proof.pass_step(slot, last, steps[-1]))
+        steps.append(WallStep(None if last is None else last.point, point, hand, (), number))
+        smaller.append(proof.pass_step(1, last, steps[-1], tracker.latest))
     return smaller
 
 
@@ -330,9 +341,9 @@ def open_rad(proof: SlotProof) -> float:
 def test_a_slot_keeps_what_a_walk_closed_and_passes_it_on() -> None:
     """Slot 0 sees slot 1. The walk closes arcs by its steps, and an arc with slot 1."""
     proof = at_slot(0, PAIR)
-    assert pass_walk(proof, 0, PASSING, -1) == [False, True, True]
+    assert pass_walk(proof, PASSING, -1) == [False, True, True]
     assert proof.open_arcs() == [pytest.approx((0.0, math.tau - math.radians(70.0)))]
-    assert not any(pass_walk(proof, 0, PASSING, -1)), "nothing is new"
+    assert not any(pass_walk(proof, PASSING, -1)), "nothing is new"
     heir = SlotProof()
     heir.inherit(proof.memory())
     heir.update(0, ScanResult(PAIR, FlagComplex(PAIR), ()), ())
@@ -349,8 +360,8 @@ def test_a_slot_keeps_what_a_walk_closed_and_passes_it_on() -> None:
 def test_a_slot_proves_an_arc_at_a_neighbour_that_did_not_see_the_whole_walk() -> None:
     """Slot 1 does not know that there is a wall beyond the line of sight from slot 0."""
     here, there = at_slot(0, PAIR), at_slot(1, PAIR)
-    pass_walk(here, 0, PASSING, -1)
-    pass_walk(there, 1, PASSING[1:], -1)
+    pass_walk(here, PASSING, -1)
+    pass_walk(there, PASSING[1:], -1)
     assert there.for_neighbours == []
     assert open_rad(there) == pytest.approx(math.tau - math.radians(25.0))
     assert [there.accept(arc) for slot, arc in here.for_neighbours if slot == 1] == [True]
@@ -362,7 +373,7 @@ def test_a_slot_proves_an_arc_at_a_neighbour_that_did_not_see_the_whole_walk() -
 def test_a_slot_proves_nothing_at_a_neighbour_beside_a_door() -> None:
     proof = at_slot(0, PAIR)
     for points in DOOR:
-        pass_walk(proof, 0, points, -1)
+        pass_walk(proof, points, -1)
     assert proof.for_neighbours == []
 
 
@@ -370,14 +381,17 @@ def test_two_points_of_walks_beside_a_door_close_nothing_at_a_slot() -> None:
     """The triangles of the two robots with the points cross. Behind the crossing, each robot would rely on the other."""
     proof = at_slot(0, PAIR)
     for points in DOOR:
-        pass_walk(proof, 0, points, -1)
+        pass_walk(proof, points, -1)
     assert open_rad(proof) == pytest.approx(math.tau)
 
 
 def test_an_arc_behind_a_corner_stays_closed_while_the_robot_that_saw_the_way_stands() -> None:
     proof = at_slot(0, PAIR)
     before, point = (WalkPoint({0: math.radians(each)}, SOUTH, ()) for each in (-90.0, -70.0))
-    assert proof.pass_step(0, None, WallStep(before, point, -1, (1,)))
+    tracker = StretchTracker(-1, 0.0)
+    for number in (0, 1):
+        tracker.take(number, before.at, SOUTH, (), (0,))
+    assert proof.pass_step(1, None, WallStep(before, point, -1, (1,)), tracker.latest)
     assert open_rad(proof) == pytest.approx(math.tau - math.radians(20.0))
     proof.update(0, ScanResult({0: {}}, FlagComplex({0: {}}), ()), ())
     assert open_rad(proof) == pytest.approx(math.tau)

@@ -5,14 +5,15 @@ from collections.abc import Callable
 
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracker
+from zwerm.agents.sensor_coverage.local_node import MAKERS
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, DeadInSight, NeighbourProved, PassedPoint
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.component import Outgoing
-from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
+from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol, message_of
 
 # The robot, its neighbour in the east, and the walking robot, which follows a wall in the south from west to east; their slots.
 ME, NEIGHBOUR, WALKER = 7, 8, 9
@@ -31,15 +32,17 @@ class Here:
 
     on_step: Callable[[Waypoint], None] = staticmethod(lambda _: None)
     node = ME
+    radius_m = 0.0
 
     def __init__(self) -> None:
-        self.local_map = LocalMap(ME, PlannerParameters(walls="followed"), Planner)
+        self.local_map = LocalMap(ME, PlannerParameters(walls="followed"), MAKERS)
         self.local_map.occupy(SLOTS[ME])
         self.local_map.heading = 0.0
         self.hear_neighbour(1, 3)
         self.local_map.receive(WALKER, state(WALKER, 1, 2, True), 0)
         self.dead, self.said_dead = dict[int, None](), dict[int, None]()
         self.walls = WallProtocol(self)
+        self.walk = StretchTracker(-1, self.radius_m)
         self.sees = dict[int, float]()
 
     @property
@@ -61,8 +64,16 @@ class Here:
     def watch_walk(self, last: int = len(WAY)) -> None:
         for number, point in enumerate(WAY[:last], 1):
             seen = tuple((node, math.radians(each)) for node, each in point.items())
-            self.walls.receive(WALKER, PassedPoint(1, number, -1, 1, seen, (math.radians(-90.0),), ()), 0)
+            self.pass_point(number, seen, (math.radians(-90.0),))
             self.walls.poll(0)
+
+    def pass_point(
+        self, number: int, seen: tuple[tuple[int, float], ...], walls: tuple[float, ...], robots: tuple[int, ...] = ()
+    ) -> None:
+        """Let a point of the walk be received."""
+        self.walk.take(number, (0.0, 0.0), walls, robots, [node for node, _ in seen])
+        stretch = None if self.walk.latest is None else message_of(self.walk.latest)
+        self.walls.receive(WALKER, PassedPoint(1, number, -1, 1, seen, walls, robots, (0.0, 0.0), stretch), 0)
 
     @property
     def closed_deg(self) -> float:
@@ -148,7 +159,7 @@ def seen_body(here: Here, number: int, direction_deg: float, walls: bool, touche
     """Have a point of a walk received, at which the walking robot touches walls, or touches or sees a robot without a slot."""
     seen = ((ME, math.radians(direction_deg)), *(((BODY, 1.0),) if sees else ()))
     touched = (math.radians(-90.0),) if walls else ()
-    here.walls.receive(WALKER, PassedPoint(1, number, -1, 1, seen, touched, (BODY,) if touches else ()), 0)
+    here.pass_point(number, seen, touched, (BODY,) if touches else ())
 
 
 @pytest.mark.parametrize(("touches", "closed_deg"), [(False, 40.0), (True, 0.0)])
