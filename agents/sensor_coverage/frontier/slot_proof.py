@@ -107,8 +107,9 @@ class SlotProof:
         if slot in point.robots:
             touch = SeenTouch(number, point, self._others(_witnesses_of(point)))
             self._touches[walk] = [*self._touches.get(walk, ())[-BLIND_MAX:], touch]
-            for each in [each for key, each in self._stretches.items() if key[0] == walk]:
-                each.add_touch(touch)
+            for (its_walk, _), each in self._stretches.items():
+                if its_walk == walk and number <= each.stretch.last_number + BLIND_MAX:
+                    each.add_touch(touch)
         self._add_fan(slot, point, [step])
         if earlier is not None and earlier.point is before:
             self._add_fan(slot, earlier.point, [earlier, step])
