@@ -4,7 +4,7 @@ from typing import Final
 
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
-from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof
+from zwerm.agents.sensor_coverage.frontier.proofs.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.messages import advice, peers
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP

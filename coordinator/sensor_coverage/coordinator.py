@@ -15,8 +15,8 @@ from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS, Emerged, Report, RollCall, ScanRequest
 from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_complex
 from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst

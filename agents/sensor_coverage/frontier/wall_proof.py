@@ -98,6 +98,10 @@ class WalkPoint(NamedTuple):
             turned_vector(self.at, by),
         )
 
+    def unseen_by(self, slots: Collection[int]) -> "WalkPoint":
+        """Return the same point as if these slots had not seen it."""
+        return self._replace(seen={slot: there for slot, there in self.seen.items() if slot not in slots})
+
 
 class WallStep(NamedTuple):
     """A point of a walk, the point before it if the wall was followed since, and the hand at the wall.
@@ -127,6 +131,10 @@ class Walk(NamedTuple):
     def turned(self, frame: int, by: float) -> "Walk":
         """Return the walk in another frame."""
         return self._replace(frame=frame, points=tuple(each.turned(by) for each in self.points))
+
+    def unseen_by(self, slots: Collection[int]) -> "Walk":
+        """Return the walk as if these slots had not seen it."""
+        return self._replace(points=tuple(each.unseen_by(slots) for each in self.points))
 
 
 def turned_vector(vector: tuple[float, float], by: float) -> tuple[float, float]:
@@ -252,6 +260,11 @@ def united(arcs: Iterable[Arc]) -> list[Arc]:
         else:
             found.append(Arc(start, width))
     return found
+
+
+def contains(arcs: Iterable[Arc], arc: Arc) -> bool:
+    """Return whether one of these arcs contains an arc."""
+    return any((arc.start_rad - each.start_rad) % math.tau + arc.width_rad <= each.width_rad for each in arcs)
 
 
 def shared_arcs(a: Arc, b: Arc) -> list[Arc]:

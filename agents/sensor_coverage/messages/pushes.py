@@ -4,10 +4,39 @@ Each message of a push goes to one neighbour as a `Segment`, which the neighbour
 frame of the base.
 """
 
+from typing import NamedTuple
+
 from msgspec import Struct
 
-# An arc that a walk closed: the slots that must stand, the slots that saw the walk there, start [rad], width [rad].
-ProvedArc = tuple[tuple[int, ...], tuple[int, ...], float, float]
+
+class WalkTriangle(NamedTuple):
+    """A triangle of two slots and a point of a walk, for one of the slots; the other one is `beside`.
+
+    The point is on one `side` of the direction to that slot, +1 left, -1 right. `there_rad` is the angle at that slot. The
+    point has a `number` in a `walk`, and is on the `stretch` of wall with this number of its first point, -1 on none, with the
+    wall at the `hand`, +1 left, -1 right.
+    """
+
+    beside: int
+    side: int
+    there_rad: float
+    walk: int
+    stretch: int
+    number: int
+    hand: int
+
+
+class ProvedArc(NamedTuple):
+    """An arc that a walk closed: the slots `needed` must stand, and the slots `seen` saw the walk there.
+
+    It ends at a followed wall, or is the angle of a `triangle`.
+    """
+
+    needed: tuple[int, ...]
+    seen: tuple[int, ...]
+    start_rad: float
+    width_rad: float
+    triangle: WalkTriangle | None = None
 
 
 class _PushMessagePart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

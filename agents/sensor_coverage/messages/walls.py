@@ -70,7 +70,7 @@ class NeighbourProved(_WalkMessage, frozen=True, tag="neighbour-proved"):
     """
 
     slot: int
-    arc: tuple[tuple[int, ...], tuple[int, ...], float, float]
+    arc: tuple[tuple[int, ...], tuple[int, ...], float, float, tuple[int, int, float, int, int, int, int] | None]
 
 
 class DeadInSight(_WalkMessage, frozen=True, tag="dead-in-sight"):

@@ -25,7 +25,7 @@ def test_the_base_takes_the_arcs_of_a_wall_that_was_followed_beside_it_into_its_
     assert isinstance(base, LocalBase)
     base.schedule._active = PUSH
     base.components.dispatch(3, body, 1)
-    assert [(start, width) for *_, start, width in base.local_map.proof.memory()] == list(NEAR)
+    assert [(each.start_rad, each.width_rad) for each in base.local_map.proof.memory()] == list(NEAR)
 
 
 @pytest.mark.parametrize("end", [SHUT, STRETCH])

@@ -16,9 +16,11 @@ ALONE = (*EXACT, "services.path=gradient")
         pytest.param(5, False, EXACT, id="central, a bend of 1.3 bodies"),
         pytest.param(5, False, NOISY, id="central, noise, a bend of 1.3 bodies"),
         pytest.param(39, True, NOISY, id="central, noise, a body behind a bend of 1.4 bodies"),
+        pytest.param(100, True, EXACT, id="central, a body in a chicane of 1.7 bodies, and robots beside their slots"),
         pytest.param(5, False, ALONE, id="decentralised, a bend of 1.3 bodies"),
         pytest.param(5, True, (*ALONE, *NOISY), id="decentralised, noise, a body in a bend of 1.3 bodies"),
         pytest.param(13, True, ALONE, id="decentralised, a body in a door of 1.8 bodies"),
+        pytest.param(112, True, ALONE, id="decentralised, a body in a corner of 1.5 bodies between two walks"),
         pytest.param(38, False, ALONE, id="decentralised, a robot in a door beside which another one touched the wall"),
     ],
 )

@@ -356,7 +356,7 @@ def test_robots_without_a_coordinator_leave_a_bay_with_bent_walls() -> None:
     bay = "[2.9,2.73],[3.2,2.8],[3.28,2.5],[3.34,2.56],[2.94,1.76],[3.6,1.75],[3.6,1.2],[2.0,1.2],[2.6,1.5],[2.48,1.94]"
     outside = "[1.86,2.13],[1.94,2.23],[1.93,2.39],[3.08,2.43]"
     settings = (f"arena.polygon=[{bay},{outside}]", "base.pose=[3.15,2.61,0.4]", "robots.count=20")
-    more = ("services.path=gradient", "time.duration_s=600.0")
+    more = ("services.path=gradient", "time.duration_s=900.0")
     result = run("sensor-coverage-narrow", 101, "inline", (*settings, *more))
     assert result.outcome == "completed"
     assert result.metrics["reachable_coverage_fraction"] > 0.99

@@ -26,6 +26,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
+from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc, WalkTriangle
 from zwerm.agents.sensor_coverage.messages.walls import (
     ArcClosed,
     DeadInSight,
@@ -288,7 +289,7 @@ class WallProtocol(Component):
             self._proves
             and local_map.proof.ready
             and local_map.slot == message.slot
-            and local_map.proof.accept(message.arc)
+            and local_map.proof.accept(_proved_arc(message))
         ):
             self._replan_at = tick + PASSED_TICKS
 
@@ -374,3 +375,9 @@ def _stretch_of(message: WallStretch, slots: Mapping[int, int]) -> FollowedStret
         for each in (message.first, message.last)
     )
     return FollowedStretch(message.first_number, message.last_number, first, last, message.radius_m)
+
+
+def _proved_arc(message: NeighbourProved) -> ProvedArc:
+    """Return the arc of a message."""
+    needed, seen, start_rad, width_rad, triangle = message.arc
+    return ProvedArc(needed, seen, start_rad, width_rad, None if triangle is None else WalkTriangle(*triangle))

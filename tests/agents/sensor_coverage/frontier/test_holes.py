@@ -9,8 +9,8 @@ from zwerm.agents.sensor_coverage.frontier.holes import Hole, holes, is_bare, si
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.maths.simplicial import FlagComplex
 

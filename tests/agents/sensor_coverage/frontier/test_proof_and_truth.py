@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon, box
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
+from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 

@@ -5,8 +5,8 @@ import math
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk
 from zwerm.maths.simplicial import Edge, FlagComplex
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import Crossing, arcs_beside_pocket, arcs_into
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket, StretchEnd, touched_point
-from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.maths.simplicial import FlagComplex

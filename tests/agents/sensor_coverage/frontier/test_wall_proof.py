@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof
+from zwerm.agents.sensor_coverage.frontier.proofs.slot_proof import SlotProof
+from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracker
-from zwerm.agents.sensor_coverage.frontier.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     BLIND_MAX,
     Arc,

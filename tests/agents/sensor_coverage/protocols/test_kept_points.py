@@ -10,14 +10,18 @@ from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracke
 from zwerm.agents.sensor_coverage.local_node import MAKERS
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
+from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
 from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, DeadInSight, NeighbourProved, PassedPoint
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.component import Outgoing
 from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol, message_of
 
 # The robot, its neighbour in the east, and the walking robot, which follows a wall in the south from west to east; their slots.
-ME, NEIGHBOUR, WALKER = 7, 8, 9
-SLOTS = {ME: 4, NEIGHBOUR: 5, WALKER: 17}
+# Another robot takes the slot of the neighbour over.
+ME, NEIGHBOUR, WALKER, HEIR = 7, 8, 9, 10
+SLOTS = {ME: 4, NEIGHBOUR: 5, WALKER: 17, HEIR: 5}
+# So far off [rad] is the direction to a robot that does not stand at its slot.
+OFF_RAD = 0.5
 # Directions [deg] to the points of the walk from the robot and its neighbour.
 WAY = ({ME: -70.0}, {ME: -45.0, NEIGHBOUR: -135.0}, {ME: -30.0, NEIGHBOUR: -110.0})
 STEPS_DEG, TRIANGLE_DEG = 40.0, 30.0
@@ -135,7 +139,7 @@ def test_a_robot_informs_its_neighbour_of_an_arc_that_the_neighbour_cannot_prove
     there.local_map.update_proof()
     for slot in (99, SLOTS[ME]):
         assert there.closed_deg == pytest.approx(0.0)
-        there.walls.receive(NEIGHBOUR, NeighbourProved(slot, ((SLOTS[ME],), (SLOTS[NEIGHBOUR],), 0.0, 0.5)), 0)
+        there.walls.receive(NEIGHBOUR, NeighbourProved(slot, ProvedArc((SLOTS[ME],), (SLOTS[NEIGHBOUR],), 0.0, 0.5)), 0)
     assert math.radians(there.closed_deg) == pytest.approx(0.5)
 
 
@@ -144,7 +148,7 @@ def test_a_slot_whose_robot_has_left_during_the_walk_is_informed_of_nothing() ->
     here = Here()
     here.look()
     here.local_map.update_proof()
-    here.local_map.proof.for_neighbours.append((99, ((4,), (99,), 0.0, 0.5)))
+    here.local_map.proof.for_neighbours.append((99, ProvedArc((4,), (99,), 0.0, 0.5)))
     here.watch_walk(last=1)
     assert not any(isinstance(each.message, NeighbourProved) for each in here.walls.outgoing())
     assert here.local_map.proof.for_neighbours == []
@@ -197,3 +201,20 @@ def test_a_walking_robot_is_told_once_which_robots_in_sight_are_dead() -> None:
     assert list(here.said_dead) == [BODY]
     here.walls.begin(2, -1)
     assert not here.said_dead, "another walk"
+
+
+@pytest.mark.parametrize(("node", "kept_deg"), [(NEIGHBOUR, 0.0), (HEIR, STEPS_DEG + TRIANGLE_DEG)])
+def test_what_a_former_robot_saw_of_walls_falls_where_this_one_stands_elsewhere(node: int, kept_deg: float) -> None:
+    """If another robot is at the neighbour's slot, that one stands elsewhere."""
+    here = Here()
+    here.look()
+    here.walls.poll(0)
+    here.watch_walk()
+    here.local_map.learn_references()
+    assert here.closed_deg == pytest.approx(STEPS_DEG + TRIANGLE_DEG)
+    here.local_map.forget(NEIGHBOUR)
+    seen = SeenRobot(ME, here.local_map.epoch, SLOTS[ME], math.pi + OFF_RAD)
+    here.local_map.receive(node, state(node, 3, 5, False, seen), 0)
+    here.local_map.update_bearings({node: OFF_RAD})
+    here.local_map.learn_references()
+    assert here.closed_deg == pytest.approx(kept_deg)

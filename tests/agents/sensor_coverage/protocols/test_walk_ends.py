@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.slot_proof import SlotProof
+from zwerm.agents.sensor_coverage.frontier.proofs.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracker
 from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, WallStep
 from zwerm.maths.simplicial import FlagComplex

@@ -1,8 +1,11 @@
 """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.proofs.chosen_triangles import ChosenTriangles
+from zwerm.agents.sensor_coverage.frontier.proofs.walk_arcs import WalkArcs
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
 from zwerm.agents.sensor_coverage.frontier.strips.seen_stretch import SeenStep, SeenStretch, SeenTouch
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
@@ -18,15 +21,15 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     complement,
     ends_at,
     fan_of,
-    united,
+    side_of,
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
+from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc, WalkTriangle
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.maths.sums import added
 
-# The slots that must stand, and those that saw the walk: see `SlotProof._add`.
-Witnesses = tuple[tuple[int, ...], tuple[int, ...]]
+# Arcs of walks that a slot's next occupant learns: a message has a greatest length.
+MEMORY_MAX: Final = 300
 
 
 class SlotProof:
@@ -47,7 +50,8 @@ class SlotProof:
         self._touched: tuple[float, ...] = ()
         self._at_walls: list[Arc] = []  # arcs of walls in touch
         self._contacts: list[Arc] = []  # the directions of their contacts
-        self._by_walks: dict[Witnesses, list[Arc]] = {}
+        self._by_walks = WalkArcs()
+        self._triangles = ChosenTriangles()
         self._stretches: dict[tuple[int, int], SeenStretch] = {}  # by walk, and the number of their first point
         self._touches: dict[int, list[SeenTouch]] = {}  # by walk: the latest contacts with this slot's robot
         # Arcs that end at the stretch of wall up to the latest point, seen without a break, as if its ends were tied.
@@ -75,10 +79,8 @@ class SlotProof:
         """Return the arcs that nothing closes."""
         standing = self._scan.complex_.neighbours
         walks = [
-            arc
-            for (needed, _), arcs in self._by_walks.items()
-            if all(each in standing for each in needed)
-            for arc in arcs
+            *self._by_walks.counting(standing),
+            *(Arc(each.start_rad, each.width_rad) for each in self._triangles.counting(standing)),
         ]
         followed = [arc for each in self._stretches.values() for arc in each.arcs(standing, self._touched)]
         return complement([*self._by_view, *self._at_walls, *walks, *followed])
@@ -110,9 +112,10 @@ class SlotProof:
             for (its_walk, _), each in self._stretches.items():
                 if its_walk == walk and number <= each.stretch.last_number + BLIND_MAX:
                     each.add_touch(touch)
-        self._add_fan(slot, point, [step])
+        first_number = None if stretch is None else stretch.first_number
+        self._add_fan(walk, first_number, point, [step])
         if earlier is not None and earlier.point is before:
-            self._add_fan(slot, earlier.point, [earlier, step])
+            self._add_fan(walk, first_number, earlier.point, [earlier, step])
         return self._open_rad() < old - NEWS_RAD
 
     def _stretch_of(self, walk: int, hand: int, stretch: FollowedStretch) -> SeenStretch:
@@ -138,8 +141,13 @@ class SlotProof:
             for needed, seen, arc in self._stretches.pop(key).keyed_arcs(self._touched):
                 self._add(needed, seen, arc)
 
-    def _add_fan(self, slot: int, point: WalkPoint, steps: Sequence[WallStep]) -> None:
-        """Add the triangles of this slot, a neighbour and a point, if the space beyond them is proved by these steps."""
+    def _add_fan(self, walk: int, stretch: int | None, point: WalkPoint, steps: Sequence[WallStep]) -> None:
+        """Add the triangles of this slot, a neighbour and a point, if the space beyond them is proved by these steps.
+
+        The robot follows the `stretch` of wall with this number of its first point.
+        """
+        slot, number, hand = self._slot, steps[0].number, steps[0].hand
+        stretch = -1 if stretch is None or stretch > number else stretch
         views, neighbours = self._scan.views, self._scan.complex_.neighbours
         if slot not in point.seen or not any(each in self.around for each in point.seen):
             return
@@ -152,7 +160,7 @@ class SlotProof:
                 for arc in arcs_of_step(each, step.before, step.point, step.hand)
             ]
             if each == slot:
-                walls += [*self._stretch, *self._contacts, *self._by_walks.get(((), ()), ())]
+                walls += [*self._stretch, *self._contacts, *self._by_walks.unconditional()]
             for side in (1, -1):
                 at_walls[each, side] = ends_at(walls, point.seen[each], side)
         fan = fan_of(point, views, neighbours, at_walls)
@@ -162,22 +170,35 @@ class SlotProof:
             for pair in fan:
                 if slot in pair:
                     other = sum(pair) - slot
-                    self._add(needed, _witnesses_of(point), arc_between(views[slot][other], point.seen[slot]))
+                    here, there = (_arc_of_triangle(each, sum(pair) - each, point, views) for each in (slot, other))
+                    side = side_of(point, slot, views[slot][other])
+                    needed_, seen = self._others(needed), self._others(_witnesses_of(point))
+                    way = walk, stretch, number, hand
+                    triangle = WalkTriangle(other, -side, there.width_rad, *way)
+                    self._triangles.add(ProvedArc(needed_, seen, *here, triangle), triangle)
                     if slot in views[other] and not all(other in each.seen for each in points):
-                        arc = arc_between(views[other][slot], point.seen[other])
-                        self.for_neighbours.append((other, (tuple(needed), _witnesses_of(point), *arc)))
+                        triangle = WalkTriangle(slot, side, here.width_rad, *way)
+                        self.for_neighbours.append(
+                            (other, ProvedArc(tuple(needed), _witnesses_of(point), *there, triangle))
+                        )
 
     def accept(self, proved: ProvedArc) -> bool:
         """Take in an arc that a neighbour has proved; return whether the open arcs are smaller."""
         old = self._open_rad()
-        needed, seen, start, width = proved
-        self._add(needed, seen, Arc(start, width))
+        self._take(proved)
         return self._open_rad() < old - NEWS_RAD
+
+    def _take(self, proved: ProvedArc) -> None:
+        """Take in an arc from another robot."""
+        needed, seen = self._others(proved.needed), self._others(proved.seen)
+        if proved.triangle is None:
+            self._add(needed, seen, Arc(proved.start_rad, proved.width_rad))
+        else:
+            self._triangles.add(proved._replace(needed=needed, seen=seen), proved.triangle)
 
     def _add(self, needed: Iterable[int], seen: Iterable[int], arc: Arc) -> None:
         """Add an arc that counts while the slots `needed` stand, until one of the slots `seen` is lost, which saw the walk."""
-        key = self._others(needed), self._others(seen)
-        self._by_walks[key] = united([*self._by_walks.get(key, ()), arc])
+        self._by_walks.add((self._others(needed), self._others(seen)), arc)
 
     def _others(self, slots: Iterable[int]) -> tuple[int, ...]:
         """Return slots without this one, each once, ascending."""
@@ -188,9 +209,8 @@ class SlotProof:
 
         A walk ends where no standing robot sees it. So what it leaves out is the part of the robots that saw it.
         """
-        self._by_walks = {
-            key: arcs for key, arcs in self._by_walks.items() if not any(each in key[1] for each in slots)
-        }
+        self._by_walks.lose(slots)
+        self._triangles.lose(slots)
         for stretch in self._stretches.values():
             stretch.lose(slots)
         for walk, touches in self._touches.items():
@@ -202,16 +222,26 @@ class SlotProof:
             self._add((), (), Arc(*each))
 
     def memory(self) -> tuple[ProvedArc, ...]:
-        """Return the arcs that walks closed, for the slot's next occupant."""
-        kept = tuple((*key, *arc) for key, arcs in self._by_walks.items() for arc in arcs)
+        """Return the arcs that walks closed, for the slot's next occupant: of many those that rely on few slots."""
+        kept = (ProvedArc(*key, *arc) for key, arc in self._by_walks.all())
         followed = (arc for each in self._stretches.values() for arc in each.keyed_arcs(self._touched))
-        return kept + tuple((self._others(needed), self._others(seen), *arc) for needed, seen, arc in followed)
+        ended = (ProvedArc(self._others(needed), self._others(seen), *arc) for needed, seen, arc in followed)
+        found = (*kept, *self._triangles.all(), *ended)
+        if len(found) <= MEMORY_MAX:
+            return found
+        return tuple(sorted(found, key=lambda each: len(each.needed) + len(each.seen))[:MEMORY_MAX])
 
     def inherit(self, memory: Iterable[ProvedArc]) -> None:
         """Take over the arcs that walks closed from the slot's former occupant."""
-        self._by_walks, self._stretches, self._touches = {}, {}, {}
-        for needed, seen, start, width in memory:
-            self._by_walks.setdefault((needed, seen), []).append(Arc(start, width))
+        self._by_walks, self._triangles = WalkArcs(), ChosenTriangles()
+        self._stretches, self._touches = {}, {}
+        for each in memory:
+            self._take(each)
+
+
+def _arc_of_triangle(slot: int, other: int, point: WalkPoint, views: Mapping[int, Mapping[int, float]]) -> Arc:
+    """Return the arc at a slot between another one and a point."""
+    return arc_between(views[slot][other], point.seen[slot])
 
 
 def _witnesses_of(point: WalkPoint) -> tuple[int, ...]:

@@ -1,0 +1,1 @@
+"""The proofs of coverage of all slots, and of one slot."""
