@@ -12,6 +12,8 @@ from collections.abc import Iterable
 REFERENCE_WEIGHT = 0.1
 # A reference direction that differs from a new reading by more than this [rad] is replaced: a robot was displaced.
 REFERENCE_OFF_RAD = 0.35
+# A robot that stands within this distance [m] of its slot, less than a body's diameter, sees of walls what the former one saw.
+DISPLACED_M_MIN = 0.1
 # Readings of a heading after which its weight no longer falls.
 HEADING_READINGS_MAX = 20
 # Contacts within this angle [rad] belong to the same wall.
@@ -49,13 +51,29 @@ def refined_reference(known: Reference | None, there_rad: float, back_rad: float
 
     The low weight of one reading prevents a random walk of the reference, which the paper's "current bearings" cause.
     """
-    now = cmath.exp(1j * there_rad) + cmath.exp(1j * (back_rad + math.pi))
-    now /= abs(now) or 1.0
-    mean, count = (now, 0) if known is None else known
-    if abs(cmath.phase(now / mean)) > REFERENCE_OFF_RAD:
-        mean, count = now, 0
+    now = _reading(there_rad, back_rad)
+    mean, count = (now, 0) if known is None or _off_rad(known[0], now) > REFERENCE_OFF_RAD else known
     mean += max(1.0 / (count + 1), REFERENCE_WEIGHT) * (now - mean)
     return mean / (abs(mean) or 1.0), count + 1
+
+
+def is_displaced(known: Reference | None, there_rad: float, back_rad: float, distance_m: float) -> bool:
+    """Return whether a reading from both ends shows that a robot at one of them stands elsewhere than at earlier readings.
+
+    `distance_m` is the distance of the slots [m], infinite if it is not known.
+    """
+    off = 0.0 if known is None else _off_rad(known[0], _reading(there_rad, back_rad))
+    return off > REFERENCE_OFF_RAD and distance_m * math.sin(min(off, math.pi / 2.0)) > DISPLACED_M_MIN
+
+
+def _off_rad(mean: complex, now: complex) -> float:
+    return abs(cmath.phase(now / mean))
+
+
+def _reading(there_rad: float, back_rad: float) -> complex:
+    """Return the direction from one slot to another by a reading from both ends, as a unit vector."""
+    now = cmath.exp(1j * there_rad) + cmath.exp(1j * (back_rad + math.pi))
+    return now / (abs(now) or 1.0)
 
 
 def add_wall(known: list[float], direction_rad: float) -> bool:

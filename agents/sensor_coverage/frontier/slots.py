@@ -14,7 +14,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from operator import itemgetter
 
-from zwerm.agents.sensor_coverage.frontier.directions import Reference, add_wall, refined_heading, refined_reference
+from zwerm.agents.sensor_coverage.frontier.directions import (
+    Reference,
+    add_wall,
+    is_displaced,
+    refined_heading,
+    refined_reference,
+)
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint, drives_away, tail, turned_vector
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
@@ -46,6 +52,10 @@ class Slots:
         self.frame: dict[int, int] = {}
         self._heading_readings: dict[int, int] = {}
         self._reference: dict[int, dict[int, Reference]] = {}  # by the slot that sees, then by the slot that it sees
+        self._readers: dict[
+            tuple[int, int], tuple[int | None, int | None]
+        ] = {}  # the robots at both, at the last reading
+        self._displaced: dict[int, None] = {}
         self._next = 0
 
     # --- slots and occupants ----------------------------------------------------------------------------------------
@@ -210,13 +220,40 @@ class Slots:
         self._refer(a, b, (mean, 1))
 
     def learn_references(self, views: Mapping[int, Mapping[int, float]]) -> None:
-        """Refine the reference directions of all slots that see each other."""
+        """Refine the reference directions of all slots that see each other.
+
+        If one is off, the new occupants of its slots stand elsewhere. What former ones saw of walls closes nothing there.
+        """
+        displaced: dict[int, None] = {}
         for a, seen in views.items():
             for b, there in seen.items():
                 back = views.get(b, {}).get(a)
                 if back is None or b < a:
                     continue
-                self._refer(a, b, refined_reference(self._reference.get(a, {}).get(b), there, back))
+                known = self._reference.get(a, {}).get(b)
+                before, now = self._readers.get((a, b)), (self.occupant.get(a), self.occupant.get(b))
+                length = self.length_m.get((a, b), math.inf)
+                if before is not None and is_displaced(known, there, back, length):
+                    new = [slot for slot, was, is_ in zip((a, b), before, now, strict=True) if was != is_]
+                    displaced |= dict.fromkeys(new or (a, b))
+                self._readers[a, b] = now
+                self._refer(a, b, refined_reference(known, there, back))
+        if displaced:
+            self._forget_walls(displaced)
+
+    def _forget_walls(self, slots: Mapping[int, None]) -> None:
+        """Forget what was seen from these slots of robots that followed walls."""
+        self._displaced |= slots
+        for slot in slots:
+            self.near.pop(slot, None)
+        if any(slot in point.seen for walk in self.walks for point in walk.points for slot in slots):
+            self.walks = [each.unseen_by(slots) for each in self.walks]
+
+    def take_displaced(self) -> tuple[int, ...]:
+        """Return, once, the slots of which it was forgotten what was seen from there of robots that followed walls."""
+        found = tuple(self._displaced)
+        self._displaced = {}
+        return found
 
     def known_from(self, slot: int) -> Iterator[tuple[int, float]]:
         """Yield (slot, direction [rad]) of every occupied slot that was ever seen from this one, ascending."""

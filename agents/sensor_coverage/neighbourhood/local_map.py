@@ -10,7 +10,7 @@ from itertools import islice
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService, SlotCoverageProof
-from zwerm.agents.sensor_coverage.frontier.directions import Reference, refined_reference, wrapped
+from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
@@ -20,6 +20,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotM
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
 from zwerm.agents.sensor_coverage.neighbourhood.obstructions import Obstructions
+from zwerm.agents.sensor_coverage.neighbourhood.references import References
 from zwerm.agents.sensor_coverage.protocols.path_vector import PathVectorProtocol
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
@@ -63,8 +64,7 @@ class LocalMap(NeighbourTable):
         self._bodies = Obstructions()
         self.plan_count = 0
         self._makers = makers
-        self._references: dict[int, Reference] = {}
-        self._learned: dict[int, tuple[int, ...]] = {}
+        self._references = References()
         self._slots = Slots()
         self._planner = makers.planner(parameters, self._slots)
         self._plan_basis: object = None
@@ -73,16 +73,20 @@ class LocalMap(NeighbourTable):
     # --- memory of the slot -------------------------------------------------------------------------------------------
 
     def learn_references(self) -> None:
-        """Refine the reference directions to all slots whose robots see this robot too."""
+        """Refine the reference directions to all slots whose robots see this robot too.
+
+        Where this robot stands elsewhere than the former one at its slot, what that one saw of walls closes nothing.
+        """
         if self.heading is None or self.slot == NOWHERE:
             return
         for node, state in self.mutual().items():
-            readings = self.epoch, self.samples, state.epoch, state.samples
-            if self._learned.get(node) == readings:
-                continue
-            self._learned[node] = readings
-            there, back = self.seen[node].bearing_rad + self.heading, self._back(node) or 0.0
-            self._references[state.slot] = refined_reference(self._references.get(state.slot), there, back)
+            numbers = self.epoch, self.samples, state.epoch, state.samples
+            if self._references.is_new(node, numbers):
+                there, back = self.seen[node].bearing_rad + self.heading, self._back(node) or 0.0
+                distance_m = self.distances_m.get(state.slot, math.inf)
+                if self._references.take(node, state.slot, numbers, there, back, distance_m):
+                    self.proof.inherit(())
+                    self._planner.walls.tried.clear()
 
     def update_walls(self, bearings: tuple[float, ...]) -> None:
         """Remember the walls that this robot touches, by their bearings [rad]."""
@@ -162,8 +166,7 @@ class LocalMap(NeighbourTable):
         """Occupy no slot, and delete all that is known of the present one."""
         self.slot = NOWHERE
         self.redundant = False
-        self._references.clear()
-        self._learned.clear()
+        self._references = References()
         self._slots = Slots()
         self._planner = self._makers.planner(self.parameters, self._slots)
         self._drop_plans()
@@ -189,8 +192,7 @@ class LocalMap(NeighbourTable):
         """Take over a slot with its memory."""
         self._take(memory.slot, memory.claims)
         me = self.slot
-        for each in memory.references:
-            self._references[each.slot] = cmath.rect(1.0, each.direction_rad), each.count
+        self._references = References((each.slot, each.direction_rad, each.count) for each in memory.references)
         self._slots.walls[me] = list(memory.walls)
         log = self._planner.attempt_log
         log.closed = dict.fromkeys(memory.closed)

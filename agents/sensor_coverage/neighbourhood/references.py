@@ -1,0 +1,40 @@
+"""The reference directions from one robot's slot to the slots around."""
+
+import cmath
+from collections.abc import Iterable
+
+from zwerm.agents.sensor_coverage.frontier.directions import Reference, is_displaced, refined_reference
+
+
+class References:
+    """The reference directions from one robot's slot, by the slots to which they lead."""
+
+    def __init__(self, inherited: Iterable[tuple[int, float, int]] = ()) -> None:
+        """Begin with the former occupant's: (slot, direction [rad], number of readings)."""
+        self._known: dict[int, Reference] = {
+            slot: (cmath.rect(1.0, direction), count) for slot, direction, count in inherited
+        }
+        self._learned: dict[int, tuple[int, ...]] = {}  # by robot: the numbers of the latest readings at both ends
+        self._readers: dict[int, int] = {}  # by slot: the robot there at the latest reading
+
+    def is_new(self, node: int, numbers: tuple[int, ...]) -> bool:
+        """Return whether a robot's readings with these numbers have not been taken yet."""
+        return self._learned.get(node) != numbers
+
+    def take(
+        self, node: int, slot: int, numbers: tuple[int, ...], there_rad: float, back_rad: float, distance_m: float
+    ) -> bool:
+        """Take a reading from both ends; return whether it shows that this robot stands elsewhere than the former one here.
+
+        It does if the direction is off, unless another robot stands at the other slot than before. `distance_m` is the distance
+        of that slot [m], infinite if it is not known.
+        """
+        known = self._known.get(slot)
+        displaced = is_displaced(known, there_rad, back_rad, distance_m) and self._readers.get(slot, node) == node
+        self._learned[node], self._readers[slot] = numbers, node
+        self._known[slot] = refined_reference(known, there_rad, back_rad)
+        return displaced
+
+    def items(self) -> Iterable[tuple[int, Reference]]:
+        """Return the slots and the reference directions to them."""
+        return self._known.items()

@@ -1,0 +1,71 @@
+"""A robot that takes a slot over and stands elsewhere: what the former one saw of walls closes nothing there."""
+
+import math
+from itertools import pairwise
+
+import pytest
+
+from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint
+
+EAST = math.radians(10.0)
+FAR_OFF, CLOSE = math.radians(25.0), math.radians(15.0)
+
+
+def three_slots() -> Slots:
+    """Slots 0, 1 and 2 see each other. A robot followed a wall close to slot 1, and was seen from slots 0 and 1."""
+    slots = Slots()
+    for robot in (10, 11, 12):
+        slots.add(robot)
+    slots.learn_references(views(0.0))
+    slots.near[1] = [Arc(0.0, 1.0)]
+    slots.walks.append(Walk(10, 1, (WalkPoint({0: 0.5, 1: 1.5}, (0.0,), ()), WalkPoint({0: 0.6}, (0.0,), ()))))
+    return slots
+
+
+def views(off: float) -> dict[int, dict[int, float]]:
+    """Return views in which slot 1 is seen in other directions, by an angle [rad]."""
+    found = dict[int, dict[int, float]]({0: {}, 1: {}, 2: {}})
+    for (a, b), there in zip(pairwise((0, 1, 2, 0)), (EAST + off, 2.0 + off, 4.0), strict=True):
+        found[a][b], found[b][a] = there, there + math.pi
+    return found
+
+
+def test_what_a_slot_saw_of_walls_falls_when_its_new_robot_stands_elsewhere() -> None:
+    slots = three_slots()
+    slots.occupant[1] = 13
+    slots.learn_references(views(FAR_OFF))
+    assert slots.take_displaced() == (1,)
+    assert slots.take_displaced() == (), "they are named once"
+    assert 1 not in slots.near
+    assert [tuple(each.seen) for each in slots.walks[0].points] == [(0,), (0,)]
+    assert slots.direction(0, 1) == pytest.approx(EAST + FAR_OFF)
+
+
+@pytest.mark.parametrize(("robot", "off"), [(13, CLOSE), (11, 0.0)])
+def test_what_a_slot_saw_of_walls_remains_when_its_robot_stands_there(robot: int, off: float) -> None:
+    slots = three_slots()
+    walks = slots.walks
+    slots.occupant[1] = robot
+    slots.learn_references(views(off))
+    assert slots.take_displaced() == ()
+    assert slots.near[1] == [Arc(0.0, 1.0)]
+    assert slots.walks is walks
+
+
+def test_both_slots_are_displaced_when_no_robot_is_new() -> None:
+    """Nobody knows which of the two robots has moved."""
+    slots = three_slots()
+    moved = views(0.0)
+    moved[0][1], moved[1][0] = EAST + FAR_OFF, EAST + FAR_OFF + math.pi
+    slots.learn_references(moved)
+    assert slots.take_displaced() == (0, 1)
+
+
+def test_a_robot_that_stands_less_than_a_body_beside_its_slot_is_not_displaced() -> None:
+    slots = three_slots()
+    slots.occupant[1] = 13
+    slots.length_m = {(0, 1): 0.2, (1, 2): 0.2}
+    slots.learn_references(views(FAR_OFF))
+    assert slots.take_displaced() == ()
+    assert slots.direction(0, 1) == pytest.approx(EAST + FAR_OFF)
