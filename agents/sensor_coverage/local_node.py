@@ -86,7 +86,7 @@ class LocalNode(Controller):
             situation.telemetry["claims_frontier"] = self._claimed
         telemetry, situation.telemetry = situation.telemetry, {}
         snapshot, situation.snapshot = situation.snapshot, b""
-        outbox = self.components.outbox()
+        outbox = self.components.outbox(len(snapshot))
         return Command(drive=velocity, outbox=outbox, wake=self._wake(), telemetry=telemetry, snapshot=snapshot)
 
     @property

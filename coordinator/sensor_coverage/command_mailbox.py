@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Generator, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
+from zwerm.agents.sensor_coverage.messages.command_size import fitting
 from zwerm.agents.sensor_coverage.messages.commands import (
     UNKNOWN,
     UPLINK,
@@ -24,7 +25,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     write,
 )
 from zwerm.coordinator.sensor_coverage.retry_policy import BUSY_TICKS, REPEAT_TICKS, RetryPolicy
-from zwerm.wire.messages import MESSAGE_BYTES_MAX, Packet, Transmission, Wake
+from zwerm.wire.messages import Packet, Transmission, Wake
 
 T = TypeVar("T")
 Routine = Generator[Wake, None, T]
@@ -45,9 +46,6 @@ OVERDUE_DIVISOR: Final = 4
 # Recovery burst of a coordinator that starts again, until a robot receives its first request after the roll call. The
 # numbers are copies of the roll call, and copies of each request in every tick if messages are lost.
 ROLL_CALL_COPIES: Final = 8
-# Bytes of a command that are kept free for everything but packets and snapshot, and bytes of a packet beside its payload.
-COMMAND_BYTES_FREE: Final = 2_048
-PACKET_BYTES: Final = 40
 RECOVERY_COPIES: Final = 3
 
 
@@ -229,14 +227,8 @@ class CommandMailbox:
                 self._transmit(node, pending)
                 urgent = pending.tries > URGENT_TRIES or self._copies > 1
                 pending.due = self.tick + (1 if urgent else self.retry_policy.repeat_ticks)
-        left = MESSAGE_BYTES_MAX - COMMAND_BYTES_FREE - bytes_taken
-        fitting = 0
-        for packet in self._outbox:
-            left -= len(packet.payload) + PACKET_BYTES
-            if left < 0 and fitting:
-                break
-            fitting += 1
-        outbox, self._outbox = tuple(self._outbox[:fitting]), self._outbox[fitting:]
+        count = fitting(self._outbox, bytes_taken)
+        outbox, self._outbox = tuple(self._outbox[:count]), self._outbox[count:]
         return outbox
 
     def next_wake_s(self) -> float | None:

@@ -45,6 +45,11 @@ ACROSS_M_MIN: Final = 0.03
 ROBOT_BEHIND_RAD: Final = math.radians(60.0)
 # Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
 LEG_M: Final = 3.0
+# Greatest length of the waypoints of a leg in a message, of a waypoint without its sightings, and of a sighting. Among many
+# robots a leg is shorter, because a command has a greatest length.
+LEG_BYTES_MAX: Final = 40_000
+WAYPOINT_BYTES: Final = 60
+SIGHTING_BYTES: Final = 16
 # Longest way [m] of a station's first robot to a wall.
 FIRST_HOP_M: Final = 0.95
 # Number of consecutive legs that closed nothing after which a walk ends.
@@ -163,9 +168,9 @@ class WallWalk:
     ) -> DriveToWalk:
         """Follow the wall for `length_m`, in sight of a robot of `keep`, or of any robot if `keep` is empty.
 
-        Ends: STRETCH (`length_m` were followed). LOST (no such robot is in sight further on; the robot stands at the
-        last place with a margin of `margin_m`). MET (a robot of `meet` and another one are in sight). SHUT (no wall any
-        more, or the robot is wedged).
+        Ends: STRETCH (`length_m` were followed, or the waypoints fill a message). LOST (no such robot is in sight further on;
+        the robot stands at the last place with a margin of `margin_m`). MET (a robot of `meet` and another one are in
+        sight). SHUT (no wall any more, or the robot is wedged).
         """
         reported = list[Waypoint]()
 
@@ -202,7 +207,8 @@ class WallWalk:
         number, kept = 0, [0]
         seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
         last, way, stuck = motion.position, 0.0, 0
-        while way < length_m:
+        sightings = len(seen)
+        while way < length_m and len(kept) * WAYPOINT_BYTES + sightings * SIGHTING_BYTES < LEG_BYTES_MAX:
             if self._meets(meet):
                 return MET, way, kept
             if self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
@@ -223,10 +229,13 @@ class WallWalk:
             if now != seen or touch != hands:
                 if before != last:
                     kept.append(number - 1)
+                    sightings += len(seen)
                 kept.append(number)
+                sightings += len(now)
                 seen, hands, last = now, touch, motion.position
             elif math.dist(last, motion.position) >= SPACING_M:
                 kept.append(number)
+                sightings += len(now)
                 last = motion.position
         return STRETCH, way, kept
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from zwerm.agents.sensor_coverage.messages.command_size import fitting
 from zwerm.agents.sensor_coverage.messages.incarnations import ANY, Incarnations
 from zwerm.agents.sensor_coverage.messages.peers import read_envelope, write
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
@@ -44,6 +45,7 @@ class ComponentLoop:
         self.losses = LossEstimate()
         self._incarnations = Incarnations(incarnation)
         self._broadcasts = 0
+        self._unsent: list[Transmission] = []  # packets that did not fit into the latest command
         self._receivers: dict[type[Any], list[Component]] = {}
         for component in components:
             for kind in component.accepts:
@@ -96,6 +98,8 @@ class ComponentLoop:
 
     def is_idle(self, tick: int) -> bool:
         """Return whether no component has anything to do before `next_wake`, if no message said something new."""
+        if self._unsent:
+            return False
         for is_idle in self._idle:  # noqa: SIM110 (asked at most steps: a generator takes twice as long)
             if not is_idle(tick):
                 return False
@@ -106,13 +110,19 @@ class ComponentLoop:
         for poll in self._polled:
             poll(tick)
 
-    def outbox(self) -> tuple[Transmission, ...]:
-        """Return the packets to send in this tick."""
-        sent: list[Transmission] = []
-        for channel, outgoing in self._senders:
-            for each in outgoing():
-                sent += self._transmissions(channel, each)
-        return tuple(sent)
+    def outbox(self, bytes_taken: int = 0) -> tuple[Transmission, ...]:
+        """Return the packets to send in this tick; `bytes_taken` of the command are in use already.
+
+        Packets that do not fit into the command are sent in the next ticks, before components are asked for more.
+        """
+        unsent = self._unsent
+        if not unsent:
+            for channel, outgoing in self._senders:
+                for each in outgoing():
+                    unsent += self._transmissions(channel, each)
+        count = fitting(unsent, bytes_taken)
+        self._unsent = unsent[count:]
+        return tuple(unsent[:count])
 
     def _transmissions(self, channel: str, outgoing: Outgoing) -> list[Transmission]:
         """Return the packets of one message: in envelopes, with the number of copies that the radio's losses require."""
@@ -128,8 +138,8 @@ class ComponentLoop:
         return [Transmission(channel, payload, to)] * copies
 
     def next_wake(self) -> int | None:
-        """Return the earliest wake-up of a component, or None."""
-        earliest: int | None = None
+        """Return the earliest wake-up of a component, or None; an earlier tick than the present one while packets wait."""
+        earliest: int | None = 0 if self._unsent else None
         for next_wake in self._wakers:
             wake = next_wake()
             if wake is not None and (earliest is None or wake < earliest):

@@ -28,8 +28,12 @@ from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc, WalkTriangle
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.maths.sums import added
 
-# Arcs of walks that a slot's next occupant learns: a message has a greatest length.
+# Arcs of walks that a slot's next occupant learns, and their greatest length in a message: the command has a greatest length.
 MEMORY_MAX: Final = 300
+MEMORY_BYTES_MAX: Final = 45_000
+# Greatest length of an arc and its triangle in a message, without its slots, and that of a slot.
+ARC_BYTES: Final = 60
+SLOT_BYTES: Final = 5
 
 
 class SlotProof:
@@ -227,9 +231,12 @@ class SlotProof:
         followed = (arc for each in self._stretches.values() for arc in each.keyed_arcs(self._touched))
         ended = (ProvedArc(self._others(needed), self._others(seen), *arc) for needed, seen, arc in followed)
         found = (*kept, *self._triangles.all(), *ended)
-        if len(found) <= MEMORY_MAX:
+        if len(found) <= MEMORY_MAX and _bytes_of(found) <= MEMORY_BYTES_MAX:
             return found
-        return tuple(sorted(found, key=lambda each: len(each.needed) + len(each.seen))[:MEMORY_MAX])
+        found = tuple(sorted(found, key=lambda each: len(each.needed) + len(each.seen))[:MEMORY_MAX])
+        while _bytes_of(found) > MEMORY_BYTES_MAX:
+            found = found[:-1]
+        return found
 
     def inherit(self, memory: Iterable[ProvedArc]) -> None:
         """Take over the arcs that walks closed from the slot's former occupant."""
@@ -237,6 +244,11 @@ class SlotProof:
         self._stretches, self._touches = {}, {}
         for each in memory:
             self._take(each)
+
+
+def _bytes_of(arcs: Iterable[ProvedArc]) -> int:
+    """Return the greatest length of arcs in a message."""
+    return sum(ARC_BYTES + SLOT_BYTES * (len(each.needed) + len(each.seen)) for each in arcs)
 
 
 def _arc_of_triangle(slot: int, other: int, point: WalkPoint, views: Mapping[int, Mapping[int, float]]) -> Arc:
