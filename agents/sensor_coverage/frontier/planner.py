@@ -33,8 +33,8 @@ BRIDGE: Final = 100
 LAST: Final = 200
 # A drive that a wall stopped also rules out directions within this angle.
 BLOCKED_RAD: Final = math.radians(20.0)
-# Where walls are followed, and all slots are known, a robot stays beside an edge only if it has driven this fraction of its
-# hop: a followed wall needs no robot between it and the lattice.
+# Where walls are followed, a robot stays beside an edge only if it has driven this fraction of its hop: a followed wall needs
+# no robot between it and the lattice.
 WHOLE_HOP: Final = 0.98
 
 
@@ -51,7 +51,6 @@ class Planner:
         self.walls = WallPlans(parameters, slots, proof)
         self._slots = slots
         self._follows_walls = parameters.walls == "followed"
-        self._whole_hops = False
         self._open: Mapping[int, Sequence[Arc]] | None = None  # the open arcs of all slots, once walls were followed
         self._views, self._complex, self._bases = ScanResult({}, FlagComplex({}), ())
         self._plans: list[Plan] = []
@@ -59,8 +58,8 @@ class Planner:
     def update(self, scan: ScanResult, edges: Iterable[Edge] | None = None) -> None:
         """Take a new scan, and find the fence, or the part of it on `edges`. Algorithm 3."""
         self._views, self._complex, self._bases = scan
-        self._whole_hops = self._follows_walls and edges is None
-        self._open = self.walls.open_arcs(scan) if self._whole_hops and self._slots.walks else None
+        knows_all = self._follows_walls and edges is None
+        self._open = self.walls.open_arcs(scan) if knows_all and self._slots.walks else None
         found = self.fence = fence(self._views, self._complex, self._parameters.corner_margin_rad, edges)
         obstacle = dict.fromkeys(found.corners)
         self._plans = []
@@ -143,7 +142,7 @@ class Planner:
             if walls_matter and self._walled(mover, self._views[mover][other] + sign * near):
                 continue
             clear = min(self._parameters.clear_m, 0.85 * length)
-            if self._whole_hops:
+            if self._follows_walls:
                 clear = WHOLE_HOP * length
             plans.append(Plan(key, mover, direction, length, clear, anchors))
         return plans

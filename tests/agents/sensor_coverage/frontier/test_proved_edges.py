@@ -1,9 +1,12 @@
 """Where walls were followed, no robot is pushed to a side of an edge that is proved to be closed."""
 
 import math
+from typing import Literal
+
+import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.planner import Planner
+from zwerm.agents.sensor_coverage.frontier.planner import WHOLE_HOP, Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
@@ -14,19 +17,25 @@ PLACES = {0: (0.0, 0.0), 1: (1.0, 0.0), 2: (0.5, 0.87)}
 SOUTH: Edge = (0, 1)
 
 
-def frontier(closed: tuple[int, ...], walks: int) -> tuple[set[Edge], set[Edge]]:
-    """Return frontier and obstacle edges of a triangle, with the south closed around some slots, after some walks."""
+VIEWS = {i: {j: math.atan2(b[1] - a[1], b[0] - a[0]) for j, b in PLACES.items() if j != i} for i, a in PLACES.items()}
+SCAN = ScanResult(VIEWS, FlagComplex({i: set(seen) for i, seen in VIEWS.items()}), ())
+
+
+def slots_of_triangle() -> Slots:
     slots = Slots()
     for robot in PLACES:
         slots.add(robot)
+    return slots
+
+
+def frontier(closed: tuple[int, ...], walks: int) -> tuple[set[Edge], set[Edge]]:
+    """Return frontier and obstacle edges of a triangle, with the south closed around some slots, after some walks."""
+    slots = slots_of_triangle()
     for slot in closed:
         slots.near[slot] = [Arc(-math.pi, math.pi)]
     slots.walks += [Walk(0, 1, ())] * walks
-    views = {
-        i: {j: math.atan2(b[1] - a[1], b[0] - a[0]) for j, b in PLACES.items() if j != i} for i, a in PLACES.items()
-    }
     planner = Planner(PlannerParameters(walls="followed"), slots, SwarmProof())
-    planner.update(ScanResult(views, FlagComplex({i: set(seen) for i, seen in views.items()}), ()))
+    planner.update(SCAN)
     return set(planner.frontier), set(planner.obstacle)
 
 
@@ -38,3 +47,16 @@ def test_an_edge_is_frontier_until_both_of_its_ends_are_proved_to_be_closed() ->
 
 def test_before_the_first_walk_every_edge_counts() -> None:
     assert SOUTH in frontier((0, 1), walks=0)[0]
+
+
+@pytest.mark.parametrize("walls", ["paper", "followed"])
+@pytest.mark.parametrize("edges", [None, (SOUTH,)], ids=["with a coordinator", "by a robot at the edge"])
+def test_a_robot_beside_an_edge_stays_only_after_its_whole_hop_where_walls_are_followed(
+    walls: Literal["paper", "followed"], edges: tuple[Edge, ...] | None
+) -> None:
+    parameters = PlannerParameters(walls=walls)
+    planner = Planner(parameters, slots_of_triangle(), SwarmProof() if edges is None else None)
+    planner.update(SCAN, edges)
+    plans = next(planner.plans())
+    assert plans
+    assert {each.clear_m for each in plans} == {WHOLE_HOP * parameters.hop_m if walls == "followed" else 0.8}
