@@ -28,15 +28,16 @@ class TargetPoint(NamedTuple):
 
 
 def target_point(
-    landmarks: Sequence[Landmark], seen: Mapping[int, float], by_odometry: Vector, hop_m: float
+    landmarks: Sequence[Landmark], seen: Mapping[int, float], by_odometry: Vector | None, hop_m: float
 ) -> TargetPoint:
-    """Return the offset to the goal of a move; `by_odometry` is its offset [m] by odometry alone.
+    """Return the offset to the goal of a move; `by_odometry` is its offset [m] by odometry alone, None if that is unknown.
 
     Landmarks that stand still determine it if there are enough of them. A single landmark determines no offset. A landmark
     that drives is up to a hop away from the place that its bearing refers to, and odometry is off by a small fraction of
-    a hop. So odometry determines the offset until enough landmarks stand.
+    a hop. So odometry determines the offset until enough landmarks stand. Without it landmarks that drive do: they will stand
+    where their bearings refer to.
     """
-    rx, ry = by_odometry
+    rx, ry = by_odometry or (0.0, 0.0)
     found, pairs = Offset(0.0, 0.0, None, False), []
     for still in (True, False):
         pairs = [
@@ -46,7 +47,7 @@ def target_point(
         ]
         found = offset(pairs)
         if found.known and found.blind is None:
-            x, y = (found.x * hop_m, found.y * hop_m) if still else by_odometry
+            x, y = (found.x * hop_m, found.y * hop_m) if still or by_odometry is None else by_odometry
             return TargetPoint(x, y, False, not still, found.spread)
     if len(pairs) < 2 or not found.known or found.blind is None:
         return TargetPoint(rx, ry, used_odometry=True)

@@ -110,8 +110,13 @@ def deploy(
     return DriveResult(True, driven_m=done, touched=touched)
 
 
-def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequence[Landmark]) -> DriveToResult:
-    """Drive to the slot ahead. Section III-B, by the visual homing of section II-D."""
+def move(
+    motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequence[Landmark], knows_way: bool = True
+) -> DriveToResult:
+    """Drive to the slot ahead. Section III-B, by the visual homing of section II-D.
+
+    Without `knows_way` the bearing and the length of the way are unknown, and landmarks alone lead to the slot.
+    """
     p, frame = motion.parameters, motion.frame
     frame.forget()
     start = motion.position
@@ -123,7 +128,7 @@ def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequen
     target = TargetPoint(0.0, 0.0)
     passing = _Passing(motion)
     for _ in range(p.drive_ticks_max):
-        target = target_point(landmarks, frame.seen, _offset(motion, goal), scale_m)
+        target = target_point(landmarks, frame.seen, _offset(motion, goal) if knows_way else None, scale_m)
         approaches = noisy and not target.used_moving_landmarks  # else odometry leads to the goal
         if target.distance_m < (NOISY_NEAR_M if approaches else p.tolerance_m):
             break
@@ -134,7 +139,8 @@ def move(motion: Locomotion, bearing_rad: float, hop_m: float, landmarks: Sequen
         far_m = math.hypot(frame.x_m - start[0], frame.y_m - start[1])
         gain = 1.0 if far_m < 0.5 * hop_m else LATE_GAIN
         x, y = slide(gain * target.x, gain * target.y, frame.touched)
-        if passing.by_odometry(_offset(motion, goal), target.distance_m, math.hypot(x, y) < p.tolerance_m):
+        stopped = math.hypot(x, y) < p.tolerance_m
+        if knows_way and passing.by_odometry(_offset(motion, goal), target.distance_m, stopped):
             x, y = slide(*_offset(motion, goal), frame.touched)
             if math.hypot(x, y) < p.tolerance_m:
                 passing.stop(_offset(motion, goal), target.distance_m)

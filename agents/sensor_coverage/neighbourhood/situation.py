@@ -306,13 +306,13 @@ class Situation:
         self._start = self.motion.position
         self._drive(deploy(self.motion, bearing_rad, hop_m, clear_m, lambda: self.on_cleared()))
 
-    def move(self, bearing_rad: float, hop_m: float, landmarks: Sequence[Landmark]) -> None:
-        """Begin to drive to the slot ahead."""
+    def move(self, bearing_rad: float, hop_m: float, landmarks: Sequence[Landmark], knows_way: bool = True) -> None:
+        """Begin to drive to the slot ahead, by landmarks alone if the way there is unknown."""
         (x, y), (ux, uy) = self.motion.position, unit(bearing_rad)
         if hop_m > 0.0:
             self._start = x, y
             self._goal = x + hop_m * ux, y + hop_m * uy
-        self._drive(move(self.motion, bearing_rad, hop_m, landmarks))
+        self._drive(move(self.motion, bearing_rad, hop_m, landmarks, knows_way))
 
     def regain(self, node: int) -> None:
         """Begin to look for a robot that was in sight from the slot to which this robot has moved."""

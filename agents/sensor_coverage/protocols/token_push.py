@@ -244,7 +244,8 @@ class TokenPush(PushPart, WallPush):
         self._map.inherit(memory)
         self._map.distances_m |= measured
         hop_m = self._map.distances_m.get(origin, self._map.parameters.hop_m) if back_rad is not None else 0.0
-        self._situation.move(bearing_rad, hop_m, landmarks)
+        # The former robot at the slot may never have seen a robot that was out of the complex.
+        self._situation.move(bearing_rad, hop_m, landmarks, knows_way=back_rad is not None)
 
     # --- after the drive ----------------------------------------------------------------------------------------------
 

@@ -35,3 +35,13 @@ def test_odometry_and_not_a_landmark_on_its_way_determines_the_offset() -> None:
     target = target_point(landmarks({1: True, 2: False}), seen(0.5), GOAL, HOP_M)
     assert (target.x, target.y) == pytest.approx(GOAL)
     assert target.used_moving_landmarks, "it homes again when the landmark stands"
+
+
+def test_without_a_known_way_landmarks_on_their_way_determine_the_offset() -> None:
+    """The former robot at the slot never saw the robot that comes from outside the complex."""
+    target = target_point(landmarks({1: True, 2: False}), seen(), None, HOP_M)
+    assert (target.x, target.y) == pytest.approx(GOAL, abs=0.01)
+    assert target.used_moving_landmarks, "it homes again when the landmark stands"
+    lonely = target_point(landmarks({1: True, 2: False})[:1], seen(), None, HOP_M)
+    assert (lonely.x, lonely.y) == (0.0, 0.0)
+    assert lonely.used_odometry

@@ -125,6 +125,16 @@ def test_decentralised_robots_cover_a_small_hall_about_as_well_as_under_a_coordi
     assert cycles <= 0.0
 
 
+@pytest.mark.parametrize("seed", [1, 3])
+def test_followed_walls_take_few_robots_more_without_a_coordinator(seed: int) -> None:
+    """Robots that have left the complex after their walks come back into it: nobody there knows their places."""
+    central = run("sensor-coverage", seed=seed, runner="inline", overrides=HALL)
+    alone = run("sensor-coverage", seed=seed, runner="inline", overrides=ALONE)
+    assert alone.outcome == central.outcome == "completed"
+    assert alone.metrics["reachable_coverage_fraction"] >= 0.99
+    assert alone.metrics["robots_deployed"] <= central.metrics["robots_deployed"] + 2
+
+
 @pytest.mark.parametrize(
     "air",
     [
