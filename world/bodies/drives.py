@@ -47,6 +47,7 @@ class Drives:
         self.kind = self._drive.command
         self._axes = len(self.kind.__struct_fields__)
         self._commanded: Floats = np.zeros((count, self._axes))
+        self._everyone = list(range(count))
         self.lagging = body.latency_ticks > 0
         self._pending = [self._commanded.copy() for _ in range(body.latency_ticks - 1)]
         # Noise and latency change what acts at every tick, of every robot.
@@ -71,7 +72,11 @@ class Drives:
             self._newest.clear()
         axes, numbers = self._axes, chain.from_iterable(map(msgspec.structs.astuple, drives.values()))
         commanded = np.fromiter(numbers, np.float64, axes * len(drives)).reshape(-1, axes)
-        self._commanded[list(drives)] = commanded
+        robots = list(drives)
+        if robots == self._everyone:
+            self._commanded[:] = commanded
+        else:
+            self._commanded[robots] = commanded
 
     def stop(self, robot: int) -> None:
         """Stop a robot's motors from the next step on, and drop its commands that have not acted yet."""

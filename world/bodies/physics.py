@@ -15,6 +15,7 @@ from pymunk import batch
 from zwerm.scenario.tables import BodyTable
 from zwerm.world.bodies import Velocities
 from zwerm.world.bodies.approach import ApproachLimit, Meeting
+from zwerm.world.bodies.engine_calls import reader, substeps
 from zwerm.world.bodies.parking import FEW_BODIES, SEARCH_TICKS, Parking
 from zwerm.world.scene import Bools, Floats, Ints
 
@@ -29,7 +30,7 @@ _FORCE: Final = batch.BodyFields.FORCE | batch.BodyFields.TORQUE
 _VELOCITY: Final = batch.BodyFields.VELOCITY
 _MOTION: Final = batch.BodyFields.POSITION | _VELOCITY
 _VELOCITY_AND_FORCE: Final = _VELOCITY | batch.BodyFields.ANGULAR_VELOCITY | _FORCE
-_POSE: Final = batch.BodyFields.BODY_ID | batch.BodyFields.POSITION | batch.BodyFields.ANGLE
+_POSE: Final = batch.BodyFields.POSITION | batch.BodyFields.ANGLE
 
 
 class Physics:
@@ -55,11 +56,12 @@ class Physics:
         self._middle_s: Floats = np.arange(0.5, body.substeps)[:, None] * self._substep_s
         self._inertia: Floats = np.array([body.mass_kg, body.mass_kg, self._moment]) / self._substep_s
         self._poses = batch.Buffer()
-        # The newest drives, those of the bodies in the engine, and which robots have a drive at all.
+        self._read_poses = reader(self._space, _POSE, self._poses)
+        # The newest drives, and those of the bodies in the engine. Which robots have a drive: None before it is needed.
         nothing = np.zeros(count)
         self._drives: Velocities = (nothing, None, nothing)
         self._engine_drives: Velocities = (nothing, None, nothing)
-        self._driven: Bools = np.zeros(count, dtype=np.bool_)
+        self._driven_robots: Bools | None = np.zeros(count, dtype=np.bool_)
         self._resting = True
         self._arranged = False
 
@@ -97,30 +99,32 @@ class Physics:
         """Rebuild the buffers: pymunk's batches follow its own order of bodies, and include the static one."""
         parked = self._parking.parked
         owner = {body.id: robot for robot, body in self._bodies.items() if not parked[robot]}
-        self._poses.clear()
-        batch.get_space_bodies(self._space, _POSE, self._poses)
-        ids = np.frombuffer(bytes(self._poses.int_buf()), dtype=np.uintp).tolist()
+        in_order = batch.Buffer()
+        batch.get_space_bodies(self._space, batch.BodyFields.BODY_ID, in_order)
+        ids = np.frombuffer(bytes(in_order.int_buf()), dtype=np.uintp).tolist()
         rows = [(row, owner[body]) for row, body in enumerate(ids) if body in owner]
         self._rows = _plain([row for row, _ in rows], len(rows))
         self._ids = _plain([robot for _, robot in rows], len(self.position))
         self._pushes: Floats = np.zeros((self._table.substeps, len(ids), 3))
         self._start: Floats = np.zeros((len(ids), 6))  # the velocity, and the force of the first substep
-        self._push_buffers = [_buffer(pushes) for pushes in self._pushes[1:]]
-        self._start_buffer = _buffer(self._start)
+        self._loads = [(_VELOCITY_AND_FORCE, _buffer(self._start))]
+        self._loads += [(_FORCE, _buffer(pushes)) for pushes in self._pushes[1:]]
+        self._integrate = substeps(self._space, self._substep_s, self._loads)
         self._resting = False
         self._arranged = True
 
-    def _take(self, forward: Floats, left: Floats | None, turn: Floats) -> None:
-        """Take new drives."""
-        driven = (forward != 0.0) | (turn != 0.0)
-        if left is not None:
-            driven |= left != 0.0
-        self._drives, self._driven = (forward, left, turn), driven
-        self._parking.urge()
+    def _driven(self) -> Bools:
+        """Return (n,) which robots have a drive at all."""
+        if self._driven_robots is None:
+            forward, left, turn = self._drives
+            self._driven_robots = (forward != 0.0) | (turn != 0.0)
+            if left is not None:
+                self._driven_robots |= left != 0.0
+        return self._driven_robots
 
     def _park(self) -> None:
         """Move bodies into the engine and out of it."""
-        entering, leaving = self._parking.change(self.position, self._present, self._driven)
+        entering, leaving = self._parking.change(self.position, self._present, self._driven())
         for robot in entering.tolist():
             body = self._bodies[robot]
             self._space.add(body, *body.shapes)
@@ -139,8 +143,9 @@ class Physics:
         last_forward, last_left, last_turn = self._drives
         same = forward_m_s is last_forward and left_m_s is last_left and turn_rad_s is last_turn
         if not same:
-            self._take(forward_m_s, left_m_s, turn_rad_s)
-        if self._resting and self._arranged and not self._driven.any():
+            self._drives, self._driven_robots = (forward_m_s, left_m_s, turn_rad_s), None
+            self._parking.urge()
+        if self._resting and self._arranged and not self._driven().any():
             return moved
         may_park = len(self._bodies) > FEW_BODIES or self._parking.in_use
         if may_park:
@@ -160,7 +165,7 @@ class Physics:
         here, heading = self.position[ids], self.heading[ids]
         angle = heading + self._middle_s * turn
         pushes = self._pushes
-        if angle.any():
+        if np.count_nonzero(angle):  # faster than any()
             cos, sin = np.cos(angle), np.sin(angle)
             vx, vy = forward * cos, forward * sin
             if left is not None:
@@ -176,16 +181,13 @@ class Physics:
         # The force of substep s acts on the velocity that substep s + 1 integrates.
         pushes[:-1] = pushes[1:]
         pushes *= self._inertia
-        space = self._space
         self._start[:, 3:] = pushes[0]
-        batch.set_space_bodies(space, _VELOCITY_AND_FORCE, self._start_buffer)
         meeting = None if self._approach is None else self._approach.meeting(here)
-        self._step(meeting)
-        for buffer in self._push_buffers:
-            batch.set_space_bodies(space, _FORCE, buffer)
-            self._step(meeting)
-        self._poses.clear()
-        batch.get_space_bodies(space, _POSE, self._poses)
+        if meeting is None:
+            self._integrate()
+        else:
+            self._integrate_approaching(meeting)
+        self._read_poses()
         poses = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 3)[rows]
         place, angle = poses[:, :2], poses[:, 2]
         differs = here != place
@@ -197,18 +199,24 @@ class Physics:
             self._parking.note_moved(moved)
         return moved
 
-    def _step(self, meeting: Meeting | None) -> None:
-        """Integrate one substep, in which the bodies of `meeting` approach each other no faster than they may."""
-        if self._approach is not None and meeting is not None:
-            self._poses.clear()
-            batch.get_space_bodies(self._space, _MOTION, self._poses)
-            motion = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 4)
-            position, velocity = motion[self._rows, :2], motion[self._rows, 2:].copy()
-            if self._approach.slow(position, velocity, meeting):
-                slowed = motion[:, 2:].copy()
-                slowed[self._rows] = velocity
-                batch.set_space_bodies(self._space, _VELOCITY, _buffer(slowed))
-        self._space.step(self._substep_s)
+    def _integrate_approaching(self, meeting: Meeting) -> None:
+        """Integrate one tick, in which the bodies of `meeting` approach each other no faster than they may."""
+        for fields, buffer in self._loads:
+            batch.set_space_bodies(self._space, fields, buffer)
+            self._slow(meeting)
+            self._space.step(self._substep_s)
+
+    def _slow(self, meeting: Meeting) -> None:
+        if self._approach is None:
+            return
+        self._poses.clear()
+        batch.get_space_bodies(self._space, _MOTION, self._poses)
+        motion = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 4)
+        position, velocity = motion[self._rows, :2], motion[self._rows, 2:].copy()
+        if self._approach.slow(position, velocity, meeting):
+            slowed = motion[:, 2:].copy()
+            slowed[self._rows] = velocity
+            batch.set_space_bodies(self._space, _VELOCITY, _buffer(slowed))
 
 
 def _make_space(substep_s: float, friction: float, segments: Floats) -> pymunk.Space:
