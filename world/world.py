@@ -14,7 +14,8 @@ informs the driver when the run is over.
 The world is deterministic: its state after a tick is a function of the scenario, the seed and the accepted answers.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import tee
 from typing import Final
 
 from msgspec.structs import replace
@@ -42,7 +43,7 @@ from zwerm.world.tick.sensing import Sensing
 from zwerm.world.tick.telemetry import TelemetrySink
 from zwerm.world.tick.wakes import WakeEvent, Wakes
 
-Send = Callable[[int, bytes], object]
+SendMany = Callable[[Iterable[tuple[int, bytes]]], object]
 
 
 # A node with this many refused messages has crashed: a correct program has none, and each costs the world time.
@@ -103,10 +104,10 @@ class World:
         self._lifecycle.stop_paused(tick)
         return actions
 
-    def observe(self, send: Send | None = None) -> tuple[list[int], list[bytes]]:
+    def observe(self, send_many: SendMany | None = None) -> tuple[list[int], list[bytes]]:
         """Sense, and return the ids of the nodes that are awake, ascending, and the encoded observation of each.
 
-        Each observation is given to `send` as soon as it is encoded, so that nodes start while others are still encoded.
+        `send_many` takes each observation as soon as it is encoded, so that nodes start while others are still encoded.
         """
         scene, tick = self.scene, self.tick
         receivers = self.medium.arrive(tick)
@@ -119,13 +120,12 @@ class World:
         robots = awake[:-1] if nodes and nodes[-1] == self.scenario.robots.count else awake
         readings = self._sensing.readings(scene, robots)
         inboxes = self.medium.deliver(nodes, tick) if receivers else None
-        observations: list[bytes] = []
         times = None if self.clocks is None else self.clocks.local_s(scene.time_s, nodes)
         made = self._sensing.observations(scene, len(robots), len(nodes), readings, inboxes, times)
-        for node, observation in zip(nodes, made, strict=True):
-            observations.append(observation)
-            if send is not None:
-                send(node, observation)
+        if send_many is not None:
+            sent, made = tee(made)
+            send_many(zip(nodes, sent, strict=True))
+        observations = list(made)
         # Bookkeeping comes after sending: the nodes work meanwhile.
         self.intake.begin_tick(tick, nodes, observations)
         for field in self._wakes.events:
@@ -143,6 +143,13 @@ class World:
         next_scene = self.bodies.advance_early()
         if next_scene is not None and not self._wakes.sleeping:
             self._sensing.precompute(next_scene)
+
+    def accept_plain(self, arrivals: Iterator[tuple[int, bytes | None]]) -> tuple[int, tuple[int, bytes | None] | None]:
+        """Accept valid commands for this tick up to the first arrival that is none; return their number, and that arrival.
+
+        That arrival is None if there is none; else it is for `accept`, or reports a loss.
+        """
+        return self.intake.accept_plain(arrivals, self.status.crashed)
 
     def accept(self, node: int, payload: bytes, late_allowed: bool = False) -> None:
         """Accept a node's answer to its observation of this tick, or with `late_allowed` of an earlier one.

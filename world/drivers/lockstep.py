@@ -53,7 +53,7 @@ class LockStep(Driver):
         self._processes.carry_out(actions)
 
     def _exchange(self) -> None:
-        nodes, _ = self._world.observe(self._link.send)
+        nodes, _ = self._world.observe(self._link.send_many)
         self._world.precompute()
         self._collect(len(nodes))
 
@@ -73,15 +73,19 @@ class LockStep(Driver):
                 awaited = world.awaited()
                 self._lost += len(self._link.idle(awaited, PROBE_S))
                 raise StragglerError(awaited, world.tick, self._straggler_s)
-            accept = world.accept
-            for arrival in arrivals:
-                node, payload = arrival
+            unread = iter(arrivals)
+            while True:
+                accepted, other = world.accept_plain(unread)
+                missing -= accepted
+                if other is None:
+                    break
+                node, payload = other
                 if payload is None:
                     self._lose(node, EXIT_CODE_S)
                     missing = len(world.awaited())
                     continue
                 try:
-                    accept(node, payload)
+                    world.accept(node, payload)
                 except ProtocolError:
                     continue  # the world has counted the refusal
                 missing -= 1

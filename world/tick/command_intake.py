@@ -5,7 +5,7 @@ refused for a reason, counted, and changes nothing. If the driver allows late an
 earlier tick is accepted too, in order.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Final, NamedTuple, Protocol
 
 from zwerm.errors import ProtocolError
@@ -78,6 +78,35 @@ class CommandIntake:
         self._payloads = dict.fromkeys(nodes, NO_ANSWER)
         self._traced = {}
         self.observed_count += len(nodes)
+
+    def accept_plain(
+        self, arrivals: Iterator[tuple[int, bytes | None]], crashed: Collection[int]
+    ) -> tuple[int, tuple[int, bytes | None] | None]:
+        """Accept plain answers from `arrivals` up to the first that is not plain; return their number and that arrival.
+
+        A plain answer is a valid command for this tick, of a node that is not in `crashed`. `accept` does the same with it, but
+        takes more time.
+        """
+        answers, payloads, drives, fixed, tick = self._answers, self._payloads, self._drives, self._fixed, self._tick
+        accepted = 0
+        for arrival in arrivals:
+            node, payload = arrival
+            if payload is None or node in crashed or answers.get(node, arrival) is not None:
+                return accepted, arrival
+            try:
+                answer = open_answer(payload)
+                if answer.tick != tick or type(answer) is not Command:
+                    return accepted, arrival
+                if answer.outbox or type(answer.drive) not in drives or node in fixed:
+                    self._check_content(node, answer)
+            except ProtocolError:
+                return accepted, arrival
+            answers[node] = answer
+            payloads[node] = payload
+            if answer.telemetry or answer.snapshot:
+                self._traced[node] = traced_bytes(answer, payload)
+            accepted += 1
+        return accepted, None
 
     def accept(self, node: int, payload: bytes, late_allowed: bool = False) -> Command | Failure:
         """Accept a node's answer and return it decoded; with `late_allowed` also an answer to an earlier tick.

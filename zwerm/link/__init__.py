@@ -30,6 +30,9 @@ class WorldLink(Protocol):
     def send(self, node: int, payload: bytes) -> None:
         """Send one message to a node that has joined."""
 
+    def send_many(self, messages: Iterable[tuple[int, bytes]]) -> None:
+        """Send messages to nodes that have joined, each as soon as `messages` yields it."""
+
     def receive(self, timeout_s: float) -> Arrival | None:
         """Return the next arrival, or None after `timeout_s` seconds without one."""
 

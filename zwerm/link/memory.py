@@ -1,7 +1,7 @@
 """The memory link: nodes live in the world's own process and compute their answers when the world collects them."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from zwerm.errors import LinkError
 from zwerm.link import Answer, Arrival
@@ -11,7 +11,7 @@ from zwerm.wire.refusals import Refusals
 class MemoryLink:
     """The world's end of nodes that run inline. A node is a function from one message to one message.
 
-    `send` only queues a message; a controller runs inside `receive` or `receive_many`. `make`, of a node's id and
+    `send` and `send_many` only queue messages; a controller runs inside `receive` or `receive_many`. `make`, of a node's id and
     incarnation number, returns the node that a fault starts. The nodes in `late_joiners` do not run before that.
     """
 
@@ -31,6 +31,10 @@ class MemoryLink:
     def send(self, node: int, payload: bytes) -> None:
         """Queue a message to a node."""
         self._unanswered.append((node, payload))
+
+    def send_many(self, messages: Iterable[tuple[int, bytes]]) -> None:
+        """Queue messages to nodes."""
+        self._unanswered.extend(messages)
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """Return the next loss or answer, or None at once: nothing arrives later in memory."""

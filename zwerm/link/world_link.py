@@ -11,7 +11,7 @@ for each message would cost more than the work on the message.
 import contextlib
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import msgspec
@@ -98,6 +98,12 @@ class ZenohWorldLink:
     def send(self, node: int, payload: bytes) -> None:
         """Send one message to a node that has joined."""
         self._put[node](payload)
+
+    def send_many(self, messages: Iterable[tuple[int, bytes]]) -> None:
+        """Send messages to nodes that have joined, each as soon as `messages` yields it."""
+        put = self._put
+        for node, payload in messages:
+            put[node](payload)
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """Return the next arrival, or None after `timeout_s` seconds without one. Raises LinkError once closed."""

@@ -8,7 +8,7 @@ killed or hang, and a program may return.
 import heapq
 import itertools
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 import pytest
@@ -116,6 +116,11 @@ class VirtualNetwork:
             self._later("in", node, lambda: self._receive(node, answer))
 
         self._later("out", node, arrive)
+
+    def send_many(self, messages: Iterable[tuple[int, bytes]]) -> None:
+        """Carry messages to nodes, and their answers back."""
+        for node, payload in messages:
+            self.send(node, payload)
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """Return the next arrival, or None after `timeout_s` of virtual time."""

@@ -24,7 +24,7 @@ from zwerm.world.faults.generator import random_faults
 from zwerm.world.faults.programs.crash import Crash, CrashTable
 from zwerm.world.faults.sensing.sensor_noise import SensorNoise, SensorNoiseTable
 from zwerm.world.tick.node_status import ProcessAction
-from zwerm.world.world import Send
+from zwerm.world.world import SendMany
 
 POSES = [[0.3, 0.3, 0.0], [1.7, 0.3, 0.0], [0.3, 1.7, 0.0], [1.7, 1.7, 0.0]]
 
@@ -64,8 +64,8 @@ class Life:
             self.orders.append(begin())
             return self.orders[-1]
 
-        def spied_observe(send: Send | None = None) -> tuple[list[int], list[bytes]]:
-            nodes, payloads = observe(send)
+        def spied_observe(send_many: SendMany | None = None) -> tuple[list[int], list[bytes]]:
+            nodes, payloads = observe(send_many)
             self.observed.append(dict(zip(nodes, map(decode_observation, payloads), strict=True)))
             return nodes, payloads
 
