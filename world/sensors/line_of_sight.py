@@ -5,6 +5,7 @@ robot before it meets a wall. Without a range the distance does not matter. The 
 with some probability the reading is replaced by a random bit. The reading contains no distance and no id.
 """
 
+import math
 from typing import Any, ClassVar
 
 import numpy as np
@@ -50,7 +51,8 @@ class LineOfSightSensor(Sensor):
         self._imagined = max(parameters.false_positive, parameters.combined) / 2.0
         # No wall comes between bodies that are inside a convex arena, so it does not matter where the ray enters one.
         self._any_entry_will_do = surroundings.arena.is_convex and parameters.range_m is None
-        self._total = 0
+        self._memory, self._marks = np.empty((2, 0)), np.empty(0, dtype=np.bool_)
+        self._shape(0, 0)
 
     def read(self, scene: Scene, robots: Ints) -> list[bool]:
         """Return whether each of `robots` has a robot straight ahead."""
@@ -71,39 +73,45 @@ class LineOfSightSensor(Sensor):
             x, y, ox, oy, heading = x[others], y[others], x[robots], y[robots], heading[robots]
         cos, sin = np.cos(heading), np.sin(heading)
         offset = oy * cos - ox * sin
-        cos_column, sin_column, offset_column = cos[:, None], sin[:, None], offset[:, None]
+        own = None if others is robots else np.searchsorted(others, robots)
         radius2 = scene.radius_m**2
         sees = np.zeros(len(robots), dtype=np.bool_)
         entry_m = None if self._any_entry_will_do else np.full(len(robots), np.inf)
-        total = len(others)
-        if total != self._total:
-            self._prepare(total)
-        for first in range(0, len(robots), self._rows):
-            last = min(first + self._rows, len(robots))
-            size = (last - first) * total
-            across, on_line = self._across[:size], self._on_line[:size]
-            grid, product = self._across_grid[: last - first], self._product_grid[: last - first]
-            # Squared distance of each centre from the ray: elementwise, so that every machine rounds in the same way.
-            np.multiply(cos_column[first:last], y, out=grid)
-            np.multiply(sin_column[first:last], x, out=product)
+        total, first = len(others), 0
+        rays: Ints | None = None  # those that are still to be followed; None for all
+        c, s, o = cos, sin, offset
+        while first < total and len(c):
+            last = min(first + max(1, _PAIRS_AT_ONCE // len(c)), total)
+            if self._grids[0].shape != (last - first, len(c)):
+                self._shape(last - first, len(c))
+            grid, product, on_line = self._grids
+            # Squared distance of each centre from each ray: elementwise, so that every machine rounds in the same way.
+            np.multiply(y[first:last, None], c, out=grid)
+            np.multiply(x[first:last, None], s, out=product)
             np.subtract(grid, product, out=grid)
-            np.subtract(grid, offset_column[first:last], out=grid)
-            np.multiply(across, across, out=across)
-            if others is robots:
-                across[first :: total + 1] = np.inf  # no robot sees itself
-            else:
-                grid[np.arange(last - first), np.searchsorted(others, robots[first:last])] = np.inf
-            np.less_equal(across, radius2, out=on_line)
-            near = on_line.nonzero()[0]
-            row, seen = self._row[near] + first, self._column[near]
+            np.subtract(grid, o, out=grid)
+            np.multiply(grid, grid, out=grid)
+            np.less_equal(grid, radius2, out=on_line)
+            near = on_line.reshape(-1).nonzero()[0]
+            seen = near // len(c)
+            row = near - seen * len(c)
+            if rays is not None:
+                row = rays[row]
+            if first:
+                seen += first
             ahead = (x[seen] - ox[row]) * cos[row] + (y[seen] - oy[row]) * sin[row]
-            half_chord2 = radius2 - across[near]
+            half_chord2 = radius2 - grid.reshape(-1)[near]
             # The disc's far side is ahead: in front, or about the ray's own start (where bodies may overlap).
             met = ahead * np.abs(ahead) >= -half_chord2
-            if entry_m is None:
-                sees[row[met]] = True
-            else:
+            met &= seen != (row if own is None else own[row])  # no robot sees itself
+            if entry_m is not None:
                 np.minimum.at(entry_m, row[met], np.maximum(ahead[met] - np.sqrt(half_chord2[met]), 0.0))
+            else:
+                sees[row[met]] = True
+                if last < total:  # one robot ahead is enough
+                    rays = np.flatnonzero(~sees)
+                    c, s, o = cos[rays], sin[rays], offset[rays]
+            first = last
         if entry_m is not None:
             hit = np.flatnonzero((entry_m <= self._range_m) & (entry_m < np.inf))
             start = np.column_stack([ox[hit], oy[hit]])
@@ -111,14 +119,13 @@ class LineOfSightSensor(Sensor):
             sees[hit[~scene.arena.blocked(start, start + ray)]] = True
         return sees
 
-    def _prepare(self, total: int) -> None:
-        """Make the buffers for this number of rows at a time of `total` robots, and tables of each entry's row and column."""
-        self._total = total
-        self._rows = min(max(1, _PAIRS_AT_ONCE // total), total)
-        size = self._rows * total
-        self._across, self._product, self._on_line = np.empty(size), np.empty(size), np.empty(size, dtype=np.bool_)
-        self._across_grid, self._product_grid = self._across.reshape(-1, total), self._product.reshape(-1, total)
-        self._row, self._column = np.divmod(np.arange(size), total)
+    def _shape(self, *shape: int) -> None:
+        """Give the grids of all pairs this shape. New memory for each would cost more than what is computed in it."""
+        size = math.prod(shape)
+        if size > len(self._marks):
+            self._memory, self._marks = np.empty((2, size)), np.empty(size, dtype=np.bool_)
+        one, other = self._memory[:, :size]
+        self._grids = one.reshape(shape), other.reshape(shape), self._marks[:size].reshape(shape)
 
     @classmethod
     def rest(cls) -> bool:
