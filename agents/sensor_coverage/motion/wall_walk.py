@@ -150,15 +150,18 @@ class WallWalk:
     ) -> DriveToWalk:
         """Follow the walls that are met along these bearings, one after the other, as far as a station is in sight.
 
-        Ends as `along` does, with the first way that is longer than `clear_m`, or with the last one.
+        Ends as `along` does, with the first wall along which the robot drives more than `clear_m`, or that is so far from
+        the station, or with the last one. `driven_m` is the greater of the two lengths.
         """
-        walked = WalkResult(SHUT)
+        walked, start = WalkResult(SHUT), self._motion.position
         for bearing in bearings_rad:
             yield from self.to_wall(bearing, hop_m, 0.0, -1)
             for hand in (1, -1):
                 walked = yield from self.along(hand, LEG_M, (station,), (), margin_m)
                 if walked.end == LOST:
                     break
+            # The drive to the wall, or the other hand, may have led to the end of the station's sight.
+            walked = walked._replace(driven_m=max(walked.driven_m, math.dist(start, self._motion.position)))
             if walked.driven_m > clear_m:
                 break
         return walked

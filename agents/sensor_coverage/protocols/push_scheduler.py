@@ -36,6 +36,10 @@ WALKED_TICKS_MAX: Final = 3 * CLOSE_TICKS
 GAP_TICKS: Final = 24
 # Bound of the ticks to wait for a robot that stands at the base and is not ready.
 READY_TICKS_MAX: Final = 1500
+# Where no robot can leave the base, although others have left it: attempts before the base gives up, and ticks between them.
+# Meanwhile the robot finds out which bodies in its way are dead and can be pushed, and robots that are cut off may come back.
+LEAVES_MAX: Final = 8
+LEAVE_TICKS: Final = 400
 # Number of pushes before a pause, and ticks of the pause: redundant robots negotiate while all robots stand still.
 PAUSE_EVERY: Final = 10
 PAUSE_TICKS: Final = 80
@@ -79,6 +83,8 @@ class PushScheduler(Component):
         self._since = self._edges_since = 0
         self._walked_at: int | None = None  # when the walk of the active push ended
         self._not_ready_since = 0
+        self._blocked = 0  # attempts in a row in which no robot could leave the base
+        self._leave_at = 0  # tick of the next attempt
         self._tokens = first_count(situation.incarnation)  # the number of a push is the name of a slot
         self._paused_at = 0
         self._paused_until: int | None = None
@@ -192,7 +198,7 @@ class PushScheduler(Component):
         if not alone and wall is None and self._map.to_gap and tick - self._edges_since < GAP_TICKS:
             return  # news of an edge may be on its way
         self._termination.disturb()
-        if self._pauses(tick):
+        if self._pauses(tick) or (alone and tick < self._leave_at):
             return
         if not alone and wall is None and self._offers:
             self._call(tick)
@@ -244,7 +250,16 @@ class PushScheduler(Component):
         self.cycles += tried or done
         self.pushes += done
         self._report_numbers()
-        if self._is_first and tried and not done:
+        if done:
+            self._blocked = 0
+        elif self._is_first and tried:
+            self._count_blocked()
+
+    def _count_blocked(self) -> None:
+        """Record that no robot could leave the base; give up at once if no other one has been out."""
+        self._blocked += 1
+        self._leave_at = self._situation.tick + LEAVE_TICKS
+        if self.released < 2 or self._blocked >= LEAVES_MAX:
             self.outcome = "source-blocked: no robot can leave the base"
 
     # --- conditions ---------------------------------------------------------------------------------------------------
