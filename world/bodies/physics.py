@@ -55,7 +55,10 @@ class Physics:
         # The middle of each substep [s], and the factor from a change of velocity to the force that causes it.
         self._middle_s: Floats = np.arange(0.5, body.substeps)[:, None] * self._substep_s
         self._inertia: Floats = np.array([body.mass_kg, body.mass_kg, self._moment]) / self._substep_s
-        self._poses = batch.Buffer()
+        # pymunk never frees the memory of a buffer, so these are all that this engine uses.
+        self._order, self._poses, self._slowed = batch.Buffer(), batch.Buffer(), batch.Buffer()
+        fields = [_VELOCITY_AND_FORCE, *[_FORCE] * (body.substeps - 1)]
+        self._loads = [(each, batch.Buffer()) for each in fields]  # what each substep begins with
         self._read_poses = reader(self._space, _POSE, self._poses)
         # The newest drives, and those of the bodies in the engine. Which robots have a drive: None before it is needed.
         nothing = np.zeros(count)
@@ -99,16 +102,16 @@ class Physics:
         """Rebuild the buffers: pymunk's batches follow its own order of bodies, and include the static one."""
         parked = self._parking.parked
         owner = {body.id: robot for robot, body in self._bodies.items() if not parked[robot]}
-        in_order = batch.Buffer()
-        batch.get_space_bodies(self._space, batch.BodyFields.BODY_ID, in_order)
-        ids = np.frombuffer(bytes(in_order.int_buf()), dtype=np.uintp).tolist()
+        self._order.clear()
+        batch.get_space_bodies(self._space, batch.BodyFields.BODY_ID, self._order)
+        ids = np.frombuffer(bytes(self._order.int_buf()), dtype=np.uintp).tolist()
         rows = [(row, owner[body]) for row, body in enumerate(ids) if body in owner]
         self._rows = _plain([row for row, _ in rows], len(rows))
         self._ids = _plain([robot for _, robot in rows], len(self.position))
         self._pushes: Floats = np.zeros((self._table.substeps, len(ids), 3))
         self._start: Floats = np.zeros((len(ids), 6))  # the velocity, and the force of the first substep
-        self._loads = [(_VELOCITY_AND_FORCE, _buffer(self._start))]
-        self._loads += [(_FORCE, _buffer(pushes)) for pushes in self._pushes[1:]]
+        for (_, buffer), values in zip(self._loads, [self._start, *self._pushes[1:]], strict=True):
+            buffer.set_float_buf(values)
         self._integrate = substeps(self._space, self._substep_s, self._loads)
         self._resting = False
         self._arranged = True
@@ -216,7 +219,8 @@ class Physics:
         if self._approach.slow(position, velocity, meeting):
             slowed = motion[:, 2:].copy()
             slowed[self._rows] = velocity
-            batch.set_space_bodies(self._space, _VELOCITY, _buffer(slowed))
+            self._slowed.set_float_buf(slowed)
+            batch.set_space_bodies(self._space, _VELOCITY, self._slowed)
 
 
 def _make_space(substep_s: float, friction: float, segments: Floats) -> pymunk.Space:
@@ -235,9 +239,3 @@ def _make_space(substep_s: float, friction: float, segments: Floats) -> pymunk.S
 def _plain(rows: list[int], count: int) -> slice | Ints:
     """Return an index for these rows: a slice if they are all of `count` in order, which avoids a copy."""
     return slice(count) if rows == list(range(count)) else np.array(rows, dtype=np.int64)
-
-
-def _buffer(values: Floats) -> batch.Buffer:
-    buffer = batch.Buffer()
-    buffer.set_float_buf(values)
-    return buffer

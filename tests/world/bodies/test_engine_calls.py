@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pymunk import batch
 
 from zwerm.scenario.tables import BodyTable
 from zwerm.world.bodies import engine_calls, physics
@@ -52,3 +53,29 @@ def test_a_pymunk_without_these_names_is_used_by_its_own_methods(monkeypatch: py
     assert engine_calls._library() is None
     monkeypatch.setitem(sys.modules, "pymunk._chipmunk_cffi", None)
     assert engine_calls._library() is None
+
+
+def test_no_buffer_is_made_when_bodies_enter_or_leave(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+
+    class Counted(batch.Buffer):
+        """A buffer that counts: pymunk never frees one."""
+
+        def __init__(self) -> None:
+            made.append(self)
+            super().__init__()
+
+    monkeypatch.setattr(batch, "Buffer", Counted)
+    swarm = Physics(
+        BodyTable(kind="holonomic", radius_m=0.08, max_speed_m_s=0.5, continuous_collision=True), WALLS, 2, 0.1
+    )
+    counts = []
+    for _ in range(5):
+        for robot in range(2):
+            swarm.add(robot, np.array([0.41 + 0.18 * robot, 0.5]), np.pi * robot)
+        for _ in range(3):
+            swarm.advance(np.full(2, 0.5), np.zeros(2), np.zeros(2))
+        for robot in range(2):
+            swarm.remove(robot)
+        counts.append(len(made))
+    assert len(set(counts)) == 1
