@@ -188,7 +188,11 @@ class PushScheduler(Component):
     def _start_push(self, tick: int) -> None:
         """Start the next push, or wait for its conditions."""
         visible = self._situation.bearings
-        alone = not any(node in visible and each.slot not in (0, NOWHERE) for node, each in self._map.states.items())
+        # A robot that has left the complex makes no plans: with such neighbours only, nobody looks for the frontier.
+        alone = not any(
+            node in visible and each.slot not in (0, NOWHERE) and not each.redundant
+            for node, each in self._map.states.items()
+        )
         wall = None
         if not alone and not self._map.has_route:
             wall = self._own_wall_plan(tick)

@@ -1,7 +1,10 @@
 """The first robot leaves the base, or the only way is blocked by the bodies of robots that have died."""
 
+import pytest
+
 from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.local_base import LocalBase
+from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, StateBeacon
 from zwerm.agents.sensor_coverage.messages.pushes import PushAborted
 from zwerm.agents.sensor_coverage.protocols.push_scheduler import LEAVES_MAX
 from zwerm.deploy.node_specs import node_specs
@@ -39,3 +42,14 @@ def test_a_base_whose_neighbours_have_died_tries_again_before_it_gives_up() -> N
     """The next robot may not know yet that the bodies in its way are dead, and robots that are cut off come back."""
     assert outcome_after(LEAVES_MAX - 1, 3) == ""
     assert outcome_after(LEAVES_MAX, 3) == "source-blocked"
+
+
+@pytest.mark.parametrize("redundant", [True, False])
+def test_a_base_whose_only_neighbour_has_left_the_complex_releases_a_robot(redundant: bool) -> None:
+    """That robot plans nothing, so the base would wait for a frontier for ever, or conclude that there is none."""
+    base = Node(*node_specs(SCENARIO, 1)[0])._controller
+    assert isinstance(base, LocalBase)
+    base.situation.motion.frame.seen = {3: 0.5}
+    base.local_map.receive(3, StateBeacon(0, 5, 1, False, False, 1, (), (), (), NO_PATH_VECTOR, redundant), 1)
+    base.schedule.poll(2)
+    assert base.schedule.release is redundant
