@@ -208,11 +208,12 @@ class PushExecution:
         self, followers: Sequence[int], going: Sequence[int], arrived: Mapping[int, Arrived]
     ) -> tuple[list[int], list[int]]:
         """Return the followers that have arrived, and their slots; the slots of the others are empty."""
-        self.lost |= {robot: None for robot in followers if robot in arrived and not arrived[robot].ok}
+        lost = {robot: None for robot in followers if robot in arrived and not arrived[robot].ok}
+        self.lost |= lost
         for slot, robot in zip(going, followers, strict=True):
-            if robot in self.lost:
+            if robot in lost:
                 self._slots.drop(slot)
-        left = [(robot, slot) for robot, slot in zip(followers, going, strict=True) if robot not in self.lost]
+        left = [(robot, slot) for robot, slot in zip(followers, going, strict=True) if robot not in lost]
         return [robot for robot, _ in left], [slot for _, slot in left]
 
     def _straighten(
