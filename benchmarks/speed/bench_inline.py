@@ -15,7 +15,7 @@ from zwerm.run.runner import run
 from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 
-TARGETS = {25: 60_000, 100: 90_000}
+TARGETS = {25: 170_000, 100: 200_000, 1000: 150_000}
 
 
 def emulator_rate(scenario: Scenario, seed: int) -> float:
