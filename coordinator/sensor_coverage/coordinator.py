@@ -250,9 +250,7 @@ class SensorCoverageCoordinator:
     def _strangers(self, reports: Mapping[int, Report], at_station: Collection[int]) -> list[int]:
         """Return visible robots without a slot: a coordinator that starts again finds the swarm as it is."""
         waiting = self.sources.waiting.values()
-        # Where walls are followed, a robot that did not reach its slot gets one where it stands: it may fill a passage.
-        lost = self.pushing.lost if self.parameters.walls == "paper" else ()
-        known = {*self.slots.occupant.values(), *waiting, *at_station, *self._silent, *lost}
+        known = {*self.slots.occupant.values(), *waiting, *at_station, *self._silent, *self.pushing.lost}
         seen = {each.node for report in reports.values() for each in report.sightings or ()}
         return sorted(seen - known)
 

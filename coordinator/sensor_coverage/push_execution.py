@@ -4,6 +4,7 @@ Several pushes may run concurrently if no slot of one path is a landmark in anot
 """
 
 import math
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
@@ -24,6 +25,9 @@ from zwerm.maths.simplicial import FlagComplex
 
 # Attempts of a robot to home again on landmarks that were moving before.
 HOMING_ATTEMPTS = 2
+# Failures to reach a slot after which a robot is given up: its motors may be dead. With followed walls it gets a slot where
+# it stands before that, because it may fill a passage.
+FAILURES_MAX = {"paper": 1, "followed": 2}
 
 # Robots that have moved.
 Moved = Sequence[int]
@@ -33,7 +37,7 @@ class PushExecution:
     """The pushes of one cycle.
 
     `pushes` counts the successful ones, and `stopped` those that a wall stopped, with the leader back at its slot. `lost`
-    are robots that did not reach their slots. `scan` and `cycle` are those of the present cycle.
+    are robots that are given up, because they did not reach their slots. `scan` and `cycle` are those of the present cycle.
     """
 
     def __init__(
@@ -47,6 +51,7 @@ class PushExecution:
         self.pushes = 0
         self.stopped = 0
         self.lost: dict[int, None] = {}
+        self._failures: Counter[int] = Counter()  # slots that a robot did not reach, by robot
         self.cycle = 0
         self.scan = ScanResult({}, FlagComplex({}), ())
         self._parameters = parameters
@@ -208,12 +213,14 @@ class PushExecution:
         self, followers: Sequence[int], going: Sequence[int], arrived: Mapping[int, Arrived]
     ) -> tuple[list[int], list[int]]:
         """Return the followers that have arrived, and their slots; the slots of the others are empty."""
-        lost = {robot: None for robot in followers if robot in arrived and not arrived[robot].ok}
-        self.lost |= lost
+        failed = [robot for robot in followers if robot in arrived and not arrived[robot].ok]
+        self._failures.update(failed)
+        failures_max = FAILURES_MAX[self._parameters.walls]
+        self.lost |= {robot: None for robot in failed if self._failures[robot] >= failures_max}
         for slot, robot in zip(going, followers, strict=True):
-            if robot in lost:
+            if robot in failed:
                 self._slots.drop(slot)
-        left = [(robot, slot) for robot, slot in zip(followers, going, strict=True) if robot not in lost]
+        left = [(robot, slot) for robot, slot in zip(followers, going, strict=True) if robot not in failed]
         return [robot for robot, _ in left], [slot for _, slot in left]
 
     def _straighten(
