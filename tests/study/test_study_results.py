@@ -122,3 +122,8 @@ def test_each_kind_of_study_figure_is_drawn(write: Callable[..., Study], tmp_pat
     result = run_here(write(text), tmp_path / "out.parquet")
     with Image.open(draw_study(tmp_path / "out.png", result.results)) as image:
         assert len(image.convert("RGB").getcolors(1 << 24) or []) > 10
+
+
+def test_equal_values_have_no_deviation() -> None:
+    """The mean of twenty equal numbers is rounded, and is not one of them."""
+    assert condense([1.1162790697674418] * 20)[1:] == (pytest.approx(1.1162790697674418), 0.0, 0.0)

@@ -30,7 +30,7 @@ def condense(values: Sequence[float]) -> Sample:
     mean = float(np.mean(values))
     if n == 1:
         return Sample(1, mean, math.nan, math.nan)
-    sd = float(np.std(values, ddof=1))
+    sd = float(np.std(values, ddof=1)) if np.ptp(values) else 0.0  # the mean of equal numbers is rounded
     return Sample(n, mean, sd, half_width(sd, n))
 
 
