@@ -6,7 +6,7 @@ continues from that slot.
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Final
 
 import msgspec
@@ -16,6 +16,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
+from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import (
     LOST,
     MET,
@@ -198,9 +199,15 @@ class WallWalks:
                 if origin in slots.occupant:
                     slots.length_m[here, origin] = slots.length_m[origin, here] = math.hypot(walked.x_m, walked.y_m)
                 return
+            self.idle = without_witnesses(self.idle, slots.walks[number].points)
             before, left = left, self._open(scan)
             idle_legs = idle_legs + 1 if left > before - PROGRESS_RAD or walked.end == SHUT else 0
         self.idle[slots.slot_of()[leader]] = None
+
+    def keep_needed(self, scan: ScanResult) -> None:
+        """Forget idle slots that are empty or needed."""
+        idle = {slot: None for slot in self.idle if slot in self._slots.occupant}
+        self.idle = still_idle(idle, scan.complex_.neighbours)
 
     def _open(self, scan: ScanResult) -> float:
         """Return the sum of all open arcs [rad]."""
@@ -220,6 +227,22 @@ class WallWalks:
         answers = yield from self._mailbox.answers([robot], Walked)
         answer = answers.get(robot)
         return answer if isinstance(answer, Walked) else None
+
+
+def still_idle(idle: Mapping[int, None], neighbours: Mapping[int, Collection[int]]) -> dict[int, None]:
+    """Return the idle slots without those that no other slot sees, and without the idle slots in sight of these.
+
+    A robot that no other one sees stands where the proof has seen nothing.
+    """
+    apart = [slot for slot in idle if all(each in idle for each in neighbours.get(slot, ()))]
+    needed = {*apart, *(each for slot in apart for each in neighbours.get(slot, ()))}
+    return {slot: None for slot in idle if slot not in needed}
+
+
+def without_witnesses(idle: Mapping[int, None], points: Iterable[WalkPoint]) -> dict[int, None]:
+    """Return the idle slots without those that saw a point of a walk which no other slot saw."""
+    needed = {slot for point in points if all(each in idle for each in point.seen) for slot in point.seen}
+    return {slot: None for slot in idle if slot not in needed}
 
 
 def past_dead(command: ToWall | FollowWall, silent: Collection[int]) -> ToWall | FollowWall:

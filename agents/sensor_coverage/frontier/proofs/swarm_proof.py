@@ -81,6 +81,7 @@ class SwarmProof:
         self._count = 0  # walks that `_points` contains
         self._points: list[WalkPoint] = []
         self._passed: dict[int, list[Passed]] = {}
+        self._stretch_of: dict[int, int] = {}  # the number of the first point of the stretch, by the number of a point
         self._witnessed: dict[int, dict[int, None]] = {}  # slots that rely on points which this slot saw
         self._gone: dict[int, None] = {}  # slots that stood in an earlier scan
         self._forget()
@@ -90,9 +91,11 @@ class SwarmProof:
         self._neighbours: dict[int, frozenset[int]] = {}
         self._around: dict[int, ArcBasis] = {}
         self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
+        self._by_stretch: dict[int, dict[int, list[Arc]]] = {}  # of them those of one stretch, by slot and stretch
         self._pairs: dict[int, tuple[Pair, ...]] = {}  # the valid triangles, by the number of their point
-        self._chosen: dict[Pair, tuple[WalkPoint, ...]] = {}  # the points of triangles beside an edge, one a side
+        self._chosen: dict[Pair, dict[int, WalkPoint]] = {}  # the points of triangles beside an edge, by side
         self._open_arcs: dict[int, list[Arc]] = {}
+        self._settled: dict[int, None] = {}  # open slots that no other choice of points closes better
 
     def update(
         self,
@@ -129,6 +132,7 @@ class SwarmProof:
 
     def open_arcs(self) -> dict[int, list[Arc]]:
         """Return the arcs in which each slot is open, without the slots that are open in none."""
+        self._choose_again()
         return {slot: arcs for slot in self._around if (arcs := self._open(slot))}
 
     # --- what has changed -------------------------------------------------------------------------------------------
@@ -137,11 +141,12 @@ class SwarmProof:
         """Find the slots that saw each point of the walks that are new. Another list: all have other directions."""
         if walks is not self._walks:
             self._walks, self._count = walks, 0
-            self._points, self._passed, self._witnessed = [], {}, {}
+            self._points, self._passed, self._witnessed, self._stretch_of = [], {}, {}, {}
             self._forget()
         for walk in walks[self._count :]:
             for slot, passed in _passes(walk, len(self._points)):
                 self._passed.setdefault(slot, []).append(passed)
+                self._stretch_of[passed.number] = passed.stretch
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
                 relied = (*passed.between, *(each.ties for each in ends))
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
@@ -157,7 +162,7 @@ class SwarmProof:
             points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
             stale |= self._witnessed.get(slot, {})
             self._spoil(slot)
-            for known in (self._around, self._followed):
+            for known in (self._around, self._followed, self._by_stretch):
                 known.pop(slot, None)
         for slot in stale:
             if slot in self._around:
@@ -165,7 +170,7 @@ class SwarmProof:
                 self._followed[slot] = self._arcs_to_walls(slot)
                 self._spoil(slot)
         for number in points:
-            old, new = self._pairs.get(number, ()), self._valid(self._points[number])
+            old, new = self._pairs.get(number, ()), self._valid(number)
             if old != new:
                 self._pairs[number] = new
                 for slot in dict.fromkeys(slot for pair in (*old, *new) for slot in pair):
@@ -173,11 +178,17 @@ class SwarmProof:
 
     def _spoil(self, slot: int) -> None:
         """Forget what depends on the arcs of a slot."""
-        self._open_arcs.pop(slot, None)
+        self._reopen(slot)
         for pair in [pair for pair in self._chosen if slot in pair]:
             del self._chosen[pair]
             for each in pair:
-                self._open_arcs.pop(each, None)
+                self._reopen(each)
+
+    def _reopen(self, slot: int) -> None:
+        """Forget the open arcs of a slot: other points may be better for it and its neighbours now."""
+        self._open_arcs.pop(slot, None)
+        for each in (slot, *self._neighbours.get(slot, ())):
+            self._settled.pop(each, None)
 
     # --- arcs -------------------------------------------------------------------------------------------------------
 
@@ -185,12 +196,19 @@ class SwarmProof:
         """Return the open arcs of a slot."""
         known = self._open_arcs.get(slot)
         if known is None:
-            view = self._scan.views[slot]
-            closed = self._closed_without_fans(slot)
-            for other in self._neighbours[slot]:
-                closed += [arc_between(view[other], each.seen[slot]) for each in self._choose(slot, other)]
-            known = self._open_arcs[slot] = complement(closed)
+            known = self._open_arcs[slot] = self._open_without(slot, None, 0)
         return known
+
+    def _open_without(self, slot: int, pair: Pair | None, side: int) -> list[Arc]:
+        """Return the arcs of a slot that are open without the triangle on one side of an edge."""
+        view = self._scan.views[slot]
+        closed = self._closed_without_fans(slot)
+        for other in self._neighbours[slot]:
+            its_pair = _pair_of(slot, other)
+            points = self._choose(its_pair)
+            kept = (point for its_side, point in points.items() if its_pair != pair or its_side != side)
+            closed += [arc_between(view[other], each.seen[slot]) for each in kept]
+        return complement(closed)
 
     def _closed_without_fans(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that walls and triangles of robots close."""
@@ -198,26 +216,61 @@ class SwarmProof:
         closed = [*self._followed[slot], *arcs_of_walls(self._around[slot].touched)]
         return closed + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
 
-    def _choose(self, slot: int, other: int) -> tuple[WalkPoint, ...]:
+    def _choose(self, pair: Pair) -> dict[int, WalkPoint]:
         """Return the point of the triangle on each side of an edge, if there is one: the one that closes most at both ends.
 
         With different points at the two ends, the triangles would cross, and each end would rely on the other.
         """
-        a, b = pair = (slot, other) if slot < other else (other, slot)
         known = self._chosen.get(pair)
         if known is None:
-            views = self._scan.views
-            points = [each.point for each in self._passed.get(a, ()) if pair in self._pairs.get(each.number, ())]
-            best: dict[int, tuple[float, WalkPoint]] = {}
+            points = self._candidates(pair)
             opened = {each: complement(self._closed_without_fans(each)) for each in (pair if points else ())}
-            for point in points:
-                arcs = ((a, arc_between(views[a][b], point.seen[a])), (b, arc_between(views[b][a], point.seen[b])))
-                gain = added(overlap(arc, each) for slot, arc in arcs for each in opened[slot])
-                side = side_of(point, a, views[a][b])
-                if side not in best or gain > best[side][0] + EQUAL_RAD:
-                    best[side] = gain, point
-            known = self._chosen[pair] = tuple(point for _, point in best.values())
+            known = self._chosen[pair] = {
+                side: self._best(pair, each, opened, None) for side, each in points.items()
+            }
         return known
+
+    def _candidates(self, pair: Pair) -> dict[int, list[WalkPoint]]:
+        """Return the points of the triangles with an edge that count, by side."""
+        found: dict[int, list[WalkPoint]] = {}
+        there = self._scan.views[pair[0]][pair[1]]
+        for each in self._passed.get(pair[0], ()):
+            if pair in self._pairs.get(each.number, ()):
+                found.setdefault(side_of(each.point, pair[0], there), []).append(each.point)
+        return found
+
+    def _best(
+        self, pair: Pair, points: Sequence[WalkPoint], opened: Mapping[int, Sequence[Arc]], present: WalkPoint | None
+    ) -> WalkPoint:
+        """Return the point whose triangle closes most of the open arcs at both ends; it is `present` if no other is better."""
+        best, most = present, -1.0
+        for point in points if present is None else (present, *points):
+            arcs = ((slot, arc_between(self._scan.views[slot][other], point.seen[slot])) for slot, other in (pair, pair[::-1]))
+            gain = added(overlap(arc, each) for slot, arc in arcs for each in opened[slot])
+            if gain > most + EQUAL_RAD:
+                best, most = point, gain
+        if best is None:
+            raise ValueError("no points to choose from")
+        return best
+
+    def _choose_again(self) -> None:
+        """Choose other points around the slots that are open, where these close more together with the points of other edges."""
+        waiting = [slot for slot in self._around if slot not in self._settled and self._open(slot)]
+        while waiting:
+            slot = waiting.pop()
+            if slot in self._settled or not self._open(slot):
+                continue
+            self._settled[slot] = None
+            for other in sorted(self._neighbours[slot]):
+                pair = _pair_of(slot, other)
+                for side, points in self._candidates(pair).items():
+                    opened = {each: self._open_without(each, pair, side) for each in pair}
+                    best = self._best(pair, points, opened, self._choose(pair)[side])
+                    if best is not self._choose(pair)[side]:
+                        self._choose(pair)[side] = best
+                        for each in pair:
+                            self._reopen(each)
+                        waiting += [slot, *sorted(self._neighbours[slot] | self._neighbours[other])]
 
     def _arcs_to_walls(self, slot: int) -> list[Arc]:
         """Return the arcs at a slot that end at followed walls or at contacts. They are disjoint."""
@@ -234,25 +287,43 @@ class SwarmProof:
                 is_loose = not pocket.other.is_tied(self._neighbours)
                 crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
                 found += arcs_beside_pocket(hand, pocket, around.touched)
-        for each in crossings.values():
-            found += arcs_into(each)
+        by_stretch = self._by_stretch[slot] = {number: arcs_into(each) for number, each in crossings.items()}
+        for each in by_stretch.values():
+            found += each
         return united(found)
 
     def _counts(self, point: WalkPoint) -> bool:
         """Return whether all slots that saw a point of a walk still stand."""
         return self._gone.keys().isdisjoint(point.seen)
 
-    def _valid(self, point: WalkPoint) -> tuple[Pair, ...]:
-        """Return the pairs of slots whose triangle with a point counts."""
+    def _valid(self, number: int) -> tuple[Pair, ...]:
+        """Return the pairs of slots whose triangle with the point of this number counts."""
+        point = self._points[number]
         if not self._counts(point):
             return ()
         at_walls = {
-            (slot, side): ends_at(self._followed[slot], there, side)
-            for slot, there in point.seen.items()
+            (slot, side): self._ends_beyond(slot, number, side)
+            for slot in point.seen
             if slot in self._neighbours
             for side in (1, -1)
         }
         return fan_of(point, self._scan.views, self._neighbours, at_walls)
+
+    def _ends_beyond(self, slot: int, number: int, side: int) -> bool:
+        """Return whether the wall that was followed at a point lies beyond the line of sight to it, on one side.
+
+        Another wall may end at a corner before the point, and nobody sees the space behind the corner. Beside a robot in
+        touch with the walking robot all walls count.
+        """
+        point = self._points[number]
+        if slot in point.robots:
+            return ends_at(self._followed[slot], point.seen[slot], side)
+        return ends_at(self._by_stretch[slot].get(self._stretch_of.get(number, -1), ()), point.seen[slot], side)
+
+
+def _pair_of(slot: int, other: int) -> Pair:
+    """Return the two slots, the lower number first."""
+    return (slot, other) if slot < other else (other, slot)
 
 
 def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:

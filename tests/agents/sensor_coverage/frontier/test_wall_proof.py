@@ -215,6 +215,36 @@ def test_robots_in_touch_with_both_sides_of_a_door_do_not_close_it() -> None:
     assert math.degrees(open_rad(local)) == pytest.approx(270.0)
 
 
+def test_a_wall_that_ends_before_a_point_of_another_walk_closes_no_triangle_with_it() -> None:
+    """Beside their lines of sight to a point in a passage, the two robots see the corners at its mouth. Between the corners
+    and the point they do not see what is behind the corners.
+    """
+    point = between_two((-45, -135))
+    corners = [
+        [WalkPoint({slot: math.radians(each)}, SOUTH, ()) for each in degrees]
+        for slot, degrees in ((0, (-80, -60, -40)), (1, (-140, -120, -100)))
+    ]
+    walks = tuple(Walk(0, -1, tuple(points)) for points in (*corners, point))
+    assert _degrees(open_arcs(PAIR, walks)) == {0: 320, 1: 320}
+
+
+def test_an_edge_chooses_the_point_that_closes_what_no_other_edge_closes() -> None:
+    """A point of the edge 0 1 closes 50 degrees at slot 1, and another one 30 degrees at slot 0.
+
+    The edge 1 2 closes the former, too.
+    """
+    views = {0: {1: 0.0}, 1: {0: math.pi, 2: math.radians(100.0)}, 2: {1: math.radians(280.0)}}
+
+    def walk(**directions: int) -> Walk:
+        seen = {int(slot[1:]): degrees for slot, degrees in directions.items()}
+        points = [{slot: math.radians(each + step) for slot, each in seen.items()} for step in (-2, 0, 2)]
+        return Walk(0, -1, tuple(WalkPoint(each, SOUTH, ()) for each in points))
+
+    walks = walk(_0=6, _1=130), walk(_0=30, _1=170)
+    assert _degrees(open_arcs(views, walks))[0] == 348, "without the edge 1 2 the first point closes more"
+    assert _degrees(open_arcs(views, (*walks, walk(_1=181, _2=230))))[0] == 328
+
+
 def test_both_ends_of_an_edge_rely_on_the_same_point_of_a_walk() -> None:
     """There is a wall on both sides of a door. Slot 0 would rely on the left wall, and slot 1 on the right one."""
     left, right = ((-84, -153), (-80, -150), (-77, -148)), ((-33, -103), (-30, -100), (-26, -96))

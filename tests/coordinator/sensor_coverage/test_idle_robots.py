@@ -1,0 +1,27 @@
+"""Robots that stand where a walk has ended are idle, unless the proof of coverage needs what they see."""
+
+import pytest
+
+from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint
+from zwerm.coordinator.sensor_coverage.wall_walks import still_idle, without_witnesses
+
+IDLE = dict.fromkeys((7, 8, 9))
+
+
+@pytest.mark.parametrize(
+    ("neighbours", "left"),
+    [
+        pytest.param({7: (1,), 8: (1, 7), 9: (2,)}, [7, 8, 9], id="each is in sight of a slot that is not idle"),
+        pytest.param({7: (1,), 8: (2,), 9: ()}, [7, 8], id="nobody sees one of them: it went where nobody has been"),
+        pytest.param({7: (1,), 8: (1, 9), 9: (8,)}, [7], id="only an idle one sees it, and both are needed"),
+    ],
+)
+def test_a_robot_is_idle_only_where_a_standing_robot_sees_it(
+    neighbours: dict[int, tuple[int, ...]], left: list[int]
+) -> None:
+    assert list(still_idle(IDLE, neighbours)) == left
+
+
+def test_a_robot_that_alone_saw_a_walking_robot_is_not_idle() -> None:
+    points = [WalkPoint(dict.fromkeys(seen, 0.0), (), ()) for seen in ((1, 7), (7, 8), (1, 2), ())]
+    assert list(without_witnesses(IDLE, points)) == [9]
