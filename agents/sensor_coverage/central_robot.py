@@ -5,7 +5,7 @@ questions itself: its offset from the bearings that it must reach, contacts with
 """
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Collection, Generator, Sequence
 from typing import Final
 
 from zwerm.agents.runtime.contract import Controller, Setup
@@ -14,6 +14,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     UPLINK,
     Arrived,
     Cleared,
+    ComeBack,
     Correct,
     Deploy,
     Emerged,
@@ -36,7 +37,8 @@ from zwerm.agents.sensor_coverage.messages.commands import (
 from zwerm.agents.sensor_coverage.motion.homing import Vector
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive, Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
-from zwerm.agents.sensor_coverage.motion.push_drives import DriveToResult, correct, deploy, move
+from zwerm.agents.sensor_coverage.motion.push_drives import DriveToResult, correct, deploy, drive_back, move
+from zwerm.agents.sensor_coverage.motion.trail import Trail
 from zwerm.agents.sensor_coverage.motion.wall_walk import DriveToWalk, WallWalk
 from zwerm.agents.sensor_coverage.protocols.component import Component
 from zwerm.agents.sensor_coverage.protocols.component_loop import Codec, ComponentLoop
@@ -58,6 +60,7 @@ class CentralRobot(Controller):
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
         self.motion = Locomotion(self.parameters, setup)
+        self._trail = Trail()
         self._dead: dict[int, None] = {}  # as far as the coordinator has said
         self.wall_walk = WallWalk(self.motion, self._dead)
         self.commands = RequestDeduplicator(int(self.random.integers(1, INCARNATIONS)), self._on_command)
@@ -74,6 +77,7 @@ class CentralRobot(Controller):
     def step(self, observation: Observation) -> Command:
         """Take in readings and messages, go on with the activity, and poll the components."""
         self.motion.frame.update(observation)
+        self._trail.record(self.motion.position)
         self.components.deliver(observation.inbox, observation.tick)
         drive = self._advance()
         self.components.poll(observation.tick)
@@ -117,6 +121,8 @@ class CentralRobot(Controller):
                 return self._drive(cycle, move(self.motion, bearing_rad, hop_m, landmarks))
             case Correct(cycle, anchors):
                 return self._drive(cycle, correct(self.motion, anchors))
+            case ComeBack(cycle, apart):
+                return self._drive(cycle, self._come_back(apart))
             case ToWall(cycle, bearing_rad, hop_m, clear_m, hand):
                 return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, clear_m, hand))
             case FollowWall(cycle, length_m, hand, keep, meet):
@@ -148,6 +154,12 @@ class CentralRobot(Controller):
                 result.near,
                 self.motion.radius_m,
             )
+        )
+
+    def _come_back(self, apart: Collection[int]) -> DriveToResult:
+        motion = self.motion
+        return drive_back(
+            motion, tuple(self._trail.points), lambda: any(each not in apart for each in motion.frame.seen)
         )
 
     def _clear(self, cycle: int) -> None:

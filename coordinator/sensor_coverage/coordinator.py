@@ -156,6 +156,7 @@ class SensorCoverageCoordinator:
                     yield from self._find_redundant()  # 5: (periodically) identify redundant robots
                 plans = yield from self._find_paths()  # 6: find path in the 1-skeleton
                 pushes = [self._carry_out(plan) for plan in plans]  # 7 and 8: push robots in path, deploy robot n + 1
+                pushes = pushes or self._recall()
             if self._schedule.unscanned and not pushes:
                 self._schedule.scan_next()
                 continue  # only a new scan shows that nothing is left
@@ -280,7 +281,7 @@ class SensorCoverageCoordinator:
     def _update_fence(self, scan: ScanResult) -> None:
         """Find the fence of the complex without robots that have left it; pushes may begin at those."""
         self.scan = self.pushing.scan = scan
-        self.walking.keep_needed(scan)
+        self.walking.idle = {slot: None for slot in self.walking.idle if slot in self.slots.occupant}
         if self.walking.idle:
             self.scan = scan = scan._replace(complex_=scan.complex_.without(self.walking.idle))
         if self._redundancy == "link":
@@ -324,6 +325,9 @@ class SensorCoverageCoordinator:
         if not plans and self.sources.empty:
             yield from self._find_redundant()
             plans = self._assign()
+        if not plans and self.walking.wake_needed(self.pushing.scan):
+            self._update_fence(self.pushing.scan)
+            plans = self._assign()
         return plans
 
     def _assign(self) -> tuple[Plan, ...]:
@@ -337,6 +341,18 @@ class SensorCoverageCoordinator:
             return services.paths.routes(complex_, sources, services.frontier.obstacle, shut)
 
         return services.assignment.assign(services.frontier.plans(), self.pushing.scan, sources, find_routes)
+
+    def _recall(self) -> list[Routine[Moved]]:
+        """Return the return of one robot that is cut off from all stations: where walls are followed, its way is known."""
+        scan, stations = self.pushing.scan, self.sources.alive()
+        if self.parameters.walls == "paper" or not stations:
+            return []
+        for piece in scan.complex_.components():
+            slots = [slot for slot in piece if slot not in stations and self.pushing.may_recall(slot)]
+            if slots and not any(slot in stations for slot in piece):
+                apart = [*(self.slots.occupant[slot] for slot in piece), *self._silent]
+                return [self.pushing.recall(max(slots), apart)]
+        return []
 
     # --- line 9: the end ----------------------------------------------------------------------------------------------
 

@@ -6,13 +6,14 @@ Several pushes may run concurrently if no slot of one path is a landmark in anot
 import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.messages.commands import Arrived, Cleared, Correct, Deploy, Move, Sighting
+from zwerm.agents.sensor_coverage.messages.commands import Arrived, Cleared, ComeBack, Correct, Deploy, Move, Sighting
 from zwerm.agents.sensor_coverage.motion.push_geometry import (
     FIRST_BEARINGS_RAD,
     SlotReference,
@@ -24,10 +25,13 @@ from zwerm.coordinator.sensor_coverage.sources import Sources
 from zwerm.maths.simplicial import FlagComplex
 
 # Attempts of a robot to home again on landmarks that were moving before.
-HOMING_ATTEMPTS = 2
+HOMING_ATTEMPTS: Final = 2
 # Failures to reach a slot after which a robot is given up: its motors may be dead. With followed walls it gets a slot where
 # it stands before that, because it may fill a passage.
-FAILURES_MAX = {"paper": 1, "followed": 2}
+FAILURES_MAX: Final = {"paper": 1, "followed": 2}
+
+# Times that a robot is recalled which sees no robot of the part of the swarm with a station.
+RECALLS_MAX: Final = 2
 
 # Robots that have moved.
 Moved = Sequence[int]
@@ -52,6 +56,7 @@ class PushExecution:
         self.stopped = 0
         self.lost: dict[int, None] = {}
         self._failures: Counter[int] = Counter()  # slots that a robot did not reach, by robot
+        self._recalled: Counter[int] = Counter()  # by robot
         self.cycle = 0
         self.scan = ScanResult({}, FlagComplex({}), ())
         self._parameters = parameters
@@ -267,6 +272,20 @@ class PushExecution:
                     if slot not in group or _used_moving_landmarks(arrived, robot)
                 }
         return last
+
+    def recall(self, slot: int, apart: Collection[int]) -> Routine[Moved]:
+        """Let a robot drive back on its way into sight of a robot that is not one of `apart`; it gets a slot there."""
+        robot = self._slots.occupant[slot]
+        self._recalled[robot] += 1
+        self._mailbox.send(robot, ComeBack(self.cycle, tuple(apart)), drive=True)
+        if robot in (yield from self._arrivals([robot])):
+            self._slots.drop(slot)
+            self._slots.add(robot)
+        return (robot,)
+
+    def may_recall(self, slot: int) -> bool:
+        """Return whether the robot at a slot has been recalled less than RECALLS_MAX times."""
+        return self._recalled[self._slots.occupant[slot]] < RECALLS_MAX
 
     def correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Routine[None]:
         """Correct a robot's scale by anchors with their approximate bearings [rad]."""

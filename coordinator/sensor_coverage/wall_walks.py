@@ -204,10 +204,10 @@ class WallWalks:
             idle_legs = idle_legs + 1 if left > before - PROGRESS_RAD or walked.end == SHUT else 0
         self.idle[slots.slot_of()[leader]] = None
 
-    def keep_needed(self, scan: ScanResult) -> None:
-        """Forget idle slots that are empty or needed."""
-        idle = {slot: None for slot in self.idle if slot in self._slots.occupant}
-        self.idle = still_idle(idle, scan.complex_.neighbours)
+    def wake_needed(self, scan: ScanResult) -> bool:
+        """Forget idle slots that are needed; return whether there were any. `scan` has all robots."""
+        idle, self.idle = self.idle, still_idle(self.idle, scan.complex_.neighbours)
+        return self.idle != idle
 
     def _open(self, scan: ScanResult) -> float:
         """Return the sum of all open arcs [rad]."""

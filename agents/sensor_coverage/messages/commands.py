@@ -118,6 +118,13 @@ class Correct(_UplinkMessage, frozen=True, tag="correct"):
     anchors: tuple[Sighting, ...]
 
 
+class ComeBack(_UplinkMessage, frozen=True, tag="come-back"):
+    """Drive back on the way by which the robot came, until it sees a robot that is not one of `apart`."""
+
+    cycle: int
+    apart: tuple[int, ...]
+
+
 class ToWall(_UplinkMessage, frozen=True, tag="to-wall"):
     """Drive along a bearing [rad] to a wall within `hop_m`, and along it until `clear_m` from the start.
 
@@ -240,6 +247,7 @@ RobotCommand = (
     | Deploy
     | Move
     | Correct
+    | ComeBack
     | ToWall
     | FollowWall
     | ToWallPastDead

@@ -39,6 +39,14 @@ def test_a_robot_that_did_not_reach_its_slot_in_a_passage_gets_one_where_it_stan
     assert result.metrics["reachable_coverage_fraction"] >= 0.98
 
 
+@pytest.mark.parametrize(("seed", "dies"), [(424, False), (430, True)])
+def test_a_robot_that_lost_sight_of_all_others_comes_back(seed: int, dies: bool) -> None:
+    """It followed to a slot behind the corner of a passage, and did not reach it: its part of the swarm was cut off."""
+    result = carry_out(seed, dies, NOISY)
+    assert result.outcome == "completed"
+    assert result.metrics["reachable_coverage_fraction"] >= 0.98
+
+
 def carry_out(seed: int, dies: bool, more: tuple[str, ...]) -> RunResult:
     """Run the building of a seed."""
     building = small_building(seed)

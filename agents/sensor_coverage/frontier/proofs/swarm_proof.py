@@ -225,9 +225,7 @@ class SwarmProof:
         if known is None:
             points = self._candidates(pair)
             opened = {each: complement(self._closed_without_fans(each)) for each in (pair if points else ())}
-            known = self._chosen[pair] = {
-                side: self._best(pair, each, opened, None) for side, each in points.items()
-            }
+            known = self._chosen[pair] = {side: self._best(pair, each, opened, None) for side, each in points.items()}
         return known
 
     def _candidates(self, pair: Pair) -> dict[int, list[WalkPoint]]:
@@ -245,7 +243,10 @@ class SwarmProof:
         """Return the point whose triangle closes most of the open arcs at both ends; it is `present` if no other is better."""
         best, most = present, -1.0
         for point in points if present is None else (present, *points):
-            arcs = ((slot, arc_between(self._scan.views[slot][other], point.seen[slot])) for slot, other in (pair, pair[::-1]))
+            arcs = (
+                (slot, arc_between(self._scan.views[slot][other], point.seen[slot]))
+                for slot, other in (pair, pair[::-1])
+            )
             gain = added(overlap(arc, each) for slot, arc in arcs for each in opened[slot])
             if gain > most + EQUAL_RAD:
                 best, most = point, gain
@@ -254,7 +255,7 @@ class SwarmProof:
         return best
 
     def _choose_again(self) -> None:
-        """Choose other points around the slots that are open, where these close more together with the points of other edges."""
+        """Choose other points around the open slots, where these close more together with those of other edges."""
         waiting = [slot for slot in self._around if slot not in self._settled and self._open(slot)]
         while waiting:
             slot = waiting.pop()
