@@ -188,7 +188,7 @@ class CentralRobot(Controller):
         self.commands.answer(self._report(command.cycle, sightings, home))
 
     def _report(self, cycle: int, sightings: tuple[Sighting, ...] | None, home: bool) -> Report:
-        return Report(cycle, sightings, self.motion.frame.touched, home)
+        return Report(cycle, sightings, self.motion.frame.touched, home, self.motion.frame.touched_robots)
 
     def _return_to_rest(self, rest: Vector) -> Generator[BodyVelocity, None, Vector]:
         return self.motion.return_to_rest(rest)

@@ -89,7 +89,7 @@ class NegotiatingRobot(CentralRobot):
         report = super()._report(cycle, sightings, home)
         if not self._leave.has_left:
             return report
-        return LeftComplex(report.cycle, report.sightings, report.touched, report.home)
+        return LeftComplex(report.cycle, report.sightings, report.touched, report.home, report.robots)
 
     # --- standing still for a neighbour -------------------------------------------------------------------------------
 

@@ -29,8 +29,11 @@ class CoverageProof(Protocol):
         walks: Sequence[Walk],
         touched: Mapping[int, Sequence[float]],
         near: Mapping[int, Sequence[Arc]],
+        in_touch: Mapping[int, Collection[int]],
     ) -> tuple[int, ...]:
         """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.
+
+        `in_touch` has the slots whose robots are in touch.
 
         Return the slots around which points of walks count no more, because a slot that saw them is gone.
         """
@@ -53,8 +56,8 @@ class SlotCoverageProof(Protocol):
     def ready(self) -> bool:
         """True once the proof has a view of its slot."""
 
-    def update(self, slot: int, scan: ScanResult, touched: Iterable[float]) -> None:
-        """Take in the slot's view and the complex around it, and the directions [rad] of walls in touch."""
+    def update(self, slot: int, scan: ScanResult, touched: Iterable[float], in_touch: Collection[int] = ()) -> None:
+        """Take in the slot's view and the complex around it, the directions [rad] of walls in touch, and the slots in touch."""
 
     def open_arcs(self) -> list[Arc]:
         """Return the arcs that nothing closes."""

@@ -46,6 +46,7 @@ class Slots:
         self.walls: dict[int, list[float]] = {}
         self.blocked: dict[int, list[float]] = {}
         self.touching: dict[int, list[float]] = {}
+        self.in_touch: dict[int, tuple[int, ...]] = {}  # the robots that the occupant of a slot touches now
         self.near: dict[int, list[Arc]] = {}
         self.walks: list[Walk] = []
         self.length_m: dict[tuple[int, int], float] = {}
@@ -85,19 +86,27 @@ class Slots:
             self.view.pop(robot, None)
         self.walls.pop(slot, None)
         self.touching.pop(slot, None)
+        self.in_touch.pop(slot, None)
         self.near.pop(slot, None)
 
     def take(self, robot: int, sightings: Iterable[Sighting]) -> None:
         """Store the bearings that a robot reports, in its own frame."""
         self.view[robot] = {each.node: each.bearing_rad for each in sightings}
 
-    def touch(self, slot: int, directions: Iterable[float]) -> bool:
-        """Store the directions [rad] of the walls that the occupant touches now; return whether anything has changed."""
-        before, now = self.touching.get(slot, []), list(directions)
-        self.touching[slot] = now
+    def touch(self, slot: int, directions: Iterable[float], robots: Iterable[int] = ()) -> bool:
+        """Store the directions [rad] of walls and the robots that the occupant touches now; return whether they are new."""
+        before = self.touching.get(slot, []), self.in_touch.get(slot, ())
+        now, robots = list(directions), tuple(robots)
+        self.touching[slot], self.in_touch[slot] = now, robots
         walls = self.walls.setdefault(slot, [])
         added = [each for each in now if add_wall(walls, each)]
-        return bool(added) or before != now
+        return bool(added) or before != (now, robots)
+
+    def slots_in_touch(self, slot: int) -> tuple[int, ...]:
+        """Return the slots of the robots that the occupant of a slot touches now."""
+        robots = self.in_touch.get(slot, ())
+        slot_of = self.slot_of() if robots else {}
+        return tuple(slot_of[each] for each in robots if each in slot_of)
 
     def views(self) -> dict[int, dict[int, float]]:
         """Return the directions [rad] of the slots that each slot sees, in its frame."""

@@ -169,14 +169,15 @@ class FollowWallPastDead(FollowWall, frozen=True, tag="follow-wall-past-dead"):
 class Report(_UplinkMessage, frozen=True, tag="report"):
     """The answer to a scan request or a roll call.
 
-    `sightings` is None if nothing has changed. `touched` are bearings [rad] of touched walls. `home`: the robot still
-    stands where it came out of the depot.
+    `sightings` is None if nothing has changed. `touched` are bearings [rad] of touched walls, and `robots` are touched
+    robots. `home`: the robot still stands where it came out of the depot.
     """
 
     cycle: int
     sightings: tuple[Sighting, ...] | None
     touched: tuple[float, ...]
     home: bool = False
+    robots: tuple[int, ...] = ()
 
 
 class LeftComplex(Report, frozen=True, tag="left-complex"):

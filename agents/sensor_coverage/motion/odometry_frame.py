@@ -54,6 +54,11 @@ class OdometryFrame:
         else:
             self.contacts = self.touched = ()
 
+    @property
+    def touched_robots(self) -> tuple[int, ...]:
+        """The robots in touch."""
+        return tuple(each.node for each in self.contacts if each.node is not None)
+
     def touched_among(self) -> list[tuple[int, ...]]:
         """Return for each closed switch that faces robots those robots, the nearest to its direction first."""
         return [faced for each in self._touch if (faced := self._faced(each, self.turned_rad))]

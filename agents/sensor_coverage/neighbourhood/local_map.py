@@ -88,12 +88,12 @@ class LocalMap(NeighbourTable):
                     self.proof.inherit(())
                     self._planner.walls.tried.clear()
 
-    def update_walls(self, bearings: tuple[float, ...]) -> None:
-        """Remember the walls that this robot touches, by their bearings [rad]."""
+    def update_walls(self, bearings: tuple[float, ...], robots: tuple[int, ...] = ()) -> None:
+        """Remember the walls that this robot touches, by their bearings [rad], and the robots."""
         heading = self.heading
         if heading is None or self.slot == NOWHERE:
             return
-        if self._slots.touch(self.slot, [wrapped(each + heading) for each in bearings]):
+        if self._slots.touch(self.slot, [wrapped(each + heading) for each in bearings], robots):
             self._plan_basis = None
             self.change()
 
@@ -274,7 +274,9 @@ class LocalMap(NeighbourTable):
         """Take the present view into the proof of coverage."""
         me, slots = self.slot, self._slots
         self.proof.lose(*(each.slot for each in self.states.values() if each.redundant))
-        self.proof.update(me, scan or self.scan(), slots.touching.get(me, ()))
+        robots = slots.in_touch.get(me, ())
+        in_touch = [state.slot for node, state in self.mutual().items() if node in robots and not state.redundant]
+        self.proof.update(me, scan or self.scan(), slots.touching.get(me, ()), in_touch)
 
     def scan(self) -> ScanResult:
         """Return the views of this robot and its neighbours as a scan, by this robot's slot."""

@@ -381,7 +381,7 @@ class Situation:
         yield from motion.average(lambda samples: all(frame.count(node) >= samples for node in self._standing()))
         standing = frozenset(self._standing())
         self.local_map.update_bearings({node: each for node, each in frame.averages().items() if node in standing})
-        self.local_map.update_walls(frame.touched)
+        self.local_map.update_walls(frame.touched, frame.touched_robots)
 
     def _recover(self, rest: Vector) -> Drive:
         self.motion.rest = yield from self.motion.return_to_rest(rest)

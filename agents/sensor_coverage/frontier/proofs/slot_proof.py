@@ -1,6 +1,6 @@
 """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
@@ -16,6 +16,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     WalkPoint,
     WallStep,
     arc_between,
+    arcs_of_robots,
     arcs_of_step,
     arcs_of_walls,
     complement,
@@ -67,14 +68,15 @@ class SlotProof:
         """True once the proof has a view of its slot: without one, a point of a walk closes too little."""
         return self._slot != NOWHERE
 
-    def update(self, slot: int, scan: ScanResult, touched: Iterable[float]) -> None:
-        """Take in the slot's view and the complex around it, and the directions [rad] of walls in touch."""
+    def update(self, slot: int, scan: ScanResult, touched: Iterable[float], in_touch: Collection[int] = ()) -> None:
+        """Take in the slot's view and the complex around it, the directions [rad] of walls in touch, and the slots in touch."""
         view = scan.views[slot]
         self._slot, self._scan = slot, scan
         self.around = {each: view[each] for each in scan.complex_.neighbours[slot]}
         self._touched = touched = tuple(touched)
         self._at_walls, self._contacts = arcs_of_walls(touched), arcs_of_walls(touched, CONTACT_RAD)
-        self._by_view = []
+        bodies = [there for each, there in self.around.items() if each in in_touch]
+        self._by_view = list(arcs_of_robots(bodies, touched))
         for triangle in scan.complex_.triangles_at(slot):
             a, b = (each for each in triangle if each != slot)
             self._by_view.append(arc_between(view[a], view[b]))

@@ -29,6 +29,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     Walk,
     WalkPoint,
     arc_between,
+    arcs_of_robots,
     arcs_of_walls,
     complement,
     ends_at,
@@ -71,6 +72,7 @@ class ArcBasis(NamedTuple):
     view: Mapping[int, float]
     touched: Sequence[float]
     near: Sequence[Arc]
+    in_touch: Sequence[int]
 
 
 class SwarmProof:
@@ -103,8 +105,11 @@ class SwarmProof:
         walks: Sequence[Walk],
         touched: Mapping[int, Sequence[float]],
         near: Mapping[int, Sequence[Arc]],
+        in_touch: Mapping[int, Collection[int]],
     ) -> tuple[int, ...]:
         """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.
+
+        `in_touch` has the slots whose robots are in touch.
 
         Return the slots around which points of walks count no more, because a slot that saw them is gone.
         """
@@ -120,7 +125,9 @@ class SwarmProof:
         for slot in complex_.vertices:
             view = scan.views[slot]
             beside = {each: view[each] for each in complex_.neighbours[slot]}
-            now = ArcBasis(len(self._passed.get(slot, ())), beside, touched.get(slot, ()), tuple(near.get(slot, ())))
+            robots = [each for each in in_touch.get(slot, ()) if each in beside]
+            passed = len(self._passed.get(slot, ()))
+            now = ArcBasis(passed, beside, touched.get(slot, ()), tuple(near.get(slot, ())), robots)
             if self._around.get(slot) != now:
                 self._around[slot] = now
                 changed[slot] = None
@@ -213,7 +220,9 @@ class SwarmProof:
     def _closed_without_fans(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that walls and triangles of robots close."""
         view, beside = self._scan.views[slot], self._neighbours[slot]
-        closed = [*self._followed[slot], *arcs_of_walls(self._around[slot].touched)]
+        _, _, touched, _, robots = self._around[slot]
+        bodies = arcs_of_robots([view[each] for each in robots], touched)
+        closed = [*self._followed[slot], *arcs_of_walls(touched), *bodies]
         return closed + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
 
     def _choose(self, pair: Pair) -> dict[int, WalkPoint]:

@@ -93,7 +93,7 @@ class Arena:
             for n, here in at.items()
         }
         scan = ScanResult(views, FlagComplex(views), ())
-        self.proof.update(scan, self.walks, {}, {})
+        self.proof.update(scan, self.walks, {}, {}, {})
         return len(scan.complex_.components()) == 1 and not self.proof.open_arcs()
 
     def coverage(self, keep: Collection[int]) -> float:

@@ -41,7 +41,7 @@ def proof_of(walk: Walk, standing: tuple[int, ...], touched_deg: tuple[float, ..
     views = {each: dict[int, float]() for each in standing}
     proof = SwarmProof()
     touched = {0: tuple(math.radians(each) for each in touched_deg)}
-    proof.update(ScanResult(views, FlagComplex(views), ()), (walk,), touched, {})
+    proof.update(ScanResult(views, FlagComplex(views), ()), (walk,), touched, {}, {})
     return proof
 
 

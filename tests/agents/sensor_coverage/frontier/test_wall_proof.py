@@ -37,7 +37,7 @@ def around(*degrees: float, hand: int, touched: bool = True) -> Walk:
 def open_arcs(views: Mapping[int, Mapping[int, float]], walks: tuple[Walk, ...], *walls: float) -> dict[int, list[Arc]]:
     """Return the open arcs of all slots; slot 0 touches walls in some directions."""
     proof = SwarmProof()
-    proof.update(ScanResult(views, FlagComplex(views), ()), walks, {0: walls}, {})
+    proof.update(ScanResult(views, FlagComplex(views), ()), walks, {0: walls}, {}, {})
     return proof.open_arcs()
 
 
@@ -182,14 +182,14 @@ def test_points_of_a_walk_count_only_while_all_robots_stand_that_saw_them() -> N
     proof = SwarmProof()
     alone = ScanResult({0: {}}, FlagComplex({0: {}}), ())
     together = ScanResult(PAIR, FlagComplex(PAIR), ())
-    assert proof.update(together, walks, {}, {}) == ()
+    assert proof.update(together, walks, {}, {}, {}) == ()
     closed = _degrees(proof.open_arcs())
-    assert proof.update(alone, walks, {}, {}) == (0,)
+    assert proof.update(alone, walks, {}, {}, {}) == (0,)
     assert _degrees(proof.open_arcs()) == {0: 360}
     turned = tuple(each.turned(0, 0.0) for each in walks)
-    assert proof.update(alone, turned, {}, {}) == ()
+    assert proof.update(alone, turned, {}, {}, {}) == ()
     assert _degrees(proof.open_arcs()) == {0: 360}, "the slot is still gone after frames of robots became one"
-    assert proof.update(together, turned, {}, {}) == (0, 1)
+    assert proof.update(together, turned, {}, {}, {}) == (0, 1)
     assert _degrees(proof.open_arcs()) == closed, "the slot is occupied again"
 
 
@@ -208,11 +208,31 @@ def test_robots_in_touch_with_both_sides_of_a_door_do_not_close_it() -> None:
     point = between_two((-45, -135))
     walks = (Walk(0, -1, tuple(point)),)
     proof = SwarmProof()
-    proof.update(ScanResult(PAIR, FlagComplex(PAIR), ()), walks, {0: contacts, 1: [math.radians(-100.0)]}, {})
+    proof.update(ScanResult(PAIR, FlagComplex(PAIR), ()), walks, {0: contacts, 1: [math.radians(-100.0)]}, {}, {})
     assert _degrees(proof.open_arcs()) == {0: 270, 1: 270}
     local = at_slot(0, PAIR, *contacts)
     pass_walk(local, point, -1)
     assert math.degrees(open_rad(local)) == pytest.approx(270.0)
+
+
+@pytest.mark.parametrize(
+    ("walls_deg", "open_deg"),
+    [
+        pytest.param((), 310, id="a body in touch fills 50 degrees"),
+        pytest.param((100,), 360 - 25 - 145, id="no opening fits between the body and a wall in touch"),
+        pytest.param((150,), 360 - 50 - 90, id="a wall at the other side"),
+    ],
+)
+def test_a_robot_in_touch_closes_what_its_body_hides(walls_deg: tuple[int, ...], open_deg: int) -> None:
+    scan, walls = ScanResult(PAIR, FlagComplex(PAIR), ()), [math.radians(each) for each in walls_deg]
+    proof = SwarmProof()
+    proof.update(scan, (), {0: walls}, {}, {0: (1,)})
+    assert _degrees(proof.open_arcs()) == {0: open_deg, 1: 360}
+    proof.update(ScanResult({0: {}}, FlagComplex({0: {}}), ()), (), {0: walls}, {}, {0: (1,)})
+    assert _degrees(proof.open_arcs()) == {0: 360 - 90 * len(walls)}, "the robot has left the complex"
+    local = SlotProof()
+    local.update(0, scan, walls, (1,))
+    assert math.degrees(open_rad(local)) == pytest.approx(open_deg)
 
 
 def test_a_wall_that_ends_before_a_point_of_another_walk_closes_no_triangle_with_it() -> None:
