@@ -59,9 +59,10 @@ class OdometryFrame:
         """The robots in touch."""
         return tuple(each.node for each in self.contacts if each.node is not None)
 
-    def touched_among(self) -> list[tuple[int, ...]]:
-        """Return for each closed switch that faces robots those robots, the nearest to its direction first."""
-        return [faced for each in self._touch if (faced := self._faced(each, self.turned_rad))]
+    def touched_among(self) -> list[tuple[float, tuple[int, ...]]]:
+        """Return for each closed switch that faces robots its bearing [rad] and those robots, the nearest to it first."""
+        turned = self.turned_rad
+        return [(each.bearing_rad + turned, faced) for each in self._touch if (faced := self._faced(each, turned))]
 
     def _contact(self, contact: Contact, turned: float) -> Touched:
         """Return what a closed switch faces: the visible robot nearest to its direction, or a wall."""

@@ -2,7 +2,8 @@
 
 A touch switch does not say what it touches. Along a wall robots stand one behind the other, so the walking robot sees several
 in the sector of a switch. The next steps show which of them is in touch: a robot in touch is one diameter away, and its
-bearing changes as the walking robot passes it. The point of the walk is held back until then.
+bearing changes as the walking robot passes it. The point of the walk is held back until then. If the bearings of all of them
+change much less, the contact is with a wall: beside a corner a robot may stand far behind the wall's end.
 """
 
 import math
@@ -20,20 +21,37 @@ POINTS_MAX: Final = 5
 # One robot is in touch if the bearings of the others are off by this [rad] (root mean square) and by this factor more.
 OFF_RAD: Final = math.radians(9.0)
 OFF_FACTOR: Final = 2.0
+# None of them is in touch if the bearings at so many points are all off by this [rad] (root mean square).
+WALL_RAD: Final = math.radians(20.0)
+WALL_POINTS: Final = 3
 
 
 class _Contact(msgspec.Struct):
-    """A contact with one of several robots: the one that was supposed, and by robot the sum of squared errors [rad²]."""
+    """A contact with one of several robots, or with a wall in the direction `bearing_rad`.
 
+    It has the robot that was supposed, and by robot the sum of squared errors [rad²].
+    """
+
+    bearing_rad: float
     supposed: int
     errors: dict[int, float]
     points: int = 0
 
     def touched(self) -> int | None:
         """Return the robot in touch, if that is certain."""
+        if len(self.errors) == 1:
+            return self.supposed if self.points >= WALL_POINTS and not self.is_wall() else None
         (best, node), (second, _) = sorted((error, node) for node, error in self.errors.items())[:2]
         certain = second > self.points * OFF_RAD**2 and second > OFF_FACTOR**2 * best
         return node if self.points and certain else None
+
+    def is_wall(self) -> bool:
+        """Return whether none of the robots is in touch."""
+        return self.points >= WALL_POINTS and min(self.errors.values()) > self.points * WALL_RAD**2
+
+    def is_certain(self) -> bool:
+        """Return whether it is certain what is in touch."""
+        return self.is_wall() or self.touched() is not None
 
 
 class TouchedRobots:
@@ -42,12 +60,11 @@ class TouchedRobots:
     def __init__(self, radius_m: float, report: Callable[[Waypoint], None]) -> None:
         self._diameter_m = 2.0 * radius_m
         self._report = report
-        self._uncertain: dict[tuple[float, float], Sequence[Sequence[int]]] = {}
+        self._uncertain: dict[tuple[float, float], Sequence[tuple[float, Sequence[int]]]] = {}
         self._held: deque[tuple[Waypoint, list[_Contact]]] = deque()
 
-    def note(self, x_m: float, y_m: float, groups: Sequence[Sequence[int]]) -> None:
-        """Note for the point at (x, y) [m] which robots each contact may be with, the supposed one first."""
-        groups = [each for each in groups if len(each) > 1]
+    def note(self, x_m: float, y_m: float, groups: Sequence[tuple[float, Sequence[int]]]) -> None:
+        """Note the contacts at the point (x, y) [m]: bearing [rad], and robots that it may be with, the supposed one first."""
         if groups:
             self._uncertain[x_m, y_m] = groups
 
@@ -58,14 +75,12 @@ class TouchedRobots:
             self._compare(at, contacts, point, seen)
         groups = self._uncertain.pop((point.x_m, point.y_m), ())
         contacts = [
-            _Contact(each[0], dict.fromkeys(each, 0.0))
-            for each in groups
-            if each[0] in point.robots and all(node in seen for node in each)
+            _Contact(bearing, nodes[0], dict.fromkeys(nodes, 0.0))
+            for bearing, nodes in groups
+            if nodes[0] in point.robots and all(node in seen for node in nodes)
         ]
         self._held.append((point, contacts))
-        while self._held and (
-            len(self._held) > POINTS_MAX or all(each.touched() is not None for each in self._held[0][1])
-        ):
+        while self._held and (len(self._held) > POINTS_MAX or all(each.is_certain() for each in self._held[0][1])):
             self._release()
 
     def end(self) -> None:
@@ -77,7 +92,7 @@ class TouchedRobots:
         """Compare the bearings of robots at a later point with those that they would have in touch with the first."""
         then = {each.node: each.bearing_rad for each in at.sightings} if contacts else {}
         for contact in contacts:
-            if contact.touched() is not None or any(node not in seen for node in contact.errors):
+            if contact.is_certain() or any(node not in seen for node in contact.errors):
                 continue
             contact.points += 1
             for node in contact.errors:
@@ -90,6 +105,10 @@ class TouchedRobots:
         point, contacts = self._held.popleft()
         for contact in contacts:
             node = contact.touched()
+            if node is None and len(contact.errors) == 1 and not contact.is_wall():
+                continue  # no other robot is there
             others = tuple(each for each in point.robots if each != contact.supposed)
             point = msgspec.structs.replace(point, robots=others if node is None else (*others, node))
+            if contact.is_wall():
+                point = msgspec.structs.replace(point, touched=(*point.touched, contact.bearing_rad))
         self._report(point)

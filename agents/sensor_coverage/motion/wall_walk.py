@@ -284,7 +284,8 @@ class WallWalk:
     def _report(self, held: HeldPoints) -> None:
         """Report the point at which the robot is now."""
         point = self._waypoint()
-        self._touched.note(point.x_m, point.y_m, self._motion.frame.touched_among())
+        groups = self._motion.frame.touched_among()
+        self._touched.note(point.x_m, point.y_m, [each for each in groups if not self._bodies.is_body(each[1][0])])
         held.take(point)
 
     def _near_point(self) -> NearPoint:

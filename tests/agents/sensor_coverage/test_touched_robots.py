@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -36,7 +37,7 @@ def reported(way: tuple[tuple[float, float], ...], supposed: int, seed: int = 1)
     judge = TouchedRobots(RADIUS_M, found.append)
     for point in points(way, supposed, seed):
         if point.robots:
-            judge.note(point.x_m, point.y_m, [(supposed, 15 - supposed)])
+            judge.note(point.x_m, point.y_m, [(0.0, (supposed, 15 - supposed))])
         judge.take(point)
     judge.end()
     return found
@@ -56,10 +57,36 @@ def test_a_contact_that_stays_uncertain_is_with_none() -> None:
     assert [each.robots for each in reported((CONTACT, *back), 7)] == [()] * (POINTS_MAX + 2)
 
 
-def test_points_with_one_robot_in_the_direction_of_a_contact_are_not_held_back() -> None:
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize(
+    ("x_m", "walls", "robots"),
+    [
+        pytest.param(0.14, (-math.pi / 2.0,), (7,), id="the robot is in touch"),
+        pytest.param(0.55, (-math.pi / 2.0, 0.1), (), id="a wall ends there, and the robot is behind the corner"),
+    ],
+)
+def test_a_contact_with_a_robot_that_is_far_away_is_one_with_a_wall(
+    x_m: float, walls: tuple[float, ...], robots: tuple[int, ...], seed: int
+) -> None:
+    found = list[Waypoint]()
+    judge = TouchedRobots(RADIUS_M, found.append)
+    for point in points((CONTACT, *PASSING), 7, seed):
+        bearing = math.atan2(-point.y_m, x_m - point.x_m) + math.remainder(
+            point.sightings[0].bearing_rad - math.atan2(-point.y_m, PLACES[7][0] - point.x_m), math.tau
+        )
+        if point.robots:
+            judge.note(point.x_m, point.y_m, [(0.1, (7,))])
+        judge.take(msgspec.structs.replace(point, sightings=(Sighting(7, bearing),)))
+    judge.end()
+    assert (found[0].touched, found[0].robots) == (walls, robots)
+
+
+def test_a_contact_with_one_robot_stays_one_if_nothing_shows_how_far_away_it_is() -> None:
     found = list[Waypoint]()
     judge = TouchedRobots(RADIUS_M, found.append)
     first = points((CONTACT,), 7, 1)[0]
-    judge.note(*CONTACT, [(7,)])
+    judge.note(*CONTACT, [(0.0, (7,))])
     judge.take(first)
+    assert found == [], "the next points may show it"
+    judge.end()
     assert found == [first]

@@ -3,15 +3,17 @@
 from collections import deque
 from collections.abc import Iterable, Sequence
 
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     Contact,
     FollowedStretch,
     Pocket,
     StretchEnd,
     Vector,
+    direction_of,
     end_of_stretch,
 )
-from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, TouchCounter, Walk
+from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, POCKET_RAD, TouchCounter, Walk
 from zwerm.agents.sensor_coverage.motion.homing import unit
 
 
@@ -20,7 +22,8 @@ def pocket_of(
 ) -> Pocket | None:
     """Return the pocket beside a robot that was touched at the point with this number, or None if that is no end of a way.
 
-    The walking robot was at the place `at` then. The touched robot sees it in a direction [rad].
+    The walking robot was at the place `at` then. The touched robot sees it in a direction [rad]. There is no pocket if the
+    standing robot is between the end of the way and the wall: the walking robot passed it meanwhile.
     """
     if stretch.first_number == stretch.last_number:
         return None  # the way of a single point leads nowhere
@@ -30,6 +33,9 @@ def pocket_of(
     ux, uy = unit(there_rad)
     place = at[0] - 2.0 * stretch.radius_m * ux, at[1] - 2.0 * stretch.radius_m * uy
     in_touch = number in (stretch.first_number, stretch.last_number)
+    end = stretch.last if is_last else stretch.first
+    if angle_between(direction_of(place, end.at), direction_of(place, end.touched)) > POCKET_RAD:
+        return None
     if is_last:
         return Pocket(stretch.last, stretch.first, stretch.radius_m, True, place, in_touch)
     return Pocket(stretch.first, stretch.last, stretch.radius_m, False, place, in_touch, before)

@@ -9,7 +9,8 @@ from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import Crossing, arcs_beside_pocket, arcs_into
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket, StretchEnd, touched_point
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd, touched_point
+from zwerm.agents.sensor_coverage.frontier.strips.stretches import pocket_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.maths.simplicial import FlagComplex
@@ -129,6 +130,15 @@ def test_a_contact_on_the_other_side_of_a_robot_closes_nothing_between() -> None
     pocket = Pocket(end, end, RADIUS_M, True, (0.0, 0.0), True)
     beside = [len(list(arcs_beside_pocket(-1, pocket, (math.radians(each),)))) for each in (85.0, -60.0)]
     assert beside == [1, 2], "the arc beyond the pocket, and the one up to the contact"
+
+
+@pytest.mark.parametrize(("wall_deg", "pockets"), [(-90.0, 1), (170.0, 0)])
+def test_a_robot_between_the_end_of_a_way_and_the_wall_makes_no_pocket(wall_deg: float, pockets: int) -> None:
+    """The walking robot was in touch with the standing one a point before, at its other side."""
+    at = 0.15, 0.0
+    end = StretchEnd(at, touched_point(at, math.radians(wall_deg), 4.0 * RADIUS_M if wall_deg > 0.0 else RADIUS_M))
+    stretch = FollowedStretch(1, 5, end, end, RADIUS_M)
+    assert (pocket_of(stretch, 0, (0.14, 0.0), 0.0) is not None) == bool(pockets)
 
 
 def test_close_ends_of_two_stretches_close_what_is_between_them_for_the_robot_beside() -> None:
