@@ -325,15 +325,17 @@ def fan_of(
     views: Mapping[int, Mapping[int, float]],
     neighbours: Mapping[int, Collection[int]],
     at_walls: Beyond,
+    without: Collection[Pair] = (),
 ) -> tuple[Pair, ...]:
     """Return the pairs of slots whose triangle with a point counts: at both slots the space beyond the triangle is proved.
 
     Beyond the line of sight from a slot to the point there must be a wall that was followed (`at_walls`), or another such
     triangle with the same point, or a triangle of robots that contains the point. A wall in touch with a slot counts here
-    in the direction of the contact only: two robots may touch the ends of walls on both sides of a door.
+    in the direction of the contact only: two robots may touch the ends of walls on both sides of a door. The pairs in
+    `without` do not count.
     """
     seen = [slot for slot in point.seen if slot in neighbours]
-    pairs = [(a, b) for a in seen for b in seen if a < b and b in neighbours[a]]
+    pairs = [(a, b) for a in seen for b in seen if a < b and b in neighbours[a] and (a, b) not in without]
     if not pairs:
         return ()
     closed = {(slot, side): at_walls.get((slot, side), False) for slot in seen for side in (1, -1)}

@@ -6,6 +6,7 @@ A walk ends where no standing robot sees it, and the deployment goes on from the
 the robots that saw it. When one of them is gone, nothing is known of its part: the points that it saw close nothing.
 """
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Final, NamedTuple
@@ -44,6 +45,8 @@ from zwerm.maths.sums import added
 
 # A triangle closes more than another one only if the difference is larger than this [rad].
 EQUAL_RAD: Final = 1e-6
+# A point of a walk lies within a triangle's angle only if it is this far from its sides: bearings have noise.
+HIDDEN_MIN_RAD: Final = math.radians(5.0)
 
 
 class Passed(NamedTuple):
@@ -84,6 +87,7 @@ class SwarmProof:
         self._points: list[WalkPoint] = []
         self._passed: dict[int, list[Passed]] = {}
         self._stretch_of: dict[int, int] = {}  # the number of the first point of the stretch, by the number of a point
+        self._of_stretch: dict[tuple[int, int], list[WalkPoint]] = {}  # the points of a stretch that a slot saw
         self._witnessed: dict[int, dict[int, None]] = {}  # slots that rely on points which this slot saw
         self._gone: dict[int, None] = {}  # slots that stood in an earlier scan
         self._forget()
@@ -148,12 +152,13 @@ class SwarmProof:
         """Find the slots that saw each point of the walks that are new. Another list: all have other directions."""
         if walks is not self._walks:
             self._walks, self._count = walks, 0
-            self._points, self._passed, self._witnessed, self._stretch_of = [], {}, {}, {}
+            self._points, self._passed, self._witnessed, self._stretch_of, self._of_stretch = [], {}, {}, {}, {}
             self._forget()
         for walk in walks[self._count :]:
             for slot, passed in _passes(walk, len(self._points)):
                 self._passed.setdefault(slot, []).append(passed)
                 self._stretch_of[passed.number] = passed.stretch
+                self._of_stretch.setdefault((slot, passed.stretch), []).append(passed.point)
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
                 relied = (*passed.between, *(each.ties for each in ends))
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
@@ -317,7 +322,25 @@ class SwarmProof:
             if slot in self._neighbours
             for side in (1, -1)
         }
-        return fan_of(point, self._scan.views, self._neighbours, at_walls)
+        views, hidden = self._scan.views, dict[Pair, None]()
+        while True:
+            pairs = fan_of(point, views, self._neighbours, at_walls, hidden)
+            more = [pair for pair in pairs if self._hides(pair, number) or self._hides(pair[::-1], number)]
+            if not more:
+                return pairs
+            hidden |= dict.fromkeys(more)
+
+    def _hides(self, pair: Pair, number: int) -> bool:
+        """Return whether the second slot lost sight of the walk within the angle at the first of their triangle with a point.
+
+        Past a corner the second slot relies on the first for what is behind it. So the first does not rely on the second.
+        """
+        slot, other = pair
+        point = self._points[number]
+        arc = arc_between(self._scan.views[slot][other], point.seen[slot])
+        beyond = [each for each in self._of_stretch[slot, self._stretch_of[number]] if other not in each.seen]
+        inner = arc.width_rad - HIDDEN_MIN_RAD
+        return any(HIDDEN_MIN_RAD < (each.seen[slot] - arc.start_rad) % math.tau < inner for each in beyond)
 
     def _ends_beyond(self, slot: int, number: int, side: int) -> bool:
         """Return whether the wall that was followed at a point lies beyond the line of sight to it, on one side.

@@ -248,6 +248,21 @@ def test_a_wall_that_ends_before_a_point_of_another_walk_closes_no_triangle_with
     assert _degrees(open_arcs(PAIR, walks)) == {0: 320, 1: 320}
 
 
+@pytest.mark.parametrize(
+    ("seen_by_0", "open_deg"),
+    [
+        pytest.param({0: -55}, {0: 290, 1: 290}, id="both see the walk between their line of sight and the point"),
+        pytest.param({}, {0: 320, 1: 310}, id="slot 0 sees it past a corner"),
+    ],
+)
+def test_a_slot_does_not_rely_on_one_that_relies_on_it_behind_a_corner(
+    seen_by_0: dict[int, int], open_deg: dict[int, int]
+) -> None:
+    directions = {0: -70}, {1: -160, **seen_by_0}, {0: -45, 1: -135}, {0: -30, 1: -110}
+    points = [WalkPoint({slot: math.radians(d) for slot, d in each.items()}, SOUTH, ()) for each in directions]
+    assert _degrees(open_arcs(PAIR, (Walk(0, -1, tuple(points)),))) == open_deg
+
+
 def test_an_edge_chooses_the_point_that_closes_what_no_other_edge_closes() -> None:
     """A point of the edge 0 1 closes 50 degrees at slot 1, and another one 30 degrees at slot 0.
 
