@@ -5,7 +5,7 @@ It knows only the robots' reports over the uplink. Each decision stands behind a
 paper prints it.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Final, Protocol
 
 import msgspec
@@ -18,7 +18,6 @@ from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerPara
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS, Emerged, Report, RollCall, ScanRequest
-from zwerm.agents.sensor_coverage.messages.snapshots import ComplexSnapshot, encode_complex
 from zwerm.coordinator.sensor_coverage.assignment import CheapestFirst
 from zwerm.coordinator.sensor_coverage.command_mailbox import (
     ROLL_CALL_COPIES,
@@ -26,6 +25,7 @@ from zwerm.coordinator.sensor_coverage.command_mailbox import (
     Routine,
     run_concurrently,
 )
+from zwerm.coordinator.sensor_coverage.complex_reports import encoded_complex
 from zwerm.coordinator.sensor_coverage.leave_requests import LeaveRequests
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
 from zwerm.coordinator.sensor_coverage.quiescence import COVERED, GIVEN_UP, QuiescenceDetector, ScanSchedule
@@ -33,7 +33,7 @@ from zwerm.coordinator.sensor_coverage.relative_homology import RelativeHomology
 from zwerm.coordinator.sensor_coverage.sources import Sources
 from zwerm.coordinator.sensor_coverage.wall_walks import WallWalks
 from zwerm.maths.keyed_random import stream
-from zwerm.maths.simplicial import Edge, FlagComplex
+from zwerm.maths.simplicial import FlagComplex
 from zwerm.wire.messages import Command, Observation, Wake
 
 # Cost to start a path at a redundant robot: it is preferred to any station.
@@ -156,11 +156,12 @@ class SensorCoverageCoordinator:
                     yield from self._find_redundant()  # 5: (periodically) identify redundant robots
                 plans = yield from self._find_paths()  # 6: find path in the 1-skeleton
                 pushes = [self._carry_out(plan) for plan in plans]  # 7 and 8: push robots in path, deploy robot n + 1
-                pushes = pushes or self._recall()
+                pushes = pushes or self.pushing.recalls(self._silent)
             if self._schedule.unscanned and not pushes:
                 self._schedule.scan_next()
                 continue  # only a new scan shows that nothing is left
-            self._report_complex(plans)
+            occupant, frontier = self.slots.occupant, self.services.frontier
+            self._snapshot = encoded_complex(self.cycle, occupant, self.scan.complex_, frontier, plans)
             self.outcome = self._judge(bool(pushes))  # 9: while F is not empty
             moved, stopped = moved if self._schedule.unscanned else [], self.pushing.stopped
             moved += [robot for each in (yield from run_concurrently(pushes)) for robot in each]
@@ -343,18 +344,6 @@ class SensorCoverageCoordinator:
 
         return services.assignment.assign(services.frontier.plans(), self.pushing.scan, sources, find_routes)
 
-    def _recall(self) -> list[Routine[Moved]]:
-        """Return the return of one robot that is cut off from all stations: where walls are followed, its way is known."""
-        scan, stations = self.pushing.scan, self.sources.alive()
-        if self.parameters.walls == "paper" or not stations:
-            return []
-        for piece in scan.complex_.components():
-            slots = [slot for slot in piece if slot not in stations and self.pushing.may_recall(slot)]
-            if slots and not any(slot in stations for slot in piece):
-                apart = [*(self.slots.occupant[slot] for slot in piece), *self._silent]
-                return [self.pushing.recall(max(slots), apart)]
-        return []
-
     # --- line 9: the end ----------------------------------------------------------------------------------------------
 
     def _judge(self, busy: bool) -> str:
@@ -390,21 +379,6 @@ class SensorCoverageCoordinator:
             yield from self.mailbox.pause(WATCH_TICKS)
 
     # --- telemetry ----------------------------------------------------------------------------------------------------
-
-    def _report_complex(self, plans: Iterable[Plan]) -> None:
-        """Report the complex and the paths of this cycle, by robots."""
-        complex_ = ComplexSnapshot(
-            cycle=self.cycle,
-            edges=self._by_robot(self.scan.complex_.edges),
-            frontier=self._by_robot(self.services.frontier.frontier),
-            obstacle=self._by_robot(self.services.frontier.obstacle),
-            paths=tuple(tuple(self.slots.occupant[each] for each in plan.path) for plan in plans),
-        )
-        self._snapshot = encode_complex(complex_)
-
-    def _by_robot(self, edges: Iterable[Edge]) -> tuple[tuple[int, int], ...]:
-        occupant = self.slots.occupant
-        return tuple((occupant[i], occupant[j]) for i, j in edges)
 
     def _report_numbers(self) -> None:
         self._telemetry |= {

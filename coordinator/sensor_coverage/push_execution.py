@@ -273,7 +273,21 @@ class PushExecution:
                 }
         return last
 
-    def recall(self, slot: int, apart: Collection[int]) -> Routine[Moved]:
+    def recalls(self, silent: Collection[int]) -> list[Routine[Moved]]:
+        """Return the return of one robot that is cut off from all stations: where walls are followed, its way is known.
+
+        `silent` are the robots that do not answer: to see them is not enough.
+        """
+        stations, occupant = self._sources.alive(), self._slots.occupant
+        if self._parameters.walls == "paper" or not stations:
+            return []
+        for piece in self.scan.complex_.components():
+            slots = [slot for slot in piece if self._recalled[occupant[slot]] < RECALLS_MAX]
+            if slots and not any(slot in stations for slot in piece):
+                return [self._recall(max(slots), [*(occupant[slot] for slot in piece), *silent])]
+        return []
+
+    def _recall(self, slot: int, apart: Collection[int]) -> Routine[Moved]:
         """Let a robot drive back on its way into sight of a robot that is not one of `apart`; it gets a slot there."""
         robot = self._slots.occupant[slot]
         self._recalled[robot] += 1
@@ -282,10 +296,6 @@ class PushExecution:
             self._slots.drop(slot)
             self._slots.add(robot)
         return (robot,)
-
-    def may_recall(self, slot: int) -> bool:
-        """Return whether the robot at a slot has been recalled less than RECALLS_MAX times."""
-        return self._recalled[self._slots.occupant[slot]] < RECALLS_MAX
 
     def correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Routine[None]:
         """Correct a robot's scale by anchors with their approximate bearings [rad]."""

@@ -131,18 +131,7 @@ def test_with_two_stations_the_deployment_continues_if_one_dies() -> None:
     assert result.metrics["coverage_fraction"] >= 0.99
 
 
-@pytest.mark.parametrize(
-    "walls",
-    [
-        "paper",
-        pytest.param(
-            "followed",
-            marks=pytest.mark.xfail(
-                reason="nobody has room to follow the wall beside a station in a closet of 0.4 m: unproven"
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("walls", ["paper", "followed"])
 def test_with_two_stations_the_deployment_continues_if_one_is_blocked(walls: str) -> None:
     box = "arena.walls=[[[3.85,1.1],[3.85,1.5]],[[3.85,1.1],[4.2,1.1]],[[3.85,1.5],[4.2,1.5]]]"
     rules = f'coordinator.parameters.walls="{walls}"'
