@@ -8,6 +8,8 @@ to move. A command to move is never refused: it waits for the end of a lock.
 from collections.abc import Generator, Sequence
 from typing import Final, TypeVar
 
+import msgspec
+
 from zwerm.agents.sensor_coverage.central_base import CentralBase
 from zwerm.agents.sensor_coverage.central_robot import CentralRobot
 from zwerm.agents.sensor_coverage.messages import peers
@@ -89,7 +91,7 @@ class NegotiatingRobot(CentralRobot):
         report = super()._report(cycle, sightings, home)
         if not self._leave.has_left:
             return report
-        return LeftComplex(report.cycle, report.sightings, report.touched, report.home, report.robots)
+        return LeftComplex(*msgspec.structs.astuple(report))
 
     # --- standing still for a neighbour -------------------------------------------------------------------------------
 

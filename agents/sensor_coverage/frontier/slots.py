@@ -102,11 +102,12 @@ class Slots:
         added = [each for each in now if add_wall(walls, each)]
         return bool(added) or before != (now, robots)
 
-    def slots_in_touch(self, slot: int) -> tuple[int, ...]:
-        """Return the slots of the robots that the occupant of a slot touches now."""
-        robots = self.in_touch.get(slot, ())
-        slot_of = self.slot_of() if robots else {}
-        return tuple(slot_of[each] for each in robots if each in slot_of)
+    def slots_in_touch(self) -> dict[int, tuple[int, ...]]:
+        """Return by slot the slots of the robots that its occupant touches now."""
+        slot_of = self.slot_of()
+        return {
+            slot: tuple(slot_of[each] for each in robots if each in slot_of) for slot, robots in self.in_touch.items()
+        }
 
     def views(self) -> dict[int, dict[int, float]]:
         """Return the directions [rad] of the slots that each slot sees, in its frame."""

@@ -43,8 +43,7 @@ class WallPlans:
         if proof is None:
             raise RuntimeError("the arcs of all slots are known with a coordinator only")
         touched = {slot: slots.touching.get(slot, ()) for slot in scan.complex_.vertices}
-        in_touch = {slot: slots.slots_in_touch(slot) for slot in scan.complex_.vertices}
-        stale = proof.update(scan, slots.walks, touched, slots.near, in_touch)
+        stale = proof.update(scan, slots.walks, touched, slots.near, slots.slots_in_touch())
         for slot in (*stale, *slots.take_displaced()):
             self.tried.pop(slot, None)
         return proof.open_arcs()

@@ -274,7 +274,7 @@ class LocalMap(NeighbourTable):
         """Take the present view into the proof of coverage."""
         me, slots = self.slot, self._slots
         self.proof.lose(*(each.slot for each in self.states.values() if each.redundant))
-        in_touch = [s.slot for node in slots.in_touch.get(me, ()) if (s := self.mutual().get(node)) and not s.redundant]
+        in_touch = [state.slot for node, state in self.mutual().items() if node in slots.in_touch.get(me, ())]
         self.proof.update(me, scan or self.scan(), slots.touching.get(me, ()), in_touch)
 
     def scan(self) -> ScanResult:

@@ -239,7 +239,7 @@ class SwarmProof:
         if known is None:
             points = self._candidates(pair)
             opened = {each: complement(self._closed_without_fans(each)) for each in (pair if points else ())}
-            known = self._chosen[pair] = {side: self._best(pair, each, opened, None) for side, each in points.items()}
+            known = self._chosen[pair] = {side: self._best(pair, each, opened) for side, each in points.items()}
         return known
 
     def _candidates(self, pair: Pair) -> dict[int, list[WalkPoint]]:
@@ -251,12 +251,10 @@ class SwarmProof:
                 found.setdefault(side_of(each.point, pair[0], there), []).append(each.point)
         return found
 
-    def _best(
-        self, pair: Pair, points: Sequence[WalkPoint], opened: Mapping[int, Sequence[Arc]], present: WalkPoint | None
-    ) -> WalkPoint:
-        """Return the point whose triangle closes most of the open arcs at both ends; it is `present` if no other is better."""
-        best, most = present, -1.0
-        for point in points if present is None else (present, *points):
+    def _best(self, pair: Pair, points: Sequence[WalkPoint], opened: Mapping[int, Sequence[Arc]]) -> WalkPoint:
+        """Return the point whose triangle closes most of the open arcs at both ends: the first of those that are equal."""
+        best, most = points[0], -1.0
+        for point in points:
             arcs = (
                 (slot, arc_between(self._scan.views[slot][other], point.seen[slot]))
                 for slot, other in (pair, pair[::-1])
@@ -264,8 +262,6 @@ class SwarmProof:
             gain = added(overlap(arc, each) for slot, arc in arcs for each in opened[slot])
             if gain > most + EQUAL_RAD:
                 best, most = point, gain
-        if best is None:
-            raise ValueError("no points to choose from")
         return best
 
     def _choose_again(self) -> None:
@@ -280,9 +276,10 @@ class SwarmProof:
                 pair = _pair_of(slot, other)
                 for side, points in self._candidates(pair).items():
                     opened = {each: self._open_without(each, pair, side) for each in pair}
-                    best = self._best(pair, points, opened, self._choose(pair)[side])
-                    if best is not self._choose(pair)[side]:
-                        self._choose(pair)[side] = best
+                    chosen = self._choose(pair)
+                    best = self._best(pair, (chosen[side], *points), opened)
+                    if best is not chosen[side]:
+                        chosen[side] = best
                         for each in pair:
                             self._reopen(each)
                         waiting += [slot, *sorted(self._neighbours[slot] | self._neighbours[other])]
