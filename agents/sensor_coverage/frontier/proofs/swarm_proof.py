@@ -6,12 +6,12 @@ A walk ends where no standing robot sees it, and the deployment goes on from the
 the robots that saw it. When one of them is gone, nothing is known of its part: the points that it saw close nothing.
 """
 
-import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     Crossing,
     arcs_beside_pocket,
@@ -34,7 +34,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     arcs_of_walls,
     complement,
     ends_at,
-    fan_of,
     overlap,
     point_before,
     side_of,
@@ -45,8 +44,6 @@ from zwerm.maths.sums import added
 
 # A triangle closes more than another one only if the difference is larger than this [rad].
 EQUAL_RAD: Final = 1e-6
-# A point of a walk lies within a triangle's angle only if it is this far from its sides: bearings have noise.
-HIDDEN_MIN_RAD: Final = math.radians(5.0)
 
 
 class Passed(NamedTuple):
@@ -86,8 +83,6 @@ class SwarmProof:
         self._count = 0  # walks that `_points` contains
         self._points: list[WalkPoint] = []
         self._passed: dict[int, list[Passed]] = {}
-        self._stretch_of: dict[int, int] = {}  # the number of the first point of the stretch, by the number of a point
-        self._of_stretch: dict[tuple[int, int], list[WalkPoint]] = {}  # the points of a stretch that a slot saw
         self._witnessed: dict[int, dict[int, None]] = {}  # slots that rely on points which this slot saw
         self._gone: dict[int, None] = {}  # slots that stood in an earlier scan
         self._forget()
@@ -98,7 +93,8 @@ class SwarmProof:
         self._around: dict[int, ArcBasis] = {}
         self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
         self._by_stretch: dict[int, dict[int, list[Arc]]] = {}  # of them those of one stretch, by slot and stretch
-        self._pairs: dict[int, tuple[Pair, ...]] = {}  # the valid triangles, by the number of their point
+        self._versions: dict[int, int] = {}  # changes of what a slot sees
+        self._triangles = PointTriangles()
         self._chosen: dict[Pair, dict[int, WalkPoint]] = {}  # the points of triangles beside an edge, by side
         self._open_arcs: dict[int, list[Arc]] = {}
         self._settled: dict[int, None] = {}  # open slots that no other choice of points closes better
@@ -132,7 +128,10 @@ class SwarmProof:
             robots = [each for each in in_touch.get(slot, ()) if each in beside]
             passed = len(self._passed.get(slot, ()))
             now = ArcBasis(passed, beside, touched.get(slot, ()), tuple(near.get(slot, ())), robots)
-            if self._around.get(slot) != now:
+            known = self._around.get(slot)
+            if known != now:
+                if known is None or known.view != now.view:
+                    self._versions[slot] = self._versions.get(slot, 0) + 1
                 self._around[slot] = now
                 changed[slot] = None
         left = dict.fromkeys(
@@ -152,13 +151,12 @@ class SwarmProof:
         """Find the slots that saw each point of the walks that are new. Another list: all have other directions."""
         if walks is not self._walks:
             self._walks, self._count = walks, 0
-            self._points, self._passed, self._witnessed, self._stretch_of, self._of_stretch = [], {}, {}, {}, {}
+            self._points, self._passed, self._witnessed = [], {}, {}
             self._forget()
         for walk in walks[self._count :]:
             for slot, passed in _passes(walk, len(self._points)):
                 self._passed.setdefault(slot, []).append(passed)
-                self._stretch_of[passed.number] = passed.stretch
-                self._of_stretch.setdefault((slot, passed.stretch), []).append(passed.point)
+                self._triangles.add(slot, passed.number, passed.stretch, passed.point)
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
                 relied = (*passed.between, *(each.ties for each in ends))
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
@@ -182,9 +180,8 @@ class SwarmProof:
                 self._followed[slot] = self._arcs_to_walls(slot)
                 self._spoil(slot)
         for number in points:
-            old, new = self._pairs.get(number, ()), self._valid(number)
+            old, new = self._triangles.pairs(number), self._valid(number)
             if old != new:
-                self._pairs[number] = new
                 for slot in dict.fromkeys(slot for pair in (*old, *new) for slot in pair):
                     self._spoil(slot)
 
@@ -247,7 +244,7 @@ class SwarmProof:
         found: dict[int, list[WalkPoint]] = {}
         there = self._scan.views[pair[0]][pair[1]]
         for each in self._passed.get(pair[0], ()):
-            if pair in self._pairs.get(each.number, ()):
+            if pair in self._triangles.pairs(each.number):
                 found.setdefault(side_of(each.point, pair[0], there), []).append(each.point)
         return found
 
@@ -312,32 +309,11 @@ class SwarmProof:
         """Return the pairs of slots whose triangle with the point of this number counts."""
         point = self._points[number]
         if not self._counts(point):
+            self._triangles.drop(number)
             return ()
-        at_walls = {
-            (slot, side): self._ends_beyond(slot, number, side)
-            for slot in point.seen
-            if slot in self._neighbours
-            for side in (1, -1)
-        }
-        views, hidden = self._scan.views, dict[Pair, None]()
-        while True:
-            pairs = fan_of(point, views, self._neighbours, at_walls, hidden)
-            more = [pair for pair in pairs if self._hides(pair, number) or self._hides(pair[::-1], number)]
-            if not more:
-                return pairs
-            hidden |= dict.fromkeys(more)
-
-    def _hides(self, pair: Pair, number: int) -> bool:
-        """Return whether the second slot lost sight of the walk within the angle at the first of their triangle with a point.
-
-        Past a corner the second slot relies on the first for what is behind it. So the first does not rely on the second.
-        """
-        slot, other = pair
-        point = self._points[number]
-        arc = arc_between(self._scan.views[slot][other], point.seen[slot])
-        beyond = [each for each in self._of_stretch[slot, self._stretch_of[number]] if other not in each.seen]
-        inner = arc.width_rad - HIDDEN_MIN_RAD
-        return any(HIDDEN_MIN_RAD < (each.seen[slot] - arc.start_rad) % math.tau < inner for each in beyond)
+        standing = [slot for slot in point.seen if slot in self._neighbours]
+        at_walls = {(slot, side): self._ends_beyond(slot, number, side) for slot in standing for side in (1, -1)}
+        return self._triangles.find(number, point, self._scan.views, self._neighbours, self._versions, at_walls)
 
     def _ends_beyond(self, slot: int, number: int, side: int) -> bool:
         """Return whether the wall that was followed at a point lies beyond the line of sight to it, on one side.
@@ -348,7 +324,7 @@ class SwarmProof:
         point = self._points[number]
         if slot in point.robots:
             return ends_at(self._followed[slot], point.seen[slot], side)
-        return ends_at(self._by_stretch[slot].get(self._stretch_of.get(number, -1), ()), point.seen[slot], side)
+        return ends_at(self._by_stretch[slot].get(self._triangles.stretch_of(number), ()), point.seen[slot], side)
 
 
 def _pair_of(slot: int, other: int) -> Pair:
