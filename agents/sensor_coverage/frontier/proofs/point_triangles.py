@@ -67,14 +67,14 @@ class PointTriangles:
         while True:
             pairs = fan_of(point, views, neighbours, at_walls, hidden)
             more = [
-                pair for pair in pairs if any(self._hides(each, number, point, views) for each in (pair, pair[::-1]))
+                pair for pair in pairs if any(self._hides(each, stretch, point, views) for each in (pair, pair[::-1]))
             ]
             if not more:
                 self._pairs[number] = pairs
                 return pairs
             hidden |= dict.fromkeys(more)
 
-    def _hides(self, pair: Pair, number: int, point: WalkPoint, views: Views) -> bool:
+    def _hides(self, pair: Pair, stretch: int, point: WalkPoint, views: Views) -> bool:
         """Return whether the second slot lost sight of the walk within the angle at the first of their triangle with a point.
 
         Past a corner the second slot relies on the first for what is behind it. So the first does not rely on the second.
@@ -83,7 +83,7 @@ class PointTriangles:
         start, width = arc_between(views[slot][other], point.seen[slot])
         if width <= 2.0 * HIDDEN_MIN_RAD:
             return False
-        lost = self._lost_by(slot, other, self._stretch_of[number])
+        lost = self._lost_by(slot, other, stretch)
         first = (start + HIDDEN_MIN_RAD) % math.tau
         last = first + width - 2.0 * HIDDEN_MIN_RAD
         if bisect_right(lost, first) < bisect_left(lost, last):
