@@ -6,15 +6,19 @@ for which none of this has changed keeps its triangles.
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
+from operator import itemgetter
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Beyond, Pair, WalkPoint, arc_between, fan_of
 
 # A point of a walk lies within a triangle's angle only if it is this far from its sides: bearings have noise.
-HIDDEN_MIN_RAD: Final = math.radians(5.0)
+HIDDEN_MIN_RAD: Final = math.radians(2.0)
 
 Views = Mapping[int, Mapping[int, float]]
+# The direction [rad] of a point from a slot, and the other slots that saw it.
+_Lost = tuple[float, tuple[int, ...]]
+_DIRECTION: Final = itemgetter(0)
 
 
 class PointTriangles:
@@ -22,17 +26,19 @@ class PointTriangles:
 
     def __init__(self) -> None:
         self._stretch_of: dict[int, int] = {}  # the number of the first point of the stretch, by the number of a point
-        self._of_stretch: dict[tuple[int, int], list[WalkPoint]] = {}  # the points of a stretch that a slot saw
-        # Of these the directions [rad] of those that another slot did not see, ascending, by slot, other slot and stretch.
-        # They hold for the number of points beside them: points of no stretch are one stretch, to which later walks add.
-        self._lost: dict[tuple[int, int, int], tuple[int, Sequence[float]]] = {}
+        self._seers: dict[int, dict[int, None]] = {}  # the slots that saw a walk, by the number of its first point
+        self._seen: dict[int, list[tuple[int, WalkPoint]]] = {}  # the points that a slot saw, each with its walk
+        # The points that a slot saw, and another one that saw the same walk did not. They hold for the number of points that
+        # the slot saw.
+        self._lost: dict[tuple[int, int], tuple[int, list[_Lost]]] = {}
         self._basis: dict[int, tuple[object, object]] = {}
         self._pairs: dict[int, tuple[Pair, ...]] = {}
 
-    def add(self, slot: int, number: int, stretch: int, point: WalkPoint) -> None:
-        """Add a point of a walk that a slot saw."""
+    def add(self, slot: int, number: int, stretch: int, walk: int, point: WalkPoint) -> None:
+        """Add a point of a walk that a slot saw; `stretch` and `walk` are the numbers of their first points."""
         self._stretch_of[number] = stretch
-        self._of_stretch.setdefault((slot, stretch), []).append(point)
+        self._seers.setdefault(walk, {})[slot] = None
+        self._seen.setdefault(slot, []).append((walk, point))
 
     def stretch_of(self, number: int) -> int:
         """Return the number of the first point of a point's stretch, or -1."""
@@ -57,45 +63,53 @@ class PointTriangles:
         at_walls: Beyond,
     ) -> tuple[Pair, ...]:
         """Find the pairs of slots whose triangle with a point counts; see `fan_of`. `versions` count the changes of views."""
-        stretch = self.stretch_of(number)
-        seen = [(slot, versions[slot]) for slot in point.seen if slot in neighbours]
-        basis = [(slot, version, len(self._of_stretch[slot, stretch])) for slot, version in seen], at_walls
-        if self._basis.get(number) == basis:
+        basis = [(slot, versions[slot]) for slot in point.seen if slot in neighbours], at_walls
+        if self._basis.get(number) == basis and not any(
+            self._is_hidden(pair, point, views, neighbours) for pair in self._pairs[number]
+        ):
             return self._pairs[number]
         self._basis[number] = basis
         hidden: dict[Pair, None] = {}
         while True:
             pairs = fan_of(point, views, neighbours, at_walls, hidden)
-            more = [
-                pair for pair in pairs if any(self._hides(each, stretch, point, views) for each in (pair, pair[::-1]))
-            ]
+            more = [pair for pair in pairs if self._is_hidden(pair, point, views, neighbours)]
             if not more:
                 self._pairs[number] = pairs
                 return pairs
             hidden |= dict.fromkeys(more)
 
-    def _hides(self, pair: Pair, stretch: int, point: WalkPoint, views: Views) -> bool:
-        """Return whether the second slot lost sight of the walk within the angle at the first of their triangle with a point.
+    def _is_hidden(self, pair: Pair, point: WalkPoint, views: Views, standing: Collection[int]) -> bool:
+        """Return whether the triangle of two slots and a point hides something from one of the slots."""
+        return any(self._hides(each, point, views, standing) for each in (pair, pair[::-1]))
 
-        Past a corner the second slot relies on the first for what is behind it. So the first does not rely on the second.
+    def _hides(self, pair: Pair, point: WalkPoint, views: Views, standing: Collection[int]) -> bool:
+        """Return whether the second slot lost sight of a walk within the angle at the first of their triangle with a point.
+
+        Past a corner the second slot relies on the first for what is behind it, unless others saw the walk there, too. So the
+        first does not rely on the second.
         """
         slot, other = pair
         start, width = arc_between(views[slot][other], point.seen[slot])
         if width <= 2.0 * HIDDEN_MIN_RAD:
             return False
-        lost = self._lost_by(slot, other, stretch)
+        lost = self._lost_by(slot, other)
         first = (start + HIDDEN_MIN_RAD) % math.tau
         last = first + width - 2.0 * HIDDEN_MIN_RAD
-        if bisect_right(lost, first) < bisect_left(lost, last):
-            return True
-        return last > math.tau and bool(lost) and lost[0] < last - math.tau
+        within = lost[bisect_right(lost, first, key=_DIRECTION) : bisect_left(lost, last, key=_DIRECTION)]
+        if last > math.tau:
+            within += lost[: bisect_left(lost, last - math.tau, key=_DIRECTION)]
+        return any(not any(each in standing for each in others) for _, others in within)
 
-    def _lost_by(self, slot: int, other: int, stretch: int) -> Sequence[float]:
-        """Return the directions [rad] of the points of a stretch that a slot saw and another one did not, ascending."""
-        key = slot, other, stretch
-        points = self._of_stretch[slot, stretch]
-        count, known = self._lost.get(key, (0, ()))
+    def _lost_by(self, slot: int, other: int) -> list[_Lost]:
+        """Return the points that a slot saw, and another one that saw the same walk did not, by their direction [rad]."""
+        points = self._seen[slot]
+        count, known = self._lost.setdefault((slot, other), (0, []))
         if count != len(points):
-            known = sorted(each.seen[slot] % math.tau for each in points if other not in each.seen)
-            self._lost[key] = len(points), known
+            known += (
+                (each.seen[slot] % math.tau, tuple(one for one in each.seen if one != slot))
+                for walk, each in points[count:]
+                if other not in each.seen and other in self._seers[walk]
+            )
+            known.sort(key=_DIRECTION)
+            self._lost[slot, other] = len(points), known
         return known

@@ -156,7 +156,7 @@ class SwarmProof:
         for walk in walks[self._count :]:
             for slot, passed in _passes(walk, len(self._points)):
                 self._passed.setdefault(slot, []).append(passed)
-                self._triangles.add(slot, passed.number, passed.stretch, passed.point)
+                self._triangles.add(slot, passed.number, passed.stretch, len(self._points), passed.point)
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
                 relied = (*passed.between, *(each.ties for each in ends))
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):

@@ -4,6 +4,8 @@ import math
 import random
 from itertools import pairwise
 
+import pytest
+
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import HIDDEN_MIN_RAD, PointTriangles
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Pair, WalkPoint, arc_between, fan_of
 
@@ -22,14 +24,14 @@ def drawn(seed: int) -> tuple[list[WalkPoint], Views, dict[int, set[int]]]:
 
     views = {a: {b: direction(at[a], at[b]) for b in at if b != a} for a in at}
     points = [
-        WalkPoint({slot: direction(here, each) for slot, here in at.items() if draw.random() < 0.8}, (0.0,), ())
+        WalkPoint({slot: direction(here, each) for slot, here in at.items() if draw.random() < 0.35}, (0.0,), ())
         for each in way
     ]
     return points, views, {slot: set(seen) for slot, seen in views.items()}
 
 
 def searched(point: WalkPoint, points: list[WalkPoint], views: Views, neighbours: dict[int, set[int]]) -> set[Pair]:
-    """Return the pairs of a point by a search through all points of its stretch."""
+    """Return the pairs of a point by a search through all points."""
     at_walls = {(slot, side): True for slot in point.seen for side in (1, -1)}
     hidden: set[Pair] = set()
     while True:
@@ -41,7 +43,9 @@ def searched(point: WalkPoint, points: list[WalkPoint], views: Views, neighbours
                 offs = [
                     (each.seen[slot] - start) % math.tau
                     for each in points
-                    if slot in each.seen and other not in each.seen
+                    if slot in each.seen
+                    and other not in each.seen
+                    and not any(one in neighbours for one in each.seen if one != slot)
                 ]
                 if any(HIDDEN_MIN_RAD < off < width - HIDDEN_MIN_RAD for off in offs):
                     more.add(pair)
@@ -55,7 +59,7 @@ def added(points: list[WalkPoint]) -> PointTriangles:
     found = PointTriangles()
     for number, point in enumerate(points):
         for slot in point.seen:
-            found.add(slot, number, 0, point)
+            found.add(slot, number, 0, 0, point)
     return found
 
 
@@ -98,7 +102,7 @@ def test_a_later_point_of_the_same_stretch_counts() -> None:
     for known in (half, POINTS):
         for number, point in enumerate(points[half:known], half):
             for slot in point.seen:
-                triangles.add(slot, number, 0, point)
+                triangles.add(slot, number, 0, 0, point)
         for number, point in enumerate(points[:half]):
             before = triangles.pairs(number)
             at_walls = {(slot, side): True for slot in point.seen for side in (1, -1)}
@@ -106,3 +110,33 @@ def test_a_later_point_of_the_same_stretch_counts() -> None:
             assert set(found) == searched(point, points[:known], views, neighbours)
             changed += known == POINTS and found != before
     assert changed > 0
+
+
+@pytest.mark.parametrize(
+    ("seen_by_other", "seen_by_third", "third_stands", "counts"),
+    [
+        pytest.param(True, False, True, False, id="the other slot lost sight of the walk"),
+        pytest.param(False, False, True, True, id="the other slot may have been empty during the walk"),
+        pytest.param(True, True, True, True, id="a third slot is responsible"),
+        pytest.param(True, True, False, False, id="the third slot is gone"),
+    ],
+)
+def test_a_point_of_another_walk_behind_a_triangle(
+    seen_by_other: bool, seen_by_third: bool, third_stands: bool, counts: bool
+) -> None:
+    views: Views = {0: {1: 0.0}, 1: {0: math.pi}}
+    point = WalkPoint({0: math.radians(60.0), 1: math.radians(120.0)}, (math.pi / 2.0,), ())
+    behind = WalkPoint({0: math.radians(40.0)} | ({2: 0.0} if seen_by_third else {}), (math.pi / 2.0,), ())
+    before = WalkPoint({0: math.radians(100.0), 1: math.radians(140.0)}, (math.pi / 2.0,), ())
+    triangles = PointTriangles()
+    triangles.add(0, 0, 0, 0, point)
+    triangles.add(1, 0, 0, 0, point)
+    at_walls = {(slot, side): True for slot in views for side in (1, -1)}
+    neighbours: dict[int, set[int]] = {0: {1}, 1: {0}} | ({2: set()} if third_stands else {})
+    assert triangles.find(0, point, views, neighbours, dict.fromkeys(views, 1), at_walls) == ((0, 1),)
+    triangles.add(0, 1, 1, 1, before)
+    if seen_by_other:
+        triangles.add(1, 1, 1, 1, before)
+    triangles.add(0, 2, 1, 1, behind)
+    found = triangles.find(0, point, views, neighbours, dict.fromkeys(views, 1), at_walls)
+    assert found == (((0, 1),) if counts else ())
