@@ -1,7 +1,8 @@
 """Triangles of two slots and a point of a walk that count, for all points of all walks.
 
 They depend on what the slots that saw the point see, and on whether followed walls lie beyond the lines of sight. A point
-for which none of this has changed keeps its triangles.
+for which none of this has changed keeps its triangles, without those behind which walks were seen since. Such a triangle
+counts again only when a view or a wall has changed, also if a third slot that saw the walk there is occupied again before.
 """
 
 import math
