@@ -327,15 +327,15 @@ def fan_of(
     at_walls: Beyond,
     without: Collection[Pair] = (),
 ) -> tuple[Pair, ...]:
-    """Return the pairs of slots whose triangle with a point counts: at both slots the space beyond the triangle is proved.
+    """Return (slot, other slot) for each triangle with a point that counts at the slot: the space beyond it is proved at both.
 
     Beyond the line of sight from a slot to the point there must be a wall that was followed (`at_walls`), or another such
     triangle with the same point, or a triangle of robots that contains the point. A wall in touch with a slot counts here
-    in the direction of the contact only: two robots may touch the ends of walls on both sides of a door. The pairs in
-    `without` do not count.
+    in the direction of the contact only: two robots may touch the ends of walls on both sides of a door. A triangle in
+    `without` does not count at its first slot. Without these all count at both.
     """
     seen = [slot for slot in point.seen if slot in neighbours]
-    pairs = [(a, b) for a in seen for b in seen if a < b and b in neighbours[a] and (a, b) not in without]
+    pairs = [(a, b) for a in seen for b in seen if b in neighbours[a] and (a, b) not in without]
     if not pairs:
         return ()
     closed = {(slot, side): at_walls.get((slot, side), False) for slot in seen for side in (1, -1)}
@@ -344,7 +344,7 @@ def fan_of(
             closed[slot, 1] = closed[slot, -1] = True
     sides = {(a, b): side_of(point, a, views[a][b]) for pair in pairs for a, b in (pair, pair[::-1])}
     while True:
-        beyond = {(a, sides[a, b]) for pair in pairs for a, b in (pair, pair[::-1])}
+        beyond = {(a, sides[a, b]) for a, b in pairs}
         kept = [
             pair
             for pair in pairs

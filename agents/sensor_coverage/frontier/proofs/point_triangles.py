@@ -46,7 +46,7 @@ class PointTriangles:
         return self._stretch_of.get(number, -1)
 
     def pairs(self, number: int) -> tuple[Pair, ...]:
-        """Return the pairs of slots whose triangle with a point counts, as they were found last."""
+        """Return (slot, other slot) for each triangle with a point that counts at the slot, as they were found last."""
         return self._pairs.get(number, ())
 
     def drop(self, number: int) -> None:
@@ -63,31 +63,30 @@ class PointTriangles:
         versions: Mapping[int, int],
         at_walls: Beyond,
     ) -> tuple[Pair, ...]:
-        """Find the pairs of slots whose triangle with a point counts; see `fan_of`. `versions` count the changes of views."""
+        """Find the triangles with a point that count, each at its first slot; see `fan_of`.
+
+        `versions` count the changes of views.
+        """
         basis = [(slot, versions[slot]) for slot in point.seen if slot in neighbours], at_walls
         if self._basis.get(number) == basis and not any(
-            self._is_hidden(pair, point, views, neighbours) for pair in self._pairs[number]
+            self._hides(pair, point, views, neighbours) for pair in self._pairs[number]
         ):
             return self._pairs[number]
         self._basis[number] = basis
         hidden: dict[Pair, None] = {}
         while True:
             pairs = fan_of(point, views, neighbours, at_walls, hidden)
-            more = [pair for pair in pairs if self._is_hidden(pair, point, views, neighbours)]
+            more = [pair for pair in pairs if self._hides(pair, point, views, neighbours)]
             if not more:
                 self._pairs[number] = pairs
                 return pairs
             hidden |= dict.fromkeys(more)
 
-    def _is_hidden(self, pair: Pair, point: WalkPoint, views: Views, standing: Collection[int]) -> bool:
-        """Return whether the triangle of two slots and a point hides something from one of the slots."""
-        return any(self._hides(each, point, views, standing) for each in (pair, pair[::-1]))
-
     def _hides(self, pair: Pair, point: WalkPoint, views: Views, standing: Collection[int]) -> bool:
         """Return whether the second slot lost sight of a walk within the angle at the first of their triangle with a point.
 
         Past a corner the second slot relies on the first for what is behind it, unless others saw the walk there, too. So the
-        first does not rely on the second.
+        first does not rely on the second: the triangle does not count at the first.
         """
         slot, other = pair
         start, width = arc_between(views[slot][other], point.seen[slot])

@@ -169,7 +169,7 @@ class SlotProof:
                 walls += [*self._stretch, *self._contacts, *self._by_walks.unconditional()]
             for side in (1, -1):
                 at_walls[each, side] = ends_at(walls, point.seen[each], side)
-        fan = fan_of(point, views, neighbours, at_walls)
+        fan = [pair for pair in fan_of(point, views, neighbours, at_walls) if pair[0] < pair[1]]
         if any(slot in pair for pair in fan):
             needed = dict.fromkeys(each for pair in fan for each in pair)
             points = [each for step in steps for each in (step.before, step.point) if each is not None]

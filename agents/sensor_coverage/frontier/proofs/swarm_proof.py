@@ -95,7 +95,7 @@ class SwarmProof:
         self._by_stretch: dict[int, dict[int, list[Arc]]] = {}  # of them those of one stretch, by slot and stretch
         self._versions: dict[int, int] = {}  # changes of what a slot sees
         self._triangles = PointTriangles()
-        self._chosen: dict[Pair, dict[int, WalkPoint]] = {}  # the points of triangles beside an edge, by side
+        self._chosen: dict[Pair, dict[int, int]] = {}  # the numbers of the points of triangles beside an edge, by side
         self._open_arcs: dict[int, list[Arc]] = {}
         self._settled: dict[int, None] = {}  # open slots that no other choice of points closes better
 
@@ -214,9 +214,13 @@ class SwarmProof:
         closed = self._closed_without_fans(slot)
         for other in self._neighbours[slot]:
             its_pair = _pair_of(slot, other)
-            points = self._choose(its_pair)
-            kept = (point for its_side, point in points.items() if its_pair != pair or its_side != side)
-            closed += [arc_between(view[other], each.seen[slot]) for each in kept]
+            numbers = self._choose(its_pair)
+            kept = (number for its_side, number in numbers.items() if its_pair != pair or its_side != side)
+            closed += [
+                arc_between(view[other], self._points[each].seen[slot])
+                for each in kept
+                if (slot, other) in self._triangles.pairs(each)
+            ]
         return complement(closed)
 
     def _closed_without_fans(self, slot: int) -> list[Arc]:
@@ -227,38 +231,41 @@ class SwarmProof:
         closed = [*self._followed[slot], *arcs_of_walls(touched), *bodies]
         return closed + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
 
-    def _choose(self, pair: Pair) -> dict[int, WalkPoint]:
-        """Return the point of the triangle on each side of an edge, if there is one: the one that closes most at both ends.
+    def _choose(self, pair: Pair) -> dict[int, int]:
+        """Return the number of the point of the triangle on each side of an edge: the one that closes most at both ends.
 
         With different points at the two ends, the triangles would cross, and each end would rely on the other.
         """
         known = self._chosen.get(pair)
         if known is None:
-            points = self._candidates(pair)
-            opened = {each: complement(self._closed_without_fans(each)) for each in (pair if points else ())}
-            known = self._chosen[pair] = {side: self._best(pair, each, opened) for side, each in points.items()}
+            numbers = self._candidates(pair)
+            opened = {each: complement(self._closed_without_fans(each)) for each in (pair if numbers else ())}
+            known = self._chosen[pair] = {side: self._best(pair, each, opened) for side, each in numbers.items()}
         return known
 
-    def _candidates(self, pair: Pair) -> dict[int, list[WalkPoint]]:
-        """Return the points of the triangles with an edge that count, by side."""
-        found: dict[int, list[WalkPoint]] = {}
+    def _candidates(self, pair: Pair) -> dict[int, list[int]]:
+        """Return the numbers of the points of the triangles with an edge that count at one of its ends, by side."""
+        found: dict[int, list[int]] = {}
         there = self._scan.views[pair[0]][pair[1]]
         for each in self._passed.get(pair[0], ()):
-            if pair in self._triangles.pairs(each.number):
-                found.setdefault(side_of(each.point, pair[0], there), []).append(each.point)
+            counting = self._triangles.pairs(each.number)
+            if pair in counting or pair[::-1] in counting:
+                found.setdefault(side_of(each.point, pair[0], there), []).append(each.number)
         return found
 
-    def _best(self, pair: Pair, points: Sequence[WalkPoint], opened: Mapping[int, Sequence[Arc]]) -> WalkPoint:
-        """Return the point whose triangle closes most of the open arcs at both ends: the first of those that are equal."""
-        best, most = points[0], -1.0
-        for point in points:
-            arcs = (
-                (slot, arc_between(self._scan.views[slot][other], point.seen[slot]))
+    def _best(self, pair: Pair, numbers: Sequence[int], opened: Mapping[int, Sequence[Arc]]) -> int:
+        """Return the point whose triangle closes most of the open arcs where it counts: the first of those that are equal."""
+        best, most = numbers[0], -1.0
+        for number in numbers:
+            counting, seen = self._triangles.pairs(number), self._points[number].seen
+            arcs = [
+                (slot, arc_between(self._scan.views[slot][other], seen[slot]))
                 for slot, other in (pair, pair[::-1])
-            )
+                if (slot, other) in counting
+            ]
             gain = added(overlap(arc, each) for slot, arc in arcs for each in opened[slot])
             if gain > most + EQUAL_RAD:
-                best, most = point, gain
+                best, most = number, gain
         return best
 
     def _choose_again(self) -> None:
@@ -271,11 +278,11 @@ class SwarmProof:
             self._settled[slot] = None
             for other in sorted(self._neighbours[slot]):
                 pair = _pair_of(slot, other)
-                for side, points in self._candidates(pair).items():
+                for side, numbers in self._candidates(pair).items():
                     opened = {each: self._open_without(each, pair, side) for each in pair}
                     chosen = self._choose(pair)
-                    best = self._best(pair, (chosen[side], *points), opened)
-                    if best is not chosen[side]:
+                    best = self._best(pair, (chosen[side], *numbers), opened)
+                    if best != chosen[side]:
                         chosen[side] = best
                         for each in pair:
                             self._reopen(each)
@@ -306,7 +313,7 @@ class SwarmProof:
         return self._gone.keys().isdisjoint(point.seen)
 
     def _valid(self, number: int) -> tuple[Pair, ...]:
-        """Return the pairs of slots whose triangle with the point of this number counts."""
+        """Return (slot, other slot) for each triangle with the point of this number that counts at the slot."""
         point = self._points[number]
         if not self._counts(point):
             self._triangles.drop(number)

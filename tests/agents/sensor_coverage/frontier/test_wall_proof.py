@@ -252,7 +252,7 @@ def test_a_wall_that_ends_before_a_point_of_another_walk_closes_no_triangle_with
     ("seen_by_0", "open_deg"),
     [
         pytest.param({0: -55}, {0: 290, 1: 290}, id="both see the walk between their line of sight and the point"),
-        pytest.param({}, {0: 320, 1: 310}, id="slot 0 sees it past a corner"),
+        pytest.param({}, {0: 290, 1: 310}, id="slot 0 sees it past a corner, and relies on slot 1"),
     ],
 )
 def test_a_slot_does_not_rely_on_one_that_relies_on_it_behind_a_corner(
