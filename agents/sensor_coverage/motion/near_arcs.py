@@ -12,7 +12,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     kept_part,
     touched_point,
 )
-from zwerm.agents.sensor_coverage.frontier.wall_proof import CONTACT_RAD, SAME_WALL_RAD
+from zwerm.agents.sensor_coverage.frontier.wall_proof import CONTACT_RAD, SAME_WALL_RAD, drives_away
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 
 # Points closer [m] to the start have no direction from there.
@@ -49,7 +49,7 @@ def arcs_around(
     (`frontier.strips.loose_ends`), and a part of a body beyond. Two successive contacts with the same wall close the arc
     between the touched points of the wall. So do two contacts at the same point, because a body does not pass between them:
     those of a corner, or of a wedge from which the robot turned back. A dead robot may fill an opening: from there on only
-    the same wall closes an arc, up to the next wall.
+    the same wall closes an arc, up to the next wall. A step from one wall to the opposite one closes nothing.
     """
     found = list[tuple[float, float]]()
     for number, each in enumerate(points):
@@ -62,8 +62,9 @@ def arcs_around(
     begins_clear = False
     for before, point in pairwise(points):
         at_body = before.at_body or (at_body and not before.walls)
+        leaves = drives_away(hand, before.walls, point.walls, point.at[0] - before.at[0], point.at[1] - before.at[1])
         same = [(a, b) for a in before.walls for b in point.walls if angle_between(a, b) < SAME_WALL_RAD]
-        if same or (bool(before.walls or point.walls) and not (at_body or point.at_body)):
+        if not leaves and (same or (bool(before.walls or point.walls) and not (at_body or point.at_body))):
             begins_clear = begins_clear if stretch else not before.at_robot
             stretch = [*(stretch or [before]), point]
         else:

@@ -5,7 +5,7 @@ from typing import cast
 
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, united
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, ends_at, united
 from zwerm.agents.sensor_coverage.messages.commands import SHUT, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
@@ -124,18 +124,29 @@ def test_a_robot_in_touch_is_no_wall_beside_a_slot() -> None:
     assert arcs_around((0.0, 0.0), way, 1, 0.07) == arcs_around((0.0, 0.0), way, -1, 0.07) == ()
 
 
-@pytest.mark.parametrize(("at_body", "closed_deg"), [(False, 22), (True, 0)])
-def test_a_dead_body_between_two_walls_closes_no_arc_beside_a_slot(at_body: bool, closed_deg: int) -> None:
-    """The slot is at the mouth of a passage in the east. The robot turns round in it, before the body."""
-    north, south = math.pi / 2.0, -math.pi / 2.0
-    first, turning = NearPoint((0.2, 0.03), (north,), at_body), NearPoint((0.21, 0.0), (), at_body)
-    arcs = arcs_around((0.0, 0.0), [first, turning, NearPoint((0.2, -0.03), (south,))], 1, 0.07)
-    assert round(math.degrees(sum(width for _, width in arcs))) == closed_deg
+@pytest.mark.parametrize("at_body", [False, True])
+def test_a_dead_body_between_two_walls_closes_no_arc_beside_a_slot(at_body: bool) -> None:
+    """The slot is at the mouth of a passage in the east. The robot turns round in it, before the body or at its end."""
+    north, south, east = math.pi / 2.0, -math.pi / 2.0, () if at_body else (0.0,)
+    first, turning = NearPoint((0.2, 0.03), (north, *east), at_body), NearPoint((0.21, 0.0), east, at_body)
+    arcs = arcs_around((0.0, 0.0), [first, turning, NearPoint((0.2, -0.03), (*east, south))], 1, 0.07)
+    closed = united(Arc(*each) for each in arcs)
+    assert (sum(width for _, width in closed) > math.radians(40.0)) is not at_body
+    assert at_body is not any(ends_at(closed, 0.0, side) for side in (1, -1))
 
 
 def test_a_wall_that_stays_in_touch_closes_the_arc_past_a_dead_body() -> None:
     way = [NearPoint((0.05 * each, 0.03), (math.pi / 2.0,), True) for each in range(1, 5)]
     assert united([Arc(*each) for each in arcs_around((0.0, 0.0), way, 1, 0.07)])
+
+
+def test_a_step_from_one_wall_to_the_opposite_one_closes_nothing() -> None:
+    """A robot was pushed across a passage. A step along one wall closes what it passes."""
+    ways = ((math.pi / 2.0,), (-math.pi / 2.0,)), ((0.0,), (0.0,))
+    for walls, closes in zip(ways, (False, True), strict=True):
+        way = [NearPoint((0.1, 0.03), walls[0]), NearPoint((0.1, -0.03), walls[1])]
+        arcs = united(Arc(*each) for each in arcs_around((0.0, 0.0), way, 1, 0.07))
+        assert any(ends_at(arcs, 0.0, side) for side in (1, -1)) is closes
 
 
 class Wedged:
