@@ -22,6 +22,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     FollowWallPastDead,
     Move,
     NegotiateLeave,
+    Probe,
     Release,
     Report,
     RobotCommand,
@@ -123,8 +124,10 @@ class CentralRobot(Controller):
                 return self._drive(cycle, correct(self.motion, anchors))
             case ComeBack(cycle, apart):
                 return self._drive(cycle, self._come_back(apart))
-            case ToWall(cycle, bearing_rad, hop_m, clear_m, hand):
-                return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, clear_m, hand))
+            case ToWall(cycle, bearing_rad, hop_m, clear_m, hand, half_rad):
+                return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, clear_m, hand, half_rad))
+            case Probe(cycle, bearing_rad, hop_m, hand, half_rad):
+                return self._walk(cycle, self.wall_walk.probe(bearing_rad, hop_m, hand, half_rad))
             case FollowWall(cycle, length_m, hand, keep, meet):
                 margin_m = self.motion.parameters.margin_m
                 return self._walk(cycle, self.wall_walk.along(hand, length_m, keep, meet, margin_m))

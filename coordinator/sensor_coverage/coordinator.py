@@ -6,6 +6,7 @@ paper prints it.
 """
 
 from collections.abc import Collection, Mapping, Sequence
+from itertools import groupby
 from typing import Any, Final, Protocol
 
 import msgspec
@@ -155,7 +156,9 @@ class SensorCoverageCoordinator:
                 if self._redundancy_is_due():
                     yield from self._find_redundant()  # 5: (periodically) identify redundant robots
                 plans = yield from self._find_paths()  # 6: find path in the 1-skeleton
-                pushes = [self._carry_out(plan) for plan in plans]  # 7 and 8: push robots in path, deploy robot n + 1
+                probes = self._probes(plans)
+                # 7 and 8: push robots in path, deploy robot n + 1
+                pushes = probes or [self._carry_out(plan) for plan in plans]
                 pushes = pushes or self.pushing.recalls(self._silent)
             if self._schedule.unscanned and not pushes:
                 self._schedule.scan_next()
@@ -170,6 +173,13 @@ class SensorCoverageCoordinator:
 
     def _carry_out(self, plan: Plan) -> Routine[Moved]:
         return self.walking.walk(plan, self.scan) if plan.walk else self.pushing.push(plan)
+
+    def _probes(self, plans: Sequence[Plan]) -> list[Routine[Moved]]:
+        """Return the probes of walls close to all slots, before a robot is sent along a wall."""
+        if not any(plan.walk and not plan.meet for plan in plans):
+            return []
+        found = groupby(self.walls.probes(self.scan), key=lambda plan: plan.mover)
+        return [self.walking.probe(list(each)) for _, each in found]
 
     def _deploy_first(self, base: int) -> Routine[Moved]:
         """Deploy a station's first robot; where walls stop it in every direction, let it follow them."""

@@ -27,6 +27,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     FollowWall,
     FollowWallPastDead,
     Move,
+    Probe,
     ToWall,
     ToWallPastDead,
     Walked,
@@ -97,12 +98,13 @@ class WallWalks:
             leader = slots.occupant[plan.mover]
             yield from pushing.prepare(plan)
         heading = slots.heading[leader]
-        to_wall = ToWall(pushing.cycle, wrapped(plan.direction - heading), plan.hop_m, CLEAR_M, -plan.hand)
+        bearing = wrapped(plan.direction - heading)
+        to_wall = ToWall(pushing.cycle, bearing, plan.hop_m, CLEAR_M, -plan.hand, plan.half_rad)
         walked = yield from self._order(leader, to_wall)
         if walked is None:  # dead
             self._sources.waiting.pop(plan.mover, None)
             return (leader,)
-        self._walls.note_near(plan.mover, [(start + heading, width) for start, width in walked.near])
+        self._note_near(plan.mover, walked, heading, -plan.hand)
         if walked.end == SHUT:
             pushing.stopped += 1
             return (leader,)
@@ -127,6 +129,29 @@ class WallWalks:
         yield from self._legs(leader, plan.mover, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
         return (*followers, leader)
 
+    def probe(self, plans: Sequence[Plan]) -> Routine[Moved]:
+        """Let the robot of a slot follow walls close by, in the directions of some plans, and return to its slot."""
+        slot = plans[0].mover
+        robot = self._slots.occupant[slot]
+        for plan in plans:
+            heading = self._slots.heading[robot]
+            bearing = wrapped(plan.direction - heading)
+            for hand in (1, -1):
+                command = Probe(self._pushing.cycle, bearing, plan.hop_m, hand, plan.half_rad)
+                walked = yield from self._order(robot, command)
+                if walked is None:
+                    return (robot,)
+                self._note_near(slot, walked, heading, hand)
+                if walked.end == OPEN:
+                    break
+        return (robot,)
+
+    def _note_near(self, slot: int, walked: Walked, heading: float, hand: int) -> None:
+        """Record the arcs of a wall that a robot with this heading [rad] followed close to a slot."""
+        arcs = [(start + heading, width) for start, width in walked.near]
+        # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
+        self._walls.note_near(slot, arcs, 0 if walked.end == SHUT else hand)
+
     def axis(self, base: int) -> Routine[Sequence[float]]:
         """Return bearings [rad] for a station's first robot, parallel to a wall nearby: lattices along walls need fewer robots.
 
@@ -138,7 +163,7 @@ class WallWalks:
             return FIRST_BEARINGS_RAD
         cycle = self._pushing.cycle
         for bearing in AXIS_BEARINGS_RAD:
-            walked = yield from self._order(robot, ToWall(cycle, bearing, AXIS_HOP_M, 0.0, 1))
+            walked = yield from self._order(robot, ToWall(cycle, bearing, AXIS_HOP_M, 0.0, 1, 0.0))
             if walked is None:
                 break
             found = None
@@ -164,7 +189,7 @@ class WallWalks:
         robot = self._sources.waiting[base]
         cycle, station = self._pushing.cycle, self._slots.occupant[base]
         for bearing in FIRST_BEARINGS_RAD:
-            to_wall = ToWall(cycle, bearing, FIRST_HOP_M, 0.0, -1)
+            to_wall = ToWall(cycle, bearing, FIRST_HOP_M, 0.0, -1, 0.0)
             walked = yield from self._order(robot, to_wall)
             for hand in (1, -1) if walked is not None else ():
                 walked = yield from self._order(robot, FollowWall(cycle, LEG_M, hand, (station,), ()))
@@ -221,9 +246,11 @@ class WallWalks:
             if node in slot_of:
                 self._slots.length_m[here, slot_of[node]] = self._slots.length_m[slot_of[node], here] = length
 
-    def _order(self, robot: int, command: ToWall | FollowWall) -> Routine[Walked | None]:
+    def _order(self, robot: int, command: ToWall | FollowWall | Probe) -> Routine[Walked | None]:
         """Return how a walk ended, or None if the robot does not answer. The command names the dead robots."""
-        self._mailbox.send(robot, past_dead(command, self._silent), drive=True)
+        if not isinstance(command, Probe):
+            command = past_dead(command, self._silent)
+        self._mailbox.send(robot, command, drive=True)
         answers = yield from self._mailbox.answers([robot], Walked)
         answer = answers.get(robot)
         return answer if isinstance(answer, Walked) else None

@@ -12,7 +12,7 @@ from zwerm.agents.sensor_coverage.frontier.fence import Fence
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WallStep
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WallStep
 from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
 from zwerm.maths.simplicial import Edge, FlagComplex
 
@@ -28,7 +28,7 @@ class CoverageProof(Protocol):
         scan: ScanResult,
         walks: Sequence[Walk],
         touched: Mapping[int, Sequence[float]],
-        near: Mapping[int, Sequence[Arc]],
+        near: Mapping[int, Sequence[NearArc]],
         in_touch: Mapping[int, Collection[int]],
     ) -> tuple[int, ...]:
         """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.

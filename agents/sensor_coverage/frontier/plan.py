@@ -25,8 +25,9 @@ class Plan(NamedTuple):
 
     `key` names what is expanded: one side of an edge, or a gap around one slot. The new robot measures its distance to
     the robots at the `anchors`. `path` leads from a source to the mover, once a path is assigned. With `walk` the robot
-    drives to a wall and follows it, with the wall at its `hand` (+1 left, -1 right). With `beside` it stays in sight of
-    the mover's slot. It stops where it sees a slot of `meet`.
+    drives to a wall and follows it, with the wall at its `hand` (+1 left, -1 right). It begins past the edge of the open arc,
+    `half_rad` beside the direction. With `beside` it stays in sight of the mover's slot. It stops where it sees a slot of
+    `meet`.
     """
 
     key: tuple[int, ...]
@@ -40,3 +41,4 @@ class Plan(NamedTuple):
     hand: int = 1
     beside: bool = False
     meet: tuple[int, ...] = ()
+    half_rad: float = 0.0

@@ -21,7 +21,15 @@ from zwerm.agents.sensor_coverage.frontier.directions import (
     refined_heading,
     refined_reference,
 )
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint, drives_away, tail, turned_vector
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    Arc,
+    NearArc,
+    Walk,
+    WalkPoint,
+    drives_away,
+    tail,
+    turned_vector,
+)
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
 # Length [m] of a leg of a walk that the next leg repeats, so that the wall between them is one stretch.
@@ -47,7 +55,7 @@ class Slots:
         self.blocked: dict[int, list[float]] = {}
         self.touching: dict[int, list[float]] = {}
         self.in_touch: dict[int, tuple[int, ...]] = {}  # the robots that the occupant of a slot touches now
-        self.near: dict[int, list[Arc]] = {}
+        self.near: dict[int, list[NearArc]] = {}
         self.walks: list[Walk] = []
         self.length_m: dict[tuple[int, int], float] = {}
         self.frame: dict[int, int] = {}
@@ -172,7 +180,9 @@ class Slots:
             for known in (self.walls, self.blocked, self.touching):
                 if slot in known:
                     known[slot] = [each + by for each in known[slot]]
-            self.near[slot] = [Arc(each.start_rad + by, each.width_rad) for each in self.near.get(slot, ())]
+            self.near[slot] = [
+                NearArc(Arc(arc.start_rad + by, arc.width_rad), hand) for arc, hand in self.near.get(slot, ())
+            ]
         self.walks = [each.turned(new, by) if each.frame == old else each for each in self.walks]
         spin = cmath.exp(1j * by)
         for slot in turned:
@@ -249,11 +259,11 @@ class Slots:
                 self._readers[a, b] = now
                 self._refer(a, b, refined_reference(known, there, back))
         if displaced:
+            self._displaced |= displaced
             self._forget_walls(displaced)
 
     def _forget_walls(self, slots: Mapping[int, None]) -> None:
         """Forget what was seen from these slots of robots that followed walls."""
-        self._displaced |= slots
         for slot in slots:
             self.near.pop(slot, None)
         if any(slot in point.seen for walk in self.walks for point in walk.points for slot in slots):

@@ -10,8 +10,9 @@ from typing import Final
 from zwerm.agents.sensor_coverage.frontier.decisions import CoverageProof
 from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, contains
 
 # Fourth element of the keys of plans to join two parts of the swarm.
 JOIN: Final = 2000
@@ -19,6 +20,9 @@ JOIN: Final = 2000
 FRACTIONS: Final = (0.5, 0.5, 0.5, 0.5, 0.25, 0.75, 0.1, 0.9)
 # Attempts after which the walking robot stays in sight of the slot, and gets a slot where that would see it no more.
 ANYWHERE_MAX: Final = 2
+# A probe goes this far [m] to a wall, and into open arcs up to this width [rad].
+PROBE_M: Final = 0.14
+PROBED_RAD_MAX: Final = math.radians(150.0)
 # Attempts to join two parts of the swarm by the same slot.
 JOINS_MAX: Final = 4
 
@@ -36,6 +40,7 @@ class WallPlans:
         self._proof = proof
         self.tried: dict[int, list[float]] = {}
         self._joined: dict[tuple[int, tuple[int, ...]], int] = {}
+        self._probed: dict[int, list[float]] = {}  # the directions [rad] of probes, by slot
 
     def open_arcs(self, scan: ScanResult) -> dict[int, list[Arc]]:
         """Return the arcs in which each slot is open."""
@@ -44,9 +49,30 @@ class WallPlans:
             raise RuntimeError("the arcs of all slots are known with a coordinator only")
         touched = {slot: slots.touching.get(slot, ()) for slot in scan.complex_.vertices}
         stale = proof.update(scan, slots.walks, touched, slots.near, slots.slots_in_touch())
-        for slot in (*stale, *slots.take_displaced()):
+        displaced = slots.take_displaced()
+        for slot in (*stale, *displaced):
             self.tried.pop(slot, None)
+        for slot in displaced:
+            self._probed.pop(slot, None)
         return proof.open_arcs()
+
+    def probes(self, scan: ScanResult) -> list[Plan]:
+        """Return a plan for each open arc that was not probed yet: the robot there follows a wall close by, and returns."""
+        found = list[Plan]()
+        for slot, arcs in self.open_arcs(scan).items():
+            known = self._probed.setdefault(slot, [])
+            # A station does not move, and a robot in touch with another one has no room.
+            for arc in arcs if slot not in scan.bases and not self._slots.in_touch.get(slot) else ():
+                if arc.width_rad <= PROBED_RAD_MAX and not any(
+                    (each - arc.start_rad) % math.tau < arc.width_rad for each in known
+                ):
+                    direction = math.remainder(arc.start_rad + arc.width_rad / 2.0, math.tau)
+                    known.append(direction)
+                    key = slot, slot, 0, WALLS + round(math.degrees(direction))
+                    found.append(
+                        Plan(key, slot, direction, PROBE_M, 0.0, (slot,), walk=True, half_rad=arc.width_rad / 2.0)
+                    )
+        return found
 
     def plans(self, scan: ScanResult) -> Iterator[Plan]:
         """Yield a plan for each open arc that has attempts left."""
@@ -73,6 +99,9 @@ class WallPlans:
                 exhausted += 1
                 continue
             direction = math.remainder(arc.start_rad + FRACTIONS[tried] * arc.width_rad, math.tau)
+            hand = -1 if tried % 2 == 0 else 1
+            # A robot that comes from the slot, with the wall at its right hand, moves to the left.
+            before = FRACTIONS[tried] if hand < 0 else 1.0 - FRACTIONS[tried]
             found.append(
                 Plan(
                     (slot, beside, 0, WALLS + round(math.degrees(direction))),
@@ -82,8 +111,9 @@ class WallPlans:
                     0.0,
                     (slot,),
                     walk=True,
-                    hand=-1 if tried % 2 == 0 else 1,
+                    hand=hand,
                     beside=tried >= ANYWHERE_MAX,
+                    half_rad=before * arc.width_rad,
                 )
             )
         return found, exhausted
@@ -124,6 +154,13 @@ class WallPlans:
         else:
             self.tried.setdefault(plan.mover, []).append(plan.direction)
 
-    def note_near(self, slot: int, arcs: Iterable[tuple[float, float]]) -> None:
-        """Record arcs (start, width) [rad] around a slot in which a wall close to it was followed."""
-        self._slots.near[slot] = [*self._slots.near.get(slot, ()), *(Arc(*each) for each in arcs)]
+    def note_near(self, slot: int, arcs: Iterable[tuple[float, float]], hand: int) -> None:
+        """Record arcs (start, width) [rad] around a slot in which a wall close to it was followed, with a hand at it.
+
+        Arcs of different walks stay apart: where they meet, a wall may end and another one begin far behind it.
+        """
+        known = self._slots.near.get(slot, [])
+        same = [each.arc for each in known if each.hand == hand]
+        fresh = [each for each in united_round(Arc(*each) for each in arcs) if not contains(same, each)]
+        kept = [each for each in known if each.hand != hand or not contains(fresh, each.arc)]
+        self._slots.near[slot] = [*kept, *(NearArc(each, hand) for each in fresh)]

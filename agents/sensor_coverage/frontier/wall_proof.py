@@ -63,6 +63,16 @@ class Arc(NamedTuple):
     width_rad: float
 
 
+class NearArc(NamedTuple):
+    """An arc around a slot in which its robot followed a wall close to it, with the wall at its `hand`, +1 left, -1 right.
+
+    The hand is 0 if the robot followed all walls around, and did not turn back.
+    """
+
+    arc: Arc
+    hand: int
+
+
 class WalkPoint(NamedTuple):
     """A point of a walk: the direction [rad] to it from each slot that it sees, the directions of walls that it touches.
 

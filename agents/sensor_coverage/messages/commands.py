@@ -128,7 +128,8 @@ class ComeBack(_UplinkMessage, frozen=True, tag="come-back"):
 class ToWall(_UplinkMessage, frozen=True, tag="to-wall"):
     """Drive along a bearing [rad] to a wall within `hop_m`, and along it until `clear_m` from the start.
 
-    The robot returns if there is no such way. `hand` is +1 if the wall is on the left, else -1.
+    The robot returns if there is no such way. `hand` is +1 if the wall is on the left, else -1. Once clear, the robot goes on
+    until it is past the direction `half_rad` beside the bearing, if that is not 0.
     """
 
     cycle: int
@@ -136,6 +137,20 @@ class ToWall(_UplinkMessage, frozen=True, tag="to-wall"):
     hop_m: float
     clear_m: float
     hand: int
+    half_rad: float
+
+
+class Probe(_UplinkMessage, frozen=True, tag="probe"):
+    """Drive along a bearing [rad] to a wall within `hop_m`, and along it past the direction `half_rad` beside it; return.
+
+    `hand` is +1 if the wall is on the left, else -1.
+    """
+
+    cycle: int
+    bearing_rad: float
+    hop_m: float
+    hand: int
+    half_rad: float
 
 
 class FollowWall(_UplinkMessage, frozen=True, tag="follow-wall"):
@@ -250,6 +265,7 @@ RobotCommand = (
     | Correct
     | ComeBack
     | ToWall
+    | Probe
     | FollowWall
     | ToWallPastDead
     | FollowWallPastDead

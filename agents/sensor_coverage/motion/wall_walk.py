@@ -17,6 +17,7 @@ from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.near_arcs import NearPoint, arcs_around
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
+from zwerm.agents.sensor_coverage.motion.past_edge import EDGE_M_MAX, past_edge
 from zwerm.agents.sensor_coverage.motion.touched_robots import TouchedRobots
 from zwerm.agents.sensor_coverage.motion.wall_heading import hand_on_wall
 from zwerm.wire.messages import BodyVelocity
@@ -99,17 +100,53 @@ class WallWalk:
         x, y = self._motion.position
         return x - self._start[0], y - self._start[1]
 
-    def to_wall(self, bearing_rad: float, hop_m: float, clear_m: float, hand: int) -> DriveToWalk:
-        """Drive along a bearing to a wall, and along the wall until the start is `clear_m` away.
+    def to_wall(
+        self, bearing_rad: float, hop_m: float, clear_m: float, hand: int, half_rad: float = 0.0
+    ) -> DriveToWalk:
+        """Drive along a bearing to a wall, and along it until `clear_m` from the start and `half_rad` beside the bearing.
 
         Ends: SHUT (no way to get clear: the robot returns to its start), OPEN (no wall within `hop_m`), STRETCH (at the wall
         and clear).
         """
-        motion, frame = self._motion, self._motion.frame
-        frame.forget()
+        motion, start = self._motion, self._begin_way()
+        met, done = yield from self._meet_wall(bearing_rad, hop_m)
+        if not met:
+            return WalkResult(OPEN, done)
+        near = [self._near_point()]
+        if not (yield from self._go_past(hand, lambda: math.dist(start, motion.position) >= clear_m, near)):
+            yield from motion.drive_to(start)
+            return WalkResult(SHUT, done, near=arcs_around(start, near, hand, motion.radius_m))
+        if half_rad > 0.0:
+            edge = past_edge(lambda: motion.position, self.radius_m, bearing_rad, hand, half_rad, start)
+            yield from self._go_past(hand, edge, [], EDGE_M_MAX)
+        return WalkResult(STRETCH, done, near=arcs_around(start, near, hand, motion.radius_m))
+
+    def probe(self, bearing_rad: float, hop_m: float, hand: int, half_rad: float) -> DriveToWalk:
+        """Follow a wall within `hop_m` along a bearing with a hand at it, past the direction `half_rad` beside it; return.
+
+        Ends: OPEN (no wall within `hop_m`), STRETCH (it was past that, or clear), SHUT (no way leads there).
+        """
+        motion, start = self._motion, self._begin_way()
+        end, near = OPEN, list[NearPoint]()
+        met, done = yield from self._meet_wall(bearing_rad, hop_m)
+        if met:
+            near.append(self._near_point())
+            edge = past_edge(lambda: motion.position, self.radius_m, bearing_rad, hand, half_rad, start, CLEAR_M)
+            end = STRETCH if (yield from self._go_past(hand, edge, near, EDGE_M_MAX)) else SHUT
+        yield from motion.drive_to(start)
+        return WalkResult(end, done, near=arcs_around(start, near, hand, motion.radius_m))
+
+    def _begin_way(self) -> Vector:
+        """Begin a way from here, and return this place."""
+        self._motion.frame.forget()
         self._bodies.begin()
-        start = self._start = motion.position
-        self._trail = [start]
+        self._start = self._motion.position
+        self._trail = [self._start]
+        return self._start
+
+    def _meet_wall(self, bearing_rad: float, hop_m: float) -> Generator[BodyVelocity, None, tuple[bool, float]]:
+        """Drive along a bearing, to a wall if there is one within `hop_m`; return whether there is, and the way [m]."""
+        motion, frame, start = self._motion, self._motion.frame, self._start
         ux, uy = unit(bearing_rad)
         done, stuck = 0.0, 0
         while True:
@@ -122,7 +159,7 @@ class WallWalk:
             if ahead or stuck > STUCK_TICKS:
                 break
             if done >= hop_m - 1e-3:
-                return WalkResult(OPEN, done)
+                return False, done
             aside = (frame.y_m - start[1]) * ux - (frame.x_m - start[0]) * uy
             left = min(hop_m - done, motion.step_m)
             yield motion.velocity(ux * left + uy * aside * 0.5, uy * left - ux * aside * 0.5)
@@ -130,12 +167,17 @@ class WallWalk:
         # Without a wall ahead, the robot has stopped at the one beside it.
         others = [] if ahead else [each.bearing_rad for each in self._bodies.contacts()]
         self._wall_rad = min(others, key=lambda each: angle_between(each, bearing_rad), default=bearing_rad)
-        self._turned_rad, self._latest_wall_rad, way, stuck = 0.0, self._wall_rad, 0.0, 0
-        near = [self._near_point()]
-        while math.hypot(frame.x_m - start[0], frame.y_m - start[1]) < clear_m:
-            if way > CLEARING_M_MAX or self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
-                yield from motion.drive_to(start)
-                return WalkResult(SHUT, done, near=arcs_around(start, near, hand, motion.radius_m))
+        self._turned_rad, self._latest_wall_rad = 0.0, self._wall_rad
+        return True, done
+
+    def _go_past(
+        self, hand: int, is_past: Callable[[], bool], near: list[NearPoint], way_m_max: float = CLEARING_M_MAX
+    ) -> Generator[BodyVelocity, None, bool]:
+        """Follow the wall for `way_m_max` at most, until the robot is past something; return whether it is. Add the points."""
+        motion, way, stuck = self._motion, 0.0, 0
+        while not is_past():
+            if way > way_m_max or self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
+                return False
             before = motion.position
             yield self._step(hand)
             step_m = math.dist(before, motion.position)
@@ -143,7 +185,7 @@ class WallWalk:
             stuck = stuck + 1 if step_m < STUCK_FRACTION * motion.step_m else 0
             self._trail.append(motion.position)
             near.append(self._near_point())
-        return WalkResult(STRETCH, done, near=arcs_around(start, near, hand, motion.radius_m))
+        return True
 
     def away_from(
         self, station: int, bearings_rad: Iterable[float], hop_m: float, clear_m: float, margin_m: float

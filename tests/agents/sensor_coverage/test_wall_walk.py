@@ -1,19 +1,21 @@
 """Following walls: the heading that contacts allow, and whole runs in buildings whose doors the paper's rules do not find."""
 
 import math
+from collections.abc import Generator, Iterator
 from typing import cast
 
 import pytest
 
+from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, ends_at, united
-from zwerm.agents.sensor_coverage.messages.commands import SHUT, Sighting, Waypoint
+from zwerm.agents.sensor_coverage.messages.commands import OPEN, SHUT, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.near_arcs import NearPoint, arcs_around
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.wall_heading import swept
-from zwerm.agents.sensor_coverage.motion.wall_walk import WEDGED_TICKS, WallWalk
+from zwerm.agents.sensor_coverage.motion.wall_walk import WEDGED_TICKS, WalkResult, WallWalk
 from zwerm.run.runner import run
 from zwerm.wire.messages import BodyVelocity
 
@@ -140,15 +142,6 @@ def test_a_wall_that_stays_in_touch_closes_the_arc_past_a_dead_body() -> None:
     assert united([Arc(*each) for each in arcs_around((0.0, 0.0), way, 1, 0.07)])
 
 
-def test_a_step_from_one_wall_to_the_opposite_one_closes_nothing() -> None:
-    """A robot was pushed across a passage. A step along one wall closes what it passes."""
-    ways = ((math.pi / 2.0,), (-math.pi / 2.0,)), ((0.0,), (0.0,))
-    for walls, closes in zip(ways, (False, True), strict=True):
-        way = [NearPoint((0.1, 0.03), walls[0]), NearPoint((0.1, -0.03), walls[1])]
-        arcs = united(Arc(*each) for each in arcs_around((0.0, 0.0), way, 1, 0.07))
-        assert any(ends_at(arcs, 0.0, side) for side in (1, -1)) is closes
-
-
 class Wedged:
     """A robot in touch with two walls, of which no velocity moves it."""
 
@@ -205,6 +198,76 @@ def test_a_robot_at_a_wall_that_sees_no_other_robot_drives_back_to_its_slot() ->
     while not seen:
         next(way)
     assert [each.node for each in seen[0]] == [9]
+
+
+class Facing(Wedged):
+    """A robot that faces a long wall 0.1 m to the east, up to which it can drive."""
+
+    def __init__(self, wall_m: float) -> None:
+        super().__init__()
+        self._wall_m = wall_m
+        self._read(0.0, 0.0)
+
+    def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        part = min(1.0, self.step_m / max(math.hypot(x_m, y_m), 1e-9))
+        self._read(min(self._wall_m, self.position[0] + part * x_m), self.position[1] + part * y_m)
+        return BodyVelocity(x_m, y_m)
+
+    def drive_to(self, goal: tuple[float, float]) -> Iterator[BodyVelocity]:
+        yield self.velocity(0.0, 0.0)
+        self._read(*goal)
+
+    def _read(self, x_m: float, y_m: float) -> None:
+        self.position = self.frame.x_m, self.frame.y_m = x_m, y_m
+        self.frame.contacts = (Touched(0.0, None),) if x_m > self._wall_m - 1e-3 else ()
+        self.frame.touched = tuple(each.bearing_rad for each in self.frame.contacts)
+
+
+def ended(walk: Generator[BodyVelocity, None, WalkResult]) -> WalkResult:
+    """Carry out a walk, and return how it ended."""
+    while True:
+        try:
+            next(walk)
+        except StopIteration as stop:
+            return cast(WalkResult, stop.value)
+
+
+@pytest.mark.parametrize("hand", [1, -1])
+def test_a_walk_begins_past_the_edge_of_the_open_arc(hand: int) -> None:
+    """With the wall at its left hand the robot goes to the right, past the direction 30 degrees beside its bearing."""
+    robot = Facing(0.3)
+    assert ended(WallWalk(cast(Locomotion, robot)).to_wall(0.0, 0.95, 0.3, hand, math.radians(30.0))).end == STRETCH
+    edge_m = 0.3 * math.tan(math.radians(30.0))
+    assert edge_m + 0.07 < -hand * robot.position[1] < edge_m + 0.25
+    middle = Facing(0.3)
+    ended(WallWalk(cast(Locomotion, middle)).to_wall(0.0, 0.95, 0.3, hand))
+    assert abs(middle.position[1]) < 0.1
+
+
+@pytest.mark.parametrize("hand", [1, -1])
+def test_a_probe_closes_an_arc_to_a_wall_close_to_its_slot_and_returns(hand: int) -> None:
+    robot = Facing(0.1)
+    found = ended(WallWalk(cast(Locomotion, robot)).probe(0.0, 0.14, hand, math.radians(40.0)))
+    assert (found.end, robot.position) == (STRETCH, (0.0, 0.0))
+    closed = united_round(Arc(*each) for each in found.near)
+    assert len(closed) == 1
+    last = math.remainder(closed[0].start_rad + (closed[0].width_rad if hand < 0 else 0.0), math.tau)
+    assert 40.0 < -hand * math.degrees(last) < 75.0
+
+
+def test_a_probe_finds_no_wall_farther_away() -> None:
+    robot = Facing(0.3)
+    found = ended(WallWalk(cast(Locomotion, robot)).probe(0.0, 0.14, 1, math.radians(40.0)))
+    assert (found.end, found.near, robot.position) == (OPEN, (), (0.0, 0.0))
+
+
+def test_a_step_from_one_wall_to_the_opposite_one_closes_nothing() -> None:
+    """A robot was pushed across a passage. A step along one wall closes what it passes."""
+    ways = ((math.pi / 2.0,), (-math.pi / 2.0,)), ((0.0,), (0.0,))
+    for walls, closes in zip(ways, (False, True), strict=True):
+        way = [NearPoint((0.1, 0.03), walls[0]), NearPoint((0.1, -0.03), walls[1])]
+        arcs = united(Arc(*each) for each in arcs_around((0.0, 0.0), way, 1, 0.07))
+        assert any(ends_at(arcs, 0.0, side) for side in (1, -1)) is closes
 
 
 class Beside(Wedged):

@@ -13,7 +13,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
 )
 from zwerm.coordinator.sensor_coverage.wall_walks import DEAD_MAX, past_dead
 
-COMMANDS = ToWall(3, 0.5, 1.0, 0.3, -1), FollowWall(3, 3.0, 1, (4,), (5, 6))
+COMMANDS = ToWall(3, 0.5, 1.0, 0.3, -1, 0.2), FollowWall(3, 3.0, 1, (4,), (5, 6))
 
 
 @pytest.mark.parametrize("command", COMMANDS)

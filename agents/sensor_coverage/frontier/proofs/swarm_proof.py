@@ -12,6 +12,13 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
+from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import (
+    SightEnd,
+    shortened,
+    sight_ends_at,
+    with_islands,
+    without_edges,
+)
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     Crossing,
     arcs_beside_pocket,
@@ -24,6 +31,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.stretches import pocket_of, st
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     Arc,
+    NearArc,
     Pair,
     SeenPoint,
     TouchCounter,
@@ -52,7 +60,7 @@ class Passed(NamedTuple):
     `number` counts the points of all walks. The slot did not see the points between these two. Each of them was seen by
     other slots. `stretch` is the number of the first point of the stretch of wall, and `ends` are the ends of the wall from the
     point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
-    number of the first point of its stretch.
+    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point.
     """
 
     number: int
@@ -63,6 +71,7 @@ class Passed(NamedTuple):
     stretch: int = -1
     ends: tuple[StretchEnd, ...] = ()
     pockets: tuple[tuple[int, Pocket], ...] = ()
+    sight_ends: tuple[SightEnd, ...] = ()
 
 
 class ArcBasis(NamedTuple):
@@ -71,7 +80,7 @@ class ArcBasis(NamedTuple):
     passed: int
     view: Mapping[int, float]
     touched: Sequence[float]
-    near: Sequence[Arc]
+    near: Sequence[NearArc]
     in_touch: Sequence[int]
 
 
@@ -93,6 +102,7 @@ class SwarmProof:
         self._around: dict[int, ArcBasis] = {}
         self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
         self._by_stretch: dict[int, dict[int, list[Arc]]] = {}  # of them those of one stretch, by slot and stretch
+        self._edged: dict[int, list[Arc]] = {}  # the same arcs as `_followed` without edges of sight
         self._versions: dict[int, int] = {}  # changes of what a slot sees
         self._triangles = PointTriangles()
         self._chosen: dict[Pair, dict[int, int]] = {}  # the numbers of the points of triangles beside an edge, by side
@@ -104,7 +114,7 @@ class SwarmProof:
         scan: ScanResult,
         walks: Sequence[Walk],
         touched: Mapping[int, Sequence[float]],
-        near: Mapping[int, Sequence[Arc]],
+        near: Mapping[int, Sequence[NearArc]],
         in_touch: Mapping[int, Collection[int]],
     ) -> tuple[int, ...]:
         """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.
@@ -158,7 +168,7 @@ class SwarmProof:
                 self._passed.setdefault(slot, []).append(passed)
                 self._triangles.add(slot, passed.number, passed.stretch, len(self._points), passed.point)
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
-                relied = (*passed.between, *(each.ties for each in ends))
+                relied = (*passed.between, *(e.ties for e in ends), *(e.witnesses for e in passed.sight_ends))
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
                     self._witnessed.setdefault(each, {})[slot] = None
             self._points += walk.points
@@ -172,7 +182,7 @@ class SwarmProof:
             points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
             stale |= self._witnessed.get(slot, {})
             self._spoil(slot)
-            for known in (self._around, self._followed, self._by_stretch):
+            for known in (self._around, self._followed, self._by_stretch, self._edged):
                 known.pop(slot, None)
         for slot in stale:
             if slot in self._around:
@@ -210,26 +220,31 @@ class SwarmProof:
 
     def _open_without(self, slot: int, pair: Pair | None, side: int) -> list[Arc]:
         """Return the arcs of a slot that are open without the triangle on one side of an edge."""
-        view = self._scan.views[slot]
-        closed = self._closed_without_fans(slot)
+        view, fans = self._scan.views[slot], list[Arc]()
         for other in self._neighbours[slot]:
             its_pair = _pair_of(slot, other)
             numbers = self._choose(its_pair)
             kept = (number for its_side, number in numbers.items() if its_pair != pair or its_side != side)
-            closed += [
+            fans += [
                 arc_between(view[other], self._points[each].seen[slot])
                 for each in kept
                 if (slot, other) in self._triangles.pairs(each)
             ]
-        return complement(closed)
+        touched, beside = arcs_of_walls(self._around[slot].touched), self._closed_by_robots(slot)
+        opened = complement([*self._followed[slot], *touched, *beside, *fans])
+        contacts = touched if slot in self._scan.bases else ()  # a station cannot look behind what it touches
+        return with_islands(opened, [*self._edged[slot], *contacts, *beside, *fans])
 
     def _closed_without_fans(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that walls and triangles of robots close."""
+        return [*self._followed[slot], *arcs_of_walls(self._around[slot].touched), *self._closed_by_robots(slot)]
+
+    def _closed_by_robots(self, slot: int) -> list[Arc]:
+        """Return the arcs of a slot that triangles of robots and robots in touch close."""
         view, beside = self._scan.views[slot], self._neighbours[slot]
         _, _, touched, _, robots = self._around[slot]
-        bodies = arcs_of_robots([view[each] for each in robots], touched)
-        closed = [*self._followed[slot], *arcs_of_walls(touched), *bodies]
-        return closed + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
+        bodies = list(arcs_of_robots([view[each] for each in robots], touched))
+        return bodies + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
 
     def _choose(self, pair: Pair) -> dict[int, int]:
         """Return the number of the point of the triangle on each side of an edge: the one that closes most at both ends.
@@ -291,21 +306,27 @@ class SwarmProof:
     def _arcs_to_walls(self, slot: int) -> list[Arc]:
         """Return the arcs at a slot that end at followed walls or at contacts. They are disjoint."""
         around = self._around[slot]
-        found = [*arcs_of_walls(around.touched, CONTACT_RAD), *around.near]
+        contacts = arcs_of_walls(around.touched, CONTACT_RAD)
         crossings: dict[int, list[Crossing]] = {}
-        for _, before, point, hand, between, stretch, ends, pockets in self._passed.get(slot, ()):
+        edges: dict[int, list[SightEnd]] = {}
+        for _, before, point, hand, between, stretch, ends, pockets, sight_ends in self._passed.get(slot, ()):
             if not self._counts(point) or (before is not None and not self._counts(before)):
                 continue
             if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
                 loose = [each for each in ends if not each.is_tied(self._neighbours)]
                 crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
+            edges.setdefault(stretch, []).extend(each for each in sight_ends if each.is_loose(self._neighbours))
             for first_number, pocket in pockets:
                 is_loose = not pocket.other.is_tied(self._neighbours)
                 crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
-                found += arcs_beside_pocket(hand, pocket, around.touched)
+                contacts += arcs_beside_pocket(hand, pocket, around.touched)
         by_stretch = self._by_stretch[slot] = {number: arcs_into(each) for number, each in crossings.items()}
-        for each in by_stretch.values():
+        edged = [*contacts, *shortened(around.near)]
+        found = [*contacts, *(each.arc for each in around.near)]
+        for stretch, each in by_stretch.items():
             found += each
+            edged += without_edges(each, edges.get(stretch, ()))
+        self._edged[slot] = united(edged)
         return united(found)
 
     def _counts(self, point: WalkPoint) -> bool:
@@ -363,7 +384,8 @@ def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             pockets = tuple(_pockets(slot, number, point, stretches, first)) if slot in point.robots else ()
             number_of = -1 if here is None else first + here.first_number
             between = between if before is not None else ()
-            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets)
+            edges = tuple(sight_ends_at(slot, number, walk.points))
+            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges)
             last[slot] = now
 
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
 
 EAST = math.radians(10.0)
 FAR_OFF, CLOSE = math.radians(25.0), math.radians(15.0)
@@ -18,7 +18,7 @@ def three_slots() -> Slots:
     for robot in (10, 11, 12):
         slots.add(robot)
     slots.learn_references(views(0.0))
-    slots.near[1] = [Arc(0.0, 1.0)]
+    slots.near[1] = [NearArc(Arc(0.0, 1.0), 1)]
     slots.walks.append(Walk(10, 1, (WalkPoint({0: 0.5, 1: 1.5}, (0.0,), ()), WalkPoint({0: 0.6}, (0.0,), ()))))
     return slots
 
@@ -49,7 +49,7 @@ def test_what_a_slot_saw_of_walls_remains_when_its_robot_stands_there(robot: int
     slots.occupant[1] = robot
     slots.learn_references(views(off))
     assert slots.take_displaced() == ()
-    assert slots.near[1] == [Arc(0.0, 1.0)]
+    assert slots.near[1] == [NearArc(Arc(0.0, 1.0), 1)]
     assert slots.walks is walks
 
 

@@ -10,7 +10,7 @@ from zwerm.agents.sensor_coverage.frontier.planner import WHOLE_HOP, Planner
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk
 from zwerm.maths.simplicial import Edge, FlagComplex
 
 PLACES = {0: (0.0, 0.0), 1: (1.0, 0.0), 2: (0.5, 0.87)}
@@ -32,7 +32,7 @@ def frontier(closed: tuple[int, ...], walks: int) -> tuple[set[Edge], set[Edge]]
     """Return frontier and obstacle edges of a triangle, with the south closed around some slots, after some walks."""
     slots = slots_of_triangle()
     for slot in closed:
-        slots.near[slot] = [Arc(-math.pi, math.pi)]
+        slots.near[slot] = [NearArc(Arc(-math.pi - 0.1, math.pi + 0.2), 1)]
     slots.walks += [Walk(0, 1, ())] * walks
     planner = Planner(PlannerParameters(walls="followed"), slots, SwarmProof())
     planner.update(SCAN)

@@ -1,0 +1,94 @@
+"""Edges of sight: directions in which a slot lost sight of a robot that followed a wall, and the islands that open there.
+
+At a corner the wall before it and a wall far behind it meet in one direction, and the two together leave no arc open. The
+space behind the corner is the part of a robot that saw the walk there. When no such robot stands, the edge is loose: the
+directions beside it count as closed only where another wall closes them.
+
+An edge is open only if nothing beside it is open: a robot that follows a wall into an open arc sees the edge from close by.
+"""
+
+import math
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from typing import Final, NamedTuple
+
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    HAIR_RAD,
+    Arc,
+    NearArc,
+    WalkPoint,
+    complement,
+    overlap,
+    united,
+)
+
+# Directions [rad] beside a loose edge that its stretch of wall does not close.
+BESIDE_EDGE_RAD: Final = math.radians(5.0)
+
+
+class SightEnd(NamedTuple):
+    """The direction [rad] in which a slot lost sight of a walk, or saw it first, and the slots that saw the next point."""
+
+    direction_rad: float
+    witnesses: tuple[int, ...]
+
+    def is_loose(self, standing: Collection[int]) -> bool:
+        """Return whether no standing robot saw the walk beyond."""
+        return not any(each in standing for each in self.witnesses)
+
+
+def sight_ends_at(slot: int, number: int, points: Sequence[WalkPoint]) -> Iterator[SightEnd]:
+    """Yield the ends of what a slot saw of a walk, at its point with this number."""
+    for step in (1, -1):
+        other = number + step
+        while 0 <= other < len(points) and points[other].is_blind and slot in points[other].seen:
+            other += step
+        if 0 <= other < len(points) and slot not in points[other].seen:
+            yield SightEnd(points[number].seen[slot], tuple(points[other].seen))
+
+
+def without_edges(arcs: Iterable[Arc], ends: Iterable[SightEnd]) -> list[Arc]:
+    """Return the arcs of one stretch of wall without the directions beside loose edges of sight."""
+    found = list(arcs)
+    for end in ends:
+        edge = Arc(end.direction_rad - BESIDE_EDGE_RAD, 2.0 * BESIDE_EDGE_RAD)
+        found = [part for each in found for part in _outside(each, edge)]
+    return found
+
+
+def united_round(arcs: Iterable[Arc]) -> list[Arc]:
+    """Return disjoint arcs that contain the same directions, as `united`; an arc that passes through zero is one."""
+    found = united(arcs)
+    if len(found) > 1 and found[-1].start_rad + found[-1].width_rad >= found[0].start_rad + math.tau - HAIR_RAD:
+        last = found.pop()
+        reach = max(last.start_rad + last.width_rad, found[0].start_rad + found[0].width_rad + math.tau)
+        found[0] = Arc(last.start_rad, min(math.tau, reach - last.start_rad))
+    return found
+
+
+def shortened(near: Iterable[NearArc]) -> list[Arc]:
+    """Return arcs of walls close to a slot without the directions beside their ends: nobody saw how these walls go on.
+
+    With the wall at the left hand, a robot that comes from the slot follows it to the right.
+    """
+    return [
+        Arc(arc.start_rad + max(hand, 0) * BESIDE_EDGE_RAD, arc.width_rad - abs(hand) * BESIDE_EDGE_RAD)
+        for arc, hand in near
+        if arc.width_rad > abs(hand) * BESIDE_EDGE_RAD
+    ]
+
+
+def _outside(arc: Arc, cut: Arc) -> Iterator[Arc]:
+    """Yield the parts of an arc outside another one, which is narrower than a turn."""
+    off = (cut.start_rad - arc.start_rad) % math.tau
+    back = off + cut.width_rad - math.tau  # the cut passes the start of the arc by this angle
+    low = max(back, 0.0)
+    if off > low and low < arc.width_rad:
+        yield Arc(arc.start_rad + low, min(off, arc.width_rad) - low)
+    if off + cut.width_rad < arc.width_rad:
+        yield Arc(arc.start_rad + off + cut.width_rad, arc.width_rad - off - cut.width_rad)
+
+
+def with_islands(opened: list[Arc], closed: Iterable[Arc]) -> list[Arc]:
+    """Return the open arcs with the islands: arcs that nothing of `closed` contains, and beside which nothing is open."""
+    islands = [each for each in complement(closed) if not any(overlap(each, arc) > 0.0 for arc in opened)]
+    return [*opened, *islands]

@@ -1,0 +1,109 @@
+"""Edges of sight: where one wall ends before another one, and nobody stands for the space behind the corner."""
+
+import math
+
+import pytest
+
+from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import (
+    SightEnd,
+    shortened,
+    sight_ends_at,
+    united_round,
+    with_islands,
+    without_edges,
+)
+from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
+from zwerm.maths.simplicial import FlagComplex
+
+SOUTH = (-math.pi / 2.0,)
+VIEWS = {0: {1: 0.0}, 1: {0: math.pi}}
+SCAN = ScanResult(VIEWS, FlagComplex({slot: set(seen) for slot, seen in VIEWS.items()}), ())
+
+
+def degrees(arcs: list[Arc]) -> list[tuple[int, int]]:
+    """Return the starts and ends of arcs [deg]."""
+    return [(round(math.degrees(start)) % 360, round(math.degrees(start + width)) % 360) for start, width in arcs]
+
+
+def arc(start: int, end: int) -> Arc:
+    return Arc(math.radians(start), math.radians(end - start))
+
+
+def point(**seen: int) -> WalkPoint:
+    """Return a point in touch with a wall, in the directions [deg] from some slots."""
+    return WalkPoint({int(slot[1:]): math.radians(each) for slot, each in seen.items()}, SOUTH, ())
+
+
+def open_at_0(*walks: tuple[WalkPoint, ...], near: tuple[NearArc, ...] = ()) -> list[tuple[int, int]]:
+    """Return the open arcs of slot 0 [deg] after some walks with the wall at the right hand."""
+    proof = SwarmProof()
+    proof.update(SCAN, [Walk(0, -1, each) for each in walks], {}, {0: near}, {})
+    return degrees(proof.open_arcs()[0])
+
+
+BEFORE = point(_0=150), point(_0=200), point(_0=250)
+BEYOND = point(_0=250), point(_0=290), point(_0=330)
+
+
+@pytest.mark.parametrize(
+    ("behind", "opened"),
+    [
+        pytest.param(point(_1=200), [(330, 150)], id="slot 1 saw the wall behind the corner"),
+        pytest.param(point(_2=200), [(245, 255), (330, 150)], id="the slot that saw it is empty"),
+        pytest.param(point(), [(245, 255), (330, 150)], id="nobody saw it"),
+    ],
+)
+def test_an_edge_of_sight_is_open_if_nobody_stands_for_what_is_behind_it(
+    behind: WalkPoint, opened: list[tuple[int, int]]
+) -> None:
+    assert sorted(open_at_0((*BEFORE, behind), (behind, *BEYOND))) == opened
+
+
+def test_an_edge_of_sight_beside_an_open_arc_opens_nothing() -> None:
+    assert open_at_0((*BEFORE, point())) == [(250, 150)]
+
+
+def test_another_wall_closes_an_edge_of_sight() -> None:
+    across = point(_0=230), point(_0=250), point(_0=270)
+    assert open_at_0((*BEFORE, point()), (point(), *BEYOND), across) == [(330, 150)]
+
+
+@pytest.mark.parametrize(("hand", "opened"), [(1, [(330, 150)]), (-1, [(245, 250), (330, 150)])])
+def test_a_wall_close_to_a_slot_ends_where_its_robot_turned_back(hand: int, opened: list[tuple[int, int]]) -> None:
+    """With the wall at its right hand the robot moved to the left, and nobody saw how the wall goes on there."""
+    near = NearArc(arc(150, 250), hand)
+    assert sorted(open_at_0(BEYOND, near=(near, NearArc(arc(150, 160), -hand)))) == opened
+
+
+def test_the_ends_of_what_a_slot_saw_are_found_past_points_without_a_contact() -> None:
+    blind = WalkPoint({0: 0.5}, (), ())
+    points = [point(_0=10), blind, point(_1=20, _2=30)]
+    assert list(sight_ends_at(0, 0, points)) == [SightEnd(math.radians(10), (1, 2))]
+    assert list(sight_ends_at(0, 0, points[:2])) == [], "the walk ends in sight"
+    assert list(sight_ends_at(1, 2, points)) == [SightEnd(math.radians(20), (0,))]
+
+
+def test_an_edge_is_cut_out_of_the_arcs_of_its_stretch() -> None:
+    ends = [SightEnd(0.0, ())]
+    assert degrees(without_edges([arc(-40, 40)], ends)) == [(320, 355), (5, 40)]
+    assert degrees(without_edges([arc(2, 40)], ends)) == [(5, 40)]
+    assert degrees(without_edges([arc(-40, -2)], ends)) == [(320, 355)]
+    assert degrees(without_edges([arc(-3, 3), arc(90, 180)], ends)) == [(90, 180)]
+
+
+def test_an_arc_close_to_a_slot_that_is_narrower_than_an_edge_is_left_out() -> None:
+    near = NearArc(arc(0, 4), 1), *(NearArc(arc(0, 40), hand) for hand in (1, -1, 0))
+    assert degrees(shortened(near)) == [(5, 40), (0, 35), (0, 40)]
+
+
+def test_an_island_touches_no_open_arc() -> None:
+    closed = [arc(0, 90), arc(100, 180), arc(190, 300)]
+    assert degrees(with_islands([arc(185, 190)], closed)) == [(185, 190), (90, 100), (300, 0)]
+
+
+def test_arcs_that_meet_at_zero_are_one() -> None:
+    parts = [arc(-30, 0), arc(-5, 20), arc(90, 100)]
+    assert sorted(degrees(united_round(parts))) == [(90, 100), (330, 20)]
+    assert degrees(united_round([arc(0, 350), arc(340, 370)]))[0] in {(340, 340), (0, 0)}, "a full turn"
