@@ -62,6 +62,7 @@ class CentralRobot(Controller):
         super().__init__(setup)
         self.motion = Locomotion(self.parameters, setup)
         self._trail = Trail()
+        self._left = self.motion.position  # where it stood before it was deployed or moved to another slot
         self._dead: dict[int, None] = {}  # as far as the coordinator has said
         self.wall_walk = WallWalk(self.motion, self._dead)
         self.commands = RequestDeduplicator(int(self.random.integers(1, INCARNATIONS)), self._on_command)
@@ -117,8 +118,11 @@ class CentralRobot(Controller):
             case ScanRequest():
                 return self._scan(command)
             case Deploy(cycle, bearing_rad, hop_m, clear_m):
+                self._left = self.motion.position
                 return self._drive(cycle, deploy(self.motion, bearing_rad, hop_m, clear_m, lambda: self._clear(cycle)))
             case Move(cycle, bearing_rad, hop_m, landmarks):
+                if hop_m > 0.0:
+                    self._left = self.motion.position
                 return self._drive(cycle, move(self.motion, bearing_rad, hop_m, landmarks))
             case Correct(cycle, anchors):
                 return self._drive(cycle, correct(self.motion, anchors))
@@ -139,7 +143,8 @@ class CentralRobot(Controller):
         result = yield from drive
         self.motion.settle()
         seen = result.used_odometry, result.used_moving_landmarks
-        self.commands.answer(Arrived(cycle, result.ok, *seen, result.driven_m, result.touched))
+        way_m = math.dist(self._left, self.motion.position)
+        self.commands.answer(Arrived(cycle, result.ok, *seen, result.driven_m, result.touched, way_m))
 
     def _walk(self, cycle: int, walk: DriveToWalk) -> Drive:
         """Drive to a wall or along it, and answer with the result."""

@@ -105,7 +105,10 @@ class PushExecution:
         anchors = [slots.occupant[each] for each in plan.anchors if each in slots.occupant]
         if arrived and anchors:
             back = plan.direction + math.pi - slots.heading[leader]
-            yield from self.correct(leader, [(each, back) for each in anchors])
+            there_now = yield from self.correct(leader, [(each, back) for each in anchors])
+            slot = slots.slot_of().get(leader)
+            if there_now is not None and slot is not None:
+                slots.note_way(plan.mover, slot, there_now.way_m, False)
         return (*followers, leader)
 
     def prepare(self, plan: Plan) -> Routine[None]:
@@ -237,11 +240,13 @@ class PushExecution:
         """
         slots = self._slots
         for robot, slot in zip(followers, going, strict=True):
-            back = slots.direction(slot, rear)
-            by_odometry = robot in arrived and arrived[robot].used_odometry
+            back, there = slots.direction(slot, rear), arrived.get(robot)
+            by_odometry = there is not None and there.used_odometry
             # Walls, and not the range of sight, determine a distance that was measured.
             if by_odometry and (slot, rear) not in slots.length_m and rear in slots.occupant and back is not None:
-                yield from self.correct(robot, [(slots.occupant[rear], back - slots.heading[robot])])
+                there = yield from self.correct(robot, [(slots.occupant[rear], back - slots.heading[robot])])
+            if there is not None:
+                slots.note_way(rear, slot, there.way_m, by_odometry)
             rear = slot
 
     def _home_again(
@@ -297,11 +302,11 @@ class PushExecution:
             self._slots.add(robot)
         return (robot,)
 
-    def correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Routine[None]:
-        """Correct a robot's scale by anchors with their approximate bearings [rad]."""
+    def correct(self, robot: int, anchors: Sequence[tuple[int, float]]) -> Routine[Arrived | None]:
+        """Correct a robot's scale by anchors with their approximate bearings [rad]; return its arrival unless it is dead."""
         sightings = tuple(Sighting(node, wrapped(there)) for node, there in anchors)
         self._mailbox.send(robot, Correct(self.cycle, sightings), drive=True)
-        yield from self._arrivals([robot])
+        return (yield from self._arrivals([robot])).get(robot)
 
     def _arrivals(self, robots: Collection[int]) -> Routine[dict[int, Arrived]]:
         """Wait until robots have arrived or are given up."""

@@ -15,6 +15,7 @@ from itertools import pairwise
 from operator import itemgetter
 
 from zwerm.agents.sensor_coverage.frontier.directions import (
+    DISPLACED_M_MIN,
     Reference,
     add_wall,
     is_displaced,
@@ -58,6 +59,7 @@ class Slots:
         self.near: dict[int, list[NearArc]] = {}
         self.walks: list[Walk] = []
         self.length_m: dict[tuple[int, int], float] = {}
+        self._way_m: dict[tuple[int, int], float] = {}  # driven from slot to slot, at the last time
         self.frame: dict[int, int] = {}
         self._heading_readings: dict[int, int] = {}
         self._reference: dict[int, dict[int, Reference]] = {}  # by the slot that sees, then by the slot that it sees
@@ -261,6 +263,20 @@ class Slots:
         if displaced:
             self._displaced |= displaced
             self._forget_walls(displaced)
+
+    def note_way(self, start: int, end: int, way_m: float, by_odometry: bool) -> None:
+        """Note the distance [m] that a robot drove from slot to slot.
+
+        If it differs from what a former robot drove, the robot stands elsewhere: what former robots saw of walls closes nothing
+        there. So it may if it found its place by odometry, where nobody drove before. Attempts at its arcs are not counted
+        anew: where robots die one after the other, they had no end.
+        """
+        known = self._way_m.get((start, end), self.length_m.get((start, end)))
+        if by_odometry if known is None else abs(known - way_m) > DISPLACED_M_MIN:
+            seen = any(end in point.seen for walk in self.walks for point in walk.points)
+            if seen or self.near.get(end):
+                self._forget_walls({end: None})
+        self._way_m[start, end] = way_m
 
     def _forget_walls(self, slots: Mapping[int, None]) -> None:
         """Forget what was seen from these slots of robots that followed walls."""

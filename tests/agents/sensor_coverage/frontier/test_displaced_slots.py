@@ -69,3 +69,34 @@ def test_a_robot_that_stands_less_than_a_body_beside_its_slot_is_not_displaced()
     slots.learn_references(views(FAR_OFF))
     assert slots.take_displaced() == ()
     assert slots.direction(0, 1) == pytest.approx(EAST + FAR_OFF)
+
+
+@pytest.mark.parametrize(
+    ("ways_m", "remains"),
+    [
+        pytest.param((0.5, 0.45), True, id="as far as the first robot"),
+        pytest.param((0.5, 0.7), False, id="farther, in the same direction"),
+        pytest.param((0.5,), True, id="the first robot of the slot"),
+    ],
+)
+def test_a_slot_is_displaced_along_a_line_of_sight(ways_m: tuple[float, ...], remains: bool) -> None:
+    """Bearings do not show it: the robots that the slot sees are all in one line with it."""
+    slots = three_slots()
+    for number, way_m in enumerate(ways_m):
+        slots.note_way(0, 1, way_m, by_odometry=number > 0)
+    assert (1 in slots.near) is remains
+    assert slots.take_displaced() == (), "attempts are not counted anew"
+
+
+def test_a_robot_that_drove_as_far_as_was_measured_stands_at_its_slot() -> None:
+    slots = three_slots()
+    slots.length_m[0, 1] = 0.5
+    slots.note_way(0, 1, 0.5, by_odometry=True)
+    assert 1 in slots.near
+
+
+def test_a_slot_to_which_nobody_drove_before_may_be_displaced() -> None:
+    slots = three_slots()
+    slots.note_way(0, 1, 0.5, by_odometry=True)
+    assert 1 not in slots.near
+    assert [tuple(each.seen) for each in slots.walks[0].points] == [(0,), (0,)]
