@@ -121,7 +121,7 @@ class CentralRobot(Controller):
                 self._left = self.motion.position
                 return self._drive(cycle, deploy(self.motion, bearing_rad, hop_m, clear_m, lambda: self._clear(cycle)))
             case Move(cycle, bearing_rad, hop_m, landmarks):
-                if hop_m > 0.0:
+                if hop_m > 0.0:  # else it homes again at its slot
                     self._left = self.motion.position
                 return self._drive(cycle, move(self.motion, bearing_rad, hop_m, landmarks))
             case Correct(cycle, anchors):

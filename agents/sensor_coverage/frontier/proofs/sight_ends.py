@@ -77,6 +77,12 @@ def shortened(near: Iterable[NearArc]) -> list[Arc]:
     ]
 
 
+def with_islands(opened: list[Arc], closed: Iterable[Arc]) -> list[Arc]:
+    """Return the open arcs with the islands: arcs that nothing of `closed` contains, and beside which nothing is open."""
+    islands = [each for each in complement(closed) if not any(overlap(each, arc) > 0.0 for arc in opened)]
+    return [*opened, *islands]
+
+
 def _outside(arc: Arc, cut: Arc) -> Iterator[Arc]:
     """Yield the parts of an arc outside another one, which is narrower than a turn."""
     off = (cut.start_rad - arc.start_rad) % math.tau
@@ -86,9 +92,3 @@ def _outside(arc: Arc, cut: Arc) -> Iterator[Arc]:
         yield Arc(arc.start_rad + low, min(off, arc.width_rad) - low)
     if off + cut.width_rad < arc.width_rad:
         yield Arc(arc.start_rad + off + cut.width_rad, arc.width_rad - off - cut.width_rad)
-
-
-def with_islands(opened: list[Arc], closed: Iterable[Arc]) -> list[Arc]:
-    """Return the open arcs with the islands: arcs that nothing of `closed` contains, and beside which nothing is open."""
-    islands = [each for each in complement(closed) if not any(overlap(each, arc) > 0.0 for arc in opened)]
-    return [*opened, *islands]
