@@ -58,12 +58,22 @@ def refined_reference(known: Reference | None, there_rad: float, back_rad: float
 
 
 def is_displaced(known: Reference | None, there_rad: float, back_rad: float, distance_m: float) -> bool:
-    """Return whether a reading from both ends shows that a robot at one of them stands elsewhere than at earlier readings.
+    """Return whether a reading from both ends is far off earlier ones: a robot at one of them stands at another place.
 
     `distance_m` is the distance of the slots [m], infinite if it is not known.
     """
     off = 0.0 if known is None else _off_rad(known[0], _reading(there_rad, back_rad))
     return off > REFERENCE_OFF_RAD and distance_m * math.sin(min(off, math.pi / 2.0)) > DISPLACED_M_MIN
+
+
+def is_beside(known: Reference | None, there_rad: float, back_rad: float, distance_m: float) -> bool:
+    """Return whether a reading from both ends shows that a robot at one of them stands beside the place of earlier readings.
+
+    `distance_m` is the distance of the slots [m], infinite if it is not known: then nothing shows it. A new robot's reading
+    differs from earlier ones by less than 3.5 degrees in 95 of 100 cases, with a noise of 2.5 degrees.
+    """
+    off = 0.0 if known is None else _off_rad(known[0], _reading(there_rad, back_rad))
+    return math.isfinite(distance_m) and distance_m * math.sin(min(off, math.pi / 2.0)) > DISPLACED_M_MIN
 
 
 def _off_rad(mean: complex, now: complex) -> float:

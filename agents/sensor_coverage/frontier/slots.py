@@ -18,6 +18,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import (
     DISPLACED_M_MIN,
     Reference,
     add_wall,
+    is_beside,
     is_displaced,
     refined_heading,
     refined_reference,
@@ -244,7 +245,8 @@ class Slots:
     def learn_references(self, views: Mapping[int, Mapping[int, float]]) -> None:
         """Refine the reference directions of all slots that see each other.
 
-        If one is off, the new occupants of its slots stand elsewhere. What former ones saw of walls closes nothing there.
+        If one is off, the new occupants of its slots stand elsewhere. What former ones saw of walls closes nothing there. A
+        robot beside its slot sees walls close by in other directions: then they are forgotten, and those farther off are not.
         """
         displaced: dict[int, None] = {}
         for a, seen in views.items():
@@ -254,15 +256,23 @@ class Slots:
                     continue
                 known = self._reference.get(a, {}).get(b)
                 before, now = self._readers.get((a, b)), (self.occupant.get(a), self.occupant.get(b))
-                length = self.length_m.get((a, b), math.inf)
-                if before is not None and is_displaced(known, there, back, length):
+                if before is not None:
                     new = [slot for slot, was, is_ in zip((a, b), before, now, strict=True) if was != is_]
-                    displaced |= dict.fromkeys(new or (a, b))
+                    if is_displaced(known, there, back, self.length_m.get((a, b), math.inf)):
+                        displaced |= dict.fromkeys(new or (a, b))
+                    elif is_beside(known, there, back, self._distance_m(a, b)):
+                        for slot in new:
+                            self.near.pop(slot, None)
                 self._readers[a, b] = now
                 self._refer(a, b, refined_reference(known, there, back))
         if displaced:
             self._displaced |= displaced
             self._forget_walls(displaced)
+
+    def _distance_m(self, a: int, b: int) -> float:
+        """Return the distance [m] of two slots as it was measured or driven last, or infinity."""
+        known = self.length_m.get((a, b)) or self._way_m.get((a, b)) or self._way_m.get((b, a))
+        return math.inf if known is None else known
 
     def note_way(self, start: int, end: int, way_m: float, by_odometry: bool) -> None:
         """Note the distance [m] that a robot drove from slot to slot.

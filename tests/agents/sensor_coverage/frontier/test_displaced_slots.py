@@ -100,3 +100,15 @@ def test_a_slot_to_which_nobody_drove_before_may_be_displaced() -> None:
     slots.note_way(0, 1, 0.5, by_odometry=True)
     assert 1 not in slots.near
     assert [tuple(each.seen) for each in slots.walks[0].points] == [(0,), (0,)]
+
+
+@pytest.mark.parametrize(("off_deg", "remains"), [(12.0, False), (5.0, True)])
+def test_walls_close_by_are_forgotten_where_a_new_robot_stands_beside_its_slot(off_deg: float, remains: bool) -> None:
+    slots = three_slots()
+    walks = slots.walks
+    slots.note_way(0, 1, 0.9, by_odometry=False)
+    slots.occupant[1] = 13
+    slots.learn_references(views(math.radians(off_deg)))
+    assert (1 in slots.near) is remains
+    assert slots.walks is walks, "walls farther off are seen in nearly the same directions"
+    assert slots.take_displaced() == ()
