@@ -317,8 +317,9 @@ class Slots:
             seen = any(end in point.seen for walk in self.walks for point in walk.points)
             if seen or self.near.get(end):
                 self._forget_walls({end: None})
-        self._way_m[start, end] = way_m
-        self._places = None
+        if known is None or not by_odometry:  # else it went as far as it was sent, or something stopped it
+            self._way_m[start, end] = way_m
+            self._places = None
 
     def _forget_walls(self, slots: Mapping[int, None]) -> None:
         """Forget what was seen from these slots of robots that followed walls."""
