@@ -9,7 +9,7 @@ there.
 An obstacle that lies within one triangle is not found. The triangle's sides are at most r_v long.
 
 A triangle of two slots and a point of a walk counts only if the space beyond its sides is proved, too: two such triangles
-with different points may cross, and each slot would rely on the other's (`fan_of`).
+with different points may cross, and each slot would rely on the other's (`frontier.fans`).
 
 Walks are remembered in directions from the slots that saw them. What a slot closed together with others counts while
 these stand.
@@ -24,6 +24,9 @@ from zwerm.maths.sums import added
 # An open arc narrower than this [rad] counts as closed: ends of arcs that join differ by less. An opening that a robot sees
 # along the wall may be 2 degrees wide, as a door of 0.25 m is at 0.6 m from a robot in touch with its wall.
 GAP_RAD: Final = math.radians(1.5)
+# An angle of 180 degrees less this [rad] or more between two robots closes nothing: noise decides on which side it is. Bearings
+# of standing robots are averaged.
+FLAT_RAD: Final = math.radians(3.0)
 # A wall in touch with a standing robot closes this angle [rad] on both sides of its direction.
 TOUCH_RAD: Final = math.radians(45.0)
 # The touched wall lies within this angle [rad] of the direction: half a switch.
@@ -276,6 +279,14 @@ def arc_between(a_rad: float, b_rad: float) -> Arc:
     return Arc(a_rad, off) if off >= 0.0 else Arc(b_rad, -off)
 
 
+def arcs_of_triangles(directions: Iterable[tuple[float, float]]) -> Iterator[Arc]:
+    """Yield the arcs at a slot between the directions [rad] of the two other robots of triangles, except of flat ones."""
+    for a, b in directions:
+        arc = arc_between(a, b)
+        if arc.width_rad < math.pi - FLAT_RAD:
+            yield arc
+
+
 def united(arcs: Iterable[Arc]) -> list[Arc]:
     """Return disjoint arcs that contain the same directions. Arcs that are apart by less than a hair become one."""
     found: list[Arc] = []
@@ -323,78 +334,7 @@ def complement(arcs: Iterable[Arc]) -> list[Arc]:
     return found
 
 
-# --- triangles of two slots and a point of a walk ---------------------------------------------------------------------
-
-Pair = tuple[int, int]
-# By slot and side of a point (+1 left, -1 right): whether the directions beyond the line of sight to the point are closed.
-Beyond = Mapping[tuple[int, int], bool]
-
-
-def fan_of(
-    point: WalkPoint,
-    views: Mapping[int, Mapping[int, float]],
-    neighbours: Mapping[int, Collection[int]],
-    at_walls: Beyond,
-    without: Collection[Pair] = (),
-) -> tuple[Pair, ...]:
-    """Return (slot, other slot) for each triangle with a point that counts at the slot: the space beyond it is proved at both.
-
-    Beyond the line of sight from a slot to the point there must be a wall that was followed (`at_walls`), or another such
-    triangle with the same point, or a triangle of robots that contains the point. A wall in touch with a slot counts here
-    in the direction of the contact only: two robots may touch the ends of walls on both sides of a door. A triangle in
-    `without` does not count at its first slot. Without these all count at both.
-    """
-    seen = [slot for slot in point.seen if slot in neighbours]
-    pairs = [(a, b) for a in seen for b in seen if b in neighbours[a] and (a, b) not in without]
-    if not pairs:
-        return ()
-    closed = {(slot, side): at_walls.get((slot, side), False) for slot in seen for side in (1, -1)}
-    for slot in seen:
-        if not (closed[slot, 1] and closed[slot, -1]) and _is_inside(slot, point, seen, views, neighbours):
-            closed[slot, 1] = closed[slot, -1] = True
-    sides = {(a, b): side_of(point, a, views[a][b]) for pair in pairs for a, b in (pair, pair[::-1])}
-    while True:
-        beyond = {(a, sides[a, b]) for a, b in pairs}
-        kept = [
-            pair
-            for pair in pairs
-            if all(closed[a, -sides[a, b]] or (a, -sides[a, b]) in beyond for a, b in (pair, pair[::-1]))
-        ]
-        if len(kept) == len(pairs):
-            return tuple(kept)
-        pairs = kept
-
-
-def side_of(point: WalkPoint, slot: int, direction: float) -> int:
-    """Return +1 if a direction [rad] from a slot is to the left of a point, else -1."""
-    return 1 if math.remainder(direction - point.seen[slot], math.tau) > 0.0 else -1
-
-
 def ends_at(arcs: Iterable[Arc], there: float, side: int) -> bool:
     """Return whether one of these arcs contains the directions on one side of a direction [rad]."""
     beside = there + side * BESIDE_RAD
     return any((beside - start) % math.tau < width for start, width in arcs)
-
-
-def _is_inside(
-    slot: int,
-    point: WalkPoint,
-    seen: Iterable[int],
-    views: Mapping[int, Mapping[int, float]],
-    neighbours: Mapping[int, Collection[int]],
-) -> bool:
-    """Return whether a triangle of this slot and two others contains a point. One of these sees the point."""
-    return any(
-        _between(point.seen[slot], views[slot][a], views[slot][b])
-        and _between(point.seen[a], views[a][slot], views[a][b])
-        for a in seen
-        if a in neighbours[slot]
-        for b in neighbours[slot]
-        if b in neighbours[a]
-    )
-
-
-def _between(there: float, a: float, b: float) -> bool:
-    """Return whether a direction [rad] lies within the smaller angle between two others."""
-    left, right = math.remainder(a - there, math.tau), math.remainder(b - there, math.tau)
-    return left * right < 0.0 and abs(left) + abs(right) < math.pi

@@ -11,7 +11,8 @@ from collections.abc import Collection, Mapping
 from operator import itemgetter
 from typing import Final
 
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Beyond, Pair, WalkPoint, arc_between, fan_of
+from zwerm.agents.sensor_coverage.frontier.fans import Beyond, Pair, fan_of
+from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, arc_between
 
 # A point of a walk lies within a triangle's angle only if it is this far from its sides: bearings have noise.
 HIDDEN_MIN_RAD: Final = math.radians(2.0)

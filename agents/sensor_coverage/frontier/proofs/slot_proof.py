@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Final
 
+from zwerm.agents.sensor_coverage.frontier.fans import fan_of, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.chosen_triangles import ChosenTriangles
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_arcs import WalkArcs
@@ -18,11 +19,10 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     arc_between,
     arcs_of_robots,
     arcs_of_step,
+    arcs_of_triangles,
     arcs_of_walls,
     complement,
     ends_at,
-    fan_of,
-    side_of,
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc, WalkTriangle
@@ -79,7 +79,7 @@ class SlotProof:
         self._by_view = list(arcs_of_robots(bodies, touched))
         for triangle in scan.complex_.triangles_at(slot):
             a, b = (each for each in triangle if each != slot)
-            self._by_view.append(arc_between(view[a], view[b]))
+            self._by_view += arcs_of_triangles([(view[a], view[b])])
 
     def open_arcs(self) -> list[Arc]:
         """Return the arcs that nothing closes."""

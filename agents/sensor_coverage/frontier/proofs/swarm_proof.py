@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Final, NamedTuple
 
+from zwerm.agents.sensor_coverage.frontier.fans import Pair, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
 from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import (
@@ -32,19 +33,18 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     Arc,
     NearArc,
-    Pair,
     SeenPoint,
     TouchCounter,
     Walk,
     WalkPoint,
     arc_between,
     arcs_of_robots,
+    arcs_of_triangles,
     arcs_of_walls,
     complement,
     ends_at,
     overlap,
     point_before,
-    side_of,
     united,
 )
 from zwerm.maths.simplicial import FlagComplex
@@ -243,8 +243,8 @@ class SwarmProof:
         """Return the arcs of a slot that triangles of robots and robots in touch close."""
         view, beside = self._scan.views[slot], self._neighbours[slot]
         _, _, touched, _, robots = self._around[slot]
-        bodies = list(arcs_of_robots([view[each] for each in robots], touched))
-        return bodies + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
+        pairs = ((view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b)
+        return [*arcs_of_robots([view[each] for each in robots], touched), *arcs_of_triangles(pairs)]
 
     def _choose(self, pair: Pair) -> dict[int, int]:
         """Return the number of the point of the triangle on each side of an edge: the one that closes most at both ends.

@@ -6,8 +6,9 @@ from itertools import pairwise
 
 import pytest
 
+from zwerm.agents.sensor_coverage.frontier.fans import Pair, fan_of
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import HIDDEN_MIN_RAD, PointTriangles
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Pair, WalkPoint, arc_between, fan_of
+from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, arc_between
 
 POINTS = 40
 Views = dict[int, dict[int, float]]
