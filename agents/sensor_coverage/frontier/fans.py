@@ -7,8 +7,8 @@ from typing import Final
 from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint
 
 # A triangle with an angle of 180 degrees less this [rad] or more is flat. A point of a walk is seen once, with the noise of a
-# bearing, which is 2.5 degrees in most of our runs.
-POINT_FLAT_RAD: Final = math.radians(8.0)
+# bearing: 2.5 degrees in most runs.
+FLAT_RAD: Final = math.radians(5.0)
 
 Pair = tuple[int, int]
 # By slot and side of a point (+1 left, -1 right): whether the directions beyond the line of sight to the point are closed.
@@ -58,7 +58,7 @@ def fan_of(
 def _is_flat(point: WalkPoint, views: Mapping[int, Mapping[int, float]], a: int, b: int) -> bool:
     """Return whether the angle at one of two slots is nearly 180 degrees: noise decides on which side the triangle is."""
     return any(
-        abs(math.remainder(views[slot][other] - point.seen[slot], math.tau)) > math.pi - POINT_FLAT_RAD
+        abs(math.remainder(views[slot][other] - point.seen[slot], math.tau)) > math.pi - FLAT_RAD
         for slot, other in ((a, b), (b, a))
     )
 

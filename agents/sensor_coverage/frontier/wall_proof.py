@@ -24,9 +24,6 @@ from zwerm.maths.sums import added
 # An open arc narrower than this [rad] counts as closed: ends of arcs that join differ by less. An opening that a robot sees
 # along the wall may be 2 degrees wide, as a door of 0.25 m is at 0.6 m from a robot in touch with its wall.
 GAP_RAD: Final = math.radians(1.5)
-# An angle of 180 degrees less this [rad] or more between two robots closes nothing: noise decides on which side it is. Bearings
-# of standing robots are averaged.
-FLAT_RAD: Final = math.radians(3.0)
 # A wall in touch with a standing robot closes this angle [rad] on both sides of its direction.
 TOUCH_RAD: Final = math.radians(45.0)
 # The touched wall lies within this angle [rad] of the direction: half a switch.
@@ -277,14 +274,6 @@ def arc_between(a_rad: float, b_rad: float) -> Arc:
     """Return the smaller arc between two directions [rad]."""
     off = math.remainder(b_rad - a_rad, math.tau)
     return Arc(a_rad, off) if off >= 0.0 else Arc(b_rad, -off)
-
-
-def arcs_of_triangles(directions: Iterable[tuple[float, float]]) -> Iterator[Arc]:
-    """Yield the arcs at a slot between the directions [rad] of the two other robots of triangles, except of flat ones."""
-    for a, b in directions:
-        arc = arc_between(a, b)
-        if arc.width_rad < math.pi - FLAT_RAD:
-            yield arc
 
 
 def united(arcs: Iterable[Arc]) -> list[Arc]:

@@ -19,7 +19,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     arc_between,
     arcs_of_robots,
     arcs_of_step,
-    arcs_of_triangles,
     arcs_of_walls,
     complement,
     ends_at,
@@ -79,7 +78,7 @@ class SlotProof:
         self._by_view = list(arcs_of_robots(bodies, touched))
         for triangle in scan.complex_.triangles_at(slot):
             a, b = (each for each in triangle if each != slot)
-            self._by_view += arcs_of_triangles([(view[a], view[b])])
+            self._by_view.append(arc_between(view[a], view[b]))
 
     def open_arcs(self) -> list[Arc]:
         """Return the arcs that nothing closes."""

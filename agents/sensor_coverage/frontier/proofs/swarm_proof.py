@@ -39,7 +39,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     WalkPoint,
     arc_between,
     arcs_of_robots,
-    arcs_of_triangles,
     arcs_of_walls,
     complement,
     ends_at,
@@ -243,8 +242,8 @@ class SwarmProof:
         """Return the arcs of a slot that triangles of robots and robots in touch close."""
         view, beside = self._scan.views[slot], self._neighbours[slot]
         _, _, touched, _, robots = self._around[slot]
-        pairs = ((view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b)
-        return [*arcs_of_robots([view[each] for each in robots], touched), *arcs_of_triangles(pairs)]
+        bodies = list(arcs_of_robots([view[each] for each in robots], touched))
+        return bodies + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
 
     def _choose(self, pair: Pair) -> dict[int, int]:
         """Return the number of the point of the triangle on each side of an edge: the one that closes most at both ends.

@@ -1,14 +1,14 @@
-"""A triangle with an angle of nearly 180 degrees closes nothing: noise decides on which side of the slot it is."""
+"""A triangle with a point whose angle is nearly 180 degrees closes nothing: noise decides on which side it is."""
 
 import math
 
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.fans import fan_of
-from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, arcs_of_triangles
+from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint
 
 
-@pytest.mark.parametrize(("angle_deg", "counts"), [(160.0, True), (171.0, True), (175.0, False), (-179.0, False)])
+@pytest.mark.parametrize(("angle_deg", "counts"), [(160.0, True), (174.0, True), (177.0, False), (-179.0, False)])
 def test_a_flat_triangle_with_a_point_of_a_walk_counts_at_no_slot(angle_deg: float, counts: bool) -> None:
     """Slot 0 sees slot 1 in the east and the point nearly in the west, as slot 26 did beside the mouth of a passage."""
     views = {0: {1: 0.0}, 1: {0: math.pi}}
@@ -16,11 +16,3 @@ def test_a_flat_triangle_with_a_point_of_a_walk_counts_at_no_slot(angle_deg: flo
     point = WalkPoint({0: math.radians(angle_deg), 1: math.pi - math.copysign(0.05, angle_deg)}, (), ())
     walls_beyond = {(slot, side): True for slot in (0, 1) for side in (1, -1)}
     assert fan_of(point, views, neighbours, walls_beyond) == (((0, 1), (1, 0)) if counts else ())
-
-
-def test_a_flat_triangle_of_robots_closes_nothing() -> None:
-    """A robot on the line between two others, with errors of the bearings to either side."""
-    arcs = [list(arcs_of_triangles([(0.0, math.radians(each))])) for each in (120.0, 176.0, 179.0, -179.0, -176.0)]
-    assert [len(each) for each in arcs] == [1, 1, 0, 0, 1]
-    assert arcs[0][0].width_rad == pytest.approx(math.radians(120.0))
-    assert list(arcs_of_triangles([])) == []
