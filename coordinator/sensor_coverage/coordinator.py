@@ -28,7 +28,6 @@ from zwerm.coordinator.sensor_coverage.command_mailbox import (
 )
 from zwerm.coordinator.sensor_coverage.complex_reports import encoded_complex
 from zwerm.coordinator.sensor_coverage.leave_requests import LeaveRequests
-from zwerm.coordinator.sensor_coverage.places import places
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
 from zwerm.coordinator.sensor_coverage.quiescence import COVERED, GIVEN_UP, QuiescenceDetector, ScanSchedule
 from zwerm.coordinator.sensor_coverage.relative_homology import RelativeHomology
@@ -81,7 +80,7 @@ class SensorCoverageCoordinator:
     def __init__(self, setup: SensorCoverageSetup) -> None:
         parameters: PlannerParameters = msgspec.convert(setup.parameters, PlannerParameters)
         self.parameters = parameters
-        self.slots = Slots(places)
+        self.slots = Slots()
         incarnation = int(stream(setup.stream_key).integers(1, INCARNATIONS))
         self.mailbox = CommandMailbox(setup.dt_s, incarnation, parameters.survey_ticks_max, parameters.drive_ticks_max)
         self.sources = Sources(setup.bases, self.slots, self.mailbox)
@@ -346,11 +345,12 @@ class SensorCoverageCoordinator:
     def _assign(self) -> tuple[Plan, ...]:
         services = self.services
         self.redundant = tuple(slot for slot in self.redundant if slot in self.slots.occupant)
+        shut = self.scan.bases  # a station does not move
         redundant = (*self.redundant, *self.walking.idle)
         sources = dict.fromkeys(self.sources.available(), 0.0) | dict.fromkeys(redundant, REDUNDANT_COST)
 
         def find_routes(complex_: FlagComplex, sources: Mapping[int, float]) -> CheapestRoutes:
-            return services.paths.routes(complex_, sources, services.frontier.obstacle, self.scan.bases)
+            return services.paths.routes(complex_, sources, services.frontier.obstacle, shut)
 
         return services.assignment.assign(services.frontier.plans(), self.pushing.scan, sources, find_routes)
 
@@ -378,8 +378,7 @@ class SensorCoverageCoordinator:
         return "source-blocked" if alone else "cut-off"
 
     def _reconsider_outcome(self) -> Routine[None]:
-        """Continue if stations may be silent by loss, if walls can be tried again, or until `watch_until_s`."""
-        self.outcome = "" if self.outcome == "unproven" and self.walls.begin_again() else self.outcome
+        """Continue if silent stations may be a first loss, or if `watch_until_s` has not passed."""
         if self.outcome == "source-lost" and self.mailbox.suspect_loss():
             self.outcome = ""
             for slot, base in self.sources.stations.items():

@@ -33,11 +33,6 @@ FAILURES_MAX: Final = {"paper": 1, "followed": 2}
 # Times that a robot is recalled which sees no robot of the part of the swarm with a station.
 RECALLS_MAX: Final = 2
 
-# A hop to a slot at the same place [m]: a hop of no length means to home again.
-SHORT_M: Final = 0.01
-# A distance that is shorter than a hop by this [m] is not that of two robots at the range of sight.
-HOP_SHORT_M: Final = 0.1
-
 # Robots that have moved.
 Moved = Sequence[int]
 
@@ -86,7 +81,8 @@ class PushExecution:
                 return ()
             if arrived[robot].ok:
                 del self._sources.waiting[base]
-                yield from self._settle_new(robot, base, bearing)
+                self._slots.add(robot)
+                yield from self.correct(robot, [(self._slots.occupant[base], bearing + math.pi)])
                 return (robot,)
         self._sources.blocked[base] = None
         return ()
@@ -140,15 +136,9 @@ class PushExecution:
         del self._sources.waiting[base]
         if robot in arrived:
             self.pushes += 1
-            yield from self._settle_new(robot, base, plan.direction - heading)
+            slots.add(robot)
+            yield from self.correct(robot, [(slots.occupant[base], plan.direction + math.pi - heading)])
         return (robot,)
-
-    def _settle_new(self, robot: int, base: int, bearing: float) -> Routine[None]:
-        """Give a robot a slot that came from a station along a bearing [rad], and correct its distance."""
-        slot = self._slots.add(robot)
-        there = yield from self.correct(robot, [(self._slots.occupant[base], bearing + math.pi)])
-        if there is not None:
-            self._slots.note_way(base, slot, there.way_m, False)
 
     def close_up(self, plan: Plan, leader: int, there: bool) -> Routine[tuple[list[int], bool] | None]:
         """Move the robots behind the leader up by one slot, and give the leader a new slot.
@@ -214,7 +204,7 @@ class PushExecution:
         for robot, origin, goal in zip(robots, origins, goals, strict=True):
             heading = slots.heading[robot]
             direction = slots.direction(origin, goal)
-            hop_m = self._distance_m(origin, goal)
+            hop_m = slots.length_m.get((origin, goal), self._parameters.hop_m)
             if direction is None:
                 direction, hop_m = 0.0, 0.0
             landmarks = landmarks_for_move(
@@ -226,12 +216,6 @@ class PushExecution:
                 station=origin if origin in bases else None,
             )
             self._mailbox.send(robot, Move(self.cycle, wrapped(direction - heading), hop_m, landmarks), drive=True)
-
-    def _distance_m(self, a: int, b: int) -> float:
-        """Return the distance [m] of two slots: a hop, unless it is known to be shorter. The paper's robots drive hops."""
-        hop_m, known_m = self._parameters.hop_m, self._slots.distance_m(a, b)
-        is_hop = self._parameters.walls == "paper" or known_m is None or known_m > hop_m - HOP_SHORT_M
-        return hop_m if is_hop or known_m is None else max(known_m, SHORT_M)
 
     def _without_lost(
         self, followers: Sequence[int], going: Sequence[int], arrived: Mapping[int, Arrived]
@@ -258,9 +242,8 @@ class PushExecution:
         for robot, slot in zip(followers, going, strict=True):
             back, there = slots.direction(slot, rear), arrived.get(robot)
             by_odometry = there is not None and there.used_odometry
-            # Walls, and not the range of sight, determine a distance shorter than a hop.
-            is_hop = self._distance_m(rear, slot) == self._parameters.hop_m
-            if by_odometry and is_hop and rear in slots.occupant and back is not None:
+            # Walls, and not the range of sight, determine a distance that was measured.
+            if by_odometry and (slot, rear) not in slots.length_m and rear in slots.occupant and back is not None:
                 there = yield from self.correct(robot, [(slots.occupant[rear], back - slots.heading[robot])])
             if there is not None:
                 slots.note_way(rear, slot, there.way_m, by_odometry)

@@ -2,7 +2,7 @@
 
 A slot outlives its robots: a push moves robots, not slots. Directions are in the frame of a base station. A robot's
 bearings are turned into that frame by its heading. Headings come from reciprocal bearings alone, because the bearing
-from a to b and the bearing from b to a are opposite. Distances are those that robots drove between slots, by odometry.
+from a to b and the bearing from b to a are opposite. There are no positions and no distances.
 
 The rotation between the frames of two stations is unknown until their robots see each other. So each heading is in the
 frame of one robot, at first the robot's own. Two frames that meet become one.
@@ -10,18 +10,16 @@ frame of one robot, at first the robot's own. Two frames that meet become one.
 
 import cmath
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from operator import itemgetter
 
 from zwerm.agents.sensor_coverage.frontier.directions import (
     DISPLACED_M_MIN,
-    OFF_RAD_MIN,
     Reference,
     add_wall,
     is_beside,
     is_displaced,
-    off_rad,
     refined_heading,
     refined_reference,
 )
@@ -39,8 +37,6 @@ from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 # Length [m] of a leg of a walk that the next leg repeats, so that the wall between them is one stretch.
 JOINED_M = 1.0
 
-FindPlaces = Callable[[Mapping[tuple[int, int], complex], Mapping[tuple[int, int], float]], Mapping[int, complex]]
-
 
 class Slots:
     """Slots by number, and what is remembered of each. The first slots are those of the base stations.
@@ -51,12 +47,9 @@ class Slots:
     touches where it stands: another occupant may stand beside an opening. `near` has the arcs in which a wall close to a slot
     was followed. `walks` are the walls that robots followed. `length_m` has the distances [m] between slots that are not a hop
     apart.
-
-    `find_places` finds the places of slots, as complex numbers [m], from the directions between them as unit vectors, and from
-    the known distances [m], both by pairs of slots.
     """
 
-    def __init__(self, find_places: FindPlaces = lambda directions, driven_m: {}) -> None:
+    def __init__(self) -> None:
         self.occupant: dict[int, int] = {}
         self.heading: dict[int, float] = {}
         self.view: dict[int, dict[int, float]] = {}
@@ -75,8 +68,6 @@ class Slots:
             tuple[int, int], tuple[int | None, int | None]
         ] = {}  # the robots at both, at the last reading
         self._displaced: dict[int, None] = {}
-        self._find_places = find_places
-        self._places: Mapping[int, complex] | None = None  # None: not computed since the last change
         self._next = 0
 
     # --- slots and occupants ----------------------------------------------------------------------------------------
@@ -258,7 +249,6 @@ class Slots:
         robot beside its slot sees walls close by in other directions: then they are forgotten, and those farther off are not.
         """
         displaced: dict[int, None] = {}
-        self._places = None
         for a, seen in views.items():
             for b, there in seen.items():
                 back = views.get(b, {}).get(a)
@@ -266,12 +256,11 @@ class Slots:
                     continue
                 known = self._reference.get(a, {}).get(b)
                 before, now = self._readers.get((a, b)), (self.occupant.get(a), self.occupant.get(b))
-                if before is not None and off_rad(known, there, back) > OFF_RAD_MIN:
-                    away_m = self.distance_m(a, b)
+                if before is not None:
                     new = [slot for slot, was, is_ in zip((a, b), before, now, strict=True) if was != is_]
-                    if is_displaced(known, there, back, math.inf if away_m is None else away_m):
+                    if is_displaced(known, there, back, self.length_m.get((a, b), math.inf)):
                         displaced |= dict.fromkeys(new or (a, b))
-                    elif away_m is not None and is_beside(known, there, back, away_m):
+                    elif is_beside(known, there, back, self._distance_m(a, b)):
                         for slot in new:
                             self.near.pop(slot, None)
                 self._readers[a, b] = now
@@ -280,30 +269,10 @@ class Slots:
             self._displaced |= displaced
             self._forget_walls(displaced)
 
-    def distance_m(self, a: int, b: int) -> float | None:
-        """Return the distance [m] of two slots as a robot drove it last, as it was measured, or by their places, or None.
-
-        The places are those that agree best with all directions and with the distances that were driven.
-        """
-        known = self._driven_m(a, b)
-        if known is not None or b not in self._reference.get(a, {}):
-            return known
-        places = self._places = self._found_places() if self._places is None else self._places
-        return abs(places[a] - places[b]) if a in places and b in places else None
-
-    def _driven_m(self, a: int, b: int) -> float | None:
-        return self._way_m.get((a, b), self._way_m.get((b, a), self.length_m.get((a, b))))
-
-    def _found_places(self) -> Mapping[int, complex]:
-        directions, driven_m = dict[tuple[int, int], complex](), dict[tuple[int, int], float]()
-        for a in self.occupant:
-            for b, (there, _) in self._reference.get(a, {}).items():
-                if a < b and b in self.occupant:
-                    directions[a, b] = there
-                    known = self._driven_m(a, b)
-                    if known is not None:
-                        driven_m[a, b] = known
-        return self._find_places(directions, driven_m)
+    def _distance_m(self, a: int, b: int) -> float:
+        """Return the distance [m] of two slots as it was measured or driven last, or infinity."""
+        known = self.length_m.get((a, b)) or self._way_m.get((a, b)) or self._way_m.get((b, a))
+        return math.inf if known is None else known
 
     def note_way(self, start: int, end: int, way_m: float, by_odometry: bool) -> None:
         """Note the distance [m] that a robot drove from slot to slot.
@@ -312,14 +281,12 @@ class Slots:
         there. So it may if it found its place by odometry, where nobody drove before. Attempts at its arcs are not counted
         anew: where robots die one after the other, they had no end.
         """
-        known = self.distance_m(start, end)
+        known = self._way_m.get((start, end), self.length_m.get((start, end)))
         if by_odometry if known is None else abs(known - way_m) > DISPLACED_M_MIN:
             seen = any(end in point.seen for walk in self.walks for point in walk.points)
             if seen or self.near.get(end):
                 self._forget_walls({end: None})
-        if known is None or not by_odometry:  # else it went as far as it was sent, or something stopped it
-            self._way_m[start, end] = way_m
-            self._places = None
+        self._way_m[start, end] = way_m
 
     def _forget_walls(self, slots: Mapping[int, None]) -> None:
         """Forget what was seen from these slots of robots that followed walls."""

@@ -112,12 +112,3 @@ def test_walls_close_by_are_forgotten_where_a_new_robot_stands_beside_its_slot(o
     assert (1 in slots.near) is remains
     assert slots.walks is walks, "walls farther off are seen in nearly the same directions"
     assert slots.take_displaced() == ()
-
-
-def test_a_robot_that_something_stopped_on_a_known_way_changes_no_distance() -> None:
-    slots = three_slots()
-    slots.note_way(0, 1, 0.9, by_odometry=False)
-    slots.note_way(0, 1, 0.14, by_odometry=True)
-    assert slots.distance_m(0, 1) == slots.distance_m(1, 0) == 0.9
-    slots.note_way(0, 1, 0.8, by_odometry=False)
-    assert slots.distance_m(0, 1) == 0.8
