@@ -2,13 +2,8 @@
 
 import math
 from collections.abc import Collection, Iterable, Mapping
-from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint
-
-# A triangle with an angle of 180 degrees less this [rad] or more is flat. A point of a walk is seen once, with the noise of a
-# bearing: 2.5 degrees in most runs.
-FLAT_RAD: Final = math.radians(5.0)
 
 Pair = tuple[int, int]
 # By slot and side of a point (+1 left, -1 right): whether the directions beyond the line of sight to the point are closed.
@@ -27,15 +22,10 @@ def fan_of(
     Beyond the line of sight from a slot to the point there must be a wall that was followed (`at_walls`), or another such
     triangle with the same point, or a triangle of robots that contains the point. A wall in touch with a slot counts here
     in the direction of the contact only: two robots may touch the ends of walls on both sides of a door. A triangle in
-    `without` does not count at its first slot. Without these all count at both. A flat triangle counts at neither.
+    `without` does not count at its first slot. Without these all count at both.
     """
     seen = [slot for slot in point.seen if slot in neighbours]
-    pairs = [
-        (a, b)
-        for a in seen
-        for b in seen
-        if b in neighbours[a] and (a, b) not in without and not _is_flat(point, views, a, b)
-    ]
+    pairs = [(a, b) for a in seen for b in seen if b in neighbours[a] and (a, b) not in without]
     if not pairs:
         return ()
     closed = {(slot, side): at_walls.get((slot, side), False) for slot in seen for side in (1, -1)}
@@ -53,14 +43,6 @@ def fan_of(
         if len(kept) == len(pairs):
             return tuple(kept)
         pairs = kept
-
-
-def _is_flat(point: WalkPoint, views: Mapping[int, Mapping[int, float]], a: int, b: int) -> bool:
-    """Return whether the angle at one of two slots is nearly 180 degrees: noise decides on which side the triangle is."""
-    return any(
-        abs(math.remainder(views[slot][other] - point.seen[slot], math.tau)) > math.pi - FLAT_RAD
-        for slot, other in ((a, b), (b, a))
-    )
 
 
 def side_of(point: WalkPoint, slot: int, direction: float) -> int:
