@@ -378,7 +378,8 @@ class SensorCoverageCoordinator:
         return "source-blocked" if alone else "cut-off"
 
     def _reconsider_outcome(self) -> Routine[None]:
-        """Continue if silent stations may be a first loss, or if `watch_until_s` has not passed."""
+        """Continue if stations may be silent by loss, if walls can be tried again, or until `watch_until_s`."""
+        self.outcome = "" if self.outcome == "unproven" and self.walls.begin_again() else self.outcome
         if self.outcome == "source-lost" and self.mailbox.suspect_loss():
             self.outcome = ""
             for slot, base in self.sources.stations.items():

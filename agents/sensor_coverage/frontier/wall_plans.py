@@ -20,6 +20,8 @@ JOIN: Final = 2000
 FRACTIONS: Final = (0.5, 0.5, 0.5, 0.5, 0.25, 0.75, 0.1, 0.9)
 # Attempts after which the walking robot stays in sight of the slot, and gets a slot where that would see it no more.
 ANYWHERE_MAX: Final = 2
+# Times that the attempts at an arc are made, while nothing else is left to do.
+ROUNDS_MAX: Final = 3
 # A probe goes this far [m] to a wall, and into open arcs up to this width [rad].
 PROBE_M: Final = 0.14
 PROBED_RAD_MAX: Final = math.radians(150.0)
@@ -39,6 +41,7 @@ class WallPlans:
         self._slots = slots
         self._proof = proof
         self.tried: dict[int, list[float]] = {}
+        self._rounds = 1
         self._joined: dict[tuple[int, tuple[int, ...]], int] = {}
         self._probed: dict[int, list[float]] = {}  # the directions [rad] of probes, by slot
 
@@ -146,6 +149,19 @@ class WallPlans:
                     hand=-1 if tried % 2 == 0 else 1,
                     meet=pieces[other],
                 )
+
+    def begin_again(self) -> bool:
+        """Count the attempts at the arcs that stay open anew, a few times; return whether it was done.
+
+        Noise and the places of other robots differ from walk to walk, and pushes have moved slots meanwhile.
+        """
+        if not self.unproven or self._rounds == ROUNDS_MAX:
+            return False
+        self._rounds += 1
+        for slot in self.unproven:
+            self.tried.pop(slot, None)
+            self._probed.pop(slot, None)
+        return True
 
     def note_attempt(self, plan: Plan) -> None:
         """Record that a plan is tried."""
