@@ -2,8 +2,12 @@
 
 import math
 from collections.abc import Collection, Iterable, Mapping
+from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint
+
+# A triangle is flat from an angle of 180 degrees less this [rad] on: three times the noise of a bearing, 2.5 degrees.
+FLAT_RAD: Final = math.radians(8.0)
 
 Pair = tuple[int, int]
 # By slot and side of a point (+1 left, -1 right): whether the directions beyond the line of sight to the point are closed.
@@ -22,7 +26,8 @@ def fan_of(
     Beyond the line of sight from a slot to the point there must be a wall that was followed (`at_walls`), or another such
     triangle with the same point, or a triangle of robots that contains the point. A wall in touch with a slot counts here
     in the direction of the contact only: two robots may touch the ends of walls on both sides of a door. A triangle in
-    `without` does not count at its first slot. Without these all count at both.
+    `without` does not count at its first slot. Without these all count at both. A flat triangle that may lie on either side
+    of its middle slot does not count there.
     """
     seen = [slot for slot in point.seen if slot in neighbours]
     pairs = [(a, b) for a in seen for b in seen if b in neighbours[a] and (a, b) not in without]
@@ -41,8 +46,19 @@ def fan_of(
             if all(closed[a, -sides[a, b]] or (a, -sides[a, b]) in beyond for a, b in (pair, pair[::-1]))
         ]
         if len(kept) == len(pairs):
-            return tuple(kept)
+            return tuple(pair for pair in kept if not _may_be_turned_over(point, *pair, views))
         pairs = kept
+
+
+def _may_be_turned_over(point: WalkPoint, slot: int, other: int, views: Mapping[int, Mapping[int, float]]) -> bool:
+    """Return whether a triangle of two slots and a point is flat at a slot, and lies on different sides by their angles.
+
+    By noise it seems to lie on the other side of the slot then. The slot would rely on the other one for a space that lies
+    on its own side.
+    """
+    here = math.remainder(views[slot][other] - point.seen[slot], math.tau)
+    there = math.remainder(views[other][slot] - point.seen[other], math.tau)
+    return abs(here) > math.pi - FLAT_RAD and (here > 0.0) == (there > 0.0)
 
 
 def side_of(point: WalkPoint, slot: int, direction: float) -> int:

@@ -23,6 +23,7 @@ ALONE = (*EXACT, "services.path=gradient")
         pytest.param(
             445, True, EXACT, id="central, a body in a chicane of 1.6 bodies, where two robots rely on each other"
         ),
+        pytest.param(442, True, NOISY, id="central, noise, a body in a chicane of 1.4 bodies, and flat triangles"),
         pytest.param(5, False, ALONE, id="decentralised, a bend of 1.3 bodies"),
         pytest.param(5, True, (*ALONE, *NOISY), id="decentralised, noise, a body in a bend of 1.3 bodies"),
         pytest.param(13, True, ALONE, id="decentralised, a body in a door of 1.8 bodies"),
@@ -44,7 +45,7 @@ def test_a_robot_that_did_not_reach_its_slot_in_a_passage_gets_one_where_it_stan
 
 def test_robots_that_lost_sight_of_all_others_come_back() -> None:
     """Their part of the swarm was cut off. Without calls back the run ends as `cut-off`."""
-    result = carry_out(407, True, NOISY)
+    result = carry_out(407, True, (*NOISY, "time.duration_s=5000.0"))
     assert result.outcome == "completed"
     assert result.metrics["reachable_coverage_fraction"] >= 0.98
 

@@ -168,7 +168,8 @@ class SlotProof:
                 walls += [*self._stretch, *self._contacts, *self._by_walks.unconditional()]
             for side in (1, -1):
                 at_walls[each, side] = ends_at(walls, point.seen[each], side)
-        fan = [pair for pair in fan_of(point, views, neighbours, at_walls) if pair[0] < pair[1]]
+        counting = fan_of(point, views, neighbours, at_walls)
+        fan = [pair for pair in counting if pair[0] < pair[1] or pair[::-1] not in counting]
         if any(slot in pair for pair in fan):
             needed = dict.fromkeys(each for pair in fan for each in pair)
             points = [each for step in steps for each in (step.before, step.point) if each is not None]
@@ -179,9 +180,11 @@ class SlotProof:
                     side = side_of(point, slot, views[slot][other])
                     needed_, seen = self._others(needed), self._others(_witnesses_of(point))
                     way = walk, stretch, number, hand
-                    triangle = WalkTriangle(other, -side, there.width_rad, *way)
-                    self._triangles.add(ProvedArc(needed_, seen, *here, triangle), triangle)
-                    if slot in views[other] and not all(other in each.seen for each in points):
+                    if (slot, other) in counting:
+                        triangle = WalkTriangle(other, -side, there.width_rad, *way)
+                        self._triangles.add(ProvedArc(needed_, seen, *here, triangle), triangle)
+                    sees_all = all(other in each.seen for each in points)
+                    if (other, slot) in counting and slot in views[other] and not sees_all:
                         triangle = WalkTriangle(slot, side, here.width_rad, *way)
                         self.for_neighbours.append(
                             (other, ProvedArc(tuple(needed), _witnesses_of(point), *there, triangle))

@@ -140,3 +140,14 @@ def test_a_point_of_another_walk_behind_a_triangle(
     triangles.add(0, 2, 1, 1, behind)
     found = triangles.find(0, point, views, neighbours, dict.fromkeys(views, 1), at_walls)
     assert found == (((0, 1), (1, 0)) if counts else ((1, 0),)), "the other slot may rely on the first one"
+
+
+@pytest.mark.parametrize(("error_rad", "counting"), [(0.0, {(0, 1), (1, 0)}), (-0.035, {(1, 0)})])
+def test_a_flat_triangle_that_noise_turns_over_does_not_count_at_its_middle(
+    error_rad: float, counting: set[Pair]
+) -> None:
+    """Slot 0 stands between slot 1 and the point, 1 cm to the left of their line as seen from slot 1."""
+    point = WalkPoint({0: math.pi + 0.0125 + error_rad, 1: math.pi + 0.0056}, (0.0,), ())
+    views = {0: {1: 0.0}, 1: {0: math.pi}}
+    at_walls = {(slot, side): True for slot in point.seen for side in (1, -1)}
+    assert set(fan_of(point, views, {0: {1}, 1: {0}}, at_walls)) == counting
