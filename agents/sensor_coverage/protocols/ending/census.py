@@ -39,8 +39,8 @@ class Census:
     In every tick `update` comes first, then `receive` for each message, then `poll`. A robot that lacks an answer asks
     every `poll_s`. A wave begins every `every_s`. If the wave before has not come back, the interval doubles each time.
     `now_s` is the robot's own clock; that of the base must not be set back, not even by a restart. `incarnation` is a
-    random number, another one after each loss of memory. `search` is the number of the latest search for missing
-    robots; the base increases it.
+    random number, another one after each loss of memory. `search` counts the times that all robots
+    were to try again what had failed; the base increases it.
     """
 
     def __init__(self, me: int, poll_s: float, every_s: float, incarnation: int, base: bool = False) -> None:

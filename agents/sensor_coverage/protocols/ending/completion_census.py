@@ -50,7 +50,7 @@ class CompletionProtocol(Component):
 
     @property
     def search(self) -> int:
-        """The number of the latest search for missing robots."""
+        """The number of times that all robots were to try again what had failed."""
         return self._census.search
 
     def begin_search(self) -> None:

@@ -1,9 +1,10 @@
 """The end of a decentralised deployment: covered, by a census in which no robot is missing, or failed, with the reason.
 
 The base takes the census when no path has led to a frontier for some time. If the census counts every released robot as
-present, or as dead with a witness, all is covered. If a robot is missing, the base lets all robots repeat the failed
-attempts, a few times, and then gives up. It also gives up when no attempt has had success for a long time. It never
-reports success because time has passed.
+present, or as dead with a witness, and no arc stays open, all is covered. If a robot is missing, or an arc stays open after
+all attempts to follow a wall there, the base lets all robots repeat the failed attempts, a few times, and then gives up:
+noise and the places of other robots differ from walk to walk. It also gives up when no attempt has had success for a long
+time. It never reports success because time has passed.
 """
 
 from collections.abc import Iterable
@@ -16,7 +17,8 @@ UNPROVEN: Final = "unproven: a wall was not followed to its end"
 
 # Ticks without a frontier before the census.
 QUIET_TICKS: Final = 60
-# Ticks that a robot may be missing before a search. It may be down for some time, or its death may have no witness yet.
+# Ticks that a robot may be missing, or an arc open, before a search. A robot may be down for some time, or its death may have
+# no witness yet.
 MISSING_TICKS: Final = 900
 SEARCHES_MAX: Final = 2
 # Ticks without any progress after which the base gives up.
@@ -55,16 +57,15 @@ class Termination:
         self.takes_census = tick - self._quiet_since > QUIET_TICKS + 4 * samples
         if not (self.takes_census and self._completion.concluded):
             return ""
-        missing = self._completion.missing
-        if not missing:
-            last = self._completion.last
-            return COVERED if last is None or not last.unproven else UNPROVEN
+        last, missing = self._completion.last, self._completion.missing
+        if not missing and (last is None or not last.unproven):
+            return COVERED
         if self._missing_since is None:
             self._missing_since = tick
         if tick - self._missing_since <= MISSING_TICKS:
             return ""
         if self._completion.search >= SEARCHES_MAX:
-            return self._missing_robots_outcome()
+            return self._missing_robots_outcome() if missing else UNPROVEN
         self._completion.begin_search()
         self._missing_since = None
         self._progress_at = tick
