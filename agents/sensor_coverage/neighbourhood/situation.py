@@ -322,9 +322,9 @@ class Situation:
         """Begin to correct the scale."""
         self._drive(correct(self.motion, anchors))
 
-    def to_wall(self, bearing_rad: float, hop_m: float, hand: int) -> None:
-        """Begin to drive to a wall, and along it until the start is clear."""
-        self._drive(self.wall_walk.to_wall(bearing_rad, hop_m, CLEAR_M, hand))
+    def to_wall(self, bearing_rad: float, hop_m: float, hand: int, half_rad: float) -> None:
+        """Begin to drive to a wall, and along it until the start is clear, and `half_rad` beside the bearing."""
+        self._drive(self.wall_walk.to_wall(bearing_rad, hop_m, CLEAR_M, hand, half_rad))
 
     def follow_wall(self, hand: int, keep: Collection[int]) -> None:
         """Begin to follow the wall in touch, in sight of a robot of `keep`, or of any robot if `keep` is empty."""

@@ -36,8 +36,8 @@ class WallSituation(Protocol):
     def stand(self) -> None:
         """End a drive."""
 
-    def to_wall(self, bearing_rad: float, hop_m: float, hand: int) -> None:
-        """Begin to drive to a wall, and along it until the start is clear."""
+    def to_wall(self, bearing_rad: float, hop_m: float, hand: int, half_rad: float) -> None:
+        """Begin to drive to a wall, and along it until the start is clear, and `half_rad` beside the bearing."""
 
     def follow_wall(self, hand: int, keep: Collection[int]) -> None:
         """Begin to follow the wall in touch, in sight of a robot of `keep`, or of any robot if `keep` is empty."""
@@ -109,9 +109,10 @@ class WallPush:
         self._walk_over = self._chain.ahead == self._chain.leader[1]
 
     def _approach(self, plan: Plan) -> None:
-        """Drive into an open arc, to a wall."""
+        """Drive into an open arc, to a wall, and past the edge of the arc: the walk begins there, and closes all of it."""
         self._enter("approaching")
-        self._situation.to_wall(wrapped(plan.direction - self._heading), plan.hop_m, -plan.hand)
+        bearing = wrapped(plan.direction - self._heading)
+        self._situation.to_wall(bearing, plan.hop_m, -plan.hand, plan.half_rad)
 
     def _approached(self, result: DriveResult | WalkResult) -> None:
         """Leave the slot to the follower, unless there is no way to get clear of it."""
