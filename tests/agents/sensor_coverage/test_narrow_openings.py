@@ -1,14 +1,7 @@
 """Drawn buildings in which a narrow opening was passed by: `completed` must not be said while the space behind it is unseen."""
 
 import pytest
-
-from benchmarks.common.small_buildings import small_building
-from zwerm.run.result import RunResult
-from zwerm.run.runner import run
-
-EXACT = ("robots.sensors.0.sd_rad=0.0",)
-NOISY = ("robots.sensors.0.sd_rad=0.0436332",)
-ALONE = (*EXACT, "services.path=gradient")
+from narrow_openings import EXACT, NOISY, carry_out
 
 
 @pytest.mark.parametrize(
@@ -24,11 +17,6 @@ ALONE = (*EXACT, "services.path=gradient")
             445, True, EXACT, id="central, a body in a chicane of 1.6 bodies, where two robots rely on each other"
         ),
         pytest.param(442, True, NOISY, id="central, noise, a body in a chicane of 1.4 bodies, and flat triangles"),
-        pytest.param(5, False, ALONE, id="decentralised, a bend of 1.3 bodies"),
-        pytest.param(5, True, (*ALONE, *NOISY), id="decentralised, noise, a body in a bend of 1.3 bodies"),
-        pytest.param(13, True, ALONE, id="decentralised, a body in a door of 1.8 bodies"),
-        pytest.param(112, True, ALONE, id="decentralised, a body in a corner of 1.5 bodies between two walks"),
-        pytest.param(38, False, ALONE, id="decentralised, a robot in a door beside which another one touched the wall"),
     ],
 )
 def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[str, ...]) -> None:
@@ -48,15 +36,3 @@ def test_robots_that_lost_sight_of_all_others_come_back() -> None:
     result = carry_out(407, True, (*NOISY, "time.duration_s=5000.0"))
     assert result.outcome == "completed"
     assert result.metrics["reachable_coverage_fraction"] >= 0.98
-
-
-def carry_out(seed: int, dies: bool, more: tuple[str, ...]) -> RunResult:
-    """Run the building of a seed."""
-    building = small_building(seed)
-    settings = (
-        *building.settings(),
-        *((building.death(),) if dies else ()),
-        "robots.count=30",
-        "time.duration_s=3000.0",
-    )
-    return run("sensor-coverage-narrow", seed, "inline", (*settings, *more))

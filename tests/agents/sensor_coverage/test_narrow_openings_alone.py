@@ -1,0 +1,21 @@
+"""Without a coordinator, `completed` must not be said either while the space behind a narrow opening is unseen."""
+
+import pytest
+from narrow_openings import EXACT, NOISY, carry_out
+
+ALONE = (*EXACT, "services.path=gradient")
+
+
+@pytest.mark.parametrize(
+    ("seed", "dies", "more"),
+    [
+        pytest.param(5, False, ALONE, id="a bend of 1.3 bodies"),
+        pytest.param(5, True, (*ALONE, *NOISY), id="noise, a body in a bend of 1.3 bodies"),
+        pytest.param(13, True, ALONE, id="a body in a door of 1.8 bodies"),
+        pytest.param(112, True, ALONE, id="a body in a corner of 1.5 bodies between two walks"),
+        pytest.param(38, False, ALONE, id="a robot in a door beside which another one touched the wall"),
+    ],
+)
+def test_robots_alone_pass_by_no_narrow_opening(seed: int, dies: bool, more: tuple[str, ...]) -> None:
+    result = carry_out(seed, dies, more)
+    assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
