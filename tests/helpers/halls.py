@@ -1,16 +1,20 @@
-"""Small halls for sensor coverage, and a function that runs one step by step for a test."""
+"""Small halls and drawn buildings for sensor coverage, and functions that run them for a test."""
 
 from collections.abc import Callable
 
+from benchmarks.common.small_buildings import small_building
 from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
+from zwerm.run.result import RunResult
+from zwerm.run.runner import run
 from zwerm.scenario.tables import Scenario
 from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.world import World
 
 HALL = ("arena.size_m=[3.4,2.8]", "base.pose=[0.2,1.4,0.0]", "robots.count=40")
+EXACT = ("robots.sensors.0.sd_rad=0.0",)
 NOISE = "robots.sensors.0.sd_rad=0.0436332"
 OBSTACLE = "arena.obstacles=[[[1.5,1.0],[2.3,1.0],[2.3,1.8],[1.5,1.8]]]"
 
@@ -30,3 +34,15 @@ def drive(
     driver = LockStep(world, MemoryLink(answers), [] if on_tick is None else [on_tick])
     outcome = driver.run()
     return outcome, world
+
+
+def carry_out(seed: int, dies: bool, more: tuple[str, ...]) -> RunResult:
+    """Run a small building with a narrow opening. Longer runs belong to `benchmarks/algorithms/bench_openings.py`."""
+    building = small_building(seed)
+    settings = (
+        *building.settings(),
+        *((building.death(),) if dies else ()),
+        "robots.count=30",
+        "time.duration_s=2000.0",
+    )
+    return run("sensor-coverage-narrow", seed, "inline", (*settings, *more))

@@ -1,7 +1,7 @@
 """Without a coordinator, `completed` must not be said either while the space behind a narrow opening is unseen."""
 
 import pytest
-from narrow_openings import EXACT, NOISY, carry_out
+from halls import EXACT, NOISE, carry_out
 
 ALONE = (*EXACT, "services.path=gradient")
 
@@ -10,7 +10,7 @@ ALONE = (*EXACT, "services.path=gradient")
     ("seed", "dies", "more"),
     [
         pytest.param(5, False, ALONE, id="a bend of 1.3 bodies"),
-        pytest.param(5, True, (*ALONE, *NOISY), id="noise, a body in a bend of 1.3 bodies"),
+        pytest.param(5, True, (*ALONE, NOISE), id="noise, a body in a bend of 1.3 bodies"),
         pytest.param(13, True, ALONE, id="a body in a door of 1.8 bodies"),
         pytest.param(112, True, ALONE, id="a body in a corner of 1.5 bodies between two walks"),
         pytest.param(38, False, ALONE, id="a robot in a door beside which another one touched the wall"),

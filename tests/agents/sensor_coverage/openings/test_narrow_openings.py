@@ -1,22 +1,24 @@
 """Drawn buildings in which a narrow opening was passed by: `completed` must not be said while the space behind it is unseen."""
 
 import pytest
-from narrow_openings import EXACT, NOISY, carry_out
+from halls import EXACT, NOISE, carry_out
 
 
 @pytest.mark.parametrize(
     ("seed", "dies", "more"),
     [
         pytest.param(5, False, EXACT, id="central, a bend of 1.3 bodies"),
-        pytest.param(5, False, NOISY, id="central, noise, a bend of 1.3 bodies"),
+        pytest.param(5, False, (NOISE,), id="central, noise, a bend of 1.3 bodies"),
         pytest.param(28, False, EXACT, id="central, a chicane of 1.4 bodies, and corners at its mouth"),
-        pytest.param(410, True, NOISY, id="central, noise, a body in a chicane of 1.4 bodies, in line with two robots"),
-        pytest.param(39, True, NOISY, id="central, noise, a body behind a bend of 1.4 bodies"),
+        pytest.param(
+            410, True, (NOISE,), id="central, noise, a body in a chicane of 1.4 bodies, in line with two robots"
+        ),
+        pytest.param(39, True, (NOISE,), id="central, noise, a body behind a bend of 1.4 bodies"),
         pytest.param(100, True, EXACT, id="central, a body in a chicane of 1.7 bodies, and robots beside their slots"),
         pytest.param(
             445, True, EXACT, id="central, a body in a chicane of 1.6 bodies, where two robots rely on each other"
         ),
-        pytest.param(442, True, NOISY, id="central, noise, a body in a chicane of 1.4 bodies, and flat triangles"),
+        pytest.param(442, True, (NOISE,), id="central, noise, a body in a chicane of 1.4 bodies, and flat triangles"),
     ],
 )
 def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[str, ...]) -> None:
@@ -33,6 +35,6 @@ def test_a_robot_that_did_not_reach_its_slot_in_a_passage_gets_one_where_it_stan
 
 def test_robots_that_lost_sight_of_all_others_come_back() -> None:
     """Their part of the swarm was cut off. Without calls back the run ends as `cut-off`."""
-    result = carry_out(407, True, (*NOISY, "time.duration_s=5000.0"))
+    result = carry_out(407, True, (NOISE, "time.duration_s=5000.0"))
     assert result.outcome == "completed"
     assert result.metrics["reachable_coverage_fraction"] >= 0.98
