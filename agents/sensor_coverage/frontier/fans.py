@@ -46,24 +46,20 @@ def fan_of(
             if all(closed[a, -sides[a, b]] or (a, -sides[a, b]) in beyond for a, b in (pair, pair[::-1]))
         ]
         if len(kept) == len(pairs):
-            return tuple(pair for pair in kept if not _may_be_turned_over(point, *pair, views))
+            # A triangle that is flat at a slot, and on different sides of the point by the two slots' bearings, is by noise on
+            # the other side of the slot: it would rely on the other one for a space that lies on its own side.
+            return tuple((a, b) for a, b in kept if sides[a, b] != sides[b, a] or not _is_flat(point, a, views[a][b]))
         pairs = kept
-
-
-def _may_be_turned_over(point: WalkPoint, slot: int, other: int, views: Mapping[int, Mapping[int, float]]) -> bool:
-    """Return whether a triangle of two slots and a point is flat at a slot, and lies on different sides by their angles.
-
-    By noise it seems to lie on the other side of the slot then. The slot would rely on the other one for a space that lies
-    on its own side.
-    """
-    here = math.remainder(views[slot][other] - point.seen[slot], math.tau)
-    there = math.remainder(views[other][slot] - point.seen[other], math.tau)
-    return abs(here) > math.pi - FLAT_RAD and (here > 0.0) == (there > 0.0)
 
 
 def side_of(point: WalkPoint, slot: int, direction: float) -> int:
     """Return +1 if a direction [rad] from a slot is to the left of a point, else -1."""
     return 1 if math.remainder(direction - point.seen[slot], math.tau) > 0.0 else -1
+
+
+def _is_flat(point: WalkPoint, slot: int, direction: float) -> bool:
+    """Return whether a point and a direction [rad] are nearly opposite from a slot."""
+    return abs(math.remainder(direction - point.seen[slot], math.tau)) > math.pi - FLAT_RAD
 
 
 def _is_inside(

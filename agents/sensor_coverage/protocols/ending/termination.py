@@ -34,7 +34,7 @@ class Termination:
         self.takes_census = False
         self._completion = completion
         self._quiet_since: int | None = None
-        self._missing_since: int | None = None
+        self._unsettled_since: int | None = None
         self._progress_at: int | None = None
 
     def let_out(self, robots: Iterable[int]) -> None:
@@ -47,7 +47,7 @@ class Termination:
 
     def disturb(self) -> None:
         """Record that a path leads to a frontier, or may do so."""
-        self._quiet_since = self._missing_since = None
+        self._quiet_since = self._unsettled_since = None
         self.takes_census = False
 
     def quiet(self, tick: int, samples: int) -> str:
@@ -60,14 +60,14 @@ class Termination:
         last, missing = self._completion.last, self._completion.missing
         if not missing and (last is None or not last.unproven):
             return COVERED
-        if self._missing_since is None:
-            self._missing_since = tick
-        if tick - self._missing_since <= MISSING_TICKS:
+        if self._unsettled_since is None:
+            self._unsettled_since = tick
+        if tick - self._unsettled_since <= MISSING_TICKS:
             return ""
         if self._completion.search >= SEARCHES_MAX:
             return self._missing_robots_outcome() if missing else UNPROVEN
         self._completion.begin_search()
-        self._missing_since = None
+        self._unsettled_since = None
         self._progress_at = tick
         return ""
 
