@@ -14,7 +14,7 @@ from zwerm.world.drivers.lockstep import LockStep
 from zwerm.world.world import World
 
 HALL = ("arena.size_m=[3.4,2.8]", "base.pose=[0.2,1.4,0.0]", "robots.count=40")
-EXACT = ("robots.sensors.0.sd_rad=0.0",)
+EXACT = "robots.sensors.0.sd_rad=0.0"
 NOISE = "robots.sensors.0.sd_rad=0.0436332"
 OBSTACLE = "arena.obstacles=[[[1.5,1.0],[2.3,1.0],[2.3,1.8],[1.5,1.8]]]"
 

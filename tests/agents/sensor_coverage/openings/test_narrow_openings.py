@@ -7,16 +7,18 @@ from halls import EXACT, NOISE, carry_out
 @pytest.mark.parametrize(
     ("seed", "dies", "more"),
     [
-        pytest.param(5, False, EXACT, id="central, a bend of 1.3 bodies"),
+        pytest.param(5, False, (EXACT,), id="central, a bend of 1.3 bodies"),
         pytest.param(5, False, (NOISE,), id="central, noise, a bend of 1.3 bodies"),
-        pytest.param(28, False, EXACT, id="central, a chicane of 1.4 bodies, and corners at its mouth"),
+        pytest.param(28, False, (EXACT,), id="central, a chicane of 1.4 bodies, and corners at its mouth"),
         pytest.param(
             410, True, (NOISE,), id="central, noise, a body in a chicane of 1.4 bodies, in line with two robots"
         ),
         pytest.param(39, True, (NOISE,), id="central, noise, a body behind a bend of 1.4 bodies"),
-        pytest.param(100, True, EXACT, id="central, a body in a chicane of 1.7 bodies, and robots beside their slots"),
         pytest.param(
-            445, True, EXACT, id="central, a body in a chicane of 1.6 bodies, where two robots rely on each other"
+            100, True, (EXACT,), id="central, a body in a chicane of 1.7 bodies, and robots beside their slots"
+        ),
+        pytest.param(
+            445, True, (EXACT,), id="central, a body in a chicane of 1.6 bodies, where two robots rely on each other"
         ),
         pytest.param(442, True, (NOISE,), id="central, noise, a body in a chicane of 1.4 bodies, and flat triangles"),
     ],
@@ -28,7 +30,7 @@ def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[st
 
 def test_a_robot_that_did_not_reach_its_slot_in_a_passage_gets_one_where_it_stands() -> None:
     """Without a slot it fills the passage, and no path leads to the robots beyond."""
-    result = carry_out(22, False, EXACT)
+    result = carry_out(22, False, (EXACT,))
     assert result.outcome == "completed"
     assert result.metrics["reachable_coverage_fraction"] >= 0.98
 

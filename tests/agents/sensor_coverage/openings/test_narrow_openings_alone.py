@@ -3,7 +3,7 @@
 import pytest
 from halls import EXACT, NOISE, carry_out
 
-ALONE = (*EXACT, "services.path=gradient")
+ALONE = (EXACT, "services.path=gradient")
 
 
 @pytest.mark.parametrize(
