@@ -94,6 +94,7 @@ class PushPart:
         self._chain = PushChain(chain, situation.node)
         self._back = back if self._chain.is_rear else self._chain.behind
         self._memory: SlotMemory | None = None
+        self._ahead_rad: float | None = None  # the bearing of the robot ahead at its slot
         self._plan: Plan | None = None
         self._first_bearings = list(FIRST_BEARINGS_RAD) if first else []
         self._vacated = False
@@ -198,7 +199,8 @@ class PushPart:
 
     def _may_finish(self) -> bool:
         # Neighbours are informed of the end of the leader's drive one tick later.
-        return (self._situation.clear and self._waited > self._chain.leads) or self._waited > CLOSE_TICKS
+        informed = self._waited > 1 or not self._chain.leads or self.next is not None
+        return (self._situation.clear and informed) or self._waited > CLOSE_TICKS
 
     def _out_of_range(self) -> bool:
         return not self._chain.is_rear and self._waited > TELL_TICKS and self._back not in self._situation.bearings
