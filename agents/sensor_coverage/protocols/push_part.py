@@ -11,7 +11,7 @@ from typing import Final, Protocol
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan
 from zwerm.agents.sensor_coverage.messages.commands import Sighting
-from zwerm.agents.sensor_coverage.messages.pushes import Body, Chain, SlotMemory
+from zwerm.agents.sensor_coverage.messages.pushes import Body, Chain, LeaderReady, SlotMemory, TakeSlot
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
@@ -157,6 +157,13 @@ class PushPart:
 
     def _vacancy_check_due(self) -> bool:
         return self._waited > VACATED_TICKS and self._waited % VACANCY_PERIOD_TICKS == 1
+
+    def _take_memory(self, body: LeaderReady | TakeSlot) -> None:
+        """Take in the memory of the slot ahead, and the bearing of the robot that still stands there."""
+        self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
+        self._walks = body.walk
+        ahead = self._chain.ahead
+        self._ahead_rad = None if ahead is None else self._situation.bearings.get(ahead)
 
     # --- phases ------------------------------------------------------------------------------------------------------
 

@@ -43,7 +43,6 @@ from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
-from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS, PushPart
 from zwerm.agents.sensor_coverage.protocols.walls.wall_push import WallPush
 
@@ -60,12 +59,11 @@ class TokenPush(PushPart, WallPush):
         """Take in a message of this push."""
         match body:
             case LeaderReady():
-                self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
-                self._leader_epoch, self._walks = body.epoch, body.walk
+                self._take_memory(body)
+                self._leader_epoch = body.epoch
                 self._enter("armed")
             case TakeSlot():
-                self._chain, self._memory = PushChain(body.chain, self._chain.me), body.memory
-                self._walks = body.walk
+                self._take_memory(body)
                 self._call()
             case PushAborted():
                 self.close(body)
@@ -239,13 +237,15 @@ class TokenPush(PushPart, WallPush):
         origin = self._chain.origin
         back_rad = direction_to(memory, origin)
         landmarks = self._chain.landmarks(memory.references, self._chain.future(), self._heading, origin)
-        bearing_rad = wrapped(back_rad + math.pi - self._heading) if back_rad is not None else 0.0
+        bearing_rad = None if back_rad is None else wrapped(back_rad + math.pi - self._heading)
         measured = {origin: self._map.distances_m[memory.slot]} if memory.slot in self._map.distances_m else {}
+        if measured and bearing_rad is None:
+            # The former robot at the slot never took the bearing of this one, which was out of the complex.
+            bearing_rad = self._ahead_rad
         self._map.inherit(memory)
         self._map.distances_m |= measured
-        hop_m = self._map.distances_m.get(origin, self._map.parameters.hop_m) if back_rad is not None else 0.0
-        # The former robot at the slot may never have seen a robot that was out of the complex.
-        self._situation.move(bearing_rad, hop_m, landmarks, knows_way=back_rad is not None)
+        hop_m = 0.0 if bearing_rad is None else self._map.distances_m.get(origin, self._map.parameters.hop_m)
+        self._situation.move(bearing_rad or 0.0, hop_m, landmarks, knows_way=bearing_rad is not None)
 
     # --- after the drive ----------------------------------------------------------------------------------------------
 

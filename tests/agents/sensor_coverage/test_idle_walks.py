@@ -1,4 +1,6 @@
-"""A robot whose walk along a wall closed nothing does not keep a slot where the walk ended."""
+"""A robot whose walk along a wall closed nothing does not keep a slot where the walk ended, and is pushed from there."""
+
+import math
 
 import pytest
 
@@ -7,6 +9,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, PathVector, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import LOST, STRETCH
+from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory, TakeSlot
 from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
 from zwerm.agents.sensor_coverage.protocols.token_push import TokenPush
 from zwerm.deploy.node_specs import node_specs
@@ -51,3 +54,26 @@ def test_a_robot_leaves_after_a_walk_that_closed_nothing(
     push._walked(WalkResult(end, 0.4))
     push._leave_if_spare()
     assert robot.local_map.redundant is leaves
+
+
+@pytest.mark.parametrize(
+    ("references", "distance_m", "bearing_rad", "hop_m"),
+    [
+        ((), 0.6, 1.0, 0.6),
+        ((ReferenceBearing(8, 3, 0.5, 4),), 0.6, 0.5 - math.pi, 0.6),
+        ((), None, 0.0, 0.0),
+    ],
+    ids=["by its own bearing", "as former robots did", "by landmarks alone"],
+)
+def test_a_robot_that_nobody_remembers_drives_towards_the_robot_ahead(
+    references: tuple[ReferenceBearing, ...], distance_m: float | None, bearing_rad: float, hop_m: float
+) -> None:
+    """It was out of the complex, so the memory of the slot ahead may not know its own."""
+    robot, _ = walking(beside=False)
+    robot.local_map.heading = 0.0
+    robot.local_map.distances_m = {} if distance_m is None else {9: distance_m}
+    push = robot.pushing._join(8, 10, ((8, 3),), None)
+    push.receive(TakeSlot(8, ((8, 3), (9, 5)), SlotMemory(9, references, (), (), (), (), ())))
+    goal = hop_m * math.cos(bearing_rad), hop_m * math.sin(bearing_rad)
+    assert push.phase == "following"
+    assert robot.situation._goal == pytest.approx(goal)
