@@ -56,6 +56,10 @@ class SlotCoverageProof(Protocol):
     def ready(self) -> bool:
         """True once the proof has a view of its slot."""
 
+    @property
+    def knows_walks(self) -> bool:
+        """True once walks have closed an arc of the slot."""
+
     def update(self, slot: int, scan: ScanResult, touched: Iterable[float], in_touch: Collection[int] = ()) -> None:
         """Take in the slot's view and the complex around it, the directions [rad] of walls in touch, and the slots in touch."""
 
@@ -114,8 +118,13 @@ class FrontierService(Protocol):
     def obstacle(self) -> tuple[Edge, ...]:
         """Edges beside obstacles, in the latest scan."""
 
-    def update(self, scan: ScanResult, edges: Iterable[Edge] | None = None) -> None:
-        """Take a new scan; consider only `edges` if they are given."""
+    def update(
+        self,
+        scan: ScanResult,
+        edges: Iterable[Edge] | None = None,
+        open_arcs: Mapping[int, Sequence[Arc]] | None = None,
+    ) -> None:
+        """Take a new scan; consider only `edges` if they are given, with the open arcs of slots once walls were followed."""
 
     def plans(self) -> Iterable[Sequence[Plan]]:
         """Yield groups of possible deployments by falling priority; use a group only if no earlier one has a path."""

@@ -55,11 +55,19 @@ class Planner:
         self._views, self._complex, self._bases = ScanResult({}, FlagComplex({}), ())
         self._plans: list[Plan] = []
 
-    def update(self, scan: ScanResult, edges: Iterable[Edge] | None = None) -> None:
-        """Take a new scan, and find the fence, or the part of it on `edges`. Algorithm 3."""
+    def update(
+        self,
+        scan: ScanResult,
+        edges: Iterable[Edge] | None = None,
+        open_arcs: Mapping[int, Sequence[Arc]] | None = None,
+    ) -> None:
+        """Take a new scan, and find the fence, or the part of it on `edges`. Algorithm 3.
+
+        `open_arcs` has those of the slots that are known without a coordinator, once walls were followed there.
+        """
         self._views, self._complex, self._bases = scan
         knows_all = self._follows_walls and edges is None
-        self._open = self.walls.open_arcs(scan) if knows_all and self._slots.walks else None
+        self._open = self.walls.open_arcs(scan) if knows_all and self._slots.walks else open_arcs
         found = self.fence = fence(self._views, self._complex, self._parameters.corner_margin_rad, edges)
         obstacle = dict.fromkeys(found.corners)
         self._plans = []

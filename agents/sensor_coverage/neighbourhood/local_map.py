@@ -14,7 +14,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_proof import mark_of
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, mark_of
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
@@ -246,7 +246,12 @@ class LocalMap(NeighbourTable):
         take_over(planner.attempt_log, me, mutual.values(), self.parameters.attempts_max)
         for slot, (mean, _) in self._references.items():
             self._slots.remember(me, slot, cmath.phase(mean))
-        planner.update(scan, [each for each in scan.complex_.edges if me in each])
+        follows, arcs = self.parameters.walls == "followed", list[Arc]()
+        if follows:
+            self.update_proof(scan)
+            arcs = self.proof.open_arcs() if self.proof.around else []
+        known = {me: arcs} if self.proof.knows_walks else None
+        planner.update(scan, [each for each in scan.complex_.edges if me in each], known)
         # Plans into holes are left out, because a robot alone cannot recognise a hole.
         edges, gaps = islice(planner.plans(), 2)
         self.plans, self.gaps = list(edges), list(gaps)
@@ -260,15 +265,9 @@ class LocalMap(NeighbourTable):
         )
         seen = {node: each.bearing_rad + (self.heading or 0.0) for node, each in self.seen.items()}
         self.obstructed = self._bodies.count(me, scan, planner.fence, seen, self.states, mutual.values())
-        if self.parameters.walls == "followed":
-            self._plan_walks(scan)
-
-    def _plan_walks(self, scan: ScanResult) -> None:
-        """Find the open arcs around this robot, and the walks into them. A robot without neighbours has none."""
-        self.update_proof(scan)
-        beside = next(iter(self.proof.around), NOWHERE)
-        arcs = self.proof.open_arcs() if beside != NOWHERE else []
-        self.wall_plans, self.unproven = self._planner.walls.plans_at(self.slot, beside, arcs)
+        if follows:  # a robot without neighbours has no open arcs
+            beside = next(iter(self.proof.around), NOWHERE)
+            self.wall_plans, self.unproven = planner.walls.plans_at(me, beside, arcs)
 
     def update_proof(self, scan: ScanResult | None = None) -> None:
         """Take the present view into the proof of coverage."""

@@ -67,6 +67,11 @@ class SlotProof:
         """True once the proof has a view of its slot: without one, a point of a walk closes too little."""
         return self._slot != NOWHERE
 
+    @property
+    def knows_walks(self) -> bool:
+        """True once walks have closed an arc of the slot."""
+        return bool(self._stretches) or any(True for _ in (*self._by_walks.all(), *self._triangles.all()))
+
     def update(self, slot: int, scan: ScanResult, touched: Iterable[float], in_touch: Collection[int] = ()) -> None:
         """Take in the slot's view and the complex around it, the directions [rad] of walls in touch, and the slots in touch."""
         view = scan.views[slot]
