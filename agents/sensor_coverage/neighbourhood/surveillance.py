@@ -24,14 +24,18 @@ class Surveillance(Component):
         self._basis: object = None
         self._route_basis = 0
         self._doubt_at: int | None = None
-        self._reach_changed = False  # when it was polled last
+        self._heard = False  # a neighbour has announced another route, or other hops
+        self._polled_at = 0
+        self._reach_changed_at = -1
 
     def receive(self, sender: int, message: StateBeacon | PathVector, tick: int) -> bool:
-        """Take in a neighbour's state or route; return False if it only repeats what this robot knows."""
+        """Take in a neighbour's state or route; return whether it changes more than the routes, which `is_idle` compares."""
         situation, local_map = self._situation, self._situation.local_map
         if isinstance(message, PathVector):
-            return local_map.path_vectors.receive(sender, message)
-        news, version = local_map.path_vectors.receive(sender, message.path_vector), local_map.version
+            self._heard |= local_map.path_vectors.receive(sender, message)
+            return False
+        self._heard |= local_map.path_vectors.receive(sender, message.path_vector)
+        version = local_map.version
         if situation.failure_detector.answered(sender):
             local_map.unblock(sender)
             local_map.change()
@@ -39,7 +43,7 @@ class Surveillance(Component):
             self._beaconing.missed(tick)
         if local_map.receive(sender, message, tick):
             situation.motion.frame.forget((sender,))
-        return news or local_map.version != version
+        return local_map.version != version
 
     def restarted(self, node: int, tick: int) -> None:
         """Forget a robot that has lost its memory, and average its bearing again."""
@@ -53,7 +57,8 @@ class Surveillance(Component):
             local_map.reach.be_base(tick, first_count(situation.incarnation))
         if local_map.moving:
             return
-        self._reach_changed = local_map.reach.update(tick, situation.homes.values())
+        self._polled_at, self._heard = tick, False
+        self._update_reach(tick)
         if not situation.active:
             if situation.displaced:
                 situation.recover()
@@ -82,13 +87,31 @@ class Surveillance(Component):
         return doubt_at if handover is None else min(handover, doubt_at)
 
     def is_idle(self, tick: int) -> bool:
-        """Return whether the robot stands, and knows and sees what it knew and saw when it was polled last."""
+        """Return whether the robot stands, sees and knows what it did when it was polled last, and has the same route."""
         situation, local_map = self._situation, self._situation.local_map
-        known = local_map.path_vectors.version == self._route_basis and self._present_basis() == self._basis
-        if not known or tick >= self._next_timer():
+        if self._present_basis() != self._basis or tick >= self._next_timer() or local_map.moving:
             return False
-        reaches = not (self._reach_changed or local_map.reach.is_lost(tick))
+        if self._heard and not self._keeps_route(tick):
+            return False
+        reaches = self._reach_changed_at != self._polled_at and not local_map.reach.is_lost(tick)
         return reaches and bool(situation.bearings) and not situation.displaced
+
+    def _keeps_route(self, tick: int) -> bool:
+        """Choose the route again; return whether it is the same, and the way to the base is."""
+        local_map, self._heard = self._situation.local_map, False
+        route = local_map.route
+        if local_map.path_vectors.version != self._route_basis:
+            self._route_basis = local_map.path_vectors.version
+            if self._situation.calm:
+                local_map.find_route(tick)
+        return not self._update_reach(tick) and local_map.route == route
+
+    def _update_reach(self, tick: int) -> bool:
+        """Take in the neighbours' hops to the base; return whether that changed anything."""
+        changed = self._situation.local_map.reach.update(tick, self._situation.homes.values())
+        if changed:
+            self._reach_changed_at = tick
+        return changed
 
     def _present_basis(self) -> object:
         """Return what plans depend on."""
