@@ -1,6 +1,7 @@
 """Complete runs of sensor coverage without a coordinator in a small hall: the end, the deciding node, and no lost robot."""
 
 import math
+from statistics import fmean
 
 import pytest
 
@@ -125,14 +126,16 @@ def test_decentralised_robots_cover_a_small_hall_about_as_well_as_under_a_coordi
     assert cycles <= 0.0
 
 
-@pytest.mark.parametrize("seed", [1, 3])
-def test_followed_walls_take_few_robots_more_without_a_coordinator(seed: int) -> None:
+def test_followed_walls_take_few_robots_more_without_a_coordinator() -> None:
     """Robots that have left the complex after their walks come back into it: nobody there knows their places."""
-    central = run("sensor-coverage", seed=seed, runner="inline", overrides=HALL)
-    alone = run("sensor-coverage", seed=seed, runner="inline", overrides=ALONE)
-    assert alone.outcome == central.outcome == "completed"
-    assert alone.metrics["reachable_coverage_fraction"] >= 0.99
-    assert alone.metrics["robots_deployed"] <= central.metrics["robots_deployed"] + 2
+    more = []
+    for seed in range(1, 9):
+        central = run("sensor-coverage", seed=seed, runner="inline", overrides=HALL)
+        alone = run("sensor-coverage", seed=seed, runner="inline", overrides=ALONE)
+        assert alone.outcome == central.outcome == "completed"
+        assert alone.metrics["reachable_coverage_fraction"] >= 0.99
+        more.append(alone.metrics["robots_deployed"] - central.metrics["robots_deployed"])
+    assert fmean(more) <= 2.5
 
 
 @pytest.mark.parametrize(
