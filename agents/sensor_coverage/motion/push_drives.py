@@ -131,6 +131,9 @@ def move(
         target = target_point(landmarks, frame.seen, _offset(motion, goal) if knows_way else None, scale_m)
         approaches = noisy and not target.used_moving_landmarks  # else odometry leads to the goal
         if target.distance_m < (NOISY_NEAR_M if approaches else p.tolerance_m):
+            if not approaches:
+                # All robots come from the same side. If each stopped a little before the goal, the slot would drift.
+                yield motion.velocity(*slide(target.x, target.y, frame.touched))
             break
         lost = 0 if frame.seen else lost + 1
         if lost > LOST_TICKS:
@@ -234,6 +237,7 @@ def _approach(
         wanted = ((motion.bearing_noise_rad or 0.0) * motion.hop_m / p.tolerance_m) ** 2 * target.spread
         enough = stop * p.stop_samples >= min(wanted, p.still_samples_max)
         if enough and stop > 1 and math.hypot(sx, sy) < p.tolerance_m:
+            yield motion.velocity(sx, sy)
             break
         x, y = motion.position
         part = min(1.0, NOISY_STEP_M / max(math.hypot(sx, sy), NOISY_STEP_M))

@@ -92,6 +92,19 @@ def test_a_robot_that_a_corner_stops_passes_it_on_its_straight_way(switches_deg:
     assert math.dist(end_of_move(robot, math.dist(START, GOAL)), GOAL) < 0.05
 
 
+def test_a_slot_does_not_drift_while_robots_pass_through_it() -> None:
+    """Each robot comes from the same side, and drives to where the one before it saw the others."""
+    start, slot = (1.6, 2.2), (1.6, 2.8)
+    here = slot
+    for _ in range(40):
+        robot = BesideCorner(CORNER, 0.0, 0.0, start)
+        landmarks = [Landmark(node, bearing(here, ROBOTS[node]), True) for node in (8, 9)]
+        for velocity in move(robot, bearing(start, slot), math.dist(start, slot), landmarks):
+            robot.go(velocity)
+        here = robot.at
+    assert math.dist(here, slot) < 0.002
+
+
 def test_a_robot_that_stands_far_from_its_slot_moves_there_in_short_steps() -> None:
     """Bearings show the direction of a goal, and not how far it is: one long step could end out of sight."""
     end = end_of_move(BesideCorner(CORNER, math.pi / 72, 0.0, STOPPED), 0.0)

@@ -261,13 +261,13 @@ def test_robots_that_left_by_agreement_are_pushed_again_and_all_is_covered(loss:
 
 
 def test_redundant_robots_replace_those_that_an_empty_depot_lacks() -> None:
-    few = [*HALL, *CLOSE, "coordinator.parameters.redundancy_every=0", "robots.count=15"]
+    few = [*HALL, *CLOSE, "coordinator.parameters.redundancy_every=0", "robots.count=16"]
     alone, spared = (
         run("sensor-coverage", runner="inline", overrides=[*few, *more]) for more in (["services.redundancy=none"], [])
     )
     assert "depot-dry" in alone.reason
     assert spared.outcome == "completed"
-    assert spared.metrics["robots_deployed"] == 15
+    assert spared.metrics["robots_deployed"] == 16
     assert spared.metrics["unsafe_removals"] == 0
 
 
