@@ -61,6 +61,7 @@ class SlotProof:
         # Arcs that end at the stretch of wall up to the latest point, seen without a break, as if its ends were tied.
         self._stretch: list[Arc] = []
         self._stretch_end: WalkPoint | None = None
+        self._open: list[Arc] | None = None  # until something changes
 
     @property
     def ready(self) -> bool:
@@ -75,7 +76,7 @@ class SlotProof:
     def update(self, slot: int, scan: ScanResult, touched: Iterable[float], in_touch: Collection[int] = ()) -> None:
         """Take in the slot's view and the complex around it, the directions [rad] of walls in touch, and the slots in touch."""
         view = scan.views[slot]
-        self._slot, self._scan = slot, scan
+        self._slot, self._scan, self._open = slot, scan, None
         self.around = {each: view[each] for each in scan.complex_.neighbours[slot]}
         self._touched = touched = tuple(touched)
         self._at_walls, self._contacts = arcs_of_walls(touched), arcs_of_walls(touched, CONTACT_RAD)
@@ -87,6 +88,11 @@ class SlotProof:
 
     def open_arcs(self) -> list[Arc]:
         """Return the arcs that nothing closes."""
+        if self._open is None:
+            self._open = self._find_open()
+        return self._open
+
+    def _find_open(self) -> list[Arc]:
         standing = self._scan.complex_.neighbours
         walks = [
             *self._by_walks.counting(standing),
@@ -104,7 +110,7 @@ class SlotProof:
 
         `stretch` is the stretch of wall that the robot follows, if it has met a wall.
         """
-        old = self._open_rad()
+        old, self._open = self._open_rad(), None
         slot, (before, point, hand, witnesses, number) = self._slot, step
         if before is None or before is not self._stretch_end or witnesses:
             self._stretch = []
@@ -142,10 +148,14 @@ class SlotProof:
     def extend(self, walk: int, stretch: FollowedStretch) -> bool:
         """Take in how far a stretch of wall was followed; return whether this slot saw a part of it, and it is news."""
         known = self._stretches.get((walk, stretch.first_number))
-        return known is not None and known.extend(stretch)
+        if known is None or not known.extend(stretch):
+            return False
+        self._open = None
+        return True
 
     def end_walk(self, walk: int) -> None:
         """Keep the arcs that a walk has closed, but not its steps: it is over."""
+        self._open = None
         self._touches.pop(walk, None)
         for key in [each for each in self._stretches if each[0] == walk]:
             for needed, seen, arc in self._stretches.pop(key).keyed_arcs(self._touched):
@@ -203,6 +213,7 @@ class SlotProof:
 
     def _take(self, proved: ProvedArc) -> None:
         """Take in an arc from another robot."""
+        self._open = None
         needed, seen = self._others(proved.needed), self._others(proved.seen)
         if proved.triangle is None:
             self._add(needed, seen, Arc(proved.start_rad, proved.width_rad))
@@ -211,6 +222,7 @@ class SlotProof:
 
     def _add(self, needed: Iterable[int], seen: Iterable[int], arc: Arc) -> None:
         """Add an arc that counts while the slots `needed` stand, until one of the slots `seen` is lost, which saw the walk."""
+        self._open = None
         self._by_walks.add((self._others(needed), self._others(seen)), arc)
 
     def _others(self, slots: Iterable[int]) -> tuple[int, ...]:
@@ -222,6 +234,7 @@ class SlotProof:
 
         A walk ends where no standing robot sees it. So what it leaves out is the part of the robots that saw it.
         """
+        self._open = None
         self._by_walks.lose(slots)
         self._triangles.lose(slots)
         for stretch in self._stretches.values():
@@ -249,6 +262,7 @@ class SlotProof:
 
     def inherit(self, memory: Iterable[ProvedArc]) -> None:
         """Take over the arcs that walks closed from the slot's former occupant."""
+        self._open = None
         self._by_walks, self._triangles = WalkArcs(), ChosenTriangles()
         self._stretches, self._touches = {}, {}
         for each in memory:
