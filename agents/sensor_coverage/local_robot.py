@@ -114,6 +114,7 @@ class PushParticipant(Component):
         """Send a token to the next robot, or end the push if there is none or it has the token already."""
         visible = to is not None and to in self._situation.motion.frame.seen
         if to is None or not visible or any(node == to for _, node in token.chain):
+            self._situation.check_at_base()  # the base sees the first robot of the path
             push.close(PushAborted(token.push, False))
         else:
             push.next = to

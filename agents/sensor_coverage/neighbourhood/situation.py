@@ -326,6 +326,10 @@ class Situation:
         """Begin to drive to a wall, and along it until the start is clear, and `half_rad` beside the bearing."""
         self._drive(self.wall_walk.to_wall(bearing_rad, hop_m, CLEAR_M, hand, half_rad))
 
+    def probe(self, bearing_rad: float, hop_m: float, hand: int, half_rad: float) -> None:
+        """Begin to follow a wall close by, past the direction `half_rad` beside the bearing, and return."""
+        self._drive(self.wall_walk.probe(bearing_rad, hop_m, hand, half_rad))
+
     def follow_wall(self, hand: int, keep: Collection[int]) -> None:
         """Begin to follow the wall in touch, in sight of a robot of `keep`, or of any robot if `keep` is empty."""
         self._drive(self.wall_walk.along(hand, LEG_M, keep, (), self.motion.parameters.margin_m))
@@ -353,7 +357,7 @@ class Situation:
 
     def stand(self) -> None:
         """End a drive: the robot stands still, for neighbours to average its bearing."""
-        self._check_at_base()
+        self.check_at_base()
         self.local_map.end_drive()
         self.motion.frame.forget()
 
@@ -385,13 +389,10 @@ class Situation:
 
     def _recover(self, rest: Vector) -> Drive:
         self.motion.rest = yield from self.motion.return_to_rest(rest)
-        self._check_at_base()
+        self.check_at_base()
 
-    def _check_at_base(self) -> None:
-        """Find out whether the robot was pushed off the base's point, or did not get back onto it after a drive.
-
-        Then it does not see what the base sees, and takes a slot of its own.
-        """
+    def check_at_base(self) -> None:
+        """Find out whether the robot is off the base's point. Then it sees other robots than the base, and takes a slot."""
         away_m = math.hypot(self.motion.frame.x_m, self.motion.frame.y_m)
         if self.local_map.at_base and self.local_map.heading is not None and away_m > AT_BASE_M:
             self.local_map.at_base = False

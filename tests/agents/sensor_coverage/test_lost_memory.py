@@ -318,6 +318,12 @@ def test_the_base_waits_for_robots_out_of_its_reach() -> None:
     assert result.sim_s > 270.0
 
 
+def test_a_robot_that_is_off_the_point_of_a_silent_base_takes_a_slot() -> None:
+    """It did not know its heading when it stopped there, and does not see the robots that the base sees."""
+    medium = ("arena.size_m=[4.4,3.6]", "base.pose=[0.2,1.8,0.0]", "robots.count=60", "services.path=gradient")
+    assert is_covered(with_faults(medium, '{kind="partition", groups=[[0]], at_s=22.2, for_s=240.0}', 805))
+
+
 def test_a_base_that_receives_no_message_any_more_does_not_complete() -> None:
     result = with_faults(HALL, '{kind="partition", groups=[[0]], at_s=30.0}', 1, "time.duration_s=900.0")
     assert result.outcome == "failed" or is_covered(result)
