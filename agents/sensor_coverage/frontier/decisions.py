@@ -92,12 +92,19 @@ class SlotCoverageProof(Protocol):
 
 
 class WallService(Protocol):
-    """Finds where a robot must follow a wall. `tried` has the directions [rad] of the attempts, by slot."""
+    """Finds where a robot must follow a wall. `tried` has the directions [rad] of attempts by slot, `probed` of probes."""
 
     tried: dict[int, list[float]]
+    probed: dict[int, list[float]]
+
+    def probes_at(self, slot: int, arcs: Iterable[Arc]) -> list[Plan]:
+        """Return a plan for each arc of a slot that was not probed yet: to follow a wall close by, and return."""
 
     def plans_at(self, slot: int, beside: int, arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
         """Return a plan for each open arc of a slot that has attempts left, and the number of arcs that have none."""
+
+    def forget(self) -> None:
+        """Forget all attempts and probes."""
 
 
 class FrontierService(Protocol):

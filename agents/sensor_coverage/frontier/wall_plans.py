@@ -25,6 +25,9 @@ ROUNDS_MAX: Final = 3
 # A probe goes this far [m] to a wall, and into open arcs up to this width [rad].
 PROBE_M: Final = 0.14
 PROBED_RAD_MAX: Final = math.radians(150.0)
+# Without a coordinator only arcs up to this width [rad] are probed: a walk closes a wide arc as a whole, and what a probe
+# leaves of it is hard to close.
+SLIVER_RAD_MAX: Final = math.radians(20.0)
 # Attempts to join two parts of the swarm by the same slot.
 JOINS_MAX: Final = 4
 
@@ -32,7 +35,8 @@ JOINS_MAX: Final = 4
 class WallPlans:
     """Finds the places at which a robot must follow a wall.
 
-    `unproven` are the slots that stay open after all attempts. `tried` has the directions [rad] of the attempts, by slot.
+    `unproven` are the slots that stay open after all attempts. `tried` has the directions [rad] of the attempts, by slot, and
+    `probed` those of the probes.
     """
 
     def __init__(self, parameters: PlannerParameters, slots: Slots, proof: CoverageProof | None) -> None:
@@ -43,7 +47,7 @@ class WallPlans:
         self.tried: dict[int, list[float]] = {}
         self._rounds = 1
         self._joined: dict[tuple[int, tuple[int, ...]], int] = {}
-        self._probed: dict[int, list[float]] = {}  # the directions [rad] of probes, by slot
+        self.probed: dict[int, list[float]] = {}
 
     def open_arcs(self, scan: ScanResult) -> dict[int, list[Arc]]:
         """Return the arcs in which each slot is open."""
@@ -56,25 +60,30 @@ class WallPlans:
         for slot in (*stale, *displaced):
             self.tried.pop(slot, None)
         for slot in displaced:
-            self._probed.pop(slot, None)
+            self.probed.pop(slot, None)
         return proof.open_arcs()
 
     def probes(self, scan: ScanResult) -> list[Plan]:
-        """Return a plan for each open arc that was not probed yet: the robot there follows a wall close by, and returns."""
-        found = list[Plan]()
-        for slot, arcs in self.open_arcs(scan).items():
-            known = self._probed.setdefault(slot, [])
-            # A station does not move, and a robot in touch with another one has no room.
-            for arc in arcs if slot not in scan.bases and not self._slots.in_touch.get(slot) else ():
-                if arc.width_rad <= PROBED_RAD_MAX and not any(
-                    (each - arc.start_rad) % math.tau < arc.width_rad for each in known
-                ):
-                    direction = math.remainder(arc.start_rad + arc.width_rad / 2.0, math.tau)
-                    known.append(direction)
-                    key = slot, slot, 0, WALLS + round(math.degrees(direction))
-                    found.append(
-                        Plan(key, slot, direction, PROBE_M, 0.0, (slot,), walk=True, half_rad=arc.width_rad / 2.0)
-                    )
+        """Return the probes of all slots but stations, which do not move."""
+        arcs = self.open_arcs(scan).items()
+        return [each for slot, open_arcs in arcs if slot not in scan.bases for each in self.probes_at(slot, open_arcs)]
+
+    def probes_at(self, slot: int, arcs: Iterable[Arc]) -> list[Plan]:
+        """Return a plan for each arc of a slot that was not probed yet: the robot there follows a wall close by, and returns.
+
+        A robot in touch with another one has no room.
+        """
+        found, known = list[Plan](), self.probed.setdefault(slot, [])
+        width_max = SLIVER_RAD_MAX if self._proof is None else PROBED_RAD_MAX
+        for arc in () if self._slots.in_touch.get(slot) else arcs:
+            if arc.width_rad <= width_max and not any(
+                (each - arc.start_rad) % math.tau < arc.width_rad for each in known
+            ):
+                direction = math.remainder(arc.start_rad + arc.width_rad / 2.0, math.tau)
+                known.append(direction)
+                key = slot, slot, 0, WALLS + round(math.degrees(direction))
+                half_rad = arc.width_rad / 2.0
+                found.append(Plan(key, slot, direction, PROBE_M, 0.0, (slot,), walk=True, half_rad=half_rad))
         return found
 
     def plans(self, scan: ScanResult) -> Iterator[Plan]:
@@ -160,8 +169,13 @@ class WallPlans:
         self._rounds += 1
         for slot in self.unproven:
             self.tried.pop(slot, None)
-            self._probed.pop(slot, None)
+            self.probed.pop(slot, None)
         return True
+
+    def forget(self) -> None:
+        """Forget all attempts and probes."""
+        self.tried.clear()
+        self.probed.clear()
 
     def note_attempt(self, plan: Plan) -> None:
         """Record that a plan is tried."""

@@ -70,7 +70,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     """The memory of a slot, which the next occupant inherits.
 
     `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
-    `explored` are directions of attempts to follow a wall.
+    `explored` are directions [rad] of attempts to follow a wall, and `probed` those of probes of walls close by.
     `proved` has the arcs that walks closed. `distances_m` has (neighbouring slot, distance [m]) where a walk measured it.
     """
 
@@ -86,6 +86,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     explored: tuple[float, ...] = ()
     proved: tuple[ProvedArc, ...] = ()
     distances_m: tuple[tuple[int, float], ...] = ()
+    probed: tuple[float, ...] = ()
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).

@@ -16,7 +16,7 @@ from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerPara
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, mark_of
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
-from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory
+from zwerm.agents.sensor_coverage.messages.pushes import SlotMemory
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
 from zwerm.agents.sensor_coverage.neighbourhood.obstructions import Obstructions
@@ -86,7 +86,7 @@ class LocalMap(NeighbourTable):
                 distance_m = self.distances_m.get(state.slot, math.inf)
                 if self._references.take(node, state.slot, numbers, there, back, distance_m):
                     self.proof.inherit(())
-                    self._planner.walls.tried.clear()
+                    self._planner.walls.forget()
 
     def update_walls(self, bearings: tuple[float, ...], robots: tuple[int, ...] = ()) -> None:
         """Remember the walls that this robot touches, by their bearings [rad], and the robots."""
@@ -100,14 +100,9 @@ class LocalMap(NeighbourTable):
     def memory(self) -> SlotMemory:
         """Return the memory of this slot, for its next occupant."""
         log, me = self._planner.attempt_log, self.slot
-        references = [
-            ReferenceBearing(slot, node, cmath.phase(mean), count)
-            for slot, (mean, count) in sorted(self._references.items())
-            if (node := self.at(slot)) is not None
-        ]
         return SlotMemory(
             me,
-            tuple(references),
+            self._references.memory(self.at),
             tuple(self._slots.walls.get(me, ())),
             tuple(log.closed),
             tuple(key for key, slot in log.failed if slot == me),
@@ -118,6 +113,7 @@ class LocalMap(NeighbourTable):
             tuple(self._planner.walls.tried.get(me, ())),
             self.proof.memory(),
             tuple(self.distances_m.items()),
+            tuple(self._planner.walls.probed.get(me, ())),
         )
 
     def reopen(self) -> None:
@@ -125,7 +121,7 @@ class LocalMap(NeighbourTable):
         log = self._planner.attempt_log
         log.closed, log.failed, log.attempts = {}, {}, {}
         log.blocked.clear()
-        self._planner.walls.tried.clear()
+        self._planner.walls.forget()
         self._bodies.stopped = {}
         self.replan()
 
@@ -192,7 +188,7 @@ class LocalMap(NeighbourTable):
         """Take over a slot with its memory."""
         self._take(memory.slot, memory.claims)
         me = self.slot
-        self._references = References((each.slot, each.direction_rad, each.count) for each in memory.references)
+        self._references = References(memory.references)
         self._slots.walls[me] = list(memory.walls)
         log = self._planner.attempt_log
         log.closed = dict.fromkeys(memory.closed)
@@ -200,7 +196,7 @@ class LocalMap(NeighbourTable):
         log.attempts = dict(memory.attempts)
         log.blocked[me] = list(memory.blocked)
         self._bodies.stopped = dict(memory.obstructed)
-        self._planner.walls.tried[me] = list(memory.explored)
+        self._planner.walls.tried[me], self._planner.walls.probed[me] = list(memory.explored), list(memory.probed)
         self.proof.inherit(memory.proved)
         self.distances_m = dict(memory.distances_m)
 
@@ -315,6 +311,10 @@ class LocalMap(NeighbourTable):
         self._bodies.finished.pop(node, None)
         if node in self._bodies.stopped.values():
             self.reopen()
+
+    def probes(self) -> list[Plan]:
+        """Return a plan for each open arc here that no robot has probed yet, for this robot to carry out."""
+        return self._planner.walls.probes_at(self.slot, self.proof.open_arcs())
 
     def note_failure(self, plan: Plan, driven_m: float) -> None:
         """Record that a wall stopped a plan after `driven_m`."""

@@ -1,18 +1,19 @@
 """The reference directions from one robot's slot to the slots around."""
 
 import cmath
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from zwerm.agents.sensor_coverage.frontier.directions import Reference, is_displaced, refined_reference
+from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing
 
 
 class References:
     """The reference directions from one robot's slot, by the slots to which they lead."""
 
-    def __init__(self, inherited: Iterable[tuple[int, float, int]] = ()) -> None:
-        """Begin with the former occupant's: (slot, direction [rad], number of readings)."""
+    def __init__(self, inherited: Iterable[ReferenceBearing] = ()) -> None:
+        """Begin with those of the former robot at the slot."""
         self._known: dict[int, Reference] = {
-            slot: (cmath.rect(1.0, direction), count) for slot, direction, count in inherited
+            each.slot: (cmath.rect(1.0, each.direction_rad), each.count) for each in inherited
         }
         self._learned: dict[int, tuple[int, ...]] = {}  # by robot: the numbers of the latest readings at both ends
         self._readers: dict[int, int] = {}  # by slot: the robot there at the latest reading
@@ -34,6 +35,14 @@ class References:
         self._learned[node], self._readers[slot] = numbers, node
         self._known[slot] = refined_reference(known, there_rad, back_rad)
         return displaced
+
+    def memory(self, at: Callable[[int], int | None]) -> tuple[ReferenceBearing, ...]:
+        """Return the references for the next robot at the slot; `at` returns the robot at a slot, or None."""
+        return tuple(
+            ReferenceBearing(slot, node, cmath.phase(mean), count)
+            for slot, (mean, count) in sorted(self._known.items())
+            if (node := at(slot)) is not None
+        )
 
     def items(self) -> Iterable[tuple[int, Reference]]:
         """Return the slots and the reference directions to them."""

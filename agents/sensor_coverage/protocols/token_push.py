@@ -129,14 +129,13 @@ class TokenPush(PushPart, WallPush):
         self._enter("holding")
 
     def _offer(self) -> None:
-        if self._plan is None:
-            self._map.update_plans()
-            self._plan = None if self._first_bearings else self._map.best_plan()
+        if self._plan is None and not self._first_bearings and self._probes_first():
+            return
         behind = self._chain.behind
         if self._first_bearings or (self._plan is not None and behind is None):
             self._deploy()
         elif self._plan is None or behind is None:
-            self.close(PushAborted(self.id, False))
+            self.close(PushAborted(self.id, self._has_probed))
         else:
             self._enter("offering")
             if self._plan.walk:
@@ -369,6 +368,7 @@ PHASES: Final[Mapping[str, Phase]] = {
                   wake=lambda push: push._wake_after(LOST_TICKS if push._waited < LOST_TICKS else LINK_TICKS)),
     # Leader: wait until the local map is right, offer the slot, drive, and wait for the followers.
     "holding": Phase(((TokenPush._may_offer, TokenPush._offer),), wake=TokenPush._next_tick),
+    "probing": Phase(arrived=TokenPush._probed),
     "offering": Phase(),
     "deploying": Phase(arrived=TokenPush._deployed),
     "leaving": Phase(arrived=TokenPush._left_station),

@@ -6,7 +6,7 @@ new slot, and the deployment goes on from there.
 """
 
 from abc import abstractmethod
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Sequence
 from typing import Final, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
@@ -39,6 +39,9 @@ class WallSituation(Protocol):
     def to_wall(self, bearing_rad: float, hop_m: float, hand: int, half_rad: float) -> None:
         """Begin to drive to a wall, and along it until the start is clear, and `half_rad` beside the bearing."""
 
+    def probe(self, bearing_rad: float, hop_m: float, hand: int, half_rad: float) -> None:
+        """Begin to follow a wall close by, past the direction `half_rad` beside the bearing, and return."""
+
     def follow_wall(self, hand: int, keep: Collection[int]) -> None:
         """Begin to follow the wall in touch, in sight of a robot of `keep`, or of any robot if `keep` is empty."""
 
@@ -64,6 +67,8 @@ class WallPush:
     _has_helped = False  # the walk has closed a part of an arc
     _is_idle = False  # the walk has closed nothing, and ended where the robot behind is out of sight
     _near: tuple[tuple[float, float], ...] = ()  # arcs around this robot's slot that the leader has closed
+    _probes: Sequence[tuple[Plan, int]] = ()  # probes that are left, with the hand at the wall
+    _has_probed = False
     _is_spare = False  # the walk has ended in sight of the swarm, which needs no robot there
 
     @property
@@ -108,6 +113,41 @@ class WallPush:
         self._walks, self._since = False, self._situation.tick if self.phase == "await" else self._since
         self._walk_over = self._chain.ahead == self._chain.leader[1]
 
+    def _probes_first(self) -> bool:
+        """Choose the plan; return whether it is a walk, and walls close to the slot are followed before: nobody has yet."""
+        self._map.update_plans()
+        self._plan = self._map.best_plan()
+        if self._plan is None or not self._plan.walk:
+            return False
+        self._probes = [(plan, hand) for plan in self._map.probes() for hand in (1, -1)]
+        if not self._probe():
+            return False
+        self._plan = None
+        return True
+
+    def _probe(self) -> bool:
+        if not self._probes:
+            return False
+        plan, hand = self._probes[0]
+        self._enter("probing")
+        self._situation.probe(wrapped(plan.direction - self._heading), plan.hop_m, hand, plan.half_rad)
+        return True
+
+    def _probed(self, result: DriveResult | WalkResult) -> None:
+        """Go on with the next probe; after the last one, lead where an arc is still open."""
+        self._has_probed = True
+        if isinstance(result, WalkResult):
+            self._map.note_near(self._turned(result.near))
+        (plan, _), *left = self._probes
+        is_open = isinstance(result, WalkResult) and result.end == OPEN
+        self._probes = [each for each in left if not (is_open and each[0] is plan)]
+        if not self._probe():
+            self._situation.stand()
+            self.lead()
+
+    def _turned(self, near: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+        return tuple((start + self._heading, width) for start, width in near)
+
     def _approach(self, plan: Plan) -> None:
         """Drive into an open arc, to a wall, and past the edge of the arc: the walk begins there, and closes all of it."""
         self._enter("approaching")
@@ -118,7 +158,7 @@ class WallPush:
         """Leave the slot to the follower, unless there is no way to get clear of it."""
         near: tuple[tuple[float, float], ...] = ()
         if isinstance(result, WalkResult):
-            near = tuple((start + self._heading, width) for start, width in result.near)
+            near = self._turned(result.near)
         if not isinstance(result, WalkResult) or result.end == SHUT:
             at_base = self._map.slot == NOWHERE
             if not at_base:

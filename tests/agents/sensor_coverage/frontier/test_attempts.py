@@ -40,3 +40,16 @@ def test_attempts_are_not_counted_anew_where_no_arc_stays_open() -> None:
     assert attempts(walls, 4) == len(FRACTIONS)
     assert not walls.begin_again()
     assert attempts(walls, 4) == 0
+
+
+def test_a_narrow_arc_is_probed_once_unless_the_robot_is_in_touch_with_another_one() -> None:
+    """A walk closes the wide one as a whole."""
+    slots = Slots()
+    walls = WallPlans(PlannerParameters(), slots, None)
+    narrow, wide = Arc(2.0, 0.2), Arc(-1.0, 1.5)
+    slots.in_touch[5] = (7,)
+    assert walls.probes_at(5, [narrow]) == []
+    assert [plan.direction for plan in walls.probes_at(4, [narrow, wide])] == [2.1]
+    assert walls.probes_at(4, [Arc(2.05, 0.1)]) == []
+    walls.forget()
+    assert len(walls.probes_at(4, [narrow])) == 1
