@@ -46,7 +46,12 @@ def test_a_deployment_that_cannot_continue_states_its_reason(settings: tuple[str
 
 def test_a_frontier_that_no_path_leads_to_is_cut_off() -> None:
     """In a corridor the robots in the middle die, and their replacements die, until no robot is sent there again."""
-    corridor = ("arena.size_m=[6.0,0.5]", "base.pose=[0.2,0.25,0.0]", "robots.on_crash=continue")
+    corridor = (
+        "arena.size_m=[6.0,0.5]",
+        "base.pose=[0.2,0.25,0.0]",
+        "robots.on_crash=continue",
+        'coordinator.parameters.walls="paper"',  # robots that follow walls are sent there until the depot is empty
+    )
 
     def strike(world: World) -> None:
         position = world.scene.position

@@ -26,7 +26,7 @@ BESIDE_EDGE_RAD: Final = math.radians(5.0)
 
 
 class SightEnd(NamedTuple):
-    """The direction [rad] in which a slot lost sight of a walk, or saw it first, and the slots that saw the next point."""
+    """The direction [rad] in which a slot lost sight of a walk, or saw it first, and the slots that saw what is beyond."""
 
     direction_rad: float
     witnesses: tuple[int, ...]
@@ -36,14 +36,19 @@ class SightEnd(NamedTuple):
         return not any(each in standing for each in self.witnesses)
 
 
-def sight_ends_at(slot: int, number: int, points: Sequence[WalkPoint]) -> Iterator[SightEnd]:
-    """Yield the ends of what a slot saw of a walk, at its point with this number."""
+def sight_ends_at(slot: int, number: int, points: Sequence[WalkPoint], end: int | None = None) -> Iterator[SightEnd]:
+    """Yield the ends of what a slot saw of a walk, at its point with this number.
+
+    The robot of the slot `end` stands at the end of the walk, because no other one would see it beyond.
+    """
     for step in (1, -1):
         other = number + step
         while 0 <= other < len(points) and points[other].is_blind and slot in points[other].seen:
             other += step
         if 0 <= other < len(points) and slot not in points[other].seen:
             yield SightEnd(points[number].seen[slot], tuple(points[other].seen))
+        elif other == len(points) and end is not None:
+            yield SightEnd(points[number].seen[slot], (end,))
 
 
 def without_edges(arcs: Iterable[Arc], ends: Iterable[SightEnd]) -> list[Arc]:

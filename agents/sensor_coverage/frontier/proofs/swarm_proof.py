@@ -320,7 +320,8 @@ class SwarmProof:
                 crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
                 contacts += arcs_beside_pocket(hand, pocket, around.touched)
         by_stretch = self._by_stretch[slot] = {number: arcs_into(each) for number, each in crossings.items()}
-        edged = [*contacts, *shortened(around.near)]
+        all_edges = [edge for each in edges.values() for edge in each]
+        edged = without_edges([*contacts, *shortened(around.near)], all_edges)
         found = [*contacts, *(each.arc for each in around.near)]
         for stretch, each in by_stretch.items():
             found += each
@@ -383,7 +384,7 @@ def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             pockets = tuple(_pockets(slot, number, point, stretches, first)) if slot in point.robots else ()
             number_of = -1 if here is None else first + here.first_number
             between = between if before is not None else ()
-            edges = tuple(sight_ends_at(slot, number, walk.points))
+            edges = tuple(sight_ends_at(slot, number, walk.points, walk.end))
             yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges)
             last[slot] = now
 

@@ -82,6 +82,7 @@ def test_the_ends_of_what_a_slot_saw_are_found_past_points_without_a_contact() -
     points = [point(_0=10), blind, point(_1=20, _2=30)]
     assert list(sight_ends_at(0, 0, points)) == [SightEnd(math.radians(10), (1, 2))]
     assert list(sight_ends_at(0, 0, points[:2])) == [], "the walk ends in sight"
+    assert list(sight_ends_at(0, 1, points[:2], 7)) == [SightEnd(points[1].seen[0], (7,))], "robot 7 stands there"
     assert list(sight_ends_at(1, 2, points)) == [SightEnd(math.radians(20), (0,))]
 
 
