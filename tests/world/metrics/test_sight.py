@@ -154,9 +154,9 @@ def test_the_time_to_a_coverage_is_the_time_at_which_it_is_in_sight(deployed: Ru
     sight = SeenArea(deployed.arena, 1.0)
     for percent, time_s in zip((50, 90, 99), times, strict=True):
         first, last = (np.searchsorted(tracks.time_s, time_s + off_s) for off_s in (-1.0, 1.0))
-        # Robots move on meanwhile, so a place may go out of sight again.
+        # Robots move on meanwhile, so a place may go out of sight again, and the stored positions are 3 s apart.
         before, *near = (sight.fraction(tracks.position[k][tracks.present[k]]) for k in range(first - 1, last + 1))
-        assert before < percent / 100.0 <= max(near)
+        assert before < percent / 100.0 <= max(near) + 0.005
     assert deployed.series["coverage_fraction"][-1] == found["coverage_fraction"]
     assert deployed.series["robots_deployed"][-1] == found["robots_deployed"]
 
