@@ -1,6 +1,7 @@
 """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import chain
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.fans import fan_of, side_of
@@ -71,7 +72,7 @@ class SlotProof:
     @property
     def knows_walks(self) -> bool:
         """True once walks have closed an arc of the slot."""
-        return bool(self._stretches) or any(True for _ in (*self._by_walks.all(), *self._triangles.all()))
+        return any(True for _ in chain(self._stretches, self._by_walks.all(), self._triangles.all()))
 
     def update(self, slot: int, scan: ScanResult, touched: Iterable[float], in_touch: Collection[int] = ()) -> None:
         """Take in the slot's view and the complex around it, the directions [rad] of walls in touch, and the slots in touch."""
@@ -213,11 +214,11 @@ class SlotProof:
 
     def _take(self, proved: ProvedArc) -> None:
         """Take in an arc from another robot."""
-        self._open = None
         needed, seen = self._others(proved.needed), self._others(proved.seen)
         if proved.triangle is None:
             self._add(needed, seen, Arc(proved.start_rad, proved.width_rad))
         else:
+            self._open = None
             self._triangles.add(proved._replace(needed=needed, seen=seen), proved.triangle)
 
     def _add(self, needed: Iterable[int], seen: Iterable[int], arc: Arc) -> None:

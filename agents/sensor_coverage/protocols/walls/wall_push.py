@@ -126,6 +126,7 @@ class WallPush:
         return True
 
     def _probe(self) -> bool:
+        """Begin the next probe; return whether there is one."""
         if not self._probes:
             return False
         plan, hand = self._probes[0]
