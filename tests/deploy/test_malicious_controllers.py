@@ -57,8 +57,8 @@ def test_a_robot_that_writes_to_every_descriptor_keeps_no_other_from_a_restart(
 
 
 def test_a_flood_of_answers_is_counted_and_its_robot_evicted(nothing_left: None) -> None:
-    result = attacked("Twice", duration_s=10.0)
-    assert (result.outcome, result.ticks) == ("time-limit", 100), result.reason
+    result = attacked("Twice", duration_s=20.0)
+    assert (result.outcome, result.ticks) == ("time-limit", 200), result.reason
     assert result.crashed == [ATTACKER]
     assert f"flood: {REFUSALS_MAX} of its messages were refused" in result.crash_reasons[ATTACKER]
 

@@ -23,7 +23,9 @@ from zwerm.wire.messages import Command, Observation, Transmission, WheelSpeeds,
 ATTACKER = 1
 AT_TICK = 3
 FLOOD = 20_000
-BURST = 12  # more at once would block the only thread of the connection, which ends after 5 s
+# The queue of a connection holds 16 messages. Where it is full, the only thread of the connection blocks, and the connection
+# ends after 5 s. The next observation comes after the first answer has left: then 2 BURST + 1 messages are queued at most.
+BURST = 6
 MEBIBYTE = 2**20
 
 
