@@ -98,7 +98,7 @@ class WallWalks:
             leader = slots.occupant[plan.mover]
             yield from pushing.prepare(plan)
         heading = slots.heading[leader]
-        bearing = wrapped(plan.direction - heading)
+        bearing = wrapped(plan.aim - heading)
         to_wall = ToWall(pushing.cycle, bearing, plan.hop_m, CLEAR_M, -plan.hand, plan.half_rad)
         walked = yield from self._order(leader, to_wall)
         if walked is None:  # dead
@@ -121,7 +121,7 @@ class WallWalks:
         self.walks += 1
         if walked.end == OPEN:
             if plan.mover in slots.occupant:
-                back = plan.direction + math.pi - heading
+                back = plan.aim + math.pi - heading
                 yield from pushing.correct(leader, [(slots.occupant[plan.mover], back)])
             return (*followers, leader)
         keep = (slots.occupant[plan.mover],) if plan.beside and plan.mover in slots.occupant else ()

@@ -100,7 +100,7 @@ class WallService(Protocol):
     def probes_at(self, slot: int, arcs: Iterable[Arc]) -> list[Plan]:
         """Return a plan for each arc of a slot that was not probed yet: to follow a wall close by, and return."""
 
-    def plans_at(self, slot: int, beside: int, arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
+    def plans_at(self, slot: int, beside: Mapping[int, float], arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
         """Return a plan for each open arc of a slot that has attempts left, and the number of arcs that have none."""
 
     def forget(self) -> None:

@@ -25,9 +25,9 @@ class Plan(NamedTuple):
 
     `key` names what is expanded: one side of an edge, or a gap around one slot. The new robot measures its distance to
     the robots at the `anchors`. `path` leads from a source to the mover, once a path is assigned. With `walk` the robot
-    drives to a wall and follows it, with the wall at its `hand` (+1 left, -1 right). It begins past the edge of the open arc,
-    `half_rad` beside the direction. With `beside` it stays in sight of the mover's slot. It stops where it sees a slot of
-    `meet`.
+    drives to a wall, `aside_rad` to the left of the direction, and follows it, with the wall at its `hand` (+1 left, -1 right).
+    It begins past the edge of the open arc, `half_rad` beside where it drives. With `beside` it stays in sight of the mover's
+    slot. It stops where it sees a slot of `meet`.
     """
 
     key: tuple[int, ...]
@@ -42,3 +42,9 @@ class Plan(NamedTuple):
     beside: bool = False
     meet: tuple[int, ...] = ()
     half_rad: float = 0.0
+    aside_rad: float = 0.0
+
+    @property
+    def aim(self) -> float:
+        """The direction [rad] in which the robot drives to a wall."""
+        return self.direction + self.aside_rad

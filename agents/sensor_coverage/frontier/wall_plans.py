@@ -4,7 +4,7 @@ The proof of coverage (`zwerm.agents.sensor_coverage.frontier.wall_proof`) finds
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import CoverageProof
@@ -18,6 +18,13 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, conta
 JOIN: Final = 2000
 # Directions to try into an open arc, as fractions of its width, one after the other.
 FRACTIONS: Final = (0.5, 0.5, 0.5, 0.5, 0.25, 0.75, 0.1, 0.9)
+# In an arc up to the first width [rad] between a robot and a wall the first attempts go to the wall at its edge: in the middle
+# the robot, or the opening beside it, is in the way. The edge is that robot if they differ by less than the second angle, and
+# the robot drives to the wall the third angle beyond the edge.
+AT_EDGE_RAD_MAX: Final = math.radians(60.0)
+ROBOT_RAD: Final = math.radians(2.0)
+BEYOND_EDGE_RAD: Final = math.radians(3.0)
+AT_EDGE_MAX: Final = 4
 # Attempts after which the walking robot stays in sight of the slot, and gets a slot where that would see it no more.
 ANYWHERE_MAX: Final = 2
 # Times that the attempts at an arc are made, while nothing else is left to do.
@@ -93,16 +100,17 @@ class WallPlans:
         for slot, arcs in self.open_arcs(scan).items():
             if not scan.complex_.neighbours[slot]:
                 continue
-            found, exhausted = self.plans_at(slot, scan.complex_.neighbours[slot][0], arcs)
+            neighbours = scan.complex_.neighbours[slot]
+            found, exhausted = self.plans_at(slot, {each: scan.views[slot][each] for each in neighbours}, arcs)
             yield from found
             if exhausted:
                 unproven[slot] = None
         self.unproven = tuple(unproven)
 
-    def plans_at(self, slot: int, beside: int, arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
+    def plans_at(self, slot: int, beside: Mapping[int, float], arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
         """Return a plan for each arc of a slot that has attempts left, and the number of arcs that have none.
 
-        `beside` is a neighbour of the slot, to name the frontier.
+        `beside` has the directions [rad] of its neighbours. The first one names the frontier.
         """
         found, exhausted = list[Plan](), 0
         for arc in arcs:
@@ -110,13 +118,16 @@ class WallPlans:
             if tried >= len(FRACTIONS):
                 exhausted += 1
                 continue
-            direction = math.remainder(arc.start_rad + FRACTIONS[tried] * arc.width_rad, math.tau)
-            hand = -1 if tried % 2 == 0 else 1
+            edge = _edge_at_wall(arc, beside.values()) if tried < AT_EDGE_MAX else 0
+            fraction = FRACTIONS[tried]
+            direction = math.remainder(arc.start_rad + fraction * arc.width_rad, math.tau)
+            aside_rad = edge * (arc.width_rad / 2.0 + BEYOND_EDGE_RAD)
+            hand = (-1 if tried % 2 == 0 else 1) * (edge or 1)
             # A robot that comes from the slot, with the wall at its right hand, moves to the left.
-            before = FRACTIONS[tried] if hand < 0 else 1.0 - FRACTIONS[tried]
+            before = fraction * arc.width_rad if hand < 0 else (1.0 - fraction) * arc.width_rad
             found.append(
                 Plan(
-                    (slot, beside, 0, WALLS + round(math.degrees(direction))),
+                    (slot, next(iter(beside)), 0, WALLS + round(math.degrees(direction))),
                     slot,
                     direction,
                     self._parameters.hop_m,
@@ -125,7 +136,8 @@ class WallPlans:
                     walk=True,
                     hand=hand,
                     beside=tried >= ANYWHERE_MAX,
-                    half_rad=before * arc.width_rad,
+                    half_rad=max(0.0, before - hand * aside_rad),
+                    aside_rad=aside_rad,
                 )
             )
         return found, exhausted
@@ -194,3 +206,12 @@ class WallPlans:
         fresh = [each for each in united_round(Arc(*each) for each in arcs) if not contains(same, each)]
         kept = [each for each in known if each.hand != hand or not contains(fresh, each.arc)]
         self._slots.near[slot] = [*kept, *(NearArc(each, hand) for each in fresh)]
+
+
+def _edge_at_wall(arc: Arc, robots: Collection[float]) -> int:
+    """Return which edge of an arc is at a wall where the other one is at a robot, +1 left, -1 right; 0 if there is none."""
+    if arc.width_rad > AT_EDGE_RAD_MAX:
+        return 0
+    ends = arc.start_rad, arc.start_rad + arc.width_rad
+    at_robot = [any(abs(math.remainder(each - end, math.tau)) < ROBOT_RAD for each in robots) for end in ends]
+    return at_robot[0] - at_robot[1]

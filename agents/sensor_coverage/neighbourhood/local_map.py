@@ -262,8 +262,7 @@ class LocalMap(NeighbourTable):
         seen = {node: each.bearing_rad + (self.heading or 0.0) for node, each in self.seen.items()}
         self.obstructed = self._bodies.count(me, scan, planner.fence, seen, self.states, mutual.values())
         if follows:  # a robot without neighbours has no open arcs
-            beside = next(iter(self.proof.around), NOWHERE)
-            self.wall_plans, self.unproven = planner.walls.plans_at(me, beside, arcs)
+            self.wall_plans, self.unproven = planner.walls.plans_at(me, self.proof.around, arcs)
 
     def update_proof(self, scan: ScanResult | None = None) -> None:
         """Take the present view into the proof of coverage."""

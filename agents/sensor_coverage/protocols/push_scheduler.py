@@ -220,7 +220,7 @@ class PushScheduler(Component):
         token = PushToken(push, push, (), via)
         if wall is not None:
             self._map.note_attempt(wall)
-            token = PushToken(push, push, (), via, wall.direction, wall.hand)
+            token = PushToken(push, push, (), via, wall.aim, wall.hand)
         self._situation.mailbox.write(waiting[0], token)
 
     def _own_wall_plan(self, tick: int) -> Plan | None:

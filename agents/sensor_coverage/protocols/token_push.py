@@ -210,7 +210,7 @@ class TokenPush(PushPart, WallPush):
             return (Sighting(self._back or 0, wrapped(self._first_bearings[0] + math.pi)),)
         if self._plan is None:
             return ()
-        back_rad = wrapped(self._plan.direction + math.pi - self._heading)
+        back_rad = wrapped(self._plan.aim + math.pi - self._heading)
         future = self._chain.future()
         nodes = [future.get(slot, self._map.at(slot)) for slot in self._plan.anchors]
         return tuple(Sighting(node, back_rad) for node in nodes if node is not None)

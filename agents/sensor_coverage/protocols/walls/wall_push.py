@@ -152,7 +152,7 @@ class WallPush:
     def _approach(self, plan: Plan) -> None:
         """Drive into an open arc, to a wall, and past the edge of the arc: the walk begins there, and closes all of it."""
         self._enter("approaching")
-        bearing = wrapped(plan.direction - self._heading)
+        bearing = wrapped(plan.aim - self._heading)
         self._situation.to_wall(bearing, plan.hop_m, -plan.hand, plan.half_rad)
 
     def _approached(self, result: DriveResult | WalkResult) -> None:

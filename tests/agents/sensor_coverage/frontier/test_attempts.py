@@ -2,19 +2,28 @@
 
 import math
 
+import pytest
+
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_plans import FRACTIONS, ROUNDS_MAX, WallPlans
+from zwerm.agents.sensor_coverage.frontier.wall_plans import (
+    AT_EDGE_MAX,
+    BEYOND_EDGE_RAD,
+    FRACTIONS,
+    ROUNDS_MAX,
+    WallPlans,
+)
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc
 
 OPEN = Arc(0.5, 1.0)
+BESIDE = {0: 3.0}  # a neighbour in another direction
 
 
 def attempts(walls: WallPlans, slot: int) -> int:
     """Make all attempts at an arc that stays open, and return their number."""
     made = 0
     while True:
-        plans, exhausted = walls.plans_at(slot, 0, [OPEN])
+        plans, exhausted = walls.plans_at(slot, BESIDE, [OPEN])
         if exhausted:
             return made
         walls.note_attempt(plans[0])
@@ -53,3 +62,36 @@ def test_a_narrow_arc_is_probed_once_unless_the_robot_is_in_touch_with_another_o
     assert walls.probes_at(4, [Arc(2.05, 0.1)]) == []
     walls.forget()
     assert len(walls.probes_at(4, [narrow])) == 1
+
+
+@pytest.mark.parametrize(("robot_rad", "edge_rad", "sign"), [(1.0, 1.2, 1), (1.2, 1.0, -1)])
+def test_the_first_attempts_between_a_robot_and_a_wall_go_to_the_wall(
+    robot_rad: float, edge_rad: float, sign: int
+) -> None:
+    """In the middle of the arc the robot may be in the way. Later attempts go there. All count for the arc."""
+    walls = WallPlans(PlannerParameters(), Slots(), None)
+    arc = Arc(1.0, 0.2)
+    hands = []
+    for _ in range(AT_EDGE_MAX):
+        ((plan,), _) = walls.plans_at(4, {7: robot_rad}, [arc])
+        assert plan.aim == pytest.approx(edge_rad + sign * BEYOND_EDGE_RAD)
+        assert arc.start_rad < plan.direction < arc.start_rad + arc.width_rad
+        hands.append(plan.hand)
+        walls.note_attempt(plan)
+    assert hands == [-sign, sign] * (AT_EDGE_MAX // 2)
+    ((plan,), _) = walls.plans_at(4, {7: robot_rad}, [arc])
+    assert plan.aim == plan.direction == pytest.approx(1.0 + FRACTIONS[AT_EDGE_MAX] * 0.2)
+
+
+def test_a_walk_at_the_edge_begins_beyond_the_other_edge() -> None:
+    """With the wall at its right hand, -1, the walk passes the slot; before it the robot follows it with the other hand."""
+    walls = WallPlans(PlannerParameters(), Slots(), None)
+    ((plan,), _) = walls.plans_at(4, {7: 1.0}, [Arc(1.0, 0.2)])
+    assert plan.half_rad == pytest.approx(0.2 + BEYOND_EDGE_RAD)
+
+
+@pytest.mark.parametrize("beside", [{7: 2.0}, {7: 1.0, 8: 1.2}])
+def test_an_arc_between_walls_or_between_robots_is_tried_in_its_middle(beside: dict[int, float]) -> None:
+    walls = WallPlans(PlannerParameters(), Slots(), None)
+    ((plan,), _) = walls.plans_at(4, beside, [Arc(1.0, 0.2)])
+    assert plan.aim == plan.direction == pytest.approx(1.1)
