@@ -40,7 +40,7 @@ from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Drive, Locomoti
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveToResult, correct, deploy, drive_back, move
 from zwerm.agents.sensor_coverage.motion.trail import Trail
-from zwerm.agents.sensor_coverage.motion.wall_walk import DriveToWalk, WallWalk
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import DriveToWalk, WallWalk
 from zwerm.agents.sensor_coverage.protocols.component import Component
 from zwerm.agents.sensor_coverage.protocols.component_loop import Codec, ComponentLoop
 from zwerm.agents.sensor_coverage.protocols.transport.deduplication import RequestDeduplicator

@@ -22,7 +22,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     TakeSlot,
 )
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
-from zwerm.agents.sensor_coverage.motion.wall_walk import WalkResult
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.beaconing import Beaconing
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.neighbourhood.surveillance import Surveillance

@@ -15,7 +15,7 @@ from zwerm.agents.sensor_coverage.motion.homing import Vector, slide, unit
 from zwerm.agents.sensor_coverage.motion.landmark_target import TargetPoint, target_point
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP, Locomotion
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
-from zwerm.agents.sensor_coverage.motion.wall_heading import hand_on_wall
+from zwerm.agents.sensor_coverage.motion.walls.wall_heading import hand_on_wall
 from zwerm.wire.messages import BodyVelocity
 
 # A contact within this angle of the heading is ahead.

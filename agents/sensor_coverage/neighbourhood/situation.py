@@ -27,7 +27,7 @@ from zwerm.agents.sensor_coverage.motion.push_drives import (
     regain,
 )
 from zwerm.agents.sensor_coverage.motion.trail import Trail
-from zwerm.agents.sensor_coverage.motion.wall_walk import (
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import (
     CLEAR_M,
     FIRST_HOP_M,
     LEG_M,

@@ -40,7 +40,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
-from zwerm.agents.sensor_coverage.motion.wall_walk import CLEAR_M, WalkResult
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import CLEAR_M, WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS, PushPart

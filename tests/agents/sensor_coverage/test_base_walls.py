@@ -8,7 +8,7 @@ from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import SHUT, STRETCH
 from zwerm.agents.sensor_coverage.messages.pushes import AllStanding, PushAborted
-from zwerm.agents.sensor_coverage.motion.wall_walk import WalkResult
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import WalkResult
 from zwerm.deploy.node_specs import node_specs
 from zwerm.scenario.load import load
 

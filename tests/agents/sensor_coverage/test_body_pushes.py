@@ -6,9 +6,15 @@ from collections.abc import Collection, Sequence
 import pytest
 
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
-from zwerm.agents.sensor_coverage.motion.dead_bodies import HELD_MAX, PUSH_TICKS, REST_TICKS, DeadBodies, HeldPoints
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
+from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import (
+    HELD_MAX,
+    PUSH_TICKS,
+    REST_TICKS,
+    DeadBodies,
+    HeldPoints,
+)
 from zwerm.wire.messages import BodyVelocity
 
 BODY, OTHER = 9, 4

@@ -10,7 +10,7 @@ from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, PathVector, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import LOST, STRETCH
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory, TakeSlot
-from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import IDLE_LEGS_MAX, WalkResult
 from zwerm.agents.sensor_coverage.protocols.token_push import TokenPush
 from zwerm.deploy.node_specs import node_specs
 from zwerm.scenario.load import load

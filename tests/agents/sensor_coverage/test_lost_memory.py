@@ -19,7 +19,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import PushAborted
 from zwerm.agents.sensor_coverage.messages.robot_sets import from_bytes, members, robot_set, to_bytes
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
-from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import IDLE_LEGS_MAX, WalkResult
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.component_loop import ComponentLoop
 from zwerm.agents.sensor_coverage.protocols.ending.release_roster import ReleaseRoster

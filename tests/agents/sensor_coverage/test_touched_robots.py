@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
-from zwerm.agents.sensor_coverage.motion.touched_robots import POINTS_MAX, TouchedRobots
+from zwerm.agents.sensor_coverage.motion.walls.touched_robots import POINTS_MAX, TouchedRobots
 
 RADIUS_M = 0.07
 NOISE_RAD = math.pi / 72.0

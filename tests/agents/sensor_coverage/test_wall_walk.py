@@ -11,11 +11,11 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, ends_at, unite
 from zwerm.agents.sensor_coverage.messages.commands import OPEN, SHUT, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
-from zwerm.agents.sensor_coverage.motion.near_arcs import NearPoint, arcs_around
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
-from zwerm.agents.sensor_coverage.motion.wall_heading import swept
-from zwerm.agents.sensor_coverage.motion.wall_walk import WEDGED_TICKS, WalkResult, WallWalk
+from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, arcs_around
+from zwerm.agents.sensor_coverage.motion.walls.wall_heading import swept
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import WEDGED_TICKS, WalkResult, WallWalk
 from zwerm.run.runner import run
 from zwerm.wire.messages import BodyVelocity
 

@@ -16,7 +16,7 @@ from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STR
 from zwerm.agents.sensor_coverage.messages.pushes import AllStanding, Body, PushAborted
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
-from zwerm.agents.sensor_coverage.motion.wall_walk import IDLE_LEGS_MAX, WalkResult
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import IDLE_LEGS_MAX, WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol

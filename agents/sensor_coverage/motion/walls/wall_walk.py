@@ -12,14 +12,14 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
-from zwerm.agents.sensor_coverage.motion.dead_bodies import DeadBodies, HeldPoints
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
-from zwerm.agents.sensor_coverage.motion.near_arcs import NearPoint, arcs_around
 from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
-from zwerm.agents.sensor_coverage.motion.past_edge import EDGE_M_MAX, past_edge
-from zwerm.agents.sensor_coverage.motion.touched_robots import TouchedRobots
-from zwerm.agents.sensor_coverage.motion.wall_heading import hand_on_wall
+from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import DeadBodies, HeldPoints
+from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, arcs_around
+from zwerm.agents.sensor_coverage.motion.walls.past_edge import EDGE_M_MAX, past_edge
+from zwerm.agents.sensor_coverage.motion.walls.touched_robots import TouchedRobots
+from zwerm.agents.sensor_coverage.motion.walls.wall_heading import hand_on_wall
 from zwerm.wire.messages import BodyVelocity
 
 # The robot is lost in free space after so much turning without a contact.

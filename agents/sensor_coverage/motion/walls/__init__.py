@@ -1,0 +1,1 @@
+"""Motion along walls in touch, and what a robot reports of it."""
