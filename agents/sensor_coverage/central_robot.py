@@ -161,6 +161,7 @@ class CentralRobot(Controller):
                 result.waypoints,
                 result.near,
                 self.motion.radius_m,
+                self.wall_walk.start,
             )
         )
 

@@ -16,7 +16,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
-from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Origin, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import (
     LOST,
     MET,
@@ -104,7 +104,7 @@ class WallWalks:
         if walked is None:  # dead
             self._sources.waiting.pop(plan.mover, None)
             return (leader,)
-        self._note_near(plan.mover, walked, heading, -plan.hand)
+        self._note_near(leader, plan.mover, walked, -plan.hand)
         if walked.end == SHUT:
             pushing.stopped += 1
             return (leader,)
@@ -141,16 +141,21 @@ class WallWalks:
                 walked = yield from self._order(robot, command)
                 if walked is None:
                     return (robot,)
-                self._note_near(slot, walked, heading, hand)
+                self._note_near(robot, slot, walked, hand)
                 if walked.end == OPEN:
                     break
         return (robot,)
 
-    def _note_near(self, slot: int, walked: Walked, heading: float, hand: int) -> None:
-        """Record the arcs of a wall that a robot with this heading [rad] followed close to a slot."""
+    def _note_near(self, robot: int, slot: int, walked: Walked, hand: int) -> None:
+        """Record how a robot followed a wall close to its slot: what closes arcs there, and what others saw of it."""
+        heading = self._slots.heading[robot]
         arcs = [(start + heading, width) for start, width in walked.near]
         # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
         self._walls.note_near(slot, arcs, 0 if walked.end == SHUT else hand)
+        if len(walked.waypoints) > 1:
+            origin = Origin(slot, walked.start)
+            number = self._slots.take_walk(robot, hand, walked.waypoints, walked.radius_m, origin=origin)
+            self.idle = without_witnesses(self.idle, self._slots.walks[number].points)
 
     def axis(self, base: int) -> Routine[Sequence[float]]:
         """Return bearings [rad] for a station's first robot, parallel to a wall nearby: lattices along walls need fewer robots.

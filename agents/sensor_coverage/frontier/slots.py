@@ -26,6 +26,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import (
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     Arc,
     NearArc,
+    Origin,
     Walk,
     WalkPoint,
     drives_away,
@@ -202,10 +203,12 @@ class Slots:
         radius_m: float = 0.0,
         after: int | None = None,
         stays: bool = False,
+        origin: Origin | None = None,
     ) -> int:
         """Store a walk of a robot along a wall, in sight of robots that stand at their slots, and return its number.
 
-        It continues the walk with the number `after`. The robot stays at its end if `stays`.
+        It continues the walk with the number `after`. The robot stays at its end if `stays`. It began at the slot `origin`,
+        which has its place by odometry.
         """
         heading, frame, slot_of = self.heading[robot], self.frame[robot], self.slot_of()
         standing = {node: slot for node, slot in slot_of.items() if node != robot and self.frame[node] == frame}
@@ -216,7 +219,12 @@ class Slots:
                     standing[node]: bearing + heading + math.pi
                     for node, bearing in ((one.node, one.bearing_rad) for one in each.sightings)
                     if node in standing
-                },
+                }
+                | (
+                    {}
+                    if origin is None or each.start_rad is None
+                    else {origin.slot: each.start_rad + heading + math.pi}
+                ),
                 tuple(bearing + heading for bearing in each.touched),
                 tuple(standing[node] for node in each.robots if node in standing),
                 any(node not in standing for node in each.robots),
@@ -226,8 +234,12 @@ class Slots:
             )
             for before, each in pairwise(waypoints[:1] + waypoints)
         )
+        if origin is not None:
+            origin = Origin(origin.slot, turned_vector(origin.at, heading))
         before_it = () if after is None else tail(self.walks[after].points, JOINED_M)
-        self.walks.append(Walk(frame, hand, before_it + points, radius_m, slot_of.get(robot) if stays else None))
+        self.walks.append(
+            Walk(frame, hand, before_it + points, radius_m, slot_of.get(robot) if stays else None, origin)
+        )
         return len(self.walks) - 1
 
     # --- directions between slots -----------------------------------------------------------------------------------

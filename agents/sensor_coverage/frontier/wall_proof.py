@@ -130,10 +130,18 @@ class WallStep(NamedTuple):
     number: int = 0
 
 
+class Origin(NamedTuple):
+    """The slot that a walking robot left, and its place [m] by the robot's odometry, in the frame of the directions."""
+
+    slot: int
+    at: tuple[float, float]
+
+
 class Walk(NamedTuple):
     """A stretch of wall that a robot followed, in the frame of one robot; `hand` is +1 if the wall was on the left.
 
-    `radius_m` is the radius of its body. `end` is the slot of the walking robot if it stands at the end of the walk.
+    `radius_m` is the radius of its body. `end` is the slot of the walking robot if it stands at the end of the walk. `origin`
+    is the slot that it left, if all points are close to that.
     """
 
     frame: int
@@ -141,10 +149,12 @@ class Walk(NamedTuple):
     points: tuple[WalkPoint, ...]
     radius_m: float = 0.0
     end: int | None = None
+    origin: Origin | None = None
 
     def turned(self, frame: int, by: float) -> "Walk":
         """Return the walk in another frame."""
-        return self._replace(frame=frame, points=tuple(each.turned(by) for each in self.points))
+        origin = None if self.origin is None else self.origin._replace(at=turned_vector(self.origin.at, by))
+        return self._replace(frame=frame, points=tuple(each.turned(by) for each in self.points), origin=origin)
 
     def unseen_by(self, slots: Collection[int]) -> "Walk":
         """Return the walk as if these slots had not seen it."""

@@ -52,7 +52,8 @@ class Landmark(_UplinkPart, frozen=True):
 class Waypoint(_UplinkPart, frozen=True):
     """A point of a walk along walls: the position [m] by odometry, and the bearings [rad] of what the robot sees and touches.
 
-    `touched` are bearings of touched walls. `robots` are touched robots.
+    `touched` are bearings of touched walls. `robots` are touched robots. `start_rad` is the bearing, by odometry, of the place
+    where the robot stood before it drove to the wall, if that is close and in line of sight.
     """
 
     x_m: float
@@ -60,6 +61,7 @@ class Waypoint(_UplinkPart, frozen=True):
     sightings: tuple[Sighting, ...]
     touched: tuple[float, ...]
     robots: tuple[int, ...]
+    start_rad: float | None = None
 
 
 # --- to a robot -----------------------------------------------------------------------------------------------------
@@ -251,6 +253,7 @@ class Walked(_UplinkMessage, frozen=True, tag="walked"):
     waypoints: tuple[Waypoint, ...]
     near: tuple[tuple[float, float], ...] = ()
     radius_m: float = 0.0
+    start: tuple[float, float] = (0.0, 0.0)
 
 
 class Ack(_UplinkMessage, frozen=True, tag="ack"):

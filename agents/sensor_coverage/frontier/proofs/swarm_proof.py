@@ -7,7 +7,6 @@ the robots that saw it. When one of them is gone, nothing is known of its part: 
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.fans import Pair, side_of
@@ -20,6 +19,7 @@ from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import (
     with_islands,
     without_edges,
 )
+from zwerm.agents.sensor_coverage.frontier.proofs.walk_origins import WalkOrigins
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     Crossing,
     arcs_beside_pocket,
@@ -27,8 +27,8 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     crossings_of_pocket,
     crossings_of_step,
 )
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd
-from zwerm.agents.sensor_coverage.frontier.strips.stretches import pocket_of, stretches_of
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket, StretchEnd
+from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     Arc,
@@ -90,6 +90,7 @@ class SwarmProof:
         self._walks: Sequence[Walk] = ()
         self._count = 0  # walks that `_points` contains
         self._points: list[WalkPoint] = []
+        self._origins = WalkOrigins()
         self._passed: dict[int, list[Passed]] = {}
         self._witnessed: dict[int, dict[int, None]] = {}  # slots that rely on points which this slot saw
         self._gone: dict[int, None] = {}  # slots that stood in an earlier scan
@@ -160,7 +161,7 @@ class SwarmProof:
         """Find the slots that saw each point of the walks that are new. Another list: all have other directions."""
         if walks is not self._walks:
             self._walks, self._count = walks, 0
-            self._points, self._passed, self._witnessed = [], {}, {}
+            self._points, self._passed, self._witnessed, self._origins = [], {}, {}, WalkOrigins()
             self._forget()
         for walk in walks[self._count :]:
             for slot, passed in _passes(walk, len(self._points)):
@@ -170,6 +171,7 @@ class SwarmProof:
                 relied = (*passed.between, *(e.ties for e in ends), *(e.witnesses for e in passed.sight_ends))
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
                     self._witnessed.setdefault(each, {})[slot] = None
+            self._origins.add(len(self._points), walk)
             self._points += walk.points
         self._count = len(walks)
 
@@ -224,11 +226,10 @@ class SwarmProof:
             its_pair = _pair_of(slot, other)
             numbers = self._choose(its_pair)
             kept = (number for its_side, number in numbers.items() if its_pair != pair or its_side != side)
-            fans += [
-                arc_between(view[other], self._points[each].seen[slot])
-                for each in kept
-                if (slot, other) in self._triangles.pairs(each)
-            ]
+            for each in kept:
+                if (slot, other) in self._triangles.pairs(each):
+                    fans.append(arc_between(view[other], self._points[each].seen[slot]))
+                    fans += self._origins.arcs_beyond(slot, each, view[other])
         touched, beside = arcs_of_walls(self._around[slot].touched), self._closed_by_robots(slot)
         opened = complement([*self._followed[slot], *touched, *beside, *fans])
         contacts = touched if slot in self._scan.bases else ()  # a station cannot look behind what it touches
@@ -347,11 +348,13 @@ class SwarmProof:
         """Return whether the wall that was followed at a point lies beyond the line of sight to it, on one side.
 
         Another wall may end at a corner before the point, and nobody sees the space behind the corner. Beside a robot in
-        touch with the walking robot all walls count.
+        touch with the walking robot all walls count, and so they do beyond the wall that a robot touched close to its slot.
         """
         point = self._points[number]
         if slot in point.robots:
             return ends_at(self._followed[slot], point.seen[slot], side)
+        if any(ends_at(self._followed[slot], each, side) for each in self._origins.touched(slot, number, side)):
+            return True
         return ends_at(self._by_stretch[slot].get(self._triangles.stretch_of(number), ()), point.seen[slot], side)
 
 
@@ -376,25 +379,17 @@ def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
         now = SeenPoint(number, point)
         here = stretch_of.get(number)
         for slot in point.seen:
+            number_of = -1 if here is None else first + here.first_number
+            if walk.origin is not None and slot == walk.origin.slot:  # it knows more of its own way: see `near_arcs`
+                yield slot, Passed(first + number, None, point, walk.hand, (), number_of)
+                continue
             since = last[slot].number if slot in last else number
             between = tuple(each.seen.keys() for each in walk.points[since:number] if slot not in each.seen)
             before = point_before(slot, last.get(slot), now, touch.since, bool(between))
             there = stretch_of.get(since) if before is not None else None
             ends = () if here is None or there is None else (there.first, here.last)
-            pockets = tuple(_pockets(slot, number, point, stretches, first)) if slot in point.robots else ()
-            number_of = -1 if here is None else first + here.first_number
+            pockets = tuple(pockets_beside(slot, number, point, stretches, first)) if slot in point.robots else ()
             between = between if before is not None else ()
             edges = tuple(sight_ends_at(slot, number, walk.points, walk.end))
             yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges)
             last[slot] = now
-
-
-def _pockets(
-    slot: int, number: int, point: WalkPoint, stretches: Sequence[FollowedStretch], first: int
-) -> Iterator[tuple[int, Pocket]]:
-    """Yield the pockets beside a slot whose robot the walking robot touches at a point, by the numbers of their stretches."""
-    for before, each in pairwise((None, *stretches)):
-        end = None if before is None else before.last
-        pocket = None if each is None else pocket_of(each, number, point.at, point.seen[slot], end)
-        if each is not None and pocket is not None:
-            yield first + each.first_number, pocket

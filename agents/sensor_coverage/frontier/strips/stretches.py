@@ -1,7 +1,8 @@
 """The stretches of wall of a walk, and their ends."""
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
@@ -13,7 +14,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     direction_of,
     end_of_stretch,
 )
-from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, POCKET_RAD, TouchCounter, Walk
+from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, POCKET_RAD, TouchCounter, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.motion.homing import unit
 
 
@@ -39,6 +40,20 @@ def pocket_of(
     if is_last:
         return Pocket(stretch.last, stretch.first, stretch.radius_m, True, place, in_touch)
     return Pocket(stretch.first, stretch.last, stretch.radius_m, False, place, in_touch, before)
+
+
+def pockets_beside(
+    slot: int, number: int, point: WalkPoint, stretches: Sequence[FollowedStretch], first: int
+) -> Iterator[tuple[int, Pocket]]:
+    """Yield the pockets beside a slot whose robot the walking robot touches at a point, by the numbers of their stretches.
+
+    The point has this number in its walk, whose first point has the number `first`.
+    """
+    for before, each in pairwise((None, *stretches)):
+        end = None if before is None else before.last
+        pocket = None if each is None else pocket_of(each, number, point.at, point.seen[slot], end)
+        if each is not None and pocket is not None:
+            yield first + each.first_number, pocket
 
 
 class StretchTracker:

@@ -2,17 +2,19 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import combinations, pairwise
+from itertools import combinations, dropwhile, pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
+from zwerm.agents.sensor_coverage.frontier.strips.crossings import Crossing, arcs_into
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     direction_of,
     ends_of_stretch,
     kept_part,
     touched_point,
 )
-from zwerm.agents.sensor_coverage.frontier.wall_proof import CONTACT_RAD, SAME_WALL_RAD, drives_away
+from zwerm.agents.sensor_coverage.frontier.wall_proof import CONTACT_RAD, SAME_WALL_RAD, arc_between, drives_away
+from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 
 # Points closer [m] to the start have no direction from there.
@@ -26,6 +28,9 @@ WEDGED_M: Final = 0.005
 # The place of a touched point is known within this part of a body's radius, by the width of a switch. So far a wall goes on
 # beyond it: two walks from the same slot that begin at the same point leave no gap.
 OVERHANG: Final = math.sin(CONTACT_RAD)
+# A line of sight back to the start may leave the way on the side away from the wall by this part of a body's radius: a whole
+# radius, less the error of the place of a touched point.
+FREE: Final = 1.0 - OVERHANG
 
 
 class NearPoint(NamedTuple):
@@ -40,33 +45,65 @@ class NearPoint(NamedTuple):
     at_robot: bool = False
 
 
+class NearWay:
+    """The way of a robot along a wall from a `start` [m], with the wall at its hand: what it touched, and what it saw there.
+
+    `waypoints` are its points.
+    """
+
+    def __init__(self, start: Vector, hand: int, radius_m: float) -> None:
+        self.hand = hand
+        self.waypoints: list[Waypoint] = []
+        self._start, self._radius_m = start, radius_m
+        self._points: list[NearPoint] = []
+
+    def take(self, point: NearPoint) -> None:
+        """Take in the next point."""
+        self._points.append(point)
+
+    def arcs(self) -> tuple[tuple[float, float], ...]:
+        """Return the arcs (start, width) [rad] around the start that the way closes."""
+        return arcs_around(self._start, self._points, self.hand, self._radius_m)
+
+    def seen_from_start(self) -> list[Waypoint]:
+        """Return the waypoints from the first one that has a direction from the start."""
+        return list(
+            dropwhile(lambda each: math.dist((each.x_m, each.y_m), self._start) < self._radius_m, self.waypoints)
+        )
+
+
 def arcs_around(
     start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float
 ) -> tuple[tuple[float, float], ...]:
     """Return the arcs (start, width) [rad] around a start in which a wall was followed in touch, by odometry.
 
     Two successive points close the arc between them, if the wall is beyond, up to the touched points at the ends of a stretch
-    (`frontier.strips.loose_ends`), and a part of a body beyond. Two successive contacts with the same wall close the arc
+    (`frontier.strips.loose_ends`), and a part of a body beyond, but not where the way leads back round a corner in sight of
+    the start (`frontier.strips.crossings`). Two successive contacts with the same wall close the arc
     between the touched points of the wall. So do two contacts at the same point, because a body does not pass between them:
     those of a corner, or of a wedge from which the robot turned back. A dead robot may fill an opening: from there on only
     the same wall closes an arc, up to the next wall. A step from one wall to the opposite one closes nothing.
     """
     found = list[tuple[float, float]]()
+    in_sight = [
+        start_in_sight(start, [each.at for each in points[: number + 1]], hand, radius_m) is not None
+        for number in range(len(points))
+    ]
     for number, each in enumerate(points):
         limit_rad = WEDGE_RAD if _turns_back(start, points, number) else CORNER_RAD
         for a, b in combinations(each.walls, 2):
             if angle_between(a, b) < limit_rad:
                 found.append(_between(start, *(touched_point(each.at, wall, radius_m) for wall in (a, b))))
     at_body = False
-    stretch: list[NearPoint] = []
+    stretch: list[tuple[NearPoint, bool]] = []
     begins_clear = False
-    for before, point in pairwise(points):
+    for (before, was_in_sight), (point, is_in_sight) in pairwise(zip(points, in_sight, strict=True)):
         at_body = before.at_body or (at_body and not before.walls)
         leaves = drives_away(hand, before.walls, point.walls, point.at[0] - before.at[0], point.at[1] - before.at[1])
         same = [(a, b) for a in before.walls for b in point.walls if angle_between(a, b) < SAME_WALL_RAD]
         if not leaves and (same or (bool(before.walls or point.walls) and not (at_body or point.at_body))):
             begins_clear = begins_clear if stretch else not before.at_robot
-            stretch = [*(stretch or [before]), point]
+            stretch = [*(stretch or [(before, was_in_sight)]), (point, is_in_sight)]
         else:
             is_clear = begins_clear, not (before.at_robot or point.at_robot)
             found += _arcs_of_stretch(start, stretch, hand, radius_m, is_clear)
@@ -88,29 +125,57 @@ def _turns_back(start: Vector, points: Sequence[NearPoint], number: int) -> bool
 
 
 def _arcs_of_stretch(
-    start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float, is_clear: tuple[bool, bool]
+    start: Vector,
+    points: Sequence[tuple[NearPoint, bool]],
+    hand: int,
+    radius_m: float,
+    is_clear: tuple[bool, bool],
 ) -> Iterator[tuple[float, float]]:
     """Yield the arcs (start, width) [rad] around a start that the steps along one stretch of wall close.
 
-    `is_clear` states for each end whether no robot was in touch there: one may stand in an opening.
+    Each point states whether it is in sight of the start. `is_clear` states for each end whether no robot was in touch there:
+    one may stand in an opening.
     """
-    touching = [number for number, each in enumerate(points) if each.walls]
+    touching = [number for number, (each, _) in enumerate(points) if each.walls]
     if len(touching) < 2:
         return
     points = points[touching[0] : touching[-1] + 1]
-    ends = ends_of_stretch([(each.at, each.walls) for each in points if each.walls], hand, radius_m)
+    ends = ends_of_stretch([(each.at, each.walls) for each, _ in points if each.walls], hand, radius_m)
     for end, sign, clear in zip(ends, (1, -1), is_clear, strict=True):
         if clear:  # from the touched point along the wall, away from the stretch
             ux, uy = unit(direction_of(end.at, end.touched) + sign * hand * math.pi / 2.0)
             beyond = end.touched[0] + OVERHANG * radius_m * ux, end.touched[1] + OVERHANG * radius_m * uy
             yield _between(start, end.touched, beyond)
-    for before, point in pairwise(points):
+    crossings = list[Crossing]()
+    for (before, was_in_sight), (point, is_in_sight) in pairwise(points):
         first, width = _between(start, before.at, point.at)
-        if min(math.dist(start, each.at) for each in (before, point)) > NEAR_M_MIN and width * hand < 0.0:
-            # the start and the wall are on different sides of the step
+        if min(math.dist(start, each.at) for each in (before, point)) <= NEAR_M_MIN:
+            continue
+        if width * hand < 0.0:  # the start and the wall are on different sides of the step
             low, high = kept_part(before.at, point.at, first, width, ends)
             if low < high:
-                yield first + low * width, (high - low) * width
+                crossings.append(Crossing(arc_between(first + low * width, first + high * width), 1))
+        elif was_in_sight or is_in_sight:  # round a corner, out of the strip beside the wall
+            crossings.append(Crossing(arc_between(first, first + width), -1))
+    yield from arcs_into(crossings)
+
+
+def start_in_sight(start: Vector, way: Sequence[Vector], hand: int, radius_m: float) -> float | None:
+    """Return the direction [rad] from the end of a way back to its start, or None if the wall at the hand is in between.
+
+    The wall is a radius away from the way, on the side of the `hand`. So the line of sight is free where the way lies on that
+    side of it, or beside it. At less than a radius from the start there is no direction.
+    """
+    ux, uy = way[-1][0] - start[0], way[-1][1] - start[1]
+    length_m = math.hypot(ux, uy)
+    if length_m < radius_m:
+        return None
+    ux, uy = ux / length_m, uy / length_m
+    for x, y in way:
+        dx, dy = x - start[0], y - start[1]
+        if 0.0 < ux * dx + uy * dy < length_m and hand * (ux * dy - uy * dx) < -FREE * radius_m:
+            return None
+    return math.atan2(-uy, -ux)
 
 
 def _between(start: Vector, a: Vector, b: Vector) -> tuple[float, float]:

@@ -13,8 +13,9 @@ from typing import Final
 
 import msgspec
 
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
-from zwerm.agents.sensor_coverage.motion.homing import unit
+from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 
 # Points after which a contact that is still uncertain counts as none.
 POINTS_MAX: Final = 5
@@ -24,6 +25,9 @@ OFF_FACTOR: Final = 2.0
 # None of them is in touch if the bearings at so many points are all off by this [rad] (root mean square).
 WALL_RAD: Final = math.radians(20.0)
 WALL_POINTS: Final = 3
+# A bearing shows a distance only if the walking robot moved by this distance [m] across its line of sight: its noise would
+# decide.
+ACROSS_M_MIN: Final = 0.03
 
 
 class _Contact(msgspec.Struct):
@@ -112,3 +116,13 @@ class TouchedRobots:
             if contact.is_wall():
                 point = msgspec.structs.replace(point, touched=(*point.touched, contact.bearing_rad))
         self._report(point)
+
+
+def is_farther(distance_m: float, moved_m: Vector, before_rad: float, now_rad: float) -> bool:
+    """Return whether a point is farther away than a distance, by its bearings before and after a drive by `moved_m`.
+
+    A drive along the line of sight shows nothing.
+    """
+    ux, uy = unit(now_rad)
+    across_m = abs(moved_m[0] * uy - moved_m[1] * ux)
+    return across_m > ACROSS_M_MIN and angle_between(before_rad, now_rad) * distance_m < across_m

@@ -14,12 +14,12 @@ from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
-from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
 from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import DeadBodies, HeldPoints
-from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, arcs_around
+from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearWay, start_in_sight
 from zwerm.agents.sensor_coverage.motion.walls.past_edge import EDGE_M_MAX, past_edge
-from zwerm.agents.sensor_coverage.motion.walls.touched_robots import TouchedRobots
+from zwerm.agents.sensor_coverage.motion.walls.touched_robots import TouchedRobots, is_farther
 from zwerm.agents.sensor_coverage.motion.walls.wall_heading import hand_on_wall
+from zwerm.agents.sensor_coverage.motion.walls.waypoint_choice import WaypointChoice, first_of_message
 from zwerm.wire.messages import BodyVelocity
 
 # The robot is lost in free space after so much turning without a contact.
@@ -32,25 +32,16 @@ STUCK_TICKS: Final = 5
 STUCK_FRACTION: Final = 0.2
 # A walk ends after this many ticks in a row with less than that: the robot is wedged between walls and robots.
 WEDGED_TICKS: Final = 30
-# Distance [m] between waypoints while nothing else changes.
-SPACING_M: Final = 0.1
 # Distance [m] within which a robot must get clear of its start.
 CLEARING_M_MAX: Final = 3.0
 # The walking robot leaves its slot by this distance [m] before the next robot takes it: two bodies and some space.
 CLEAR_M: Final = 0.3
-# A robot in sight is not in touch if its bearing shows a distance of more than this many radii of a body. It shows none
-# unless the walking robot moved by this distance [m] across its line of sight: a bearing's noise would decide.
+# A robot in sight is not in touch if its bearing shows a distance of more than this many radii of a body.
 TOUCHING_RADII_MAX: Final = 4.0
-ACROSS_M_MIN: Final = 0.03
 # A robot in touch within this angle of the direction back to the start stands there.
 ROBOT_BEHIND_RAD: Final = math.radians(60.0)
 # Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
 LEG_M: Final = 3.0
-# Greatest length of the waypoints of a leg in a message, of a waypoint without its sightings, and of a sighting. Among many
-# robots a leg is shorter, because a command has a greatest length.
-LEG_BYTES_MAX: Final = 40_000
-WAYPOINT_BYTES: Final = 60
-SIGHTING_BYTES: Final = 16
 # Longest way [m] of a station's first robot to a wall.
 FIRST_HOP_M: Final = 0.95
 # Number of consecutive legs that closed nothing after which a walk ends.
@@ -86,13 +77,19 @@ class WallWalk:
         self._turned_rad = 0.0  # towards the hand, since a wall was at the hand
         self._latest_wall_rad = 0.0  # the direction of that wall
         self._start = motion.position
-        self._touched = TouchedRobots(motion.radius_m, self.on_step)
+        self._way_near: NearWay | None = None  # while the robot follows a wall close to the start
+        self._near_points = self._held_points(self.on_step)
         self._out_of_reach: frozenset[int] = frozenset()  # robots in the direction of a contact that are not in touch
 
     @property
     def radius_m(self) -> float:
         """The radius [m] of the robot's body."""
         return self._motion.radius_m
+
+    @property
+    def start(self) -> Vector:
+        """The place [m] by odometry where the latest drive to a wall began."""
+        return self._start
 
     @property
     def way(self) -> Vector:
@@ -112,14 +109,14 @@ class WallWalk:
         met, done = yield from self._meet_wall(bearing_rad, hop_m)
         if not met:
             return WalkResult(OPEN, done)
-        near = [self._near_point()]
-        if not (yield from self._go_past(hand, lambda: math.dist(start, motion.position) >= clear_m, near)):
+        way, end = self._begin_near(hand), STRETCH
+        if not (yield from self._go_past(way, lambda: math.dist(start, motion.position) >= clear_m)):
+            end = SHUT
             yield from motion.drive_to(start)
-            return WalkResult(SHUT, done, near=arcs_around(start, near, hand, motion.radius_m))
-        if half_rad > 0.0:
+        elif half_rad > 0.0:
             edge = past_edge(lambda: motion.position, self.radius_m, bearing_rad, hand, half_rad, start)
-            yield from self._go_past(hand, edge, [], EDGE_M_MAX)
-        return WalkResult(STRETCH, done, near=arcs_around(start, near, hand, motion.radius_m))
+            yield from self._go_past(way, edge, EDGE_M_MAX)
+        return self._end_near(way, end, done)
 
     def probe(self, bearing_rad: float, hop_m: float, hand: int, half_rad: float) -> DriveToWalk:
         """Follow a wall within `hop_m` along a bearing with a hand at it, past the direction `half_rad` beside it; return.
@@ -127,14 +124,36 @@ class WallWalk:
         Ends: OPEN (no wall within `hop_m`), STRETCH (it was past that, or clear), SHUT (no way leads there).
         """
         motion, start = self._motion, self._begin_way()
-        end, near = OPEN, list[NearPoint]()
         met, done = yield from self._meet_wall(bearing_rad, hop_m)
-        if met:
-            near.append(self._near_point())
-            edge = past_edge(lambda: motion.position, self.radius_m, bearing_rad, hand, half_rad, start, CLEAR_M)
-            end = STRETCH if (yield from self._go_past(hand, edge, near, EDGE_M_MAX)) else SHUT
+        if not met:
+            yield from motion.drive_to(start)
+            return WalkResult(OPEN, done)
+        way = self._begin_near(hand)
+        edge = past_edge(lambda: motion.position, self.radius_m, bearing_rad, hand, half_rad, start, CLEAR_M)
+        end = STRETCH if (yield from self._go_past(way, edge, EDGE_M_MAX)) else SHUT
         yield from motion.drive_to(start)
-        return WalkResult(end, done, near=arcs_around(start, near, hand, motion.radius_m))
+        return self._end_near(way, end, done)
+
+    def _begin_near(self, hand: int) -> NearWay:
+        """Begin to record the way along a wall from here, close to the start, with the wall at the hand."""
+        way = self._way_near = NearWay(self._start, hand, self.radius_m)
+        self._near_points = self._held_points(way.waypoints.append)
+        self._out_of_reach = frozenset()
+        self._report(self._near_points)
+        way.take(self._near_point())
+        return way
+
+    def _end_near(self, way: NearWay, end: str, driven_m: float) -> WalkResult:
+        """End this record, and return the end of the drive."""
+        self._near_points.end()
+        self._touched.end()
+        self._way_near = None
+        return WalkResult(end, driven_m, tuple(first_of_message(way.seen_from_start())), way.arcs())
+
+    def _held_points(self, report: Callable[[Waypoint], None]) -> HeldPoints:
+        """Return what takes in the points of the way from here."""
+        self._touched = TouchedRobots(self._motion.radius_m, report)
+        return HeldPoints(self._bodies, self._touched.take)
 
     def _begin_way(self) -> Vector:
         """Begin a way from here, and return this place."""
@@ -171,20 +190,22 @@ class WallWalk:
         return True, done
 
     def _go_past(
-        self, hand: int, is_past: Callable[[], bool], near: list[NearPoint], way_m_max: float = CLEARING_M_MAX
+        self, way: NearWay, is_past: Callable[[], bool], way_m_max: float = CLEARING_M_MAX
     ) -> Generator[BodyVelocity, None, bool]:
-        """Follow the wall for `way_m_max` at most, until the robot is past something; return whether it is. Add the points."""
-        motion, way, stuck = self._motion, 0.0, 0
+        """Follow the wall for `way_m_max` at most, until the robot is past something; return whether it is."""
+        motion, way_m, stuck = self._motion, 0.0, 0
         while not is_past():
-            if way > way_m_max or self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
+            if way_m > way_m_max or self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
                 return False
-            before = motion.position
-            yield self._step(hand)
+            before, seen_before = motion.position, motion.frame.seen
+            yield self._step(way.hand)
+            self._check_contacts(before, seen_before)
             step_m = math.dist(before, motion.position)
-            way += step_m
+            way_m += step_m
             stuck = stuck + 1 if step_m < STUCK_FRACTION * motion.step_m else 0
             self._trail.append(motion.position)
-            near.append(self._near_point())
+            self._report(self._near_points)
+            way.take(self._near_point())
         return True
 
     def away_from(
@@ -223,8 +244,7 @@ class WallWalk:
             reported.append(point)
             self.on_step(point)
 
-        self._touched = TouchedRobots(self._motion.radius_m, report)
-        held = HeldPoints(self._bodies, self._touched.take)
+        held, self._way_near = self._held_points(report), None
         end, way, kept = yield from self._along(hand, length_m, keep, meet, margin_m, held)
         held.end()
         self._touched.end()
@@ -249,11 +269,9 @@ class WallWalk:
         self._trail = [motion.position]
         self._turned_rad, self._out_of_reach = 0.0, frozenset()
         self._report(held)
-        number, kept = 0, [0]
-        seen, hands = tuple(sorted(frame.seen)), _hands(frame.contacts)
-        last, way, stuck = motion.position, 0.0, 0
-        sightings = len(seen)
-        while way < length_m and len(kept) * WAYPOINT_BYTES + sightings * SIGHTING_BYTES < LEG_BYTES_MAX:
+        choice = WaypointChoice(motion.position, frame.seen, frame.contacts)
+        kept, way, stuck = choice.chosen, 0.0, 0
+        while way < length_m and not choice.is_full:
             if self._meets(meet):
                 return MET, way, kept
             if self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
@@ -269,19 +287,7 @@ class WallWalk:
                 return LOST, way, kept
             self._trail.append(motion.position)
             self._report(held)
-            number += 1
-            now, touch = tuple(sorted(frame.seen)), _hands(frame.contacts)
-            if now != seen or touch != hands:
-                if before != last:
-                    kept.append(number - 1)
-                    sightings += len(seen)
-                kept.append(number)
-                sightings += len(now)
-                seen, hands, last = now, touch, motion.position
-            elif math.dist(last, motion.position) >= SPACING_M:
-                kept.append(number)
-                sightings += len(now)
-                last = motion.position
+            choice.take(motion.position, frame.seen, frame.contacts)
         return STRETCH, way, kept
 
     # --- one step ---------------------------------------------------------------------------------------------------
@@ -339,7 +345,7 @@ class WallWalk:
         return NearPoint(self._motion.position, frame.touched, self._bodies.in_touch, at_robot)
 
     def _waypoint(self) -> Waypoint:
-        frame = self._motion.frame
+        frame, near = self._motion.frame, self._way_near
         return Waypoint(
             frame.x_m,
             frame.y_m,
@@ -348,6 +354,7 @@ class WallWalk:
             tuple(
                 each.node for each in frame.contacts if each.node is not None and each.node not in self._out_of_reach
             ),
+            None if near is None else start_in_sight(self._start, self._trail, near.hand, self.radius_m),
         )
 
     # --- sight ------------------------------------------------------------------------------------------------------
@@ -382,18 +389,3 @@ class WallWalk:
             if math.hypot(dx, dy) < motion.parameters.tolerance_m:
                 return
             yield motion.velocity(dx, dy)
-
-
-def is_farther(distance_m: float, moved_m: Vector, before_rad: float, now_rad: float) -> bool:
-    """Return whether a point is farther away than a distance, by its bearings before and after a drive by `moved_m`.
-
-    A drive along the line of sight shows nothing.
-    """
-    ux, uy = unit(now_rad)
-    across_m = abs(moved_m[0] * uy - moved_m[1] * ux)
-    return across_m > ACROSS_M_MIN and angle_between(before_rad, now_rad) * distance_m < across_m
-
-
-def _hands(contacts: Iterable[Touched]) -> tuple[object, ...]:
-    """Return what decides whether a waypoint is new: the touched robots, and whether there is a wall."""
-    return (any(each.node is None for each in contacts), *(each.node for each in contacts if each.node is not None))

@@ -11,7 +11,7 @@ from zwerm.agents.sensor_coverage.messages.commands import Response, Sighting, W
 from zwerm.agents.sensor_coverage.messages.commands import write as write_command
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, read_envelope, write
 from zwerm.agents.sensor_coverage.messages.pushes import LeaderReady, ProvedArc, Segment, SlotMemory, WalkTriangle
-from zwerm.agents.sensor_coverage.motion.walls.wall_walk import LEG_BYTES_MAX, SIGHTING_BYTES, WAYPOINT_BYTES
+from zwerm.agents.sensor_coverage.motion.walls.waypoint_choice import LEG_BYTES_MAX, SIGHTING_BYTES, WAYPOINT_BYTES
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.component_loop import ComponentLoop
 from zwerm.wire.messages import MESSAGE_BYTES_MAX, Command, encode_command, open_answer

@@ -1,0 +1,136 @@
+"""A robot follows a wall close to its slot: what the slot sees of this way, by odometry, and what that proves.
+
+The wall is a block whose south face is at y = 0.08 m and whose west face is at x = -0.13 m. The slot is south of it.
+"""
+
+import math
+
+import pytest
+
+from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import united_round
+from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
+from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Origin, Walk, turned_vector
+from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
+from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearWay, arcs_around, start_in_sight
+from zwerm.agents.sensor_coverage.motion.walls.waypoint_choice import (
+    LEG_BYTES_MAX,
+    SIGHTING_BYTES,
+    WAYPOINT_BYTES,
+    first_of_message,
+)
+from zwerm.maths.simplicial import FlagComplex
+
+RADIUS_M = 0.07
+SLOT, OTHER = (0.0, 0.0), (-0.9, 0.1)
+NORTH, EAST = (math.pi / 2.0,), (0.0,)
+# The robot goes west along the south face, round the corner, and north along the west face.
+WAY = [
+    *(((x, 0.01), NORTH) for x in (-0.02, -0.07, -0.12)),
+    ((-0.17, 0.02), ()),
+    ((-0.2, 0.05), ()),
+    *(((-0.2, y), EAST) for y in (0.09, 0.14, 0.19)),
+]
+
+
+def sights(way: list[tuple[float, float]], hand: int) -> list[float | None]:
+    """Return the direction [deg] back to the slot from each point of a way, or None."""
+    found = (start_in_sight(SLOT, [SLOT, *way[: number + 1]], hand, RADIUS_M) for number in range(len(way)))
+    return [None if each is None else round(math.degrees(each), 1) for each in found]
+
+
+@pytest.mark.parametrize("hand", [-1, 1])
+def test_a_slot_sees_its_robot_up_to_a_corner_and_not_behind_it(hand: int) -> None:
+    """Up to 0.09 m north the line of sight passes the corner. The mirrored way has the wall at the other hand."""
+    way = [(x, -hand * y) for (x, y), _ in WAY]
+    seen = sights(way, hand)
+    assert [each is not None for each in seen] == [False, *[True] * 5, *[False] * 2]
+    assert seen[5] == pytest.approx(hand * math.degrees(math.atan2(0.09, 0.2)), abs=0.1)
+
+
+def test_a_slot_sees_its_robot_all_along_a_wall_that_bends_towards_it() -> None:
+    way = [(0.1, 0.0), (0.2, 0.0), (0.2, 0.1), (0.2, 0.2), (0.1, 0.25)]
+    assert None not in sights(way, -1)
+
+
+def test_a_slot_does_not_see_its_robot_on_the_other_side_of_a_thin_wall() -> None:
+    assert sights([(0.1, 0.0), (0.2, 0.0), (0.27, 0.07), (0.2, 0.15), (0.1, 0.15)], 1)[-1] is None
+
+
+def near_arcs(way: list[tuple[tuple[float, float], tuple[float, ...]]]) -> list[NearArc]:
+    points = [NearPoint(at, walls) for at, walls in way]
+    return [NearArc(each, -1) for each in united_round(Arc(*one) for one in arcs_around(SLOT, points, -1, RADIUS_M))]
+
+
+def is_closed(arcs: list[Arc], direction_deg: float) -> bool:
+    return any((math.radians(direction_deg) - start) % math.tau <= width for start, width in arcs)
+
+
+def test_a_way_round_a_corner_closes_no_directions_past_the_corner() -> None:
+    """The robot is in touch all the way round the corner. Its steps along the south face are in the directions past it."""
+    touch = [*WAY[:3], ((-0.17, 0.02), (math.radians(56.0),)), ((-0.2, 0.05), (math.radians(23.0),)), *WAY[5:]]
+    closed = [arc for arc, _ in near_arcs(touch)]
+    assert is_closed(closed, 130.0)
+    assert not any(is_closed(closed, each) for each in (155.0, 165.0, 170.0, 174.0))
+
+
+def open_at_slot(origin: int | None) -> list[Arc]:
+    """Return the open arcs of slot 0 after this way, in sight of slot 1."""
+    views = {0: {1: math.atan2(OTHER[1], OTHER[0])}, 1: {0: math.atan2(-OTHER[1], -OTHER[0])}}
+    scan = ScanResult(views, FlagComplex({slot: set(seen) for slot, seen in views.items()}), ())
+    slots = Slots()
+    for slot in (0, 1):
+        slots.occupant[slot] = slot
+    for robot in (0, 1):
+        slots.heading[robot], slots.frame[robot] = 0.0, 0
+    waypoints = []
+    for number, ((x, y), walls) in enumerate(WAY):
+        seen = (Sighting(1, math.atan2(OTHER[1] - y, OTHER[0] - x)),)
+        back = start_in_sight(SLOT, [SLOT, *(at for at, _ in WAY[: number + 1])], -1, RADIUS_M)
+        waypoints.append(Waypoint(x, y, seen, walls, (), back))
+    slots.take_walk(0, -1, waypoints, RADIUS_M, origin=None if origin is None else Origin(origin, SLOT))
+    proof = SwarmProof()
+    proof.update(scan, slots.walks, {}, {0: near_arcs(WAY)}, {})
+    return proof.open_arcs().get(0, [])
+
+
+def test_a_way_close_to_a_slot_closes_the_triangle_with_a_robot_that_sees_it() -> None:
+    """Between the corner and the other robot, at 174 degrees, is the triangle with the robot behind the corner."""
+    assert not is_closed(open_at_slot(origin=0), 160.0)
+    assert not is_closed(open_at_slot(origin=0), 153.0), "no body passes between the robot and the corner"
+    for direction_deg in (153.0, 160.0):
+        assert is_closed(open_at_slot(origin=None), direction_deg), "the slot did not see the way"
+
+
+def test_a_walk_keeps_the_slot_that_its_robot_left() -> None:
+    slots = Slots()
+    slots.occupant[3] = slots.heading[8] = slots.frame[8] = 0
+    slots.occupant[3], slots.heading[8] = 8, 1.0
+    number = slots.take_walk(
+        8,
+        1,
+        [Waypoint(0.1, 0.0, (), NORTH, (), math.pi), Waypoint(0.2, 0.0, (), NORTH, ())],
+        origin=Origin(3, (0.1, 0.2)),
+    )
+    walk: Walk = slots.walks[number]
+    assert walk.origin is not None
+    assert walk.origin.slot == 3
+    assert walk.origin.at == pytest.approx(turned_vector((0.1, 0.2), 1.0))
+    turned = walk.turned(0, 0.5).origin
+    assert turned is not None
+    assert turned.at == pytest.approx(turned_vector((0.1, 0.2), 1.5))
+    assert [dict(each.seen) for each in walk.points] == [{3: pytest.approx(1.0 + math.tau)}, {}]
+
+
+def test_a_way_begins_with_the_first_point_that_has_a_direction() -> None:
+    way = NearWay(SLOT, 1, RADIUS_M)
+    way.waypoints += [Waypoint(x, 0.0, (), NORTH, ()) for x in (0.0, 0.05, 0.1, 0.05, 0.2)]
+    assert [each.x_m for each in way.seen_from_start()] == [0.1, 0.05, 0.2]
+
+
+def test_a_message_has_the_first_points_of_a_long_way() -> None:
+    point = Waypoint(0.0, 0.0, (Sighting(1, 0.0),) * 9, NORTH, ())
+    bytes_each = WAYPOINT_BYTES + 9 * SIGHTING_BYTES
+    assert len(first_of_message([point] * 1_000)) == (LEG_BYTES_MAX - 1) // bytes_each
+    assert len(first_of_message([point] * 5)) == 5
